@@ -28,16 +28,16 @@ from m2pem.mission.mission import Mission
 from m2pem.verify.check import search as search_as_it_does
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.model_check import Result as Answered
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.net.simplify import simplify
-from m2pem.verify.properties import ALL, Searched
+from m2pem.verify.properties import ALL, SearchedMission
 from m2pem.verify.properties.results import Result, Verdict
 from m2pem.verify.requirements import Requirement
 from m2pem.verify.requirements.check import (
     Answer,
     check_requirement,
+    net_for,
     reduction_for,
-    system_for,
 )
 from m2pem.verify.search.explore import Exploration, Limits, explore
 from m2pem.verify.search.stubborn_sets import StubbornSets
@@ -72,29 +72,31 @@ def cpu_s() -> float:
 
 def searched(how: str, xml: str, limits: Limits, steps: Steps) -> tuple[int, str]:
     """States and the verdict."""
-    mission, system = _rules(xml, steps)
+    mission, net = _transitions(xml, steps)
     if how == "spin":
-        found = steps.step("search_s", lambda: search_with_spin(system, limits))
-        wrong = found.stuck_runs or found.rule_runs or found.overflow_runs
-        fired = len(found.fired) == len(system.rules)
+        found = steps.step("search_s", lambda: search_with_spin(net, limits))
+        wrong = found.stuck_runs or found.transition_runs or found.overflow_runs
+        fired = len(found.fired) == len(net.transitions)
         if found.stopped is not None:
             return found.states, f"undecided: {found.stopped}"
         return found.states, "violated" if wrong or not fired else "holds"
-    seen = steps.step("search_s", lambda: _seen(how, system, limits))
-    results = steps.step("judge_s", lambda: [each(Searched(mission, system, seen)) for each in ALL])
+    seen = steps.step("search_s", lambda: _seen(how, net, limits))
+    results = steps.step(
+        "judge_s", lambda: [each(SearchedMission(mission, net, seen)) for each in ALL]
+    )
     if seen.stopped is not None:
         return len(seen.states), f"undecided: {seen.stopped}"
     return len(seen.states), verdicts(results)
 
 
-def _rules(xml: str, steps: Steps) -> tuple[Mission, System]:
+def _transitions(xml: str, steps: Steps) -> tuple[Mission, PetriNet]:
     mission = steps.step("read_s", lambda: parse_mission(xml.encode(), "bench.bpmn"))
     fleet = fleet_for(mission)
     return mission, steps.step("derive_s", lambda: simplify(translate(mission, fleet)))
 
 
-def _seen(how: str, system: System, limits: Limits) -> Exploration:
-    return explore(system, limits, reduction=StubbornSets(system) if how == "reduced" else None)
+def _seen(how: str, net: PetriNet, limits: Limits) -> Exploration:
+    return explore(net, limits, reduction=StubbornSets(net) if how == "reduced" else None)
 
 
 def required(how: str, xml: str, formula: str, limits: Limits, steps: Steps) -> tuple[int, str]:
@@ -102,11 +104,11 @@ def required(how: str, xml: str, formula: str, limits: Limits, steps: Steps) -> 
     mission = steps.step("read_s", lambda: parse_mission(xml.encode(), "bench.bpmn"))
     asked = Requirement("asked", parse(formula), "")
     fleet = fleet_for(mission)
-    system = steps.step("derive_s", lambda: system_for(mission, fleet, [asked]))
+    net = steps.step("derive_s", lambda: net_for(mission, fleet, [asked]))
 
     def search() -> Answer:
-        reduction = reduction_for(system, mission, fleet, asked) if how == "reduced" else None
-        found = explore(system, limits, reduction=reduction)
+        reduction = reduction_for(net, mission, fleet, asked) if how == "reduced" else None
+        found = explore(net, limits, reduction=reduction)
         return check_requirement(found, mission, fleet, asked)
 
     answer = steps.step("search_s", search)
@@ -118,14 +120,14 @@ def required(how: str, xml: str, formula: str, limits: Limits, steps: Steps) -> 
 def checked(how: str, file: str, fleet: str | None, steps: Steps) -> tuple[int, str]:
     """What `m2pem verify` does; its steps are taken once before, to see what each of them takes."""
     asked = asked_of(load_source(file), fleet, None, {})
-    system = steps.step(
+    net = steps.step(
         "derive_s", lambda: simplify(translate(asked.mission, asked.fleet, options=asked.options))
     )
     limits = Limits(tokens=3)
     if how == "spin":
-        states = steps.step("search_s", lambda: search_with_spin(system, limits)).states
+        states = steps.step("search_s", lambda: search_with_spin(net, limits)).states
     else:
-        states = len(steps.step("search_s", lambda: search_as_it_does(system, limits)).states)
+        states = len(steps.step("search_s", lambda: search_as_it_does(net, limits)).states)
 
     def everything() -> Sequence[Result]:
         asked = asked_of(load_source(file), fleet, None, {})

@@ -155,13 +155,13 @@ def replay_counterexample(
     from m2pem.cli.arguments import get_fleet
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import wants_colour
-    from m2pem.verify.conformance_run import NotPlayableError, Player
+    from m2pem.verify.conformance_run import NotPlayableError, ConformanceRun
 
     report = _read(file)
     violation = _violation(file, report, number)
     mission = _mission(file, report, mission_file)
     fleet = get_fleet(fleet_file or "sim", mission)
-    player = Player(mission, fleet, report["process"], report["data"])
+    player = ConformanceRun(mission, fleet, report["process"], report["data"])
     lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")
     _show(player.steps, lines, output)

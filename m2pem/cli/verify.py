@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from m2pem.executive.verification import Asked, Engine
     from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
-    from m2pem.verify.report.findings import Findings, Violated
+    from m2pem.verify.report.findings import DescribedViolation, Findings
     from m2pem.verify.search.explore import Progress
 
 
@@ -339,7 +339,7 @@ def _plain(name: str) -> str:
     return "".join(each if each.isalnum() or each in "-_" else "_" for each in name)
 
 
-def _pictures(findings: "Findings", violation: "Violated | None") -> Mapping[str, str]:
+def _pictures(findings: "Findings", violation: "DescribedViolation | None") -> Mapping[str, str]:
     from m2pem.verify.report.picture import pictures
 
     try:

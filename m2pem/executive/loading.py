@@ -195,13 +195,13 @@ def requirement_findings(
     """All of them. `data`: names given at start; `arbiters` None: a fleet is made up."""
     if _ELEMENT not in mission.source:
         return []  # most have none, and what reads them takes time to load
-    from m2pem.verify.requirements import Names, gather  # noqa: PLC0415
+    from m2pem.verify.requirements import Names, collect  # noqa: PLC0415
     from m2pem.verify.requirements.requirement import RequirementsError  # noqa: PLC0415
 
     writes = plugins.service_writes()
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     try:
-        gather(Names(mission, fleet, writes, data))
+        collect(Names(mission, fleet, writes, data))
     except RequirementsError as error:
         return [replace(finding, severity=Severity.WARNING) for finding in error.findings]
     return []

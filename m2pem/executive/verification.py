@@ -13,7 +13,7 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.check import Report, check
 from m2pem.verify.report.findings import Findings, findings_of
-from m2pem.verify.requirements import Names, Requirement, gather
+from m2pem.verify.requirements import Names, Requirement, collect
 from m2pem.verify.requirements.results import with_requirements
 from m2pem.verify.search.explore import Limits, Progress
 from m2pem.verify.spin.queries import Storage
@@ -72,7 +72,7 @@ def asked_of(
     writes = plugins.service_writes()
     options = Options(data=data, service_writes=writes, timers_in_order=timers_in_order)
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
-    requirements = gather(Names(mission, fleet, writes, data), spec)
+    requirements = collect(Names(mission, fleet, writes, data), spec)
     return Asked(mission, fleet, process, data, options, requirements)
 
 

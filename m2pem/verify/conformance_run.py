@@ -34,21 +34,23 @@ from m2pem.verify.translate.domains import constants, representatives
 _SECOND_US = 1_000_000
 _START_US = 1_767_225_600 * _SECOND_US  # 2026-01-01, as of rehearsals
 _MOST_TIMERS = 1_000
-"""That may fire before the one that is meant."""
+"""Most other timers that may fire before the timer of a step."""
 _BY = "counterexample"
 
 
 class NotPlayableError(Exception):
-    """The engine is not where the run says, or something in it cannot be brought about."""
+    """The engine is not in the state of the run, or something in the run cannot be
+    brought about.
+    """
 
 
-class _Patient(Steps):
-    """Steps of a run into which data may still be written from nowhere."""
+class _StepsWithOpenConditions(Steps):
+    """Steps of a run into which data of unknown origin may still be written."""
 
     __slots__ = ()
 
     def _fail_if_stuck(self) -> None:
-        """A condition may still become true."""
+        """A run that waits for a condition is not stuck: the condition may become true."""
         if not self.state.conditions:
             super()._fail_if_stuck()
 
@@ -56,15 +58,15 @@ class _Patient(Steps):
 class _Run(MissionRun):
     """A run into which data can be written that nothing in the mission writes.
 
-    The rules let a condition on such data become true at any time.
+    The net lets a condition on such data become true at any time.
     """
 
     def __init__(self, mission: Mission, fleet: Fleet | None) -> None:
         super().__init__(mission, fleet, "r1")
-        self._x = _Patient(self.state, fleet, 10_000)
+        self._x = _StepsWithOpenConditions(self.state, fleet, 10_000)
 
     def write(self, wait: Wait, data: dict[str, Value], now_us: int) -> Step:
-        """Write data where a condition is awaited that reads it."""
+        """Write data where an element waits for a condition that reads it."""
         x = self._x
         seq, t_us = self.state.seq + 1, self.state.mission_time_us(now_us)
         x.begin(now_us)
@@ -72,8 +74,8 @@ class _Run(MissionRun):
         return Step(i.Continue(), now_us, t_us, seq, x.finish(), ())
 
 
-class Player:
-    """A run of the engine that is led along a run of the rules. `steps` has all that it did."""
+class ConformanceRun:
+    """A run of the engine that follows a run of the net. `steps` has all that it did."""
 
     def __init__(
         self,
@@ -90,10 +92,10 @@ class Player:
         self._give(i.StartRun(process, dict(data or {}), _BY))
 
     def play(self, step: Mapping[str, Any]) -> Sequence[Step]:
-        """Bring a step about, and answer with what the engine did then.
+        """Bring a step about, and return what the engine did then.
 
         Raises:
-            NotPlayableError: it cannot be brought about here.
+            NotPlayableError: the step cannot be brought about here.
         """
         before = len(self.steps)
         trigger = step["trigger"]
@@ -107,7 +109,7 @@ class Player:
 
     @property
     def undone(self) -> list[str]:
-        """Sequence flows that the run takes, and the engine has not taken as often."""
+        """Sequence flows that the run takes more often than the engine did."""
         taken = Counter(
             record.flow
             for step in self.steps
@@ -169,7 +171,7 @@ class Player:
         raise NotPlayableError(f"no timer of {element} runs in the engine")
 
     def _come_true(self, element: str, data: Mapping[str, Value]) -> None:
-        """Write what makes the condition true for which an element waits: nothing else does."""
+        """Write data that makes the condition of an element true: nothing else does."""
         state = self.run.state
         for number, wait in list(state.waits.items()):
             if number not in state.conditions or wait.node.id != element:
@@ -196,7 +198,7 @@ class Player:
         return self._after(self.run.receive(item, self._now_us))
 
     def _after(self, step: Step) -> Sequence[Step]:
-        """What an input led to, with all that it still leads to."""
+        """What an input led to, with all that followed from it."""
         item = step.input
         before = len(self.steps)
         self.steps.append(step)
@@ -207,7 +209,7 @@ class Player:
         return self.steps[before:]
 
     def _end_cancelled(self) -> None:
-        """Vehicles do at once what they are told: a behavior that is cancelled ends."""
+        """End cancelled behaviors: vehicles obey at once."""
         for behavior in [*self.run.state.behaviors.values()]:
             if behavior.phase is BehaviorPhase.CANCELLING:
                 self._report(behavior.id, BehaviorState.CANCELLED)
@@ -230,7 +232,7 @@ def _endings(name: str) -> set[str]:
 
 _MOST_TRIES = 20_000
 _ORDINARY: tuple[Value, ...] = (True, False, 1, 0, -1, 2, None, "something", [])
-"""Values that are tried beside those that a condition compares with."""
+"""Values that are tried besides those that a condition compares with."""
 
 
 def data_for(
@@ -238,7 +240,7 @@ def data_for(
 ) -> Mapping[str, Value] | None:
     """The fewest values to write for a condition to have a truth; None: none were found.
 
-    `read`: the data that there is. `known`: names that stay as they are.
+    `read`: the data that there is. `known`: names that keep their values.
     """
     free = sorted(name for name in condition.names if name not in known)
     for data in islice(_changes(condition, free), _MOST_TRIES):

@@ -121,7 +121,7 @@ def test_an_element_that_cannot_be_wholly_expressed_is_named_with_the_reason(
 ) -> None:
     _, out, _ = invoke("verify", REPOSITORY / "examples" / example / "mission.bpmn")
     assert note in out.splitlines()
-    assert f"at {places} the rules are not exactly the mission" in out.splitlines()[-1]
+    assert f"at {places} the net is not exactly the mission" in out.splitlines()[-1]
 
 
 def test_only_some_of_many_such_elements_are_listed(invoke: Invoke, tmp_path: Path) -> None:

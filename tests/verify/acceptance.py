@@ -1,4 +1,4 @@
-"""Whether an observer accepts a run that goes round for ever, by trying all of its paths."""
+"""Whether an observer accepts a run that cycles for ever, by trying all of its paths."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Answers to a formula about a system without a mission, with and without reduction."""
+"""Answers to a formula about a net without a mission, with and without reduction."""
 
 from dataclasses import dataclass
 from random import Random
@@ -7,9 +7,9 @@ from types import SimpleNamespace
 from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.model_check import Result, check
-from m2pem.verify.net.petri_net import Action, Kind, Role, System
+from m2pem.verify.net.petri_net import Action, Kind, PetriNet, Role
 from m2pem.verify.net.simplify import simplify
-from m2pem.verify.requirements.propositions import Labels, MissionRuns
+from m2pem.verify.requirements.propositions import ExploredRuns, Labels
 from m2pem.verify.search.explore import Exploration, Limits, explore
 from m2pem.verify.search.stubborn_sets import StubbornSets
 
@@ -18,14 +18,15 @@ NO_FEWER = Limits(states=2 * FEW.states, tokens=3, seconds=1e9)
 """For what must be seen whole: a search may see a few more than its limit before it stops."""
 
 
-def atoms_of(dice: Random, system: System, count: int = 3) -> list[f.Formula]:
-    """Some things that may be true in the system."""
-    active = sorted({p.element for p in system.places if p.role is not Role.END})
+def atoms_of(dice: Random, net: PetriNet, count: int = 3) -> list[f.Formula]:
+    """Some things that may be true in the net."""
+    active = sorted({p.element for p in net.places if p.role is not Role.END})
     done = [
         step.element
-        for rule in system.rules
-        for step in rule.steps
-        if step.action is Action.COMPLETED and (rule.kind is Kind.OUTSIDE or dice.random() < 0.3)
+        for transition in net.transitions
+        for step in transition.steps
+        if step.action is Action.COMPLETED
+        and (transition.kind is Kind.OUTSIDE or dice.random() < 0.3)
     ]
     found: list[f.Formula] = []
     for _ in range(count):
@@ -87,20 +88,20 @@ class Both:
     answers: tuple[Result, Result]
 
 
-def labels_of(system: System, formula: f.Formula) -> Labels:
+def labels_of(net: PetriNet, formula: f.Formula) -> Labels:
     world = SimpleNamespace(elements={}), SimpleNamespace(teams={})
-    return Labels(system, *world, propositions(formula))  # type: ignore[arg-type]
+    return Labels(net, *world, propositions(formula))  # type: ignore[arg-type]
 
 
-def both(system: System, formula: f.Formula, whole: Exploration | None = None) -> Both | None:
+def both(net: PetriNet, formula: f.Formula, whole: Exploration | None = None) -> Both | None:
     """The formula's answers without and with reduction."""
-    whole = whole or explore(system, FEW)
+    whole = whole or explore(net, FEW)
     if not whole.complete:
         return None
-    labels = labels_of(system, formula)
-    answers = [check(MissionRuns(whole, labels), formula).result]
-    small = simplify(system, labels.visible_places(), labels.visible_rules())
+    labels = labels_of(net, formula)
+    answers = [check(ExploredRuns(whole, labels), formula).result]
+    small = simplify(net, labels.visible_places(), labels.visible_transitions())
     labels = labels_of(small, formula)
-    reduced = explore(small, NO_FEWER, reduction=StubbornSets(small, labels.visible_rules()))
-    answers.append(check(MissionRuns(reduced, labels), formula).result)
+    reduced = explore(small, NO_FEWER, reduction=StubbornSets(small, labels.visible_transitions()))
+    answers.append(check(ExploredRuns(reduced, labels), formula).result)
     return Both(whole, reduced, (answers[0], answers[1]))

@@ -1,7 +1,7 @@
-"""Playing a run of the rules to the engine: which inputs make it happen, and whether they do.
+"""Playing a run of the net to the engine: which inputs make it happen, and whether they do.
 
-played = play(mission, fleet, system, run)
-played.inputs        # one for each rule that comes from outside
+played = play(mission, fleet, net, run)
+played.inputs        # one for each transition that comes from outside
 played.agrees        # whether the engine came along all the way
 """
 
@@ -15,7 +15,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
-from m2pem.verify.net.petri_net import Action, Kind, Rule, System, Trigger
+from m2pem.verify.net.petri_net import Action, Kind, PetriNet, Transition, Trigger
 from tests.verify.trace_mapping import Follower
 
 START_US = 1_767_225_600_000_000
@@ -27,7 +27,7 @@ _MOST_CONTINUES = 100
 class Played:
     """`inputs` with their times (microseconds since the Unix epoch), and what came of them.
 
-    `stopped`: why the engine could not come along, "" when it did. A condition that the rules
+    `stopped`: why the engine could not come along, "" when it did. A condition that the transitions
     cannot follow, and timers out of the order of their times, cannot be made to happen.
     """
 
@@ -44,13 +44,13 @@ class Played:
 def play(
     mission: Mission,
     fleet: Fleet | None,
-    system: System,
+    net: PetriNet,
     run: Sequence[int],
     data: Mapping[str, Value] | None = None,
 ) -> Played:
-    """Play the rules of a run, one after the other, to a new run of the engine."""
+    """Play the transitions of a run, one after the other, to a new run of the engine."""
     engine = MissionRun(mission, fleet, "r1")
-    follower = Follower(system)
+    follower = Follower(net)
     inputs: list[tuple[int, i.Input]] = []
     steps: list[Step] = []
     now_us = START_US
@@ -64,32 +64,32 @@ def play(
             steps.append(engine.receive(i.Continue(), now_us))
         return follower.step(engine.state)
 
-    if not give(i.StartRun(system.process, dict(data or {}))):
+    if not give(i.StartRun(net.process, dict(data or {}))):
         return Played(tuple(inputs), tuple(steps), "the engine begins otherwise")
     for number in run:
-        rule = system.rules[number]
-        if rule.kind is not Kind.OUTSIDE:
+        transition = net.transitions[number]
+        if transition.kind is not Kind.OUTSIDE:
             continue
         if engine.state.status is RunStatus.ENDED:
-            return Played(tuple(inputs), tuple(steps), f"the run is over before {rule.name}")
-        if rule.trigger is Trigger.TIMER:
-            due_us = _due_us(engine.state, rule)
+            return Played(tuple(inputs), tuple(steps), f"the run is over before {transition.name}")
+        if transition.trigger is Trigger.TIMER:
+            due_us = _due_us(engine.state, transition)
             if due_us is None:
-                return Played(tuple(inputs), tuple(steps), f"no timer of {rule.element} runs")
+                return Played(tuple(inputs), tuple(steps), f"no timer of {transition.element} runs")
             now_us = max(now_us, due_us)
-        item = next(_inputs(system, rule, engine.state), None)
+        item = next(_inputs(net, transition, engine.state), None)
         if item is None:
-            return Played(tuple(inputs), tuple(steps), f"nothing makes {rule.name} happen")
+            return Played(tuple(inputs), tuple(steps), f"nothing makes {transition.name} happen")
         if not give(item):
             return Played(
-                tuple(inputs), tuple(steps), f"the engine goes another way at {rule.name}"
+                tuple(inputs), tuple(steps), f"the engine goes another way at {transition.name}"
             )
     return Played(tuple(inputs), tuple(steps), "")
 
 
-def _due_us(state: RunState, rule: Rule) -> int | None:
-    elements = {step.element for step in rule.steps[:1]}
-    elements |= {step.element for step in rule.steps if step.action is Action.TRIGGERED}
+def _due_us(state: RunState, transition: Transition) -> int | None:
+    elements = {step.element for step in transition.steps[:1]}
+    elements |= {step.element for step in transition.steps if step.action is Action.TRIGGERED}
     offset_us = state.started_us + state.paused_total_us
     due = [
         wait.due_us if wait.calendar else wait.due_us + offset_us
@@ -99,46 +99,46 @@ def _due_us(state: RunState, rule: Rule) -> int | None:
     return min(due, default=None)
 
 
-def _inputs(system: System, rule: Rule, state: RunState) -> Iterator[i.Input]:
-    element = rule.element
-    match rule.trigger:
+def _inputs(net: PetriNet, transition: Transition, state: RunState) -> Iterator[i.Input]:
+    element = transition.element
+    match transition.trigger:
         case Trigger.ANSWER:
             for prompt in state.prompts.values():
                 if prompt.token.node.id == element:
-                    yield i.PromptAnswer(prompt.id, rule.detail, "verify")
+                    yield i.PromptAnswer(prompt.id, transition.detail, "verify")
         case Trigger.SUCCEEDS | Trigger.FAILS:
-            yield from _reports(system, rule, state)
+            yield from _reports(net, transition, state)
         case Trigger.TIMER:
             yield i.Tick()
         case Trigger.SIGNAL:
-            yield i.SignalReceived(rule.detail, by="verify")
+            yield i.SignalReceived(transition.detail, by="verify")
         case Trigger.MESSAGE:
-            yield i.MessageReceived(rule.detail, by="verify")
+            yield i.MessageReceived(transition.detail, by="verify")
         case _:
             pass
 
 
-def _reports(system: System, rule: Rule, state: RunState) -> Iterator[i.Input]:
-    well = rule.trigger is Trigger.SUCCEEDS
+def _reports(net: PetriNet, transition: Transition, state: RunState) -> Iterator[i.Input]:
+    well = transition.trigger is Trigger.SUCCEEDS
     for behavior in state.behaviors.values():
-        if behavior.element == rule.element and behavior.phase is BehaviorPhase.ACTIVE:
+        if behavior.element == transition.element and behavior.phase is BehaviorPhase.ACTIVE:
             yield i.BehaviorReported(
                 behavior.id,
                 behavior.number + 1,
                 BehaviorState.SUCCEEDED if well else BehaviorState.FAILED,
-                "" if well else rule.detail,
-                outputs=_written(system, rule) if well else {},
+                "" if well else transition.detail,
+                outputs=_written(net, transition) if well else {},
             )
     for service in state.services.values():
-        if service.token.node.id == rule.element:
+        if service.token.node.id == transition.element:
             if well:
-                yield i.ServiceCompleted(service.id, _written(system, rule))
+                yield i.ServiceCompleted(service.id, _written(net, transition))
             else:
-                yield i.ServiceFailed(service.id, rule.detail)
+                yield i.ServiceFailed(service.id, transition.detail)
 
 
-def _written(system: System, rule: Rule) -> dict[str, Value]:
+def _written(net: PetriNet, transition: Transition) -> dict[str, Value]:
     return {
-        system.variables[variable].key: system.variables[variable].values[value]
-        for variable, value in rule.assign
+        net.variables[variable].key: net.variables[variable].values[value]
+        for variable, value in transition.assign
     }

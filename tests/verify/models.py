@@ -9,7 +9,7 @@ from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import Mission
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from tests.verify.conformance import START_US
 from tests.verify.trace_mapping import Follower, look_of_run
 
@@ -66,18 +66,18 @@ def branches(
 
 
 class Walk:
-    """A run of the engine in which numbers choose what happens, followed by the rules."""
+    """A run of the engine in which numbers choose what happens, followed by the net."""
 
-    def __init__(self, mission: Mission, fleet: Fleet, system: System, seed: int) -> None:
+    def __init__(self, mission: Mission, fleet: Fleet, net: PetriNet, seed: int) -> None:
         self.run = MissionRun(mission, fleet, "r1")
-        self.follower = Follower(system)
-        self.process = system.process
+        self.follower = Follower(net)
+        self.process = net.process
         self.now_us = START_US
         self.dice = Random(seed)
         self.given: list[i.Input] = []
 
     def give(self, item: i.Input) -> bool:
-        """Whether the rules can do what the engine has done."""
+        """Whether the net can do what the engine has done."""
         self.given.append(item)
         self.run.receive(item, self.now_us)
         for _ in range(50):
@@ -87,7 +87,7 @@ class Walk:
         return self.run.wants_continue or self.follower.step(self.run.state)
 
     def go(self, length: int = 25) -> str:
-        """Where the rules could not follow; "" if they always could."""
+        """Where the net could not follow; "" if they always could."""
         agrees = self.give(i.StartRun(self.process))
         while agrees and len(self.given) < length and not self.run.wants_continue:
             things = self._things()

@@ -12,11 +12,11 @@ from tests.verify.formulas import ATOMS
 
 @dataclass(frozen=True)
 class SmallSystem:
-    """`steps[s]`: rule and state after it. `of_states` and `of_rules`: what is true."""
+    """`steps[s]`: transition and state after it. `of_states` and `of_transitions`: what is true."""
 
     steps: tuple[tuple[tuple[int, int], ...], ...]
     of_states: tuple[int, ...]
-    of_rules: tuple[int, ...]
+    of_transitions: tuple[int, ...]
     propositions: Sequence[Proposition] = ATOMS
     reduced: bool = False
     open_at: int = -1
@@ -33,20 +33,20 @@ class SmallSystem:
     def true_in(self, state: int) -> int:
         return self.of_states[state]
 
-    def true_when(self, rule: int) -> int:
-        return self.of_rules[rule]
+    def true_when(self, transition: int) -> int:
+        return self.of_transitions[transition]
 
 
 @st.composite
-def systems(draw: st.DrawFn, rules: int = 3, states: int = 4) -> SmallSystem:
-    """`a` and `b` are true in states, `c` when rules fire."""
+def systems(draw: st.DrawFn, transitions: int = 3, states: int = 4) -> SmallSystem:
+    """`a` and `b` are true in states, `c` when transitions fire."""
     size = draw(st.integers(1, states))
-    step = st.tuples(st.integers(0, rules - 1), st.integers(0, size - 1))
+    step = st.tuples(st.integers(0, transitions - 1), st.integers(0, size - 1))
     steps = st.lists(step, max_size=3, unique=True).map(tuple)
     return SmallSystem(
         tuple(draw(steps) for _ in range(size)),
         tuple(draw(st.integers(0, 3)) for _ in range(size)),
-        tuple(draw(st.sampled_from([0, 0, 4])) for _ in range(rules)),
+        tuple(draw(st.sampled_from([0, 0, 4])) for _ in range(transitions)),
     )
 
 
@@ -67,6 +67,6 @@ def runs(system: SmallSystem, length: int) -> Iterator[Run]:
 
 
 def is_fair(system: SmallSystem, run: Run) -> bool:
-    """Whether each rule that can fire in a round does so."""
-    possible = {rule for move in run.cycle for rule, _ in system.successors(move.state)}
-    return possible <= {move.rule for move in run.cycle}
+    """Whether each transition that can fire in a round does so."""
+    possible = {transition for move in run.cycle for transition, _ in system.successors(move.state)}
+    return possible <= {move.transition for move in run.cycle}

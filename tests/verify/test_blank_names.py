@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.verify.report.run_steps import Words
+from m2pem.verify.report.run_steps import ElementNames
 from tests.engine.notation import mission
 
 MODEL = """<startEvent id="start"/> <exclusiveGateway id="which" name=" "/> <userTask id="u"/>
@@ -14,16 +14,18 @@ MODEL = """<startEvent id="start"/> <exclusiveGateway id="which" name=" "/> <use
 def test_an_element_with_a_blank_name_is_called_by_its_kind_and_id(name: str) -> None:
     drawn = mission(MODEL.replace('name=" "', f'name="{name}"'))
     assert drawn.elements["which"].label == "exclusive gateway which"
-    words = Words(drawn)
-    assert words.name("which") == "exclusive gateway which"
-    assert words.name("f1") == "start → exclusive gateway which"
+    element_names = ElementNames(drawn)
+    assert element_names.name("which") == "exclusive gateway which"
+    assert element_names.name("f1") == "start → exclusive gateway which"
 
 
 def test_an_element_without_a_name_is_called_by_its_kind_and_id_in_reports() -> None:
     drawn = mission(MODEL.replace('name=" "', ""))
     assert drawn.elements["which"].label == "which"
-    words = Words(drawn)
-    assert words.name("which") == words.with_id("which") == "exclusive gateway which"
+    element_names = ElementNames(drawn)
+    assert (
+        element_names.name("which") == element_names.with_id("which") == "exclusive gateway which"
+    )
 
 
 def test_kinds_are_called_what_bpmn_calls_them() -> None:

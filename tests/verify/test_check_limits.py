@@ -13,7 +13,7 @@ from m2pem.verify.net import concurrency
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.search.explore import Limits, Stopped, explore
-from m2pem.verify.translate import Bound, Options, TooLargeError, translate
+from m2pem.verify.translate import Options, SizeLimit, TooLargeError, translate
 from tests.verify.models import branches
 
 SEARCHED = {"no-deadlock", "proper-completion", "can-complete", "no-dead-element", "one-token"}
@@ -55,7 +55,7 @@ def row_of(count: int) -> Mission:
 def test_conditions_without_end_leave_a_mission_undecided_and_are_named() -> None:
     report = check(choice_of(30), limits=Limits(seconds=60))
     assert report.verdict is Verdict.UNDECIDED
-    assert report.found.stopped is Stopped.RULES
+    assert report.found.stopped is Stopped.TRANSITIONS
     undecided = {each.property for each in report.results if each.verdict is Verdict.UNDECIDED}
     assert undecided >= SEARCHED
     for each in report.results:
@@ -70,7 +70,7 @@ def test_what_needs_no_search_is_said_of_a_mission_that_is_too_large() -> None:
     assert held == {"can-be-triggered", "prompts-have-decisions"}
 
 
-def test_the_limit_of_time_holds_for_the_making_of_rules() -> None:
+def test_the_limit_of_time_holds_for_the_context_of_transitions() -> None:
     began = time.monotonic()
     report = check(choice_of(30), limits=Limits(seconds=0.05))
     assert report.found.stopped is Stopped.TIME
@@ -78,11 +78,11 @@ def test_the_limit_of_time_holds_for_the_making_of_rules() -> None:
     assert "while spelling out Which" in report.results[0].covered
 
 
-def test_no_more_rules_are_made_than_fit_into_memory() -> None:
-    with pytest.raises(TooLargeError, match="more than 100 rules"):
-        translate(row_of(200), bound=Bound(most_rules=100))
+def test_no_more_transitions_are_made_than_fit_into_memory() -> None:
+    with pytest.raises(TooLargeError, match="more than 100 transitions"):
+        translate(row_of(200), size_limit=SizeLimit(most_transitions=100))
     report = check(row_of(2_000), limits=Limits(memory_mb=1))
-    assert report.found.stopped is Stopped.RULES
+    assert report.found.stopped is Stopped.TRANSITIONS
 
 
 def test_a_long_row_of_works_that_may_fail_is_decided() -> None:
@@ -96,21 +96,21 @@ def test_a_long_row_of_works_that_may_fail_is_decided() -> None:
 
 
 @pytest.mark.parametrize("proven", [True, False])
-def test_the_limit_of_time_holds_for_making_rules_fewer(
+def test_the_limit_of_time_holds_for_context_transitions_fewer(
     proven: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not proven:
         monkeypatch.setattr(concurrency, "MOST_PLACES", 0)
-    system = translate(branches(40))
+    net = translate(branches(40))
     with pytest.raises(TooLargeError, match="limit of time"):
-        simplify(system, bound=Bound(until_s=time.monotonic() - 1))
+        simplify(net, size_limit=SizeLimit(until_s=time.monotonic() - 1))
 
 
 def test_what_may_fire_in_states_that_wait_counts_as_memory() -> None:
-    system = simplify(translate(branches(100)))
+    net = simplify(translate(branches(100)))
     tracemalloc.start()
     try:
-        found = explore(system, Limits(states=100_000, memory_mb=20))
+        found = explore(net, Limits(states=100_000, memory_mb=20))
         _, most = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -119,7 +119,7 @@ def test_what_may_fire_in_states_that_wait_counts_as_memory() -> None:
 
 
 def test_of_short_time_enough_is_left_for_a_search_that_leaves_orders_out() -> None:
-    system = simplify(translate(branches(12)))
-    found = search(system, Limits(seconds=20, states=10_000_000))
+    net = simplify(translate(branches(12)))
+    found = search(net, Limits(seconds=20, states=10_000_000))
     assert found.complete
     assert found.reduced

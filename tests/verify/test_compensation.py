@@ -6,7 +6,7 @@ import pytest
 
 from m2pem.fleet.madeup import fleet_for
 from m2pem.verify.check import check
-from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, System
+from m2pem.verify.net.petri_net import Action, Exactness, Kind, PetriNet, Role
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.search.explore import Limits, explore
@@ -20,7 +20,7 @@ from tests.verify.trace_mapping import TooManyStatesError
 
 OPEN = Options(open_world=True)
 EXACT = (30, 36, 87, 126, 154, 176, 206, 242, 261, 297, 309, 329, 339, 362, 387, 393)
-"""Random missions in which something is undone, and no rule stops at a bound."""
+"""Random missions in which something is undone, and no transition stops at a bound."""
 
 BY_ITSELF = """
 <startEvent id="start"/> <endEvent id="end"/> <userTask id="later">ask on</userTask>
@@ -151,19 +151,19 @@ MISSIONS = {
 }
 
 
-def reached(system: System) -> set[str]:
-    found = explore(system, Limits(tokens=3))
-    steps = {step for rule in found.fired for step in system.rules[rule].steps}
+def reached(net: PetriNet) -> set[str]:
+    found = explore(net, Limits(tokens=3))
+    steps = {step for transition in found.fired for step in net.transitions[transition].steps}
     return {step.element for step in steps if step.action is not Action.INTERRUPTED}
 
 
 @pytest.mark.parametrize("text", MISSIONS.values(), ids=MISSIONS)
-def test_the_rules_can_do_what_the_engine_does(text: str) -> None:
+def test_the_transitions_can_do_what_the_engine_does(text: str) -> None:
     read = mission(text)
-    system = translate(read, options=OPEN)
-    assert not [a for a in system.approximations if a.exactness is Exactness.BOUNDED]
+    net = translate(read, options=OPEN)
+    assert not [a for a in net.approximations if a.exactness is Exactness.BOUNDED]
     for seed in range(12):
-        assert Walk(read, fleet_for(read), system, seed).go() == ""
+        assert Walk(read, fleet_for(read), net, seed).go() == ""
 
 
 @pytest.mark.parametrize("text", MISSIONS.values(), ids=MISSIONS)
@@ -174,20 +174,20 @@ def test_spin_sees_the_same(text: str) -> None:
 
 
 @pytest.mark.parametrize("seed", EXACT)
-def test_the_rules_can_do_what_the_engine_does_of_random_compensation(seed: int) -> None:
+def test_the_transitions_can_do_what_the_engine_does_of_random_compensation(seed: int) -> None:
     dice = Random(seed)
     read, text = with_compensation((structured if seed % 3 else graph)(dice), dice)
-    system = translate(read, options=OPEN)
-    assert not [a for a in system.approximations if a.exactness is Exactness.BOUNDED]
+    net = translate(read, options=OPEN)
+    assert not [a for a in net.approximations if a.exactness is Exactness.BOUNDED]
     for walk in range(4):
         try:
-            game = Walk(read, fleet_for(read), system, walk)
+            game = Walk(read, fleet_for(read), net, walk)
             lost = game.go()
         except TooManyStatesError:
             continue
         detail = game.run.state.detail
         if lost and "EXPRESSION" not in detail and not detail.startswith("stuck"):
-            small = explore(simplify(system), Limits(states=20_000, tokens=3))
+            small = explore(simplify(net), Limits(states=20_000, tokens=3))
             assert small.overflows, f"{lost}\n{text}"
 
 
@@ -211,18 +211,18 @@ def test_what_was_ended_early_is_not_undone() -> None:
 
 
 def test_a_throw_does_not_wait_for_what_another_one_undoes() -> None:
-    system = translate(mission(TWO_THROWS))
-    found = explore(system)
+    net = translate(mission(TWO_THROWS))
+    found = explore(net)
     rests = [
-        {system.places[p].element for p in found.marking(state).tokens if _shows(system, p)}
+        {net.places[p].element for p in found.marking(state).tokens if _shows(net, p)}
         for state in range(len(found.states))
-        if all(system.rules[r].kind is Kind.OUTSIDE for r, _ in found.successors(state))
+        if all(net.transitions[r].kind is Kind.OUTSIDE for r, _ in found.successors(state))
     ]
     assert [each for each in rests if "unA" in each] == [{"unA", "one"}, {"unA", "two"}]
 
 
-def _shows(system: System, place: int) -> bool:
-    return system.places[place].role is Role.ACTIVE
+def _shows(net: PetriNet, place: int) -> bool:
+    return net.places[place].role is Role.ACTIVE
 
 
 def test_the_errors_of_what_undoes_pass_by_the_boundary_of_what_is_undone() -> None:

@@ -8,7 +8,7 @@ from m2pem.engine import records as r
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
-from m2pem.verify.conformance_run import NotPlayableError, Player, data_for
+from m2pem.verify.conformance_run import ConformanceRun, NotPlayableError, data_for
 from m2pem.verify.report.data import as_data
 from m2pem.verify.report.findings import findings_of
 from tests.engine.notation import mission
@@ -80,8 +80,8 @@ def violating_run(text: Mission) -> list[dict[str, Any]]:
     return steps
 
 
-def played(text: Mission, steps: list[dict[str, Any]]) -> Player:
-    player = Player(text, fleet_for(text), "MAIN")
+def played(text: Mission, steps: list[dict[str, Any]]) -> ConformanceRun:
+    player = ConformanceRun(text, fleet_for(text), "MAIN")
     for step in steps:
         player.play(step)
     assert player.undone == []
@@ -120,14 +120,14 @@ def test_what_does_not_interrupt_is_seen_false_before_it_comes_again() -> None:
 
 def test_a_condition_that_no_value_makes_true_is_told() -> None:
     text = mission(CATCH.format("a == 1 and a == 2"))
-    player = Player(text, fleet_for(text), "MAIN")
+    player = ConformanceRun(text, fleet_for(text), "MAIN")
     with pytest.raises(NotPlayableError, match="no data was found for the condition of c"):
         player.play(COMES_TRUE)
 
 
 def test_a_condition_that_is_not_awaited_is_told() -> None:
     text = mission(BOUNDARY.format("zone.clear"))
-    player = Player(text, fleet_for(text), "MAIN")
+    player = ConformanceRun(text, fleet_for(text), "MAIN")
     player.play({**COMES_TRUE, "element": "ask", "trigger": "answer", "detail": "on"})
     with pytest.raises(NotPlayableError, match="no condition of c is awaited now"):
         player.play(COMES_TRUE)

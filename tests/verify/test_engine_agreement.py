@@ -1,4 +1,4 @@
-"""What is verified is what flies: each run of the engine is a run of the rules."""
+"""What is verified is what flies: each run of the engine is a run of the net."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from m2pem.errors import MissionError
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
-from m2pem.verify.net.petri_net import Exactness, System
+from m2pem.verify.net.petri_net import Exactness, PetriNet
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.search.explore import Limits, explore
@@ -31,48 +31,50 @@ PARTS = 8
 """In which all cases are walked; all at once, they take long."""
 
 
-def walked(mission: Mission, system: System, seeds: range) -> str:
+def walked(mission: Mission, net: PetriNet, seeds: range) -> str:
     fleet = fleet_for(mission)
     for seed in seeds:
         try:
-            walk = Walk(mission, fleet, system, seed)
+            walk = Walk(mission, fleet, net, seed)
             lost = walk.go()
         except TooManyStatesError:
             continue
-        if lost and not _explained(walk, system):
+        if lost and not _explained(walk, net):
             return f"seed {seed}: {lost}"
     return ""
 
 
-def _explained(walk: Walk, system: System) -> bool:
-    """What docs/verification-internals.md says of where the rules stop short of the engine."""
-    if any(a.exactness is Exactness.BOUNDED for a in system.approximations):
+def _explained(walk: Walk, net: PetriNet) -> bool:
+    """What docs/verification-internals.md says of where the net stops short of the engine."""
+    if any(a.exactness is Exactness.BOUNDED for a in net.approximations):
         return True
     if "EXPRESSION" in walk.run.state.detail:
         return True
     if walk.run.state.detail.startswith("stuck"):
-        return any("may become true" in a.what for a in system.approximations)
-    return bool(explore(simplify(system), Limits(states=20_000, tokens=3)).overflows)
+        return any("may become true" in a.what for a in net.approximations)
+    return bool(explore(simplify(net), Limits(states=20_000, tokens=3)).overflows)
 
 
 @pytest.mark.parametrize("file", MISSIONS, ids=lambda f: f"{f.parent.name}-{f.stem}")
-def test_the_rules_can_do_what_the_engine_does_of_a_mission(file: Path) -> None:
+def test_the_transitions_can_do_what_the_engine_does_of_a_mission(file: Path) -> None:
     mission = read_mission(file)
     assert walked(mission, translate(mission, options=OPEN), range(8)) == ""
     assert walked(mission, translate(mission, options=IN_ORDER), range(8, 12)) == ""
 
 
 @pytest.mark.parametrize("part", range(PARTS))
-def test_the_rules_can_do_what_the_engine_does_of_every_case_of_the_standard(part: int) -> None:
+def test_the_transitions_can_do_what_the_engine_does_of_every_case_of_the_standard(
+    part: int,
+) -> None:
     lost = {}
     for file in CASES[part::PARTS]:
         try:
             mission = read_mission(file)
         except MissionError:
             continue
-        system = translate(mission, options=OPEN)
-        found = walked(mission, system, range(2))
-        if sum(rule.due_us is not None for rule in system.rules) > 1:
+        net = translate(mission, options=OPEN)
+        found = walked(mission, net, range(2))
+        if sum(transition.due_us is not None for transition in net.transitions) > 1:
             found = found or walked(mission, translate(mission, options=IN_ORDER), range(2, 4))
         if found:
             lost[file.stem] = found
@@ -81,7 +83,7 @@ def test_the_rules_can_do_what_the_engine_does_of_every_case_of_the_standard(par
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_rules_can_do_what_the_engine_does_of_a_random_mission(seed: int) -> None:
+def test_the_transitions_can_do_what_the_engine_does_of_a_random_mission(seed: int) -> None:
     mission = notation((structured if seed % 2 else graph)(Random(seed)))
     assert walked(mission, translate(mission, options=OPEN), range(2)) == ""
 
@@ -99,6 +101,6 @@ def test_the_runs_that_violate_a_property_can_be_played_to_the_engine() -> None:
     failures = next(each for each in report.results if each.property == "failures-handled")
     assert failures.verdict is Verdict.VIOLATED
     for violation in failures.violations:
-        played = play(mission, fleet_for(mission), report.system, violation.run)
+        played = play(mission, fleet_for(mission), report.net, violation.run)
         assert played.agrees, played.stopped
         assert "was caught by no boundary" in played.steps[-1].records[-1].detail  # type: ignore[union-attr]

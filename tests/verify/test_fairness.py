@@ -8,20 +8,20 @@ from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.model_check import Result as Answer
 from m2pem.verify.ltl.model_check import check as check_formula
 from m2pem.verify.ltl.parser import parse
-from m2pem.verify.net.petri_net import System, outcomes_of
+from m2pem.verify.net.petri_net import PetriNet, outcomes_of
 from m2pem.verify.net.simplify import simplify
-from m2pem.verify.properties import Searched
+from m2pem.verify.properties import SearchedMission
 from m2pem.verify.properties.results import Result, Verdict
 from m2pem.verify.properties.soundness import IN_EACH_STATE, can_complete, completes_if_fair
-from m2pem.verify.requirements.propositions import Labels, MissionRuns
+from m2pem.verify.requirements.propositions import ExploredRuns, Labels
 from m2pem.verify.search.explore import Exploration, Limits, explore
-from m2pem.verify.search.fairness import FairRounds
+from m2pem.verify.search.fairness import FairCycles
 from m2pem.verify.search.stubborn_sets import StubbornSets
 from m2pem.verify.translate import translate
 from tests.engine.notation import mission
 from tests.engine.random_missions import graph, structured
 from tests.verify.missions import approval
-from tests.verify.random_systems import random_system
+from tests.verify.random_nets import random_net
 
 AGREE = """
 <startEvent id="s"/><exclusiveGateway id="m"/>
@@ -53,26 +53,26 @@ def of(report: Report, name: str) -> Result:
     return next(each for each in report.results if each.property == name)
 
 
-def searched(text: Mission, found: Exploration) -> Searched:
-    return Searched(text, found.system, found)
+def searched(text: Mission, found: Exploration) -> SearchedMission:
+    return SearchedMission(text, found.net, found)
 
 
 def assert_fair_lasso(found: Exploration, result: Result) -> None:
     """Its round comes back to where it began, reaches no end, and puts nothing off."""
-    system, encoding = found.system, found.encoding
+    net, encoding = found.net, found.encoding
     number = {state: n for n, state in enumerate(found.states)}
-    outcomes = outcomes_of(system)
+    outcomes = outcomes_of(net)
     state = encoding.initial
     (violation,) = result.violations
-    for rule in violation.run:
-        assert rule in [r for r, _ in found.successors(number[state])]
-        state, _ = encoding.fire(rule, state)
+    for transition in violation.run:
+        assert transition in [r for r, _ in found.successors(number[state])]
+        state, _ = encoding.fire(transition, state)
     begin, possible, passed = state, set(), set()
-    for rule in violation.cycle:
+    for transition in violation.cycle:
         steps = dict(found.successors(number[state]))
-        possible |= {o for r in steps if not system.rules[r].flag for o in outcomes[r]}
-        passed |= set(outcomes[rule])
-        state = found.states[steps[rule]]
+        possible |= {o for r in steps if not net.transitions[r].flag for o in outcomes[r]}
+        passed |= set(outcomes[transition])
+        state = found.states[steps[transition]]
     assert violation.cycle
     assert state == begin
     assert possible <= passed
@@ -115,22 +115,22 @@ def test_a_run_that_is_stuck_does_not_end() -> None:
     assert not result.violations[0].cycle
 
 
-def systems(count: int) -> list[System]:
-    return [random_system(Random(seed)) for seed in range(count)]
+def systems(count: int) -> list[PetriNet]:
+    return [random_net(Random(seed)) for seed in range(count)]
 
 
 def test_the_rounds_found_are_those_that_break_a_fair_requirement_to_end() -> None:
     ends = parse("<> ended")
     verdicts = []
-    for system in systems(300):
-        found = explore(system, Limits(states=2_000, tokens=3))
+    for net in systems(300):
+        found = explore(net, Limits(states=2_000, tokens=3))
         if not found.complete:
             continue
-        labels = Labels(system, mission(ASKED_AGAIN), None, propositions(ends))
-        runs = MissionRuns(found, labels)
+        labels = Labels(net, mission(ASKED_AGAIN), None, propositions(ends))
+        runs = ExploredRuns(found, labels)
         answer = check_formula(runs, ends, fair=runs.outcomes())
-        stuck = any(not found.system.ends & found.marking(n).tokens.keys() for n in found.terminals)
-        fair = FairRounds(found, lambda _: False).nearest() is not None
+        stuck = any(not found.net.ends & found.marking(n).tokens.keys() for n in found.terminals)
+        fair = FairCycles(found, lambda _: False).nearest() is not None
         assert (answer.result is Answer.VIOLATED) is (stuck or fair)
         verdicts.append((stuck, fair))
     assert {(False, False), (False, True), (True, False)} <= set(verdicts)
@@ -157,8 +157,8 @@ def test_what_always_ends_if_fair_can_end_from_everywhere() -> None:
 
 def test_of_a_search_that_left_orders_out_it_says_in_what_sense_it_ends() -> None:
     for text, note in ((ASKED_AGAIN, IN_EACH_STATE), (AGREE, IN_EACH_STATE), (ONCE, "")):
-        system = simplify(translate(mission(text)))
-        found = explore(system, reduction=StubbornSets(system))
+        net = simplify(translate(mission(text)))
+        found = explore(net, reduction=StubbornSets(net))
         result = completes_if_fair(searched(mission(text), found))
         assert result.verdict is Verdict.HOLDS
         assert result.covered == note

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.search.explore import Exploration, Stopped, _Search, explore
 from m2pem.verify.search.stubborn_sets import StubbornSets
@@ -30,12 +30,12 @@ class Interruption:
         return self
 
 
-def interrupted(system: System, at: int, *, reduced: bool) -> tuple[Exploration, bool]:
+def interrupted(net: PetriNet, at: int, *, reduced: bool) -> tuple[Exploration, bool]:
     """What was seen then, and whether the search was long enough for that."""
     interruption, before = Interruption(at), sys.gettrace()
     sys.settrace(interruption)
     try:
-        found = explore(system, reduction=StubbornSets(system) if reduced else None)
+        found = explore(net, reduction=StubbornSets(net) if reduced else None)
     finally:
         sys.settrace(before)
     return found, interruption.left <= 0
@@ -43,10 +43,10 @@ def interrupted(system: System, at: int, *, reduced: bool) -> tuple[Exploration,
 
 @pytest.mark.parametrize("reduced", [False, True])
 def test_whatever_was_being_done_what_is_left_fits_together(reduced: bool) -> None:
-    system = simplify(translate(branches(2)))
+    net = simplify(translate(branches(2)))
     at, met = 1, True
     while met:
-        found, met = interrupted(system, at, reduced=reduced)
+        found, met = interrupted(net, at, reduced=reduced)
         assert (found.stopped is Stopped.INTERRUPTED) is met
         count = len(found.states)
         assert len(found.parents) == len(found.via) == count

@@ -23,7 +23,7 @@ A, B, C = 1, 2, 4
 
 
 def chain(*of_states: int, back_to: int | None = None) -> SmallSystem:
-    """States one after the other; rule n leaves state n."""
+    """States one after the other; transition n leaves state n."""
     last = len(of_states) - 1
     steps = [((n, n + 1),) for n in range(last)]
     steps.append(() if back_to is None else ((last, back_to),))
@@ -43,7 +43,7 @@ def test_a_formula_holds_just_when_no_run_breaks_it(system: SmallSystem, formula
 @settings(max_examples=150, deadline=None)
 @given(systems(), formulas.formulas)
 def test_with_fairness_only_fair_runs_count(system: SmallSystem, formula: Formula) -> None:
-    verdict = check(system, formula, fair={rule: rule for rule in range(3)})
+    verdict = check(system, formula, fair={transition: transition for transition in range(3)})
     fair = [run for run in islice(runs(system, 7), 300) if is_fair(system, run)]
     if any(breaks(system, formula, run, steps=False) for run in fair):
         assert verdict.result is Result.VIOLATED
@@ -140,9 +140,9 @@ def test_a_round_is_found_before_all_is_seen() -> None:
     assert verdict.states < 5_000
 
 
-def test_systems_that_leave_rules_out_are_refused_where_all_are_needed() -> None:
+def test_systems_that_leave_transitions_out_are_refused_where_all_are_needed() -> None:
     system = SmallSystem((((0, 0),),), (0,), (0,), reduced=True)
-    with pytest.raises(ValueError, match="leaves no rule out"):
+    with pytest.raises(ValueError, match="leaves no transition out"):
         check(system, Eventually(Completed("c")), fair={0: 0})
-    with pytest.raises(ValueError, match="leaves no rule out"):
+    with pytest.raises(ValueError, match="leaves no transition out"):
         check(system, Next(Completed("c")))

@@ -2,15 +2,15 @@
 
 import pytest
 
-from m2pem.verify.net.petri_net import Action, Kind, Place, Role, Rule, Scope, Step, System
+from m2pem.verify.net.petri_net import Action, Kind, PetriNet, Place, Role, Scope, Step, Transition
 from m2pem.verify.search.explore import Limits, Stopped, explore
 
 ENDS = tuple(Place(n, f"end{n}", f"end{n}", 0, Role.END) for n in range(3))
 START, REACHED, WORK = 3, 4, 5
 
 
-def fills(*made: tuple[int, int]) -> System:
-    """One rule makes these tokens all at once; then the work is done, a token at a time."""
+def fills(*made: tuple[int, int]) -> PetriNet:
+    """One transition makes these tokens all at once; then the work is done, a token at a time."""
     places = (
         *ENDS,
         Place(START, "start", "start", 0, Role.ACTIVE),
@@ -18,17 +18,17 @@ def fills(*made: tuple[int, int]) -> System:
         Place(WORK, "work", "work", 0, Role.ACTIVE),
     )
     step = (Step("start", Action.COMPLETED),)
-    rules = (
-        Rule(0, "begin", Kind.INTERNAL, step, consume=((START, 1),), produce=made),
-        Rule(1, "work", Kind.OUTSIDE, step, consume=((WORK, 1),)),
+    transitions = (
+        Transition(0, "begin", Kind.INTERNAL, step, consume=((START, 1),), produce=made),
+        Transition(1, "work", Kind.OUTSIDE, step, consume=((WORK, 1),)),
     )
-    return System(
+    return PetriNet(
         "m.bpmn",
         "P",
         (Scope(0, "P", None, ()),),
         places,
         (),
-        rules,
+        transitions,
         ((START, 1),),
         completed=0,
         terminated=1,

@@ -52,16 +52,16 @@ ON = ' cancelActivity="false"'
 
 
 def completed(text: str, element: str) -> tuple[bool, bool]:
-    """Whether an element completes: in the engine's run, and in some run of the rules."""
+    """Whether an element completes: in the engine's run, and in some run of the transitions."""
     mission = notation(text)
     play = Play(text).start()
     lines = play.trace()
-    system = translate(mission)
-    found = explore(system)
-    spins = search(system)
+    net = translate(mission)
+    found = explore(net)
+    spins = search(net)
     assert spins.fired == found.fired.keys()
-    steps = {step for rule in found.fired for step in system.rules[rule].steps}
-    walk = Walk(mission, fleet_for(mission), system, 1)
+    steps = {step for transition in found.fired for step in net.transitions[transition].steps}
+    walk = Walk(mission, fleet_for(mission), net, 1)
     assert walk.go() == ""
     return f"leave {element}" in lines, any(
         step.element == element and step.action is Action.COMPLETED for step in steps

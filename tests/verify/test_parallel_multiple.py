@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from m2pem.fleet.madeup import fleet_for
-from m2pem.verify.net.petri_net import Action, Exactness, Role, System
+from m2pem.verify.net.petri_net import Action, Exactness, PetriNet, Role
 from m2pem.verify.search.explore import Limits, explore
 from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission
@@ -23,9 +23,13 @@ OPEN = Options(open_world=True)
 INTERRUPTS, DOES_NOT = "", ' cancelActivity="false"'
 
 
-def reached(system: System) -> set[tuple[str, Action]]:
-    found = explore(system, Limits(tokens=3))
-    return {(s.element, s.action) for rule in found.fired for s in system.rules[rule].steps}
+def reached(net: PetriNet) -> set[tuple[str, Action]]:
+    found = explore(net, Limits(tokens=3))
+    return {
+        (s.element, s.action)
+        for transition in found.fired
+        for s in net.transitions[transition].steps
+    }
 
 
 @pytest.mark.parametrize("attributes", [INTERRUPTS, DOES_NOT])
@@ -39,13 +43,13 @@ def test_one_trigger_of_several_is_not_enough(attributes: str) -> None:
 
 
 def test_a_run_has_every_trigger_before_the_event_is_left() -> None:
-    system = translate(mission(BOTH.format(INTERRUPTS, "signal S; timer PT5S")), options=OPEN)
-    found = explore(system)
-    (left,) = [r for r in system.rules if r.element == "b" and r.steps[0].action == "completed"]
-    run = [system.rules[rule] for rule in found.run_to(found.fired[left.index])]
-    triggers = {rule.trigger for rule in run if rule.trigger is not None}
+    net = translate(mission(BOTH.format(INTERRUPTS, "signal S; timer PT5S")), options=OPEN)
+    found = explore(net)
+    (left,) = [r for r in net.transitions if r.element == "b" and r.steps[0].action == "completed"]
+    run = [net.transitions[transition] for transition in found.run_to(found.fired[left.index])]
+    triggers = {transition.trigger for transition in run if transition.trigger is not None}
     assert triggers == {"signal", "timer"}
-    assert any(step.action is Action.INTERRUPTED for rule in run for step in rule.steps)
+    assert any(step.action is Action.INTERRUPTED for transition in run for step in transition.steps)
 
 
 @pytest.mark.parametrize("attributes", [INTERRUPTS, DOES_NOT])
@@ -54,7 +58,7 @@ def test_a_run_has_every_trigger_before_the_event_is_left() -> None:
     ["signal S; timer PT5S", "message M; signal S; timer PT2S", "timer PT1S; timer PT3S"],
 )
 @pytest.mark.parametrize("in_order", [False, True])
-def test_the_rules_can_do_what_the_engine_does(
+def test_the_transitions_can_do_what_the_engine_does(
     attributes: str, triggers: str, in_order: bool
 ) -> None:
     more = '\n<boundaryEvent id="t" attachedToRef="ask">timer PT2S</boundaryEvent>\n'
@@ -62,9 +66,9 @@ def test_the_rules_can_do_what_the_engine_does(
         '<endEvent id="eb"/>', f'<endEvent id="eb"/>{more}<endEvent id="et"/>'
     )
     ways = mission(text + "t -> et\n")
-    system = translate(ways, options=Options(open_world=True, timers_in_order=in_order))
+    net = translate(ways, options=Options(open_world=True, timers_in_order=in_order))
     for seed in range(12):
-        assert Walk(ways, fleet_for(ways), system, seed).go() == ""
+        assert Walk(ways, fleet_for(ways), net, seed).go() == ""
 
 
 CONDITIONS = """
@@ -126,12 +130,12 @@ MORE = {
 
 
 @pytest.mark.parametrize("text", MORE.values(), ids=MORE)
-def test_the_rules_can_do_what_the_engine_does_wherever_all_must_come(text: str) -> None:
+def test_the_transitions_can_do_what_the_engine_does_wherever_all_must_come(text: str) -> None:
     read = mission(text)
-    system = translate(read, options=OPEN)
+    net = translate(read, options=OPEN)
     for seed in range(16):
-        assert Walk(read, fleet_for(read), system, seed).go() == ""
-    assert not [a for a in system.approximations if a.exactness is Exactness.MORE]
+        assert Walk(read, fleet_for(read), net, seed).go() == ""
+    assert not [a for a in net.approximations if a.exactness is Exactness.MORE]
 
 
 @pytest.mark.parametrize("text", MORE.values(), ids=MORE)
@@ -159,8 +163,8 @@ def test_a_process_begins_with_one_and_goes_on_when_all_have_come() -> None:
 
 
 def test_an_error_that_is_one_of_several_triggers_is_enough() -> None:
-    system = translate(mission(FAILING.format("signal S; error E")))
-    assert ("b", Action.COMPLETED) in reached(system)
+    net = translate(mission(FAILING.format("signal S; error E")))
+    assert ("b", Action.COMPLETED) in reached(net)
     without = translate(mission(FAILING.format("signal S; error F")))
     assert ("b", Action.COMPLETED) not in reached(without)
 
@@ -174,11 +178,11 @@ def test_a_condition_must_be_seen_false_before_it_comes_again() -> None:
     assert most_often(twice, "eb") == 2
 
 
-def most_often(system: System, element: str) -> int:
+def most_often(net: PetriNet, element: str) -> int:
     """How many tokens can be together at an end event, if none goes on from there."""
-    at = {p.index for p in system.places if p.element == element and p.role is Role.ENTERING}
-    stays = tuple(r for r in system.rules if not at & {p for p, _ in r.consume})
-    held = replace(system, rules=tuple(replace(r, index=n) for n, r in enumerate(stays)))
+    at = {p.index for p in net.places if p.element == element and p.role is Role.ENTERING}
+    stays = tuple(r for r in net.transitions if not at & {p for p, _ in r.consume})
+    held = replace(net, transitions=tuple(replace(r, index=n) for n, r in enumerate(stays)))
     found = explore(held, Limits(tokens=3))
     tokens = [found.marking(state).tokens for state in range(len(found.states))]
     return max(each.get(place, 0) for each in tokens for place in at)

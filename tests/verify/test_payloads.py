@@ -4,7 +4,7 @@ import pytest
 
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.search.explore import Limits, explore
 from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission
@@ -89,20 +89,22 @@ no: which -> other
 EVENTS = {"catch": SIGNAL, "boundary": BOUNDARY, "handler": HANDLER, "process": PROCESS}
 
 
-def ends(system: System) -> set[str]:
-    found = explore(system, Limits(tokens=3))
-    steps = {step.element for rule in found.fired for step in system.rules[rule].steps}
+def ends(net: PetriNet) -> set[str]:
+    found = explore(net, Limits(tokens=3))
+    steps = {
+        step.element for transition in found.fired for step in net.transitions[transition].steps
+    }
     return steps & {"two", "other"}
 
 
-def followed(read: Mission) -> System:
-    """Its rules, which can do what the engine does."""
-    system = translate(read)
+def followed(read: Mission) -> PetriNet:
+    """Its transitions, which can do what the engine does."""
+    net = translate(read)
     for seed in range(6):
-        walk = Walk(read, fleet_for(read), system, seed)
+        walk = Walk(read, fleet_for(read), net, seed)
         walk._things = _without_signals(walk)  # type: ignore[method-assign]
         assert walk.go() == ""
-    return system
+    return net
 
 
 def _without_signals(walk: Walk):  # type: ignore[no-untyped-def]
@@ -127,10 +129,10 @@ def test_what_is_sent_changes_what_the_catcher_reads(text: str, sent: str, caugh
 )
 def test_a_constant_that_is_sent_is_followed(text: str, sent: str, caught: str) -> None:
     read = mission(text.format(sent, caught))
-    system = followed(read)
-    assert ends(system) == {"two"}
-    assert not [a for a in system.approximations if "values" in a.what]
-    same(system)
+    net = followed(read)
+    assert ends(net) == {"two"}
+    assert not [a for a in net.approximations if "values" in a.what]
+    same(net)
 
 
 def test_what_brings_nothing_changes_nothing() -> None:

@@ -52,8 +52,8 @@ def numbers(file: Path) -> set[int]:
 def test_a_report_has_a_picture_of_each_file_that_the_run_passes(mission: Path) -> None:
     folder = mission.parent
     report, picture = folder / "found.md", folder / "first.svg"
-    words = ["verify", str(mission), "--report", str(report), "--report", str(picture)]
-    assert run_command_line(words) == 1
+    element_names = ["verify", str(mission), "--report", str(report), "--report", str(picture)]
+    assert run_command_line(element_names) == 1
     own, called = folder / "first.svg", folder / "first-look.svg"
     assert {"Ask", "Call", "Done"} <= drawn(own).keys()
     assert "Look" not in drawn(own)

@@ -64,14 +64,16 @@ def test_formulas_are_about_what_the_mission_does(formula: str, result: Result) 
     assert ltl(approval(), formula).result is result
 
 
-def test_a_broken_requirement_comes_with_the_rules_of_a_run() -> None:
+def test_a_broken_requirement_comes_with_the_transitions_of_a_run() -> None:
     answer = ltl(approval(), "[] !completed(Drive)")
-    done = [rule.element for rule in answer.prefix if rule.element in ("Ask", "Drive")]
+    done = [
+        transition.element for transition in answer.prefix if transition.element in ("Ask", "Drive")
+    ]
     assert done[-1] == "Drive"
     assert answer.run is not None
     assert answer.run.whatever_follows
     answer = ltl(approval(), "<> ended")
-    assert {"Ask", "Drive"} <= {rule.element for rule in answer.cycle}
+    assert {"Ask", "Drive"} <= {transition.element for transition in answer.cycle}
 
 
 def test_with_fairness_the_operator_says_stop_at_some_time() -> None:
@@ -90,7 +92,7 @@ def test_one_answer_is_good_for_one_time() -> None:
     assert check(approval(), entry.replace("go", "stop"))[0].result is VIOLATED
 
 
-def test_the_next_step_is_the_next_rule() -> None:
+def test_the_next_step_is_the_next_transition() -> None:
     mission = in_a_row(
         task("A", "rover", "goto", target="x"), task("B", "rover", "goto", target="y")
     )
@@ -118,16 +120,16 @@ def test_of_a_search_cut_short_what_is_broken_is_broken_and_the_rest_undecided()
     assert answer.why == "the search stopped at the limit of time"
 
 
-def test_rules_that_cannot_change_what_a_formula_asks_are_not_visible() -> None:
+def test_transitions_that_cannot_change_what_a_formula_asks_are_not_visible() -> None:
     mission = pair()
     fleet = fleet_for(mission)
-    system = translate(mission, fleet, options=CERTAIN)
+    net = translate(mission, fleet, options=CERTAIN)
     formula = parse("[](completed(North) -> <> commanded(uav1))")
-    visible = Labels(system, mission, fleet, propositions(formula)).visible_rules()
+    visible = Labels(net, mission, fleet, propositions(formula)).visible_transitions()
     completing = {
-        rule.element: rule.index in visible
-        for rule in system.rules
-        if rule.steps[0].action is Action.COMPLETED
+        transition.element: transition.index in visible
+        for transition in net.transitions
+        if transition.steps[0].action is Action.COMPLETED
     }
     assert completing["North"]
     assert completing["South"]

@@ -5,7 +5,7 @@ from m2pem.verify.ltl import show
 from m2pem.verify.requirements import (
     Names,
     RequirementsError,
-    gather,
+    collect,
     parse_spec,
     read_mission_requirements,
 )
@@ -181,9 +181,9 @@ def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> Non
     )
     beside = tmp_path / "spec.yaml"
     beside.write_text("requirements: [{id: north, ltl: '<> completed(North)'}]")
-    assert [each.id for each in gather(names(mission), beside)] == ["end", "north"]
+    assert [each.id for each in collect(names(mission), beside)] == ["end", "north"]
     beside.write_text("requirements: [{id: end, ltl: '<> completed(North)'}]")
     with pytest.raises(RequirementsError, match=r"m\.bpmn has a requirement of this id too"):
-        gather(names(mission), beside)
+        collect(names(mission), beside)
     with pytest.raises(RequirementsError, match="cannot be read"):
-        gather(names(mission), tmp_path / "absent.yaml")
+        collect(names(mission), tmp_path / "absent.yaml")

@@ -13,11 +13,11 @@ from m2pem.verify.requirements import Requirement
 from m2pem.verify.requirements.check import (
     check_mission,
     check_requirement,
+    net_for,
     reduction_for,
-    system_for,
 )
 from m2pem.verify.search.explore import Exploration, explore
-from m2pem.verify.search.stubborn_sets import ignoring
+from m2pem.verify.search.stubborn_sets import states_to_expand
 from m2pem.verify.translate import Options
 from tests.bpmn.bpmn_text import flow
 from tests.verify import formulas
@@ -61,7 +61,10 @@ def test_an_operator_who_goes_on_for_ever_in_one_branch_is_not_left_out() -> Non
     fleet = fleet_for(mission)
     answer = check_mission(mission, fleet, [requirement], options=CERTAIN, reduce=True)[0]
     assert answer.result is Result.VIOLATED
-    assert {step.element for rule in answer.cycle for step in rule.steps} >= {"A1", "D1"}
+    assert {step.element for transition in answer.cycle for step in transition.steps} >= {
+        "A1",
+        "D1",
+    }
 
 
 ORDERS = (
@@ -76,8 +79,8 @@ def searched(mission: Mission, text: str) -> tuple[Exploration, Result]:
     """The reduced search for a requirement, and its answer."""
     fleet = fleet_for(mission)
     requirement = Requirement("a", parse(text), "")
-    system = system_for(mission, fleet, [requirement], options=CERTAIN)
-    found = explore(system, reduction=reduction_for(system, mission, fleet, requirement))
+    net = net_for(mission, fleet, [requirement], options=CERTAIN)
+    found = explore(net, reduction=reduction_for(net, mission, fleet, requirement))
     return found, check_requirement(found, mission, fleet, requirement).result
 
 
@@ -149,14 +152,14 @@ def test_what_is_beside_a_branch_that_never_ends_is_not_put_off_for_ever(text: s
 
 def test_nothing_is_put_off_on_every_state_of_a_circle() -> None:
     ring = [[1], [2, 3], [0], []]
-    assert ignoring(ring, inner=(), partly={1}) == set()  # there is another state on it
-    assert ignoring(ring, inner=(), partly={0, 1, 2}) == {0}
-    assert ignoring(ring, inner={0, 2}, partly={1}) == {1}
-    assert ignoring(ring, inner={0, 1, 2}, partly={0, 1}) == set()
-    assert ignoring(ring, inner={0, 1, 2}, partly={0, 1, 2}) == {0}
-    assert ignoring([[1], [2], []], inner=(), partly={0, 1}) == set()
+    assert states_to_expand(ring, inner=(), partly={1}) == set()  # there is another state on it
+    assert states_to_expand(ring, inner=(), partly={0, 1, 2}) == {0}
+    assert states_to_expand(ring, inner={0, 2}, partly={1}) == {1}
+    assert states_to_expand(ring, inner={0, 1, 2}, partly={0, 1}) == set()
+    assert states_to_expand(ring, inner={0, 1, 2}, partly={0, 1, 2}) == {0}
+    assert states_to_expand([[1], [2], []], inner=(), partly={0, 1}) == set()
 
 
 def test_several_circles_through_one_state_are_each_broken() -> None:
     eight = [[1, 2], [0, 1], [0]]
-    assert ignoring(eight, inner=(), partly={0, 1, 2}) == {0, 1}
+    assert states_to_expand(eight, inner=(), partly={0, 1, 2}) == {0, 1}

@@ -19,19 +19,19 @@ from m2pem.verify.ltl.formula import Active, Completed, needs_steps, rebuilt
 from m2pem.verify.ltl.model_check import Result
 from m2pem.verify.ltl.model_check import check as check_formula
 from m2pem.verify.net.encoding import Marking
-from m2pem.verify.net.petri_net import Flag, System
+from m2pem.verify.net.petri_net import Flag, PetriNet
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties import ALL
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.requirements import Names, parse_spec
 from m2pem.verify.requirements.check import check_requirement, conditions
-from m2pem.verify.requirements.propositions import Labels, MissionRuns
+from m2pem.verify.requirements.propositions import ExploredRuns, Labels
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.search.explore import Exploration, Limits, Stopped, explore
 from m2pem.verify.spin import ltl_claims
 from m2pem.verify.spin.check import check_with_spin
-from m2pem.verify.spin.queries import Asking, Told
-from m2pem.verify.spin.search import Found, Wanted, search
+from m2pem.verify.spin.queries import QueryResult, SpinQueries
+from m2pem.verify.spin.search import SpinExploration, WantedRuns, search
 from m2pem.verify.spin.trail import replay
 from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
@@ -39,7 +39,7 @@ from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
 from tests.verify import formulas
 from tests.verify.missions import approval, pair
-from tests.verify.random_systems import random_system
+from tests.verify.random_nets import random_net
 from tests.verify.test_properties import (
     JOIN_FED_BY_ONE,
     ROUND,
@@ -55,22 +55,25 @@ BROKEN = (JOIN_FED_BY_ONE, TWO_ON_ONE, UNJOINED, UNSENT, UNHANDLED, ROUND)
 SMALL = Limits(states=3_000, tokens=3)
 FEW = 12
 LONG_S = 600.0
-MOST_RULES = 2_000
-ODD_MISSIONS, ODD_RULES = (18, 27, 234, 251, 356), (1, 19, 176, 203, 540, 728866273, 983159541)
+MOST_TRANSITIONS = 2_000
+ODD_MISSIONS, ODD_TRANSITIONS = (
+    (18, 27, 234, 251, 356),
+    (1, 19, 176, 203, 540, 728866273, 983159541),
+)
 """Seeds at which one of the two was wrong once."""
 
 
 def stuck(found: Exploration) -> list[Marking]:
-    ends = found.system.ends
+    ends = found.net.ends
     markings = [found.marking(n) for n in found.terminals]
     return [each for each in markings if not ends & each.tokens.keys()]
 
 
-def same(system: System, limits: Limits = SMALL) -> tuple[Exploration, Found]:
-    """What both see of a system without reduction; it must be the same."""
-    ours = explore(system, limits)
+def same(net: PetriNet, limits: Limits = SMALL) -> tuple[Exploration, SpinExploration]:
+    """What both see of a net without reduction; it must be the same."""
+    ours = explore(net, limits)
     assume_small(ours)
-    spins = search(system, limits)
+    spins = search(net, limits)
     assert spins.states == len(ours.states)
     # Spin counts the initial state, and goes on where nothing can happen any more.
     assert spins.transitions == ours.transitions + len(ours.terminals) + 1
@@ -81,9 +84,9 @@ def same(system: System, limits: Limits = SMALL) -> tuple[Exploration, Found]:
     assert bool(spins.stuck_runs) == bool(stuck(ours))
     for run in spins.stuck_runs:
         assert spins.encoding.marking(replay(spins.encoding, run)[-1]) in stuck(ours)
-    for rule, state in ours.flagged.items():
+    for transition, state in ours.flagged.items():
         # Spin's are short in its own steps, of which what comes from outside takes more.
-        assert len(spins.rule_runs[rule]) >= len(ours.run_to(state)) + 1
+        assert len(spins.transition_runs[transition]) >= len(ours.run_to(state)) + 1
     return ours, spins
 
 
@@ -118,7 +121,7 @@ def one_answer(mission: Mission) -> Verdict:
 
 
 @pytest.mark.parametrize("file", ["vignette1.bpmn", "mehds_vignette_4.bpmn"])
-def test_the_rules_as_derived_have_the_same_states(file: str) -> None:
+def test_the_transitions_as_derived_have_the_same_states(file: str) -> None:
     ours, _ = same(translate(read_mission(ROOT / "missions" / file)))
     assert len(ours.states) > 30
 
@@ -126,9 +129,9 @@ def test_the_rules_as_derived_have_the_same_states(file: str) -> None:
 # --- random ones ----------------------------------------------------------------------------------
 
 
-def _random_mission(seed: int) -> System:
+def _random_mission(seed: int) -> PetriNet:
     text = (structured if seed % 2 else graph)(Random(seed))
-    return (simplify if seed % 3 else lambda system: system)(translate(notation(text)))
+    return (simplify if seed % 3 else lambda net: net)(translate(notation(text)))
 
 
 @pytest.mark.parametrize("seed", sorted({*range(FEW), *ODD_MISSIONS}))
@@ -136,43 +139,48 @@ def test_random_missions_have_the_same_states(seed: int) -> None:
     same(_random_mission(seed))
 
 
-@pytest.mark.parametrize("seed", sorted({*range(FEW), *ODD_RULES}))
-def test_random_rules_have_the_same_states(seed: int) -> None:
-    same(random_system(Random(seed)))
+@pytest.mark.parametrize("seed", sorted({*range(FEW), *ODD_TRANSITIONS}))
+def test_random_transitions_have_the_same_states(seed: int) -> None:
+    same(random_net(Random(seed)))
 
 
 @pytest.mark.long
 @pytest.mark.timeout(3_600)
-@pytest.mark.parametrize("made", [_random_mission, lambda seed: random_system(Random(seed))])
+@pytest.mark.parametrize("made", [_random_mission, lambda seed: random_net(Random(seed))])
 def test_many_random_ones_have_the_same_states(made) -> None:  # type: ignore[no-untyped-def]
     for seed in seeds_for(LONG_S):
-        system = made(seed)
-        if len(system.rules) > MOST_RULES:
+        net = made(seed)
+        if len(net.transitions) > MOST_TRANSITIONS:
             continue  # Spin takes half a minute for each question
-        if len(explore(system, SMALL).states) <= SMALL.states:
+        if len(explore(net, SMALL).states) <= SMALL.states:
             try:
-                same(system)
+                same(net)
             except Exception as error:
                 error.add_note(f"seed {seed}")
                 raise
 
 
 def test_no_more_is_asked_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = random_system(Random(13))
-    system = replace(made, rules=tuple(replace(rule, flag=Flag.CONFLICT) for rule in made.rules))
-    assert len(search(system, SMALL).rule_runs) > 1
+    made = random_net(Random(13))
+    net = replace(
+        made,
+        transitions=tuple(
+            replace(transition, flag=Flag.CONFLICT) for transition in made.transitions
+        ),
+    )
+    assert len(search(net, SMALL).transition_runs) > 1
     asked: list[object] = []
-    ask = Asking.ask
+    query = SpinQueries.query
 
-    def counted(self: Asking, *words: Any, **options: Any) -> Told:
+    def counted(self: SpinQueries, *words: Any, **options: Any) -> QueryResult:
         asked.append(words)
-        return ask(self, *words, **options)
+        return query(self, *words, **options)
 
-    monkeypatch.setattr(Asking, "ask", counted)
-    monkeypatch.setattr(Asking, "began_ago", lambda self: 0.0 if len(asked) < 2 else 1e9)
-    found = search(system, SMALL, wanted=replace(Wanted.of(system), stuck=False))
+    monkeypatch.setattr(SpinQueries, "query", counted)
+    monkeypatch.setattr(SpinQueries, "began_ago", lambda self: 0.0 if len(asked) < 2 else 1e9)
+    found = search(net, SMALL, wanted=replace(WantedRuns.of(net), stuck=False))
     assert found.stopped is Stopped.TIME
-    assert len(found.rule_runs) <= 1
+    assert len(found.transition_runs) <= 1
     assert len(asked) <= 3
 
 
@@ -182,8 +190,8 @@ def test_no_more_is_asked_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch)
 def answers(mission: Mission, required: Sequence[Requirement]) -> list[tuple[Result, Result]]:
     fleet = fleet_for(mission)
     options = Options(failures=False, conditions=conditions(required))
-    system = translate(mission, fleet, options=options)
-    found, spins = explore(system), search(system)
+    net = translate(mission, fleet, options=options)
+    found, spins = explore(net), search(net)
     return [
         (
             check_requirement(found, mission, fleet, each).result,
@@ -247,15 +255,15 @@ def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
     assume(not needs_steps(formula))
     dice = Random(seed)
     mission = notation(structured(dice))
-    system = simplify(translate(mission))
-    found = explore(system, SMALL)
+    net = simplify(translate(mission))
+    found = explore(net, SMALL)
     assume(found.complete)
-    elements = sorted(system.elements)
+    elements = sorted(net.elements)
     asked = _on_elements(formula, {each: dice.choice(elements) for each in "abc"})
     fleet = fleet_for(mission)
-    labels = Labels(system, mission, fleet, propositions(asked))
-    ours = check_formula(MissionRuns(found, labels), asked)
+    labels = Labels(net, mission, fleet, propositions(asked))
+    ours = check_formula(ExploredRuns(found, labels), asked)
     spins = ltl_claims.check_requirement(
-        search(system, SMALL), mission, fleet, Requirement("r", asked, "")
+        search(net, SMALL), mission, fleet, Requirement("r", asked, "")
     )
     assert spins.result is ours.result

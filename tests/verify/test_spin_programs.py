@@ -8,12 +8,12 @@ import pytest
 
 from m2pem.errors import InternalError
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.search.explore import Limits, Progress, Stopped
 from m2pem.verify.spin import programs, queries
 from m2pem.verify.spin.programs import SpinMissingError, Tools
-from m2pem.verify.spin.queries import Cut, Found, Storage, read
+from m2pem.verify.spin.queries import CutReason, ErrorKind, Storage, read
 from m2pem.verify.spin.search import search
 from m2pem.verify.spin.trail import Trail, replay
 from m2pem.verify.spin.trail import read as read_trail
@@ -44,7 +44,7 @@ def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def rows(count: int) -> System:
+def rows(count: int) -> PetriNet:
     """4 ** count states, about."""
     return simplify(translate(branches(count)))
 
@@ -64,13 +64,15 @@ def test_a_whole_search_is_read() -> None:
 @pytest.mark.parametrize(
     ("line", "cut"),
     [
-        ("error: max search depth too small", Cut.DEPTH),
-        ("pan: reached -DMEMLIM bound", Cut.MEMORY),
-        ("pan: out of memory", Cut.MEMORY),
-        ("Warning: Search not completed", Cut.UNFINISHED),
+        ("error: max search depth too small", CutReason.DEPTH),
+        ("pan: reached -DMEMLIM bound", CutReason.MEMORY),
+        ("pan: out of memory", CutReason.MEMORY),
+        ("Warning: Search not completed", CutReason.UNFINISHED),
     ],
 )
-def test_no_errors_found_is_no_proof_when_the_search_was_cut_short(line: str, cut: Cut) -> None:
+def test_no_errors_found_is_no_proof_when_the_search_was_cut_short(
+    line: str, cut: CutReason
+) -> None:
     assert read(f"{line}\n{WHOLE}").cut is cut
 
 
@@ -80,9 +82,9 @@ def test_an_error_is_told_from_how_its_search_ended() -> None:
         f"Warning: Search not completed\n{WHOLE.replace('errors: 0', 'errors: 1')}"
     )
     report = read(text)
-    assert (report.found, report.assertion, report.cut) == (Found.ASSERTION, "(at_x<=0)", None)
+    assert (report.found, report.assertion, report.cut) == (ErrorKind.ASSERTION, "(at_x<=0)", None)
     cycle = text.replace("assertion violated (at_x<=0)", "acceptance cycle")
-    assert read(cycle).found is Found.CYCLE
+    assert read(cycle).found is ErrorKind.CYCLE
 
 
 @pytest.mark.parametrize(
@@ -111,7 +113,7 @@ def _step(number: int, line: int, what: str) -> str:
     return f" {number:2}:\tproc  0 (mission:1) mission.pml:{line} (state {number})\t[{what}]"
 
 
-def test_a_rule_that_fires_twice_in_a_row_is_told_twice() -> None:
+def test_a_transition_that_fires_twice_in_a_row_is_told_twice() -> None:
     lines = [
         _step(1, 10, "(at_a)"),
         _step(2, 10, "at_a = 0"),
@@ -123,7 +125,7 @@ def test_a_rule_that_fires_twice_in_a_row_is_told_twice() -> None:
     assert read_trail("\n".join(lines), {10: 7}) == Trail((7, 7))
 
 
-def test_a_cycle_may_begin_in_the_midst_of_a_rule() -> None:
+def test_a_cycle_may_begin_in_the_midst_of_a_transition() -> None:
     lines = [
         _step(1, 10, "(at_a)"),
         _step(2, 10, "at_a = 0"),
@@ -138,9 +140,9 @@ def test_a_cycle_may_begin_in_the_midst_of_a_rule() -> None:
 
 
 def test_a_run_that_is_none_is_not_believed() -> None:
-    system = rows(2)
+    net = rows(2)
     with pytest.raises(InternalError, match="where it cannot"):
-        replay(Encoding(system), [len(system.rules) - 1] * 2)
+        replay(Encoding(net), [len(net.transitions) - 1] * 2)
 
 
 # --- running --------------------------------------------------------------------------------------
@@ -173,13 +175,13 @@ def test_a_long_search_is_compiled_again_and_counts_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     commands: list[str] = []
-    start = programs.Workshop._start
+    start = programs.CheckerFolder._start
 
-    def noted(shop: programs.Workshop, command: list[str], printed: Path) -> object:
+    def noted(shop: programs.CheckerFolder, command: list[str], printed: Path) -> object:
         commands.append(Path(command[0]).name)
         return start(shop, command, printed)
 
-    monkeypatch.setattr(programs.Workshop, "_start", noted)
+    monkeypatch.setattr(programs.CheckerFolder, "_start", noted)
     monkeypatch.setattr(programs, "LONG_SEARCH_S", 0.0)
     tools = Tools.find()
     quick = tools.quick or tools.thorough

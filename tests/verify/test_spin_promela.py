@@ -10,8 +10,8 @@ import pytest
 
 from m2pem.bpmn import read_mission
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Kind, System
-from m2pem.verify.spin.promela import Asks, comment, identifiers, text_of
+from m2pem.verify.net.petri_net import Kind, PetriNet
+from m2pem.verify.spin.promela import Assertions, comment, identifiers, text_of
 from m2pem.verify.translate import translate
 from tests.engine.notation import mission as notation
 
@@ -27,50 +27,56 @@ fork -> b -> meet
 
 
 @pytest.fixture(scope="module")
-def vignette() -> System:
+def vignette() -> PetriNet:
     return translate(read_mission(VIGNETTE))
 
 
-def rule_lines(text: str) -> list[str]:
+def transition_lines(text: str) -> list[str]:
     return [line for line in text.splitlines() if line.startswith("    :: ") and "d_step" in line]
 
 
-def test_each_rule_is_a_line_that_names_its_element(vignette: System) -> None:
+def test_each_transition_is_a_line_that_names_its_element(vignette: PetriNet) -> None:
     model = text_of(vignette)
     lines = model.text.splitlines()
-    assert sorted(model.rule_at.values()) == list(range(len(vignette.rules)))
-    for number, rule in model.rule_at.items():
+    assert sorted(model.transition_at.values()) == list(range(len(vignette.transitions)))
+    for number, transition in model.transition_at.items():
         line = lines[number - 1]
         assert line.startswith("    :: ")
-        assert f"/* {rule} " in line
-        for step in vignette.rules[rule].steps:
+        assert f"/* {transition} " in line
+        for step in vignette.transitions[transition].steps:
             assert f"{step.element} {step.action.value}" in line
-    assert len(rule_lines(model.text)) == len(vignette.rules)
+    assert len(transition_lines(model.text)) == len(vignette.transitions)
     assert model.text.count("active proctype") == 1
     assert "end:" in lines
 
 
-def test_what_comes_from_outside_is_tried_last(vignette: System) -> None:
+def test_what_comes_from_outside_is_tried_last(vignette: PetriNet) -> None:
     model = text_of(vignette)
-    kinds = [vignette.rules[rule].kind for _, rule in sorted(model.rule_at.items())]
+    kinds = [
+        vignette.transitions[transition].kind
+        for _, transition in sorted(model.transition_at.items())
+    ]
     assert kinds == sorted(kinds, key=list(Kind).index)
     assert model.text.count(":: else ->\n") == len(set(kinds))
 
 
 def test_a_place_is_a_bit_until_it_needs_more_room() -> None:
-    system = translate(notation(TWO_BRANCHES))
-    meet = next(place for place in system.places if place.name == "meet")
-    assert re.search(r"^bit at_meet;", text_of(system).text, re.M)
-    wide = text_of(system, Encoding(system, {meet.index: 2}))
+    net = translate(notation(TWO_BRANCHES))
+    meet = next(place for place in net.places if place.name == "meet")
+    assert re.search(r"^bit at_meet;", text_of(net).text, re.M)
+    wide = text_of(net, Encoding(net, {meet.index: 2}))
     assert re.search(r"^byte at_meet;", wide.text, re.M)
     assert "at_meet = at_meet + 1" in wide.text
     assert "at_meet = at_meet - 1" in wide.text
 
 
-def test_only_what_is_asked_is_asserted(vignette: System) -> None:
-    assert "assert" not in text_of(vignette, asks=Asks()).text
-    assert "assert(false) /* the run is stuck" in text_of(vignette, asks=Asks(stuck=True)).text
-    asserted = text_of(vignette, asks=Asks(rules=frozenset({4})))
+def test_only_what_is_asked_is_asserted(vignette: PetriNet) -> None:
+    assert "assert" not in text_of(vignette, assertions=Assertions()).text
+    assert (
+        "assert(false) /* the run is stuck"
+        in text_of(vignette, assertions=Assertions(stuck=True)).text
+    )
+    asserted = text_of(vignette, assertions=Assertions(transitions=frozenset({4})))
     [line] = [line for line in asserted.text.splitlines() if "assert" in line]
     assert "/* 4 " in line
 
@@ -90,7 +96,7 @@ def test_a_comment_cannot_be_ended_by_a_name() -> None:
     assert "\n" not in said
 
 
-def test_spin_takes_the_model_as_it_is_written(vignette: System, tmp_path: Path) -> None:
+def test_spin_takes_the_model_as_it_is_written(vignette: PetriNet, tmp_path: Path) -> None:
     spin = shutil.which("spin")
     assert spin, "apt-get install spin tcc"
     odd = replace(vignette, mission="*/ odd \\ name", elements={vignette.process: "# */ é"})

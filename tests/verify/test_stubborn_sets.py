@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from m2pem.verify.net import concurrency
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.search.explore import Exploration, Limits, explore
 from m2pem.verify.search.stubborn_sets import StubbornSets
@@ -22,21 +22,21 @@ SMALL = Limits(states=1_000, tokens=3, seconds=60.0)
 
 def seen(found: Exploration) -> tuple[object, ...]:
     """What properties are read from, told by names."""
-    system = found.system
-    places = system.places
+    net = found.net
+    places = net.places
     return (
         {
             tuple(sorted((places[p].name, n) for p, n in found.marking(s).tokens.items()))
             for s in found.terminals
         },
-        {step.element for rule in found.fired for step in system.rules[rule].steps},
-        {(system.rules[r].element, system.rules[r].flag) for r in found.flagged},
+        {step.element for transition in found.fired for step in net.transitions[transition].steps},
+        {(net.transitions[r].element, net.transitions[r].flag) for r in found.flagged},
         bool(found.overflows),
     )
 
 
-def reduced(system: System, **given: bool) -> Exploration:
-    return explore(system, SMALL, reduction=StubbornSets(system), **given)
+def reduced(net: PetriNet, **given: bool) -> Exploration:
+    return explore(net, SMALL, reduction=StubbornSets(net), **given)
 
 
 @pytest.mark.parametrize("seed", range(24))
@@ -60,14 +60,14 @@ def test_what_is_put_off_round_a_circle_is_tried_at_last(seed: int) -> None:
 
 def test_branches_are_searched_in_time_that_grows_with_their_number_alone() -> None:
     for interruptible in (False, True):
-        system = simplify(translate(branches(100, interruptible=interruptible)))
-        found = reduced(system)
+        net = simplify(translate(branches(100, interruptible=interruptible)))
+        found = reduced(net)
         assert found.complete
         assert len(found.states) < 320
-        assert set(found.fired) == set(range(len(system.rules)))
+        assert set(found.fired) == set(range(len(net.transitions)))
 
 
-def failing(count: int, *, service: bool = False) -> System:
+def failing(count: int, *, service: bool = False) -> PetriNet:
     """Branches of tasks in a subprocess, each of which may fail, which interrupts all of it.
 
     They are a vehicle's, or a service's.
@@ -108,11 +108,11 @@ def test_nor_does_it_where_there_are_too_many_places_to_prove_which_meet(
     all_orders_are_left_out_but_one(failing(20, service=True))
 
 
-def all_orders_are_left_out_but_one(many: System) -> None:
+def all_orders_are_left_out_but_one(many: PetriNet) -> None:
     found = reduced(many)
     assert found.complete
     assert len(found.states) < 70
-    assert set(found.fired) == set(range(len(many.rules)))
+    assert set(found.fired) == set(range(len(many.transitions)))
 
 
 def test_without_reduction_every_order_is_searched() -> None:

@@ -1,4 +1,4 @@
-"""On random systems, what is left out of a search changes neither properties nor requirements."""
+"""On random nets, what is left out of a search changes neither properties nor requirements."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import pytest
 from m2pem.verify.ltl.formula import needs_steps
 from m2pem.verify.ltl.model_check import Result
 from m2pem.verify.net import concurrency
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.search.explore import Exploration, explore
 from m2pem.verify.search.stubborn_sets import StubbornSets
 from m2pem.verify.translate import translate
@@ -18,37 +18,37 @@ from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
 from tests.verify.answers import FEW, NO_FEWER, atoms_of, both, formula_of
+from tests.verify.random_mission_nets import random_mission_net
 from tests.verify.random_nets import random_net
-from tests.verify.random_systems import random_system
 
-Make = Callable[[Random], System]
+Make = Callable[[Random], PetriNet]
 FORMULAS = 5
 LONG_S = 240.0
-MOST_RULES = 2_000
-"""Of a system that is looked at; some random missions have very many."""
-ODD_RULES, ODD_MISSIONS = (221126029,), (655301641,)
+MOST_TRANSITIONS = 2_000
+"""Of a net that is looked at; some random missions have very many."""
+ODD_TRANSITIONS, ODD_MISSIONS = (221126029,), (655301641,)
 """Seeds at which an answer was wrong once."""
 
 
-def nets(dice: Random) -> System:
-    return random_net(dice, 16)
+def nets(dice: Random) -> PetriNet:
+    return random_mission_net(dice, 16)
 
 
-def sound_nets(dice: Random) -> System:
-    return random_net(dice, 20, spoilt=0)
+def sound_nets(dice: Random) -> PetriNet:
+    return random_mission_net(dice, 20, spoilt=0)
 
 
-def failing_nets(dice: Random) -> System:
-    return random_net(dice, 14, failing=True)
+def failing_nets(dice: Random) -> PetriNet:
+    return random_mission_net(dice, 14, failing=True)
 
 
-def rules(dice: Random) -> System:
-    made = random_system(dice, 12, 14)
+def transitions(dice: Random) -> PetriNet:
+    made = random_net(dice, 12, 14)
     start = sorted(dice.sample(range(3, 15), 5))
     return replace(made, initial=tuple((place, 1) for place in start))
 
 
-def missions(dice: Random) -> System:
+def missions(dice: Random) -> PetriNet:
     return translate(notation(dice.choice([structured, graph])(dice)))
 
 
@@ -60,15 +60,15 @@ def seen(found: Exploration) -> tuple[object, ...]:
 def compare(make: Make, seed: int, count: Counter[str]) -> list[str]:
     """What differs; `count` says what was compared."""
     dice = Random(seed)
-    system = make(dice)
-    if len(system.rules) > MOST_RULES:
+    net = make(dice)
+    if len(net.transitions) > MOST_TRANSITIONS:
         return []
-    whole = explore(system, FEW)
+    whole = explore(net, FEW)
     if not whole.complete:
         return []
     count["systems"] += 1
     wrong = []
-    less = explore(system, NO_FEWER, reduction=StubbornSets(system))
+    less = explore(net, NO_FEWER, reduction=StubbornSets(net))
     if bool(whole.overflows) != bool(less.overflows):
         wrong.append(f"{seed}: a second token")
     elif not whole.overflows and seen(whole) != seen(less):
@@ -78,14 +78,14 @@ def compare(make: Make, seed: int, count: Counter[str]) -> list[str]:
         "circles": any(
             after <= n for n in range(len(whole.states)) for _, after in _steps(whole, n)
         ),
-        "interrupted": sum(len(rule.kill) > 2 for rule in system.rules) > 1,
+        "interrupted": sum(len(transition.reset) > 2 for transition in net.transitions) > 1,
     }
     count.update(name for name, found in kinds.items() if found)
     for _ in range(FORMULAS):
-        formula = formula_of(dice, atoms_of(dice, system))
+        formula = formula_of(dice, atoms_of(dice, net))
         if needs_steps(formula):
             continue
-        found = both(system, formula, whole)
+        found = both(net, formula, whole)
         assert found is not None
         count["formulas"] += 1
         count["smaller"] += len(found.reduced.states) < len(found.whole.states)
@@ -109,7 +109,7 @@ def places(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.usefixtures("places")
 @pytest.mark.parametrize(
     ("make", "models"),
-    [(nets, 30), (sound_nets, 25), (failing_nets, 25), (rules, 25), (missions, 10)],
+    [(nets, 30), (sound_nets, 25), (failing_nets, 25), (transitions, 25), (missions, 10)],
 )
 def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int) -> None:
     count: Counter[str] = Counter()
@@ -118,13 +118,16 @@ def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int
     assert 0 < count["violated"] < count["formulas"]
     # What makes leaving things out hard is among them.
     assert min(count["smaller"], count["circles"], count["interrupted"]) > 0
-    assert count["unsafe"] or make is not rules
+    assert count["unsafe"] or make is not transitions
 
 
 @pytest.mark.usefixtures("places")
 @pytest.mark.parametrize(
     ("make", "seed"),
-    [*((rules, each) for each in ODD_RULES), *((missions, each) for each in ODD_MISSIONS)],
+    [
+        *((transitions, each) for each in ODD_TRANSITIONS),
+        *((missions, each) for each in ODD_MISSIONS),
+    ],
 )
 def test_nor_of_odd_models(make: Make, seed: int) -> None:
     assert compare(make, seed, Counter()) == []
@@ -133,7 +136,7 @@ def test_nor_of_odd_models(make: Make, seed: int) -> None:
 @pytest.mark.long
 @pytest.mark.timeout(3_600)
 @pytest.mark.usefixtures("places")
-@pytest.mark.parametrize("make", [nets, sound_nets, failing_nets, rules, missions])
+@pytest.mark.parametrize("make", [nets, sound_nets, failing_nets, transitions, missions])
 def test_nor_of_very_many_models(make: Make) -> None:
     count: Counter[str] = Counter()
     assert not [each for seed in seeds_for(LONG_S) for each in compare(make, seed, count)]

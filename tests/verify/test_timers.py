@@ -8,7 +8,7 @@ import pytest
 from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
-from m2pem.verify.net.petri_net import System, Trigger
+from m2pem.verify.net.petri_net import PetriNet, Trigger
 from m2pem.verify.properties.results import Result, Verdict
 from m2pem.verify.search.explore import Limits, explore
 from m2pem.verify.spin.check import check_with_spin
@@ -71,16 +71,18 @@ def result(report: Report, name: str) -> Result:
     return next(each for each in report.results if each.property == name)
 
 
-def reached(system: System) -> set[str]:
-    found = explore(system, Limits(tokens=3))
+def reached(net: PetriNet) -> set[str]:
+    found = explore(net, Limits(tokens=3))
     assert found.complete
-    return {step.element for rule in found.fired for step in system.rules[rule].steps}
+    return {
+        step.element for transition in found.fired for step in net.transitions[transition].steps
+    }
 
 
-def orders(system: System) -> set[tuple[str, ...]]:
+def orders(net: PetriNet) -> set[tuple[str, ...]]:
     """In which orders timers can come."""
-    found = explore(system)
-    rules = system.rules
+    found = explore(net)
+    transitions = net.transitions
     complete = set()
     waiting: list[tuple[int, tuple[str, ...]]] = [(0, ())]
     while waiting:
@@ -88,9 +90,9 @@ def orders(system: System) -> set[tuple[str, ...]]:
         after = list(found.successors(state))
         if not after:
             complete.add(came)
-        for rule, to in after:
-            timed = rules[rule].trigger is Trigger.TIMER
-            waiting.append((to, (*came, rules[rule].element) if timed else came))
+        for transition, to in after:
+            timed = transitions[transition].trigger is Trigger.TIMER
+            waiting.append((to, (*came, transitions[transition].element) if timed else came))
     return complete
 
 
@@ -160,9 +162,9 @@ def test_a_timer_around_a_handler_that_has_begun_comes_all_the_same() -> None:
         '<endEvent id="k"/>\ndue -> k', '<userTask id="w">ask on</userTask><endEvent id="k"/>\n'
         "due -> w -> k"
     )  # fmt: skip
-    system = translate(mission(text), options=IN_ORDER)
-    assert ("due", "late") in orders(system)
-    assert ("late",) not in orders(system)
+    net = translate(mission(text), options=IN_ORDER)
+    assert ("due", "late") in orders(net)
+    assert ("late",) not in orders(net)
 
 
 def test_a_prompt_that_times_out_first_lets_no_later_timer_come() -> None:
@@ -189,9 +191,9 @@ late -> el
 """
 
     def waits(text: str) -> bool:
-        system = translate(mission(text), options=IN_ORDER)
-        (late,) = [r for r in system.rules if r.element == "late" and r.trigger is not None]
-        return any(system.places[place].element == "soon" for place in late.inhibit)
+        net = translate(mission(text), options=IN_ORDER)
+        (late,) = [r for r in net.transitions if r.element == "late" and r.trigger is not None]
+        return any(net.places[place].element == "soon" for place in late.inhibit)
 
     assert not waits(text)
     alone = text.replace("b -> task -> et", "b -> e").replace("u -> e", "u -> task -> et")
@@ -247,12 +249,12 @@ g1 -> e
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_what_the_engine_does_with_timers_the_rules_can_do_in_order(seed: int) -> None:
+def test_what_the_engine_does_with_timers_the_transitions_can_do_in_order(seed: int) -> None:
     text = several_timers(Random(seed))
     fleet = fleet_for(text)
-    system = translate(text, fleet, options=IN_ORDER)
+    net = translate(text, fleet, options=IN_ORDER)
     for walk in range(4):
-        assert Walk(text, fleet, system, walk).go() == ""
+        assert Walk(text, fleet, net, walk).go() == ""
 
 
 def test_some_of_those_missions_do_less_in_order() -> None:

@@ -1,7 +1,7 @@
-"""Does the engine do only what the rules can do? A run of it is followed, state by state.
+"""Does the engine do only what the net can do? A run of it is followed, state by state.
 
-What is proved of the rules holds of a mission only as far as each step of the engine is a run of
-them. `Follower` keeps every state of the rules that looks like the engine's after each input.
+What is proved of the net holds of a mission only as far as each step of the engine is a run of
+them. `Follower` keeps every state of the net that looks like the engine's after each input.
 """
 
 import re
@@ -12,8 +12,8 @@ from m2pem.engine.records import RunOutcome
 from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.mission.elements import CallActivity, ComplexGateway, InclusiveGateway, ParallelGateway
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Kind, Role, System
-from m2pem.verify.search.read_write_sets import affected_rules
+from m2pem.verify.net.petri_net import Kind, PetriNet, Role
+from m2pem.verify.search.read_write_sets import affected_transitions
 
 Look = Counter[tuple[tuple[str, ...], str]]
 """Tokens by where they are: the activities around them, and their element."""
@@ -53,56 +53,56 @@ def _path(scope: Scope) -> tuple[str, ...]:
 
 
 class TooManyStatesError(Exception):
-    """The rules leave so much open that a run of the engine cannot be followed."""
+    """The net leaves so much open that a run of the engine cannot be followed."""
 
 
 class Follower:
-    """The states of a system that a run of the engine may be in."""
+    """The states of a net that a run of the engine may be in."""
 
-    def __init__(self, system: System, tokens: int = 15) -> None:
+    def __init__(self, net: PetriNet, tokens: int = 15) -> None:
         """`tokens`: room on each place."""
-        self.system = system
+        self.net = net
         bits = tokens.bit_length()
         self.encoding = Encoding(
-            system, {p.index: bits for p in system.places if p.role not in (Role.END,)}
+            net, {p.index: bits for p in net.places if p.role not in (Role.END,)}
         )
-        self._affected = affected_rules(self.encoding)
-        self._outside = [r.index for r in system.rules if r.kind is Kind.OUTSIDE]
-        self._joins = [r.index for r in system.rules if r.kind is Kind.JOIN]
-        self._internal = [r.index for r in system.rules if r.kind is Kind.INTERNAL]
+        self._affected = affected_transitions(self.encoding)
+        self._outside = [r.index for r in net.transitions if r.kind is Kind.OUTSIDE]
+        self._joins = [r.index for r in net.transitions if r.kind is Kind.JOIN]
+        self._internal = [r.index for r in net.transitions if r.kind is Kind.INTERNAL]
         self._paths = [
-            tuple(_NUMBERED.sub("", step) for step in scope.path) for scope in system.scopes
+            tuple(_NUMBERED.sub("", step) for step in scope.path) for scope in net.scopes
         ]
         self.candidates: set[int] = self._quiet({self.encoding.initial})
 
     # --- looks ----------------------------------------------------------------------------------
 
     def look(self, number: int) -> Look:
-        """How a state of the rules looks."""
+        """How a state of the net looks."""
         look: Look = Counter()
         for place, count in self.encoding.marking(number).tokens.items():
-            each = self.system.places[place]
+            each = self.net.places[place]
             if each.role not in (Role.CONTROL, Role.END, Role.TRIGGERED):
                 look[self._paths[each.scope], each.element] += count
         return look
 
     def _agrees(self, number: int, state: RunState, look: Look) -> bool:
-        ends = self.encoding.marking(number).tokens.keys() & self.system.ends
+        ends = self.encoding.marking(number).tokens.keys() & self.net.ends
         if state.status is not RunStatus.ENDED:
             return not ends and self.look(number) == look
         if state.outcome is RunOutcome.COMPLETED:
-            return self.system.completed in ends
+            return self.net.completed in ends
         if state.outcome is RunOutcome.TERMINATED:
-            return self.system.terminated in ends
+            return self.net.terminated in ends
         if state.detail.startswith("stuck"):
             return not ends and not self._after(number)
-        return self.system.failed in ends
+        return self.net.failed in ends
 
     # --- steps ----------------------------------------------------------------------------------
 
-    def _fire(self, rules: Iterable[int], number: int) -> list[int]:
+    def _fire(self, transitions: Iterable[int], number: int) -> list[int]:
         encoding = self.encoding
-        return [encoding.fire(r, number)[0] for r in rules if encoding.enabled(r, number)]
+        return [encoding.fire(r, number)[0] for r in transitions if encoding.enabled(r, number)]
 
     def _quiet(self, states: set[int]) -> set[int]:
         """Where the internal steps lead that follow."""
@@ -124,7 +124,9 @@ class Follower:
         return self._quiet(set(self._fire(self._outside, number)))
 
     def step(self, state: RunState) -> bool:
-        """The engine has taken an input in. False: no run of the rules looks like its state."""
+        """The engine has taken an input in. False: no run of the transitions looks like
+        its state.
+        """
         look = look_of_run(state)
         reached = set(self.candidates)
         for _ in range(_MOST_AT_ONCE):

@@ -25,11 +25,12 @@ class Edge:
     postponed: int = 0
 
     def reads(self, letter: int) -> bool:
-        """Whether a letter lets it pass."""
         return letter & self.set_ == self.set_ and not letter & self.unset
 
     def covers(self, other: "Edge") -> bool:
-        """Whether it reads all that the other reads, to the same end, with no more postponed."""
+        """Whether it reads all that the other one reads, to the same state, with no
+        more postponed.
+        """
         return (
             self.target == other.target
             and self.set_ & other.set_ == self.set_
@@ -52,8 +53,8 @@ class Automaton:
     accepting_all: int = -1
 
     @property
-    def needs_rounds(self) -> bool:
-        """Whether something is accepted only by going round for ever, not once and for all."""
+    def needs_cycles(self) -> bool:
+        """Whether some runs are accepted only because of what they repeat for ever."""
         component = components([[edge.target for edge in each] for each in self.edges])
         every = (1 << self.promises) - 1
         together: dict[int, int] = {}
@@ -69,7 +70,7 @@ class Automaton:
 
 
 def reduced(automaton: Automaton) -> Automaton:
-    """The same without states that lead nowhere, with states that do alike made one."""
+    """The same automaton without useless states and edges, and with equivalent states merged."""
     trimmed = _trim(automaton)
     while True:
         merged = _merge(trimmed)
@@ -79,7 +80,7 @@ def reduced(automaton: Automaton) -> Automaton:
 
 
 def _trim(automaton: Automaton) -> Automaton:
-    """Without edges that lead to no accepted run; promises count only where paths can go round."""
+    """Remove edges that lead to no accepted run; promises count only on cycles."""
     component = components([[edge.target for edge in each] for each in automaton.edges])
     every = (1 << automaton.promises) - 1
     postponed_by_all = [every] * (max(component, default=0) + 1)
@@ -128,7 +129,7 @@ def _trim(automaton: Automaton) -> Automaton:
 
 
 def _merge(automaton: Automaton) -> Automaton:
-    """States that no run can tell apart made one, and what cannot be reached left out."""
+    """Merge states that no run distinguishes, and remove unreachable ones."""
     block = [0] * len(automaton)
     count = 1
     while True:
@@ -217,7 +218,7 @@ MAX_CHOICES = 50_000
 
 
 class FormulaTooLargeError(M2pemError):
-    """A formula needs more states than are tried; saying it in parts helps."""
+    """A formula's automaton has too many states; split the formula."""
 
     exit_status = 2
 
@@ -277,7 +278,7 @@ def translate(formula: int, forms: Forms) -> Automaton:
 
 
 class _Choices:
-    """How formulas can be fulfilled; each is worked out once."""
+    """How formulas can be fulfilled; each is computed once."""
 
     def __init__(self, forms: Forms) -> None:
         self.forms = forms
@@ -331,7 +332,7 @@ def _both(left: tuple[_Choice, ...], right: tuple[_Choice, ...]) -> tuple[_Choic
 
 
 def _best(choices: list[_Choice]) -> tuple[_Choice, ...]:
-    """Without choices that another one makes needless."""
+    """Remove choices that another one makes redundant."""
     kept: list[_Choice] = []
     for choice in dict.fromkeys(choices):
         if not any(other.beats(choice) for other in kept):

@@ -208,34 +208,33 @@ PREFIXES: dict[type[Not] | type[Always] | type[Eventually], str] = {
     Eventually: "<>",
     Not: "!",
 }
-"""How operators of one formula are written, which stand before it."""
+"""Prefix operators."""
 OPERATORS: dict[type[Until] | type[WeakUntil] | type[Since], str] = {
     Until: "U",
     WeakUntil: "W",
     Since: "since",
 }
-"""How operators of two formulas over time are written, between them."""
+"""Infix operators over time."""
 
 TRUE = Constant(True)
 FALSE = Constant(False)
 
 
 def conjunction(operands: "Sequence[Formula]") -> Formula:
-    """All of them; true of none."""
+    """`a && b && ...`; true of no operands."""
     if not operands:
         return TRUE
     return operands[0] if len(operands) == 1 else And(tuple(operands))
 
 
 def disjunction(operands: "Sequence[Formula]") -> Formula:
-    """One of them; false of none."""
+    """`a || b || ...`; false of no operands."""
     if not operands:
         return FALSE
     return operands[0] if len(operands) == 1 else Or(tuple(operands))
 
 
 def negated(formula: Formula) -> Formula:
-    """What holds where the formula does not."""
     return formula.operand if isinstance(formula, Not) else Not(formula)
 
 
@@ -253,7 +252,7 @@ def children(formula: Formula) -> tuple[Formula, ...]:
 
 
 def rebuilt(formula: Formula, change: Callable[[Formula], Formula]) -> Formula:
-    """The formula with `change` done to those directly below."""
+    """The formula with `change` applied to those directly below."""
     if not children(formula):
         return formula
     new: dict[str, Any] = {}
@@ -276,13 +275,13 @@ def walk(formula: Formula) -> Iterator[Formula]:
 
 
 def propositions(formula: Formula) -> tuple[Proposition, ...]:
-    """What it asks of a moment, each once, in the order in which it is written."""
+    """The propositions of a formula, each once, in the order in which they are written."""
     found = (each for each in walk(formula) if isinstance(each, PROPOSITIONS))
     return tuple(dict.fromkeys(found))
 
 
 def needs_steps(formula: Formula) -> bool:
-    """Whether it looks at single steps, so that a search may leave none out."""
+    """Whether a formula observes single steps, so that a search may leave none out."""
     return any(isinstance(each, Next) for each in walk(formula))
 
 
@@ -301,7 +300,7 @@ def show(formula: Formula) -> str:
 
 
 def _show(formula: Formula, around: int) -> str:
-    """`around`: how strongly what is around binds; a weaker formula gets parentheses."""
+    """`around`: the precedence of the operator around it; a weaker formula gets parentheses."""
     match formula:
         case Active():
             return f"active({_name(formula.element)})"

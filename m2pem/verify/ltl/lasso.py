@@ -1,6 +1,6 @@
-"""Whether a formula holds of a run that goes round for ever, straight from what it means.
+"""Whether a formula holds of a run that ends in a cycle, evaluated directly by its semantics.
 
-Needs no automaton, so it is what an answer found with one is checked against.
+It uses no automaton, so answers found with one are checked against it.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ Moment = frozenset[Proposition]
 
 
 def holds(formula: Formula, prefix: Sequence[Moment], cycle: Sequence[Moment]) -> bool:
-    """Whether it holds of `prefix` and then `cycle` again and again; the cycle is not empty."""
+    """Whether a formula holds of `prefix` and then `cycle` for ever; the cycle is not empty."""
     # After as many rounds, nothing that is said of the past or counted changes from round to round.
     rounds = 1
     for each in walk(formula):
@@ -49,7 +49,7 @@ class _Lasso:
         self.known: dict[Formula, list[bool]] = {}
 
     def of(self, formula: Formula) -> list[bool]:
-        """By moment, whether the formula holds there."""
+        """For each moment, whether the formula holds there."""
         known = self.known.get(formula)
         if known is None:
             known = self.known[formula] = self._of(formula)

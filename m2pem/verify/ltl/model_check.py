@@ -27,7 +27,7 @@ from m2pem.verify.ltl.product import QUIET, STUTTER, LabelledSystem, Product
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Where a search stops undecided. `states`: pairs of the system's and the formula's."""
+    """Limits of a search. `states`: pairs of the system's states and the automaton's."""
 
     states: int = 2_000_000
     seconds: float = 600.0
@@ -35,7 +35,7 @@ class Limits:
 
 
 class Stopped(StrEnum):
-    """Why a search did not see all."""
+    """Why a search is incomplete."""
 
     STATES = "the limit of states"
     TIME = "the limit of time"
@@ -46,7 +46,7 @@ class Stopped(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a search is: pairs of states found, those still to look at, seconds so far."""
+    """How far a search is: pairs of states found, pairs still to expand, seconds so far."""
 
     states: int
     waiting: int
@@ -54,8 +54,6 @@ class Progress:
 
 
 class Result(StrEnum):
-    """What is known of a formula."""
-
     HOLDS = "holds"
     VIOLATED = "violated"
     UNDECIDED = "undecided"
@@ -63,18 +61,18 @@ class Result(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A rule fires, and leads to a state."""
+    """A transition fires, and leads to a state."""
 
-    rule: int
+    transition: int
     state: int
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run from `start`: the moves of `prefix`, then those of `cycle` again and again.
+    """A run from `start`: the moves of `prefix`, then those of `cycle` for ever.
 
     Without a cycle the run is over after the prefix; or, where `whatever_follows`, the formula is
-    broken by then, and nothing that comes later can mend it.
+    violated by then, whatever comes later.
     """
 
     start: int
@@ -84,13 +82,13 @@ class Run:
 
     @property
     def length(self) -> int:
-        """How many moves are told."""
+        """The number of moves."""
         return len(self.prefix) + len(self.cycle)
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The answer of a search, with what it cost. `run` breaks the formula; only if violated."""
+    """The answer of a search, and what it cost. `run` violates the formula; only if violated."""
 
     result: Result
     run: Run | None
@@ -101,37 +99,42 @@ class Verdict:
 
 
 class Fairness:
-    """Which rules must not be passed over for ever: those that can fire again and again do.
+    """The transitions that must not be passed over for ever: those that are enabled again and
+    again.
 
-    `rules`: by rule, the outcome that it stands for; rules of one outcome are the same to it.
+    `transitions`: by transition, its outcome; transitions of one outcome count as one.
     """
 
-    def __init__(self, product: Product, rules: dict[int, int] | None) -> None:
-        self.rules = rules
+    def __init__(self, product: Product, transitions: dict[int, int] | None) -> None:
+        self.transitions = transitions
         self._product = product
         self._possible: dict[int, frozenset[int]] = {}
 
     def possible(self, node: int) -> frozenset[int]:
-        """The outcomes that can come in a node."""
-        if self.rules is None or self._product.is_quiet(node):
+        """The outcomes that are possible in a node."""
+        if self.transitions is None or self._product.is_quiet(node):
             return frozenset()
         state = self._product.states[node]
         known = self._possible.get(state)
         if known is None:
             steps = self._product.successors(state)
-            known = frozenset(self.rules[rule] for rule, _ in steps if rule in self.rules)
+            known = frozenset(
+                self.transitions[transition]
+                for transition, _ in steps
+                if transition in self.transitions
+            )
             self._possible[state] = known
         return known
 
-    def outcome(self, rule: int) -> int | None:
-        """The outcome that a rule stands for, if it is one that counts."""
-        return self.rules.get(rule) if self.rules is not None else None
+    def outcome(self, transition: int) -> int | None:
+        """The outcome of a transition, if it is one that counts."""
+        return self.transitions.get(transition) if self.transitions is not None else None
 
 
-class Round:
-    """Nodes among which an accepted run can stay for ever; `wanted` is what it must pass.
+class AcceptingComponent:
+    """Nodes among which an accepted run can stay for ever; `wanted`: what it must pass.
 
-    A move fulfils promise n by not postponing it, and outcome o by being one of its rules.
+    A move fulfils promise n by not postponing it, and outcome o by being one of its transitions.
     """
 
     def __init__(self, product: Product, nodes: frozenset[int], outcomes: frozenset[int]) -> None:
@@ -140,12 +143,12 @@ class Round:
         self.outcomes = outcomes
 
     def moves(self, node: int) -> Iterator[tuple[int, int, int]]:
-        """The moves from a node that stay."""
+        """The moves from a node that stay in the component."""
         return (move for move in self.product.moves[node] if move[1] in self.nodes)
 
 
-def accepting_rounds(product: Product, fairness: Fairness) -> Iterator[Round]:
-    """All of them in what is expanded so far."""
+def accepting_components(product: Product, fairness: Fairness) -> Iterator[AcceptingComponent]:
+    """All accepting components of what is expanded so far."""
     expanded = len(product.moves)
     waiting = [frozenset(range(expanded))]
     while waiting:
@@ -156,14 +159,14 @@ def accepting_rounds(product: Product, fairness: Fairness) -> Iterator[Round]:
                 continue
             possible = frozenset[int]().union(*(fairness.possible(node) for node in part))
             passed = {
-                fairness.outcome(rule)
+                fairness.outcome(transition)
                 for node in part
-                for rule, target, _ in product.moves[node]
+                for transition, target, _ in product.moves[node]
                 if target in part
             }
             missing = possible - passed
             if not missing:
-                yield Round(product, part, possible)
+                yield AcceptingComponent(product, part, possible)
                 continue
             # Who stays here must not be where a missing outcome could come.
             left = frozenset(node for node in part if not fairness.possible(node) & missing)
@@ -196,23 +199,25 @@ def _postponed_always(product: Product, nodes: frozenset[int]) -> int | None:
 
 
 _Step = tuple[int, int, int, int]
-"""From which node, by which rule, to which node, with which promises postponed."""
+"""From which node, by which transition, to which node, with which promises postponed."""
 
 
 def run_to(product: Product, node: int) -> Run:
-    """The run that leads to a node after which whatever follows is accepted."""
+    """The run to a node after which every continuation is accepted."""
     start, prefix = _prefix(product, node)
     return Run(start, prefix, whatever_follows=True)
 
 
-def run_round(round_: Round, fairness: Fairness) -> Run:
-    """A run that comes to a round by the shortest way, and fulfils all it must in each."""
+def run_around(round_: AcceptingComponent, fairness: Fairness) -> Run:
+    """A shortest run to a component, and a cycle in it that fulfils all that it must."""
     product = round_.product
     cycle = _cycle(round_, fairness, min(round_.nodes))
     nearest = min(range(len(cycle)), key=lambda at: cycle[at][0])
     cycle = cycle[nearest:] + cycle[:nearest]
     start, prefix = _prefix(product, cycle[0][0])
-    return Run(start, prefix, _moves([(rule, product.states[to]) for _, rule, to, _ in cycle]))
+    return Run(
+        start, prefix, _moves([(transition, product.states[to]) for _, transition, to, _ in cycle])
+    )
 
 
 def _prefix(product: Product, node: int) -> tuple[int, tuple[Move, ...]]:
@@ -224,11 +229,13 @@ def _prefix(product: Product, node: int) -> tuple[int, tuple[Move, ...]]:
 
 
 def _moves(steps: list[tuple[int, int]]) -> tuple[Move, ...]:
-    """What happens to the system; moments in which nothing does are left out."""
-    return tuple(Move(rule, state) for rule, state in steps if rule not in (QUIET, STUTTER))
+    """What happens to the system, without quiet moments."""
+    return tuple(
+        Move(transition, state) for transition, state in steps if transition not in (QUIET, STUTTER)
+    )
 
 
-def _cycle(round_: Round, fairness: Fairness, start: int) -> list[_Step]:
+def _cycle(round_: AcceptingComponent, fairness: Fairness, start: int) -> list[_Step]:
     promises = round_.product.observer.promises
     outcomes = set(round_.outcomes)
     at = start
@@ -248,15 +255,15 @@ def _cycle(round_: Round, fairness: Fairness, start: int) -> list[_Step]:
     return steps
 
 
-def _path(round_: Round, start: int, wanted: Callable[[_Step], bool]) -> list[_Step]:
-    """The shortest way, of one step at least, whose last step is wanted."""
+def _path(round_: AcceptingComponent, start: int, wanted: Callable[[_Step], bool]) -> list[_Step]:
+    """The shortest path, of one step at least, whose last step is wanted."""
     came: dict[int, _Step] = {}
     waiting = deque([start])
     seen = {start}
     while waiting:
         node = waiting.popleft()
-        for rule, target, postponed in round_.moves(node):
-            step = (node, rule, target, postponed)
+        for transition, target, postponed in round_.moves(node):
+            step = (node, transition, target, postponed)
             if wanted(step):
                 path = [step]
                 while node != start:
@@ -271,14 +278,14 @@ def _path(round_: Round, start: int, wanted: Callable[[_Step], bool]) -> list[_S
 
 
 def breaks(system: LabelledSystem, formula: Formula, run: Run, *, steps: bool) -> bool:
-    """Whether a run is one of the system's, and the formula does not hold of it.
+    """Whether a run is one of the system's, and violates the formula.
 
-    A run that is broken whatever follows is tried with the run that first comes to hand.
+    A run that violates it whatever follows is evaluated with an arbitrary continuation.
     """
     run = _continued(system, run) if run.whatever_follows else run
     last = run.start
     for move in (*run.prefix, *run.cycle):
-        if (move.rule, move.state) not in system.successors(last):
+        if (move.transition, move.state) not in system.successors(last):
             return False
         last = move.state
     prefix = [_moment(system, run.start, None)]
@@ -296,13 +303,13 @@ def breaks(system: LabelledSystem, formula: Formula, run: Run, *, steps: bool) -
 
 
 def _continued(system: LabelledSystem, run: Run) -> Run:
-    """The run with something that follows: the first rule each time, until a state comes again."""
+    """The run with a continuation: the first transition each time, until a state comes again."""
     state = run.prefix[-1].state if run.prefix else run.start
     seen = {state: 0}
     further: list[Move] = []
     while steps := system.successors(state):
-        rule, state = steps[0]
-        further.append(Move(rule, state))
+        transition, state = steps[0]
+        further.append(Move(transition, state))
         if state in seen:
             at = seen[state]
             return Run(run.start, (*run.prefix, *further[:at]), tuple(further[at:]))
@@ -313,23 +320,23 @@ def _continued(system: LabelledSystem, run: Run) -> Run:
 def _moments(system: LabelledSystem, moves: tuple[Move, ...], *, steps: bool) -> list[Moment]:
     found: list[Moment] = []
     for move in moves:
-        found.append(_moment(system, move.state, move.rule))
-        if system.true_when(move.rule) and not steps:
+        found.append(_moment(system, move.state, move.transition))
+        if system.true_when(move.transition) and not steps:
             found.append(_moment(system, move.state, None))
     return found
 
 
-def _moment(system: LabelledSystem, state: int, rule: int | None) -> Moment:
-    bits = system.true_in(state) | (0 if rule is None else system.true_when(rule))
+def _moment(system: LabelledSystem, state: int, transition: int | None) -> Moment:
+    bits = system.true_in(state) | (0 if transition is None else system.true_when(transition))
     return frozenset(each for n, each in enumerate(system.propositions) if bits >> n & 1)
 
 
 _LOOK_EVERY = 512
-"""Nodes between two looks at the clock."""
+"""Nodes between two readings of the clock."""
 _FIRST_LOOK = 2_000
-"""Nodes after which rounds are looked for the first time."""
+"""Nodes after which accepting components are looked for the first time."""
 _MOST_ROUNDS = 50
-"""Of how many rounds the shortest is chosen."""
+"""Components among which the shortest run is chosen."""
 
 
 def check(
@@ -340,20 +347,19 @@ def check(
     limits: Limits | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Verdict:
-    """Whether a formula holds of all runs of a system.
+    """Check whether a formula holds of all runs of a system.
 
-    `fair`: by rule, the outcome it stands for; only runs count in which each outcome that can come
-    again and again does come again and again. None: all runs count.
-
-    KeyboardInterrupt ends the search undecided.
+    `fair`: the outcome of each transition; only runs count in which each outcome that is possible
+    again and again happens again and again. None: all runs count. KeyboardInterrupt ends the search
+    undecided.
 
     Raises:
-        ValueError: the system leaves rules out, and the formula or the fairness needs all.
+        ValueError: the system uses a reduction, but the formula or the fairness allows none.
         FormulaTooLargeError: the formula's automaton would be too large.
     """
     steps = needs_steps(formula)
     if system.reduced and (steps or fair is not None):
-        raise ValueError("single steps, and fairness, need a system that leaves no rule out")
+        raise ValueError("single steps, and fairness, need a system that leaves no transition out")
     observer = Observer(negated(formula), system.propositions)
     began = time.monotonic()
     product = Product(system, observer, steps=steps)
@@ -411,8 +417,8 @@ class _Search:
 
     def _round(self) -> Run | None:
         best: Run | None = None
-        for found, round_ in enumerate(accepting_rounds(self.product, self.fairness)):
-            run = run_round(round_, self.fairness)
+        for found, round_ in enumerate(accepting_components(self.product, self.fairness)):
+            run = run_around(round_, self.fairness)
             if best is None or run.length < best.length:
                 best = run
             if found == _MOST_ROUNDS:

@@ -26,7 +26,7 @@ from m2pem.verify.ltl.formula import (
 
 
 class Op(IntEnum):
-    """What a formula is."""
+    """The operator of a formula."""
 
     TRUE = 0
     FALSE = 1
@@ -50,7 +50,7 @@ TRUE, FALSE = 0, 1
 
 
 class Forms:
-    """All formulas made so far. What makes one simplifies it first."""
+    """All formulas made so far. Its constructors simplify a formula first."""
 
     def __init__(self) -> None:
         self._nodes = [_Node(Op.TRUE, ()), _Node(Op.FALSE, ())]
@@ -60,11 +60,10 @@ class Forms:
         }
 
     def op(self, formula: int) -> Op:
-        """What a formula is."""
         return self._nodes[formula].op
 
     def arguments(self, formula: int) -> tuple[int, ...]:
-        """What it is applied to."""
+        """The operands of a formula."""
         return self._nodes[formula].arguments
 
     def _make(self, op: Op, *arguments: int) -> int:
@@ -80,11 +79,10 @@ class Forms:
         return self._make(Op.LITERAL, bit, int(positive))
 
     def next(self, formula: int) -> int:
-        """What holds in the next moment."""
+        """The formula holds in the next moment."""
         return formula if formula in (TRUE, FALSE) else self._make(Op.NEXT, formula)
 
     def conjunction(self, formulas: "list[int] | tuple[int, ...]") -> int:
-        """All of them."""
         parts = self._flat(Op.AND, formulas)
         if FALSE in parts or self._contradict(parts):
             return FALSE
@@ -100,7 +98,6 @@ class Forms:
         return self._joined(Op.AND, parts, TRUE)
 
     def disjunction(self, formulas: "list[int] | tuple[int, ...]") -> int:
-        """One of them at least."""
         parts = self._flat(Op.OR, formulas)
         if TRUE in parts or self._contradict(parts):
             return TRUE
@@ -120,7 +117,7 @@ class Forms:
         return self._joined(Op.OR, parts, FALSE)
 
     def _follows(self, formula: int, parts: set[int]) -> bool:
-        """Whether other parts of a conjunction make a part true already."""
+        """Whether other parts of a conjunction imply a part."""
         if self.op(formula) is Op.OR:
             return bool(parts & set(self.arguments(formula)))
         if self.op(formula) is Op.UNTIL:
@@ -206,7 +203,9 @@ class Forms:
 
 
 def lower(formula: Formula, forms: Forms, bit: Callable[[Formula], int]) -> int:
-    """The normal form. `bit` numbers what is no connective and no operator of the future."""
+    """Return the normal form. `bit` numbers what is neither a connective nor an operator of the
+    future.
+    """
     return _Lowering(forms, bit).of(formula, True)
 
 

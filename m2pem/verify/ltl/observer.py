@@ -36,12 +36,12 @@ _COMPARE: dict[str, Callable[[int, int], bool]] = {
     "!=": operator.ne,
 }
 Memory = tuple[int, ...]
-"""What the machines remember: a number each, and one more bit for each thing that is counted."""
+"""The memory of the machines: a number each, and one more bit for each thing that is counted."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Machine:
-    """One operator: its bit of the letter, and where in the memory its own is."""
+    """One operator: its bit of the letter, and the index of its bit in the memory."""
 
     formula: Formula
     bit: int
@@ -49,7 +49,7 @@ class _Machine:
 
 
 class Past:
-    """The machines of one formula, in an order in which each finds ready what it looks at."""
+    """The machines of one formula, inner operators first."""
 
     def __init__(self, first_bit: int, number: Callable[[Formula], int]) -> None:
         self._first_bit = first_bit
@@ -59,7 +59,7 @@ class Past:
         self._slots = 0
 
     def bit(self, formula: Formula) -> int:
-        """The bit of a proposition, or of an operator of the past, whose machine is made."""
+        """The bit of a proposition, or of an operator of the past; its machine is created."""
         if not isinstance(formula, (Once, Historically, Since, Count)):
             return self._number(formula)
         known = self._bits.get(formula)
@@ -75,11 +75,11 @@ class Past:
 
     @property
     def initial(self) -> Memory:
-        """What is remembered before the first moment."""
+        """The memory before the first moment."""
         return (0,) * self._slots
 
     def step(self, memory: Memory, letter: int) -> tuple[Memory, int]:
-        """What is remembered after a moment, and the letter with the bits of the past."""
+        """Return the memory after a moment, and the letter with the bits of the past."""
         new = list(memory)
         for machine in self._machines:
             if self._watch(machine, memory, new, letter):
@@ -127,7 +127,7 @@ class Past:
 
 
 def _inside(formula: Formula) -> list[Formula]:
-    """The operators of the past nearest below."""
+    """The outermost operators of the past in a formula."""
     found: list[Formula] = []
     waiting = list(children(formula))
     while waiting:
@@ -140,7 +140,7 @@ def _inside(formula: Formula) -> list[Formula]:
 
 
 class Observer:
-    """Accepts the runs of which a formula holds.
+    """An automaton with memory that accepts the runs of which a formula holds.
 
     A letter has bit n set if the n-th of `propositions` is true in a moment. States are numbers;
     `start` is the one before the first moment.
@@ -167,15 +167,15 @@ class Observer:
 
     @property
     def promises(self) -> int:
-        """How many promises an accepted run must not postpone for ever, as a mask of them all."""
+        """A mask of all promises that an accepted run must not postpone for ever."""
         return (1 << self.automaton.promises) - 1
 
     def accepts_all(self, state: int) -> bool:
-        """Whether every run is accepted from there on."""
+        """Whether every continuation is accepted from a state on."""
         return self._states[state][0] == self.automaton.accepting_all
 
     def step(self, state: int, letter: int) -> tuple[tuple[int, int], ...]:
-        """The states after a moment, each with the promises that going there postpones."""
+        """The states after a moment, each with the promises that the step postpones."""
         key = (state, letter)
         known = self._steps.get(key)
         if known is None:

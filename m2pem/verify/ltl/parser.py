@@ -19,7 +19,7 @@ from m2pem.verify.ltl import formula as f
 
 _SPACE = re.compile(r"\s*")
 WORDS = frozenset({"U", "W", "since", "and", "or", "not", "once", "historically", "true", "false"})
-"""Words of the language: data of these names cannot be asked for."""
+"""Words of the language: they cannot be names of data."""
 
 _BREAK = re.compile(r"&&|\|\||<->|->|(?<![\w.])(?:U|W|since|and|or)(?![\w.(])")
 _HINTS = {
@@ -34,7 +34,7 @@ MAX_LENGTH = 10_000
 
 
 class Reader:
-    """Reads forward over one text. Positions are offsets in it."""
+    """Reads a text from left to right. Positions are offsets in it."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -45,13 +45,12 @@ class Reader:
             )
 
     def skip(self) -> int:
-        """Pass over spaces; where the next thing stands."""
+        """Skip spaces, and return the position."""
         found = _SPACE.match(self.text, self.position)
         self.position = found.end() if found else self.position
         return self.position
 
     def at_end(self) -> bool:
-        """Whether nothing is left."""
         return self.skip() == len(self.text)
 
     def match(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
@@ -66,19 +65,19 @@ class Reader:
         return pattern.match(self.text, self.skip())
 
     def take(self, symbol: str) -> bool:
-        """Read a symbol if it stands here."""
+        """Read a symbol if it comes next."""
         if self.text.startswith(symbol, self.skip()):
             self.position += len(symbol)
             return True
         return False
 
     def expect(self, symbol: str, why: str) -> None:
-        """Read a symbol that must stand here."""
+        """Read a symbol that must come next."""
         if not self.take(symbol):
             self.fail(f"expected '{symbol}' {why}, found {self.found()}")
 
     def found(self) -> str:
-        """What stands here, for messages."""
+        """What comes next, for messages."""
         rest = self.text[self.skip() :]
         word = re.match(r"[\w.]+|\S{1,3}", rest)
         return repr(word[0]) if word else "the end"
@@ -90,13 +89,13 @@ class Reader:
         raise ExpressionSyntaxError(f"{message}; {hint}" if hint else message, self.text, where)
 
     def hint(self, position: int) -> str:
-        """What to write for a symbol of other notations that stands there."""
+        """What to write in place of a symbol of other notations."""
         rest = self.text[position:]
         found = (hint for symbol, hint in _HINTS.items() if rest.startswith(symbol))
         return "" if rest.startswith(("==", "&&", "||")) else next(found, "")
 
     def argument(self, what: str) -> tuple[str, int]:
-        """A name up to a comma or parenthesis, quoted or not, and where it stands."""
+        """A name up to a comma or parenthesis, quoted or not, and its position."""
         start = self.skip()
         if start < len(self.text) and self.text[start] in "'\"":
             return self._quoted(start), start
@@ -115,7 +114,7 @@ class Reader:
         return re.sub(r"\\(.)", r"\1", found[1])
 
     def comparison_end(self, start: int) -> int:
-        """Where a condition over data ends that begins at `start`."""
+        """The end of a condition over data that begins at `start`."""
         at = start
         open_: list[str] = []
         while at < len(self.text):
@@ -140,7 +139,7 @@ class Reader:
         return at + 1
 
     def after_parenthesis(self, start: int) -> int:
-        """Where the text goes on after the parenthesis that opens at `start`; -1 if unclosed."""
+        """The position after the parenthesis that opens at `start` is closed; -1 if it is not."""
         at, depth = start, 0
         while at < len(self.text):
             character = self.text[at]
@@ -157,7 +156,7 @@ class Reader:
 MAX_DEPTH = 100
 MAX_COUNT = 1_000
 ATOMS = ("active(E)", "completed(E)", "commanded(RESOURCE, BEHAVIOR)", "ended", "count(...) >= N")
-"""What a formula can ask of a moment, beside comparisons of data."""
+"""Propositions, besides comparisons of data."""
 
 _PREFIXES: dict[str, Callable[[f.Formula], f.Formula]] = {
     word: kind for kind, word in f.PREFIXES.items()
@@ -181,10 +180,10 @@ _OTHER_NOTATIONS = {
 
 
 def parse(text: str) -> f.Formula:
-    """The formula that a text says.
+    """Parse a formula.
 
     Raises:
-        ExpressionSyntaxError: it is none; says where reading stopped, and what can stand there.
+        ExpressionSyntaxError: the text is no formula; says where, and what is allowed there.
     """
     return _Parser(Reader(text)).whole()
 
@@ -316,7 +315,7 @@ class _Parser:
         return self._data(start)
 
     def _alone(self, end: int) -> bool:
-        """Whether a word that ends there is not the beginning of a comparison."""
+        """Whether a word that ends there does not begin a comparison."""
         rest = self.reader.text[end:].lstrip()
         return not _OF_DATA.match(rest)
 

@@ -12,63 +12,63 @@ from m2pem.verify.ltl import Observer
 from m2pem.verify.ltl.formula import Proposition
 
 STUTTER = -1
-"""In place of a rule: the run is over, and its last state stays for ever."""
+"""In place of a transition: the run is over, and its last state remains for ever."""
 QUIET = -2
-"""In place of a rule: the quiet moment after one in which something was completed."""
+"""In place of a transition: the quiet moment after one in which something was completed."""
 
 
 class LabelledSystem(Protocol):
-    """States and rules are numbers; what is true is a bit for each of `propositions`.
+    """A labelled transition system. States and transitions are numbers; labels have a bit for each
+    of `propositions`.
 
-    A proposition of states (`active`, `commanded`, `ended`, data) is true as long as the state is
-    one in which it is. One of rules (`completed`) is true in the moment in which the rule fires.
-
-    A state without successors is the end of a run. A system that leaves out rules whose order
-    makes no difference must keep all runs apart that differ in what is true of their states and
-    rules, and says so (`reduced`).
+    A proposition of states (`active`, `commanded`, `ended`, data) is true while the system is in
+    such a state. One of transitions (`completed`) is true in the moment in which the transition
+    fires. A state without successors is the end of a run. A system with a reduction (`reduced`)
+    must keep all runs apart that differ in the labels of their states and transitions.
     """
 
     @property
     def propositions(self) -> Sequence[Proposition]:
-        """What the bits stand for."""
+        """The propositions of the labels' bits."""
         ...
 
     @property
     def reduced(self) -> bool:
-        """Whether successors are left out: not every rule that can fire is among them."""
+        """Whether successors are left out: not every enabled transition is among them."""
         ...
 
     def initial(self) -> Sequence[int]:
-        """The states in which runs begin."""
+        """The initial states."""
         ...
 
     def is_open(self, state: int) -> bool:
-        """Whether what follows a state is not known: runs may go on, but not where to."""
+        """Whether the successors of a state are unknown."""
         ...
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
-        """The rules that can fire in a state, each with the state after it."""
+        """The enabled transitions of a state, each with the state after it."""
         ...
 
     def true_in(self, state: int) -> int:
         """The propositions that are true in a state."""
         ...
 
-    def true_when(self, rule: int) -> int:
-        """The propositions that are true in the moment in which a rule fires."""
+    def true_when(self, transition: int) -> int:
+        """The propositions that are true in the moment in which a transition fires."""
         ...
 
 
 BYTES_A_NODE = 400
-"""About what a node costs in memory."""
+"""Approximate memory of a node."""
 BYTES_A_MOVE = 120
 
 
 class Product:
-    """Nodes are numbered as found. One is a state of each, and whether a quiet moment comes next.
+    """The product, built node by node. A node is a state of each, and whether a quiet moment
+    follows.
 
-    `moves[n]`: rule, node and postponed promises of each move from node n, once it was expanded.
-    With `steps`, each step of the system is one moment, and no quiet ones come between.
+    `moves[n]`: transition, node and postponed promises of each move from node n, once it was
+    expanded. With `steps`, each step of the system is one moment, and no quiet ones come between.
     """
 
     def __init__(self, system: LabelledSystem, observer: Observer, *, steps: bool) -> None:
@@ -86,9 +86,9 @@ class Product:
         self._true: dict[int, int] = {}
         self._successors: dict[int, Sequence[tuple[int, int]]] = {}
         self.open = False
-        """Whether a state was met of which what follows is not known."""
+        """Whether a state with unknown successors was reached."""
         self.broken = -1
-        """The first node from which on the observer accepts whatever comes; -1 if none."""
+        """The first node from which the observer accepts every continuation; -1 if none."""
         for state in system.initial():
             for observed, _ in observer.step(observer.start, self.true_in(state)):
                 self._node(state, observed, False, -1, STUTTER)
@@ -98,29 +98,28 @@ class Product:
 
     @property
     def bytes(self) -> int:
-        """About what it takes in memory."""
+        """Approximate memory of the product."""
         return len(self) * BYTES_A_NODE + self.number_of_moves * BYTES_A_MOVE
 
     def true_in(self, state: int) -> int:
-        """What is true in a state of the system."""
+        """The label of a state of the system."""
         known = self._true.get(state)
         if known is None:
             known = self._true[state] = self.system.true_in(state)
         return known
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
-        """The steps of the system from a state."""
         known = self._successors.get(state)
         if known is None:
             known = self._successors[state] = tuple(self.system.successors(state))
         return known
 
     def is_quiet(self, node: int) -> bool:
-        """Whether a quiet moment comes next."""
+        """Whether a quiet moment follows."""
         return bool(self._pending[node])
 
     def expand(self) -> None:
-        """Find the moves from the first node that was not yet expanded."""
+        """Find the moves from the first node that is not yet expanded."""
         node = len(self.moves)
         state, observed = self.states[node], self.observed[node]
         found: list[tuple[int, int, int]] = []
@@ -130,13 +129,13 @@ class Product:
             steps = self.successors(state)
             open_ = not steps and self.system.is_open(state)
             self.open |= open_
-            for rule, after in steps:
-                now = self.system.true_when(rule)
+            for transition, after in steps:
+                now = self.system.true_when(transition)
                 letter = self.true_in(after) | now
                 pending = bool(now) and not self.steps
                 for target, postponed in self.observer.step(observed, letter):
-                    number = self._node(after, target, pending, node, rule)
-                    found.append((rule, number, postponed))
+                    number = self._node(after, target, pending, node, transition)
+                    found.append((transition, number, postponed))
             if not steps and not open_:
                 self._move(found, node, STUTTER, state, self.true_in(state), False)
         self.number_of_moves += len(found)
@@ -146,13 +145,15 @@ class Product:
         self,
         found: list[tuple[int, int, int]],
         node: int,
-        rule: int,
+        transition: int,
         state: int,
         letter: int,
         pending: bool,
     ) -> None:
         for target, postponed in self.observer.step(self.observed[node], letter):
-            found.append((rule, self._node(state, target, pending, node, rule), postponed))
+            found.append(
+                (transition, self._node(state, target, pending, node, transition), postponed)
+            )
 
     def _node(self, state: int, observed: int, pending: bool, parent: int, via: int) -> int:
         key = (state, observed, pending)

@@ -1,47 +1,48 @@
-"""Which places may have a token at the same time, by the rules' structure alone.
+"""Which places may have a token at the same time, by the net' structure alone.
 
 A superset of what can happen, found without a search: when it says no, it is no. It proves places
-to have one token at most, and rules never to fire.
+to have one token at most, and transitions never to fire.
 """
 
 from collections.abc import Iterable
 
-from m2pem.verify.net.petri_net import Rule, System
-from m2pem.verify.net.size_limit import Bound
+from m2pem.verify.net.petri_net import PetriNet, Transition
+from m2pem.verify.net.size_limit import SizeLimit
 
 MOST_PLACES = 1_500
-"""Of a system that is looked at; the work grows with the square."""
+"""Largest net that is analyzed: the work grows with the square of its places."""
 
 
-MOST_RULES = 6_000
-"""Likewise."""
+MOST_TRANSITIONS = 6_000
+"""Largest number of transitions that are analyzed."""
 
 
-def is_small(system: System) -> bool:
-    """Whether it is worth the work."""
-    return len(system.places) <= MOST_PLACES and len(system.rules) <= MOST_RULES
+def is_small(net: PetriNet) -> bool:
+    """Whether a net is small enough for the analysis to pay."""
+    return len(net.places) <= MOST_PLACES and len(net.transitions) <= MOST_TRANSITIONS
 
 
 class _Wants:
-    """What a rule asks for and does, as bits; `before`: what it needs before each of `needed`."""
+    """What a transition tests and changes, as bits. `before`: what it needs before each of
+    `needed`.
+    """
 
-    __slots__ = ("absent", "before", "killed", "made", "needed", "needed_bits", "twice")
+    __slots__ = ("absent", "before", "made", "needed", "needed_bits", "reset_places", "twice")
 
-    def __init__(self, rule: Rule) -> None:
-        self.needed = [place for place, _ in rule.consume] + list(rule.read)
+    def __init__(self, transition: Transition) -> None:
+        self.needed = [place for place, _ in transition.consume] + list(transition.read)
         self.needed_bits = 0
         self.before: list[int] = []
         for place in self.needed:
             self.before.append(self.needed_bits & ~(1 << place))
             self.needed_bits |= 1 << place
-        self.absent = bits_of(rule.inhibit)
-        self.killed = bits_of(rule.kill)
-        self.made = bits_of(place for place, _ in rule.produce)
-        self.twice = bits_of(place for place, count in rule.produce if count > 1)
+        self.absent = bits_of(transition.inhibit)
+        self.reset_places = bits_of(transition.reset)
+        self.made = bits_of(place for place, _ in transition.produce)
+        self.twice = bits_of(place for place, count in transition.produce if count > 1)
 
 
 def bits_of(places: Iterable[int]) -> int:
-    """A bit for each place."""
     bits = 0
     for place in places:
         bits |= 1 << place
@@ -49,44 +50,46 @@ def bits_of(places: Iterable[int]) -> int:
 
 
 class Concurrency:
-    """`rows[p]`: a bit for each place that may have a token when p has one; p's own bit: two."""
+    """The concurrency relation of a net's places. `rows[p]` has a bit for each place that may have
+    a token when p has one; p's own bit says that p may have two.
+    """
 
-    def __init__(self, system: System, bound: Bound | None = None) -> None:
-        """Raises TooLargeError if it takes longer than `bound` allows."""
-        bound = bound or Bound()
-        self.rows = [0] * len(system.places)
+    def __init__(self, net: PetriNet, size_limit: SizeLimit | None = None) -> None:
+        """Raises TooLargeError if the analysis takes longer than `size_limit` allows."""
+        size_limit = size_limit or SizeLimit()
+        self.rows = [0] * len(net.places)
         self.live: set[int] = set()
         self._marked = 0
-        self._wants = [_Wants(rule) for rule in system.rules]
-        by_place: dict[int, list[Rule]] = {}
-        for rule in system.rules:
-            for place in self._looks_at(rule):
-                by_place.setdefault(place, []).append(rule)
+        self._wants = [_Wants(transition) for transition in net.transitions]
+        by_place: dict[int, list[Transition]] = {}
+        for transition in net.transitions:
+            for place in self._looks_at(transition):
+                by_place.setdefault(place, []).append(transition)
         start = 0
-        for place, _ in system.initial:
+        for place, _ in net.initial:
             start |= 1 << place
-        for place, count in system.initial:
+        for place, count in net.initial:
             self.rows[place] |= start & ~(1 << place)
             if count > 1:
                 self.rows[place] |= 1 << place
         self._marked = start
-        waiting = dict.fromkeys(rule.index for rule in system.rules)
+        waiting = dict.fromkeys(transition.index for transition in net.transitions)
         while waiting:
             number = next(iter(waiting))
             del waiting[number]
-            bound.look(system.rules[number].element)
-            for place in self._fire(system.rules[number]):
-                for rule in by_place.get(place, ()):
-                    waiting[rule.index] = None
+            size_limit.check_time(net.transitions[number].element)
+            for place in self._fire(net.transitions[number]):
+                for transition in by_place.get(place, ()):
+                    waiting[transition.index] = None
 
     @staticmethod
-    def _looks_at(rule: Rule) -> set[int]:
-        found = {place for place, _ in rule.consume} | set(rule.read)
-        return found | {source for source, _ in (*rule.moves, *rule.copies)}
+    def _looks_at(transition: Transition) -> set[int]:
+        found = {place for place, _ in transition.consume} | set(transition.read)
+        return found | {source for source, _ in (*transition.moves, *transition.copies)}
 
-    def _fire(self, rule: Rule) -> set[int]:
-        """Add what firing a rule leads to; the places that it is news for."""
-        wants = self._wants[rule.index]
+    def _fire(self, transition: Transition) -> set[int]:
+        """Add what firing a transition leads to, and return the places whose rows changed."""
+        wants = self._wants[transition.index]
         if wants.needed_bits & (~self._marked | wants.absent):
             return set()
         beside = self._marked
@@ -95,20 +98,20 @@ class Concurrency:
             if wants.before[number] & ~row:
                 return set()
             beside &= row | 1 << place
-        for place, count in rule.consume:
+        for place, count in transition.consume:
             if count > 1 and not self.rows[place] >> place & 1:
                 return set()
         beside &= ~wants.absent
-        for place, _ in rule.consume:
+        for place, _ in transition.consume:
             if not self.rows[place] >> place & 1:
                 beside &= ~(1 << place)
-        self.live.add(rule.index)
+        self.live.add(transition.index)
         moved = 0
-        for source, target in (*rule.moves, *rule.copies):
+        for source, target in (*transition.moves, *transition.copies):
             if beside >> source & 1:
                 moved |= 1 << target
         twice = wants.twice | moved & wants.made
-        return self._add(wants.made | moved, beside & ~wants.killed, twice)
+        return self._add(wants.made | moved, beside & ~wants.reset_places, twice)
 
     def _add(self, made: int, beside: int, twice: int) -> set[int]:
         news: set[int] = set()
@@ -134,14 +137,14 @@ class Concurrency:
         return news
 
     def together(self, one: int, other: int) -> bool:
-        """Whether two places may have a token at once; of the same place: two tokens."""
+        """Whether two places may have tokens at once; of the same place: two tokens."""
         return bool(self.rows[one] >> other & 1)
 
     @property
     def single(self) -> frozenset[int]:
-        """The places that have one token at most."""
+        """The places that never have more than one token."""
         return frozenset(n for n, row in enumerate(self.rows) if not row >> n & 1)
 
-    def may_fire(self, rule: Rule) -> bool:
-        """Whether a rule may ever fire."""
-        return rule.index in self.live
+    def may_fire(self, transition: Transition) -> bool:
+        """Whether a transition may ever fire."""
+        return transition.index in self.live

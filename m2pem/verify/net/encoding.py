@@ -8,26 +8,26 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from m2pem.mission.values import Value
-from m2pem.verify.net.petri_net import Rule, System
+from m2pem.verify.net.petri_net import PetriNet, Transition
 
 SEVERAL_BITS = 2
-"""Of a place where several tokens are meant: up to three."""
+"""Bits of a place where several tokens are meant: up to three."""
 
 
 @dataclass(frozen=True, slots=True)
 class Marking:
-    """A state in words: tokens by place (those that have any), values by variable."""
+    """A marking: tokens by place (places that have any), and values by variable."""
 
     tokens: Mapping[int, int]
     values: Mapping[int, int]
 
 
 @dataclass(slots=True)
-class Compiled:
-    """One rule as masks. `plain`: they say it all; else the lists do what they cannot.
+class CompiledTransition:
+    """A transition as masks. `plain`: the masks say it all; else the lists add the rest.
 
-    `erase`: of what is cleared, what goes after tokens have moved; the rest is consumed before.
-    `kill`: of that, what is emptied whatever it holds.
+    `erase`: of the bits that are cleared, those that go after tokens have moved; the others are
+    consumed before. `reset`: of those, the places that are emptied whatever they hold.
     """
 
     test: int = 0
@@ -41,40 +41,40 @@ class Compiled:
     takes: list[tuple[int, int]] = field(default_factory=list)
     moves: list[tuple[int, int, int, bool]] = field(default_factory=list)
     gives: list[tuple[int, int, int, int]] = field(default_factory=list)
-    kill: int = 0
+    reset: int = 0
     reads: int = 0
     changes: int = 0
 
 
 class Encoding:
-    """How the states of a system are written as integers, and its rules as masks."""
+    """The encoding of a net's states as integers, and of its transitions as masks."""
 
-    def __init__(self, system: System, wider: Mapping[int, int] | None = None) -> None:
-        """`wider`: more bits than usual, by place."""
-        self.system = system
+    def __init__(self, net: PetriNet, wider: Mapping[int, int] | None = None) -> None:
+        """`wider`: the width in bits of places that need more than usual."""
+        self.net = net
         self.wider = dict(wider or {})
         self.offset: list[int] = []
         self.width: list[int] = []
         self.mask: list[int] = []
         at = 0
-        for place in system.places:
+        for place in net.places:
             width = self.wider.get(place.index, SEVERAL_BITS if place.several else 1)
             self.offset.append(at)
             self.width.append(width)
             self.mask.append(((1 << width) - 1) << at)
             at += width
         self.value_bit: list[int] = []
-        for variable in system.variables:
+        for variable in net.variables:
             self.value_bit.append(at)
             at += len(variable.values)
         self.bits = at
         self.initial = 0
-        for place_index, count in system.initial:
+        for place_index, count in net.initial:
             self.initial |= count << self.offset[place_index]
-        for variable in system.variables:
+        for variable in net.variables:
             self.initial |= 1 << (self.value_bit[variable.index] + variable.initial)
-        self._kills: dict[tuple[int, ...], int] = {}
-        self.rules = [self._compile(rule) for rule in system.rules]
+        self._reset_masks: dict[tuple[int, ...], int] = {}
+        self.transitions = [self._compile(transition) for transition in net.transitions]
 
     def places_mask(self, places: Iterable[int]) -> int:
         """All bits of some places."""
@@ -83,11 +83,13 @@ class Encoding:
             mask |= self.mask[place]
         return mask
 
-    def _killed(self, places: tuple[int, ...]) -> int:
-        """The same, of what an interruption ends: often what many others end as well."""
-        known = self._kills.get(places)
+    def _reset_mask(self, places: tuple[int, ...]) -> int:
+        """All bits of the places that a transition resets; many transitions share the
+        same places.
+        """
+        known = self._reset_masks.get(places)
         if known is None:
-            known = self._kills[places] = self.places_mask(places)
+            known = self._reset_masks[places] = self.places_mask(places)
         return known
 
     def _values_mask(self, variable: int, values: Iterable[int]) -> int:
@@ -96,10 +98,10 @@ class Encoding:
             mask |= 1 << (self.value_bit[variable] + value)
         return mask
 
-    def _compile(self, rule: Rule) -> Compiled:
-        c = Compiled()
-        taken = dict(rule.consume)
-        for place, count in rule.consume:
+    def _compile(self, transition: Transition) -> CompiledTransition:
+        c = CompiledTransition()
+        taken = dict(transition.consume)
+        for place, count in transition.consume:
             if self.width[place] == 1 and count == 1:
                 c.test |= self.mask[place]
                 c.need |= self.mask[place]
@@ -107,7 +109,7 @@ class Encoding:
             else:
                 c.at_least.append((self.mask[place], self.offset[place], count))
                 c.takes.append((place, count << self.offset[place]))
-        for place in rule.read:
+        for place in transition.read:
             if place in taken:
                 continue
             if self.width[place] == 1:
@@ -115,24 +117,24 @@ class Encoding:
                 c.need |= self.mask[place]
             else:
                 c.any_of.append(self.mask[place])
-        for place in rule.inhibit:
+        for place in transition.inhibit:
             c.test |= self.mask[place]
-            if place in taken or place in rule.read:  # which it never can
+            if place in taken or place in transition.read:  # which it never can
                 c.at_least.append((self.mask[place], self.offset[place], 1 << self.width[place]))
-        for variable, values in rule.guard:
+        for variable, values in transition.guard:
             mask = self._values_mask(variable, values)
             if len(values) == 1:
                 c.test |= mask
                 c.need |= mask
-            elif len(values) < len(self.system.variables[variable].values):
+            elif len(values) < len(self.net.variables[variable].values):
                 c.any_of.append(mask)
-        if rule.kill:
-            c.kill = self._killed(rule.kill)
-            c.erase = c.kill
-        for pairs, gone in ((rule.moves, True), (rule.copies, False)):
+        if transition.reset:
+            c.reset = self._reset_mask(transition.reset)
+            c.erase = c.reset
+        for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
                 c.moves.append((self.mask[source], self.mask[target], self.offset[target], gone))
-        for place, count in rule.produce:
+        for place, count in transition.produce:
             if self.width[place] == 1 and count == 1:
                 c.put |= self.mask[place]
             else:
@@ -144,8 +146,8 @@ class Encoding:
                         (1 << self.width[place]) - 1,
                     )
                 )
-        for variable, value in rule.assign:
-            all_of = self._values_mask(variable, range(len(self.system.variables[variable].values)))
+        for variable, value in transition.assign:
+            all_of = self._values_mask(variable, range(len(self.net.variables[variable].values)))
             c.erase |= all_of
             c.put |= 1 << (self.value_bit[variable] + value)
         c.clear |= c.erase
@@ -168,8 +170,8 @@ class Encoding:
     # --- firing ---------------------------------------------------------------------------------
 
     def enabled(self, number: int, state: int) -> bool:
-        """Whether a rule's tests hold; which kinds may fire now is not looked at."""
-        c = self.rules[number]
+        """Whether a transition's tests hold. The priorities of kinds are not considered."""
+        c = self.transitions[number]
         if state & c.test != c.need:
             return False
         if c.plain:
@@ -180,21 +182,21 @@ class Encoding:
         return all((state & mask) >> offset >= count for mask, offset, count in c.at_least)
 
     def fire(self, number: int, state: int) -> tuple[int, int]:
-        """The state after an enabled rule, and the bits of the places that got more than they hold.
+        """Return the state after an enabled transition, and the bits of places that overflow.
 
         A place that is full stays full.
         """
-        c = self.rules[number]
+        c = self.transitions[number]
         if c.plain:
             state &= ~c.clear
             return state | c.put, state & c.put
         return self._fire_slowly(c, number, state)
 
-    def _fire_slowly(self, c: Compiled, number: int, state: int) -> tuple[int, int]:
+    def _fire_slowly(self, c: CompiledTransition, number: int, state: int) -> tuple[int, int]:
         for _, unit in c.takes:
             state -= unit
         consumed = 0
-        for place, _ in self.system.rules[number].consume:
+        for place, _ in self.net.transitions[number].consume:
             if self.width[place] == 1:
                 consumed |= self.mask[place]
         state &= ~consumed
@@ -222,14 +224,14 @@ class Encoding:
     # --- reading --------------------------------------------------------------------------------
 
     def marking(self, state: int) -> Marking:
-        """A state in words."""
+        """Decode a state."""
         tokens = {
             place.index: count
-            for place in self.system.places
+            for place in self.net.places
             if (count := (state & self.mask[place.index]) >> self.offset[place.index])
         }
         values: dict[int, int] = {}
-        for variable in self.system.variables:
+        for variable in self.net.variables:
             base = self.value_bit[variable.index]
             for number in range(len(variable.values)):
                 if state >> (base + number) & 1:
@@ -238,4 +240,4 @@ class Encoding:
 
     def value(self, state: int, variable: int) -> Value:
         """The value that a variable has in a state."""
-        return self.system.variables[variable].values[self.marking(state).values[variable]]
+        return self.net.variables[variable].values[self.marking(state).values[variable]]

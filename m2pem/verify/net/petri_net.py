@@ -31,35 +31,36 @@ from m2pem.mission.values import Value
 
 
 class Kind(StrEnum):
-    """When a rule may fire."""
+    """The priority of a transition."""
 
     INTERNAL = "internal"
     """A step that the executive does by itself."""
     JOIN = "join"
-    """An inclusive or complex join goes on: it waits until nothing else can move."""
+    """An inclusive or complex join completes. It waits until nothing else can move."""
     OUTSIDE = "outside"
-    """An answer, report, timer, signal or message: comes when the executive has nothing to do."""
+    """An answer, report, timer, signal or message. It comes when the executive has nothing to do.
+    """
 
 
 class Role(StrEnum):
     """What a token on a place stands for."""
 
     ENTERING = "entering"
-    """It has come to an element that is executed next."""
+    """The token has entered an element that is executed next."""
     FLOW = "flow"
-    """It has come to a join by that flow, and waits there."""
+    """The token has come to a join by that sequence flow, and waits there."""
     ACTIVE = "active"
-    """It is on an activity that works, or waits at an event or gateway."""
+    """The token is on an activity that works, or waits at an event or gateway."""
     TRIGGERED = "triggered"
-    """What an element waited for has come."""
+    """The trigger that an element waited for has come."""
     CONTROL = "control"
-    """No token of the mission: something that the rules must remember."""
+    """No token of the mission, but something that the net must remember."""
     END = "end"
     """The run is over."""
 
 
 class Trigger(StrEnum):
-    """What an outside rule stands for, so that a run can be played to the engine."""
+    """What an external transition stands for, so that a run can be played to the engine."""
 
     SUCCEEDS = "succeeds"
     """A behavior's or service's work ends well."""
@@ -74,11 +75,11 @@ class Trigger(StrEnum):
     MESSAGE = "message"
     """The message of id `detail` comes from outside."""
     CONDITION = "condition"
-    """A condition that the rules cannot follow becomes true."""
+    """A condition that the net cannot follow becomes true."""
 
 
 class Flag(StrEnum):
-    """What is wrong when a rule fires at all."""
+    """Why a transition that fires is a violation."""
 
     CONFLICT = "conflict"
     """A behavior wants a resource that another one holds (RESOURCE_UNAVAILABLE)."""
@@ -87,15 +88,15 @@ class Flag(StrEnum):
     UNCAUGHT_FAILURE = "uncaught failure"
     """A behavior, service or prompt fails, and nothing catches that."""
     UNHEARD = "unheard"
-    """An escalation, signal or message is thrown that nobody can catch."""
+    """An escalation, signal or message is thrown that nothing can catch."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """Where tokens are together: a process, a subprocess, a called process, an activity's inside.
+    """A process, a subprocess, a called process, or the inside of an activity.
 
-    `element`: the id of the process or activity. `path`: ids of the activities from outside to
-    it; with those, a place is told from the same place in another call.
+    `element`: the id of the process or activity. `path`: ids of the activities from outside to it;
+    they distinguish a place from the same place in another call.
     """
 
     index: int
@@ -106,11 +107,11 @@ class Scope:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where tokens can be.
+    """A place.
 
-    `name`: unique, for people. `element`: whose it is, an id of the mission. `several`: more than
-    one token at a time is meant, or harmless. `resources` are held, by behavior `behavior`, as
-    long as there is a token.
+    `name`: unique, for people. `element`: the id of the mission's element that it belongs to.
+    `several`: more than one token at a time is meant, or harmless. `resources` are held, by
+    behavior `behavior`, as long as there is a token.
     """
 
     index: int
@@ -122,14 +123,14 @@ class Place:
     resources: tuple[str, ...] = ()
     behavior: str = ""
     once: bool = False
-    """A token that it has no room for is lost; that is a finding, unless `several` are meant."""
+    """A token that does not fit is lost; that is a finding, unless `several` are meant."""
 
 
 @dataclass(frozen=True, slots=True)
 class Variable:
     """A name of the data store that conditions depend on, with the values that it can have.
 
-    A value that is `exact` is that value; another stands for all that compare alike.
+    An `exact` value is that value; any other represents all values that compare alike.
     """
 
     index: int
@@ -138,11 +139,11 @@ class Variable:
     exact: tuple[bool, ...]
     initial: int
     key: str = ""
-    """The name in the data store; `name` also says whose it is, in a called process."""
+    """The name in the data store; `name` also says in which called process."""
 
 
-UNDOES, UNDONE = "is undone", "has been undone"
-"""Details of steps: an activity that has completed begins to be undone, or that is over."""
+COMPENSATION_BEGINS, COMPENSATION_ENDS = "is undone", "has been undone"
+"""Details of steps: the compensation of an activity begins, or is over."""
 
 
 class Action(StrEnum):
@@ -155,7 +156,7 @@ class Action(StrEnum):
     """A sequence flow."""
     TRIGGERED = "triggered"
     THROWN = "thrown"
-    """An event throws, or an activity's error goes up."""
+    """An event throws, or an activity's error propagates."""
 
 
 BEGINS = "begins"
@@ -164,7 +165,7 @@ BEGINS = "begins"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Something that a rule does, in the words of the mission: `element` is an id of it."""
+    """Something that a transition does, in the words of the mission. `element` is an id of it."""
 
     element: str
     action: Action
@@ -172,15 +173,15 @@ class Step:
 
 
 Guard = tuple[tuple[int, frozenset[int]], ...]
-"""By variable, which of its values (by place in `Variable.values`) it must have."""
+"""By variable, the allowed values (as indexes into `Variable.values`)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
-    """A rule. Places and variables are named by their index; a place is in a tuple once.
+class Transition:
+    """A transition. Places and variables are named by their index; a place is in a tuple once.
 
-    `steps`: what it does, in order; the first is the element that it belongs to. `trigger` and
-    `detail` say what comes from outside. `flag`: firing it at all is a violation.
+    `steps`: what it does, in order; the first belongs to its own element. `trigger` and `detail`
+    say what comes from outside. `flag`: firing it at all is a violation.
     """
 
     index: int
@@ -193,7 +194,7 @@ class Rule:
     guard: Guard = ()
     moves: tuple[tuple[int, int], ...] = ()
     copies: tuple[tuple[int, int], ...] = ()
-    kill: tuple[int, ...] = ()
+    reset: tuple[int, ...] = ()
     produce: tuple[tuple[int, int], ...] = ()
     assign: tuple[tuple[int, int], ...] = ()
     trigger: Trigger | None = None
@@ -202,31 +203,30 @@ class Rule:
     flagged: str = ""
     """What the flag is about: a resource, an error's code, a signal's id."""
     quiet: bool = False
-    """It inhibits because its scope must be empty: all of the scope's places are in `inhibit`."""
+    """Its scope must be empty: all of the scope's places are in `inhibit`."""
     due_us: int | None = None
-    """Of a timer whose duration is written in the mission: microseconds after it is armed."""
+    """Of a timer whose duration the mission states: microseconds after it is armed."""
 
     outcomes: tuple[int, ...] = ()
-    """What is decided when it fires (`m2pem.verify.net.petri_net`)."""
+    """The outcomes that it stands for (see the module)."""
 
     @property
     def element(self) -> str:
-        """The element that it belongs to."""
         return self.steps[0].element
 
 
 class Exactness(StrEnum):
-    """How the rules of an element differ from what the engine does."""
+    """How the net of an element differs from what the engine does."""
 
     MORE = "more"
-    """They can do all that the engine can, and more: a proof holds, an alarm may be false."""
+    """The net can do all that the engine can, and more: a proof holds, an alarm may be false."""
     BOUNDED = "bounded"
-    """They stop short of the engine, at a bound: what is proved holds up to that bound."""
+    """The net covers the engine up to a bound: what is proved holds up to that bound."""
 
 
 @dataclass(frozen=True, slots=True)
 class Approximation:
-    """Where the rules are not exactly what the engine does: at which element, and how."""
+    """An element whose net is not exactly what the engine does, and the difference."""
 
     element: str
     exactness: Exactness
@@ -234,13 +234,12 @@ class Approximation:
 
 
 @dataclass(frozen=True, slots=True)
-class System:
-    """A mission's rules.
+class PetriNet:
+    """The net of a mission.
 
     `initial`: places with a token at first. `completed`, `terminated`, `failed`: the places that
-    say how the run ended. `elements`: every element of the mission that has rules, by id, with
-    its label. `dead`: elements that no rule can reach whatever happens (drawn, but not connected).
-    `single`: places that are known to have one token at most; None: nobody has looked.
+    say how the run ended. `elements`: the label of every element that has transitions, by id.
+    `single`: places that are known to have one token at most; None: not analyzed.
     """
 
     mission: str
@@ -248,7 +247,7 @@ class System:
     scopes: tuple[Scope, ...]
     places: tuple[Place, ...]
     variables: tuple[Variable, ...]
-    rules: tuple[Rule, ...]
+    transitions: tuple[Transition, ...]
     initial: tuple[tuple[int, int], ...]
     completed: int
     terminated: int
@@ -259,40 +258,46 @@ class System:
 
     @property
     def ends(self) -> frozenset[int]:
-        """Places that say that the run is over."""
+        """The places that say that the run is over."""
         return frozenset({self.completed, self.terminated, self.failed})
 
 
 _Decided = tuple[object, ...]
 
 
-def with_outcomes(rules: Sequence[Rule]) -> list[Rule]:
-    """The same rules, each with its outcome."""
-    alike: dict[_Decided, list[tuple[Rule, int]]] = {}
+def with_outcomes(transitions: Sequence[Transition]) -> list[Transition]:
+    """Return the same transitions, each with its outcome."""
+    alike: dict[_Decided, list[tuple[Transition, int]]] = {}
     count = 0
-    made: list[Rule] = []
-    for rule in rules:
-        if rule.kind is Kind.JOIN:
-            made.append(rule)
+    made: list[Transition] = []
+    for transition in transitions:
+        if transition.kind is Kind.JOIN:
+            made.append(transition)
             continue
-        others = alike.setdefault(_decided(rule), [])
-        taken = {outcome for other, outcome in others if not _exclude(rule, other)}
+        others = alike.setdefault(_decided(transition), [])
+        taken = {outcome for other, outcome in others if not _exclude(transition, other)}
         free = [outcome for _, outcome in others if outcome not in taken]
         outcome = free[0] if free else count
         count += not free
-        others.append((rule, outcome))
-        made.append(replace(rule, outcomes=(outcome,)))
+        others.append((transition, outcome))
+        made.append(replace(transition, outcomes=(outcome,)))
     return made
 
 
-def _decided(rule: Rule) -> _Decided:
-    if rule.kind is not Kind.OUTSIDE:
-        return (rule.index,)
-    return rule.trigger, rule.detail, rule.element, rule.consume, rule.assign
+def _decided(transition: Transition) -> _Decided:
+    if transition.kind is not Kind.OUTSIDE:
+        return (transition.index,)
+    return (
+        transition.trigger,
+        transition.detail,
+        transition.element,
+        transition.consume,
+        transition.assign,
+    )
 
 
-def _exclude(one: Rule, other: Rule) -> bool:
-    """Whether two rules ask for what cannot be at once."""
+def _exclude(one: Transition, other: Transition) -> bool:
+    """Whether two transitions are never enabled together."""
     guard = dict(one.guard)
     if any(v in guard and not guard[v] & values for v, values in other.guard):
         return True
@@ -302,8 +307,8 @@ def _exclude(one: Rule, other: Rule) -> bool:
     )
 
 
-def outcomes_of(system: System) -> Mapping[int, tuple[int, ...]]:
-    """By rule, the outcomes that it stands for: several, where it was made of several rules."""
-    if any(rule.outcomes for rule in system.rules):
-        return {rule.index: rule.outcomes for rule in system.rules}
-    return {r.index: () if r.kind is Kind.JOIN else (r.index,) for r in system.rules}
+def outcomes_of(net: PetriNet) -> Mapping[int, tuple[int, ...]]:
+    """The outcomes of each transition: several, where it was fused from several transitions."""
+    if any(transition.outcomes for transition in net.transitions):
+        return {transition.index: transition.outcomes for transition in net.transitions}
+    return {r.index: () if r.kind is Kind.JOIN else (r.index,) for r in net.transitions}

@@ -1,7 +1,9 @@
-"""A smaller system that does the same: without rules that cannot fire and places only passed.
+"""A smaller net that does the same: without dead transitions and without places that are only
+passed.
 
-A token on a passed place has one thing to do, which nothing can keep it from and nobody sees:
-what comes to the place goes straight to what follows it. The places that remain keep their names.
+A token on a passed place enables one transition that nothing can disable and no property observes.
+The transition that puts the token there is fused with the one that takes it (fusion of series
+transitions). The places that remain keep their names.
 """
 
 from collections import Counter
@@ -10,98 +12,107 @@ from dataclasses import replace
 from functools import cache
 
 from m2pem.verify.net.concurrency import Concurrency, is_small
-from m2pem.verify.net.petri_net import Kind, Role, Rule, System
-from m2pem.verify.net.size_limit import Bound
+from m2pem.verify.net.petri_net import Kind, PetriNet, Role, Transition
+from m2pem.verify.net.size_limit import SizeLimit
 
 _MOST_PAIRS = 64
-"""Rules that one passed place may be replaced by."""
+"""Most fused transitions that one passed place may be replaced by."""
 
 _WORTH_TRIMMING = 0.5
-"""Of what a rule kills, what may be left. It is more use if all rules of a scope kill alike."""
+"""Share of a transition's reset arcs above which trimming is not worth it. The reduction profits if
+all transitions of a scope reset the same places.
+"""
 
 
 def simplify(
-    system: System,
+    net: PetriNet,
     seen: Collection[int] = (),
     visible: Collection[int] = (),
-    bound: Bound | None = None,
-) -> System:
-    """The same, smaller.
+    size_limit: SizeLimit | None = None,
+) -> PetriNet:
+    """Return a smaller net that does the same.
 
-    `seen`: places that a property looks at; `visible`: rules that change those, or are looked at
-    themselves. Those places stay, and such a rule stays a step of its own after what it follows.
+    `seen`: places that a property observes; `visible`: transitions that change those, or are
+    observed themselves. Those places stay, and such a transition remains a step of its own after
+    what it follows.
 
     Raises:
-        TooLargeError: it takes longer than `bound` allows.
+        TooLargeError: it takes longer than `size_limit` allows.
     """
-    bound = bound or Bound()
-    concurrency = Concurrency(system, bound) if is_small(system) else None
-    rules = list(system.rules)
+    size_limit = size_limit or SizeLimit()
+    concurrency = Concurrency(net, size_limit) if is_small(net) else None
+    transitions = list(net.transitions)
     if concurrency is not None:
-        rules = [_trim(rule, concurrency) for rule in rules if concurrency.may_fire(rule)]
-        # What the smaller system does, this one can do as well: so that is true of it, too.
-        system = replace(system, single=concurrency.single)
-    return renumbered(system, _fused(system, rules, frozenset(seen), frozenset(visible), bound))
+        transitions = [
+            _trim(transition, concurrency)
+            for transition in transitions
+            if concurrency.may_fire(transition)
+        ]
+        # What the smaller net does, this one can do as well: so that is true of it, too.
+        net = replace(net, single=concurrency.single)
+    return renumbered(
+        net, _fused(net, transitions, frozenset(seen), frozenset(visible), size_limit)
+    )
 
 
-def _trim(rule: Rule, concurrency: Concurrency) -> Rule:
-    """Without what cannot be there when it fires anyway."""
-    needed = [place for place, _ in rule.consume] + list(rule.read)
-    if not needed or not (rule.inhibit or rule.kill):
-        return rule
+def _trim(transition: Transition, concurrency: Concurrency) -> Transition:
+    """Remove arcs from places that never have a token when the transition fires."""
+    needed = [place for place, _ in transition.consume] + list(transition.read)
+    if not needed or not (transition.inhibit or transition.reset):
+        return transition
 
     possible = -1
     for place in needed:
         possible &= concurrency.rows[place] | 1 << place
-    told = {t for _, t in (*rule.moves, *rule.copies)}
-    inhibit = tuple(p for p in rule.inhibit if possible >> p & 1)
-    absent = set(rule.inhibit) - told
-    kill = tuple(p for p in rule.kill if p not in absent and (possible >> p & 1 or p in told))
-    if len(kill) > len(rule.kill) * _WORTH_TRIMMING:
-        kill = rule.kill
-    return replace(rule, inhibit=inhibit, kill=kill)
+    targets = {t for _, t in (*transition.moves, *transition.copies)}
+    inhibit = tuple(p for p in transition.inhibit if possible >> p & 1)
+    absent = set(transition.inhibit) - targets
+    reset = tuple(
+        p for p in transition.reset if p not in absent and (possible >> p & 1 or p in targets)
+    )
+    if len(reset) > len(transition.reset) * _WORTH_TRIMMING:
+        reset = transition.reset
+    return replace(transition, inhibit=inhibit, reset=reset)
 
 
-def renumbered(system: System, rules: list[Rule]) -> System:
-    """A system with other rules, and only the places and numbers that those use."""
-    used = set(system.ends) | {place for place, _ in system.initial}
-    for rule in rules:
-        used |= {p for p, _ in (*rule.consume, *rule.produce)} | set(rule.read)
-        for one, other in (*rule.moves, *rule.copies):
+def renumbered(net: PetriNet, transitions: list[Transition]) -> PetriNet:
+    """Return a net with other transitions, and only the places and numbers that those use."""
+    used = set(net.ends) | {place for place, _ in net.initial}
+    for transition in transitions:
+        used |= {p for p, _ in (*transition.consume, *transition.produce)} | set(transition.read)
+        for one, other in (*transition.moves, *transition.copies):
             used |= {one, other}
-    order = [place for place in system.places if place.index in used]
+    order = [place for place in net.places if place.index in used]
     number = {place.index: n for n, place in enumerate(order)}
 
     @cache  # what ends one scope says the same, and as much as the scope is large
-    def killed(places: tuple[int, ...]) -> tuple[int, ...]:
+    def reset_places(places: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(number[p] for p in places if p in number)
 
     made = tuple(
         replace(
-            rule,
+            transition,
             index=n,
-            consume=tuple((number[p], c) for p, c in rule.consume),
-            produce=tuple((number[p], c) for p, c in rule.produce),
-            read=tuple(number[p] for p in rule.read),
-            inhibit=tuple(number[p] for p in rule.inhibit if p in number),
-            kill=killed(rule.kill),
-            moves=tuple((number[a], number[b]) for a, b in rule.moves),
-            copies=tuple((number[a], number[b]) for a, b in rule.copies),
+            consume=tuple((number[p], c) for p, c in transition.consume),
+            produce=tuple((number[p], c) for p, c in transition.produce),
+            read=tuple(number[p] for p in transition.read),
+            inhibit=tuple(number[p] for p in transition.inhibit if p in number),
+            reset=reset_places(transition.reset),
+            moves=tuple((number[a], number[b]) for a, b in transition.moves),
+            copies=tuple((number[a], number[b]) for a, b in transition.copies),
         )
-        for n, rule in enumerate(rules)
+        for n, transition in enumerate(transitions)
     )
     return replace(
-        system,
+        net,
         places=tuple(replace(place, index=n) for n, place in enumerate(order)),
-        rules=made,
-        initial=tuple((number[p], c) for p, c in system.initial),
-        completed=number[system.completed],
-        terminated=number[system.terminated],
-        failed=number[system.failed],
+        transitions=made,
+        initial=tuple((number[p], c) for p, c in net.initial),
+        completed=number[net.completed],
+        terminated=number[net.terminated],
+        failed=number[net.failed],
         single=(
-            None
-            if system.single is None
-            else frozenset(number[p] for p in system.single if p in number)
+            None if net.single is None else frozenset(number[p] for p in net.single if p in number)
         ),
     )
 
@@ -110,44 +121,46 @@ def renumbered(system: System, rules: list[Rule]) -> System:
 
 
 def _fused(
-    system: System,
-    rules: list[Rule],
+    net: PetriNet,
+    transitions: list[Transition],
     seen: frozenset[int],
     visible: frozenset[int],
-    bound: Bound,
-) -> list[Rule]:
+    size_limit: SizeLimit,
+) -> list[Transition]:
     looked_at: set[int] = set(seen)
     watched: set[int] = set()
-    for rule in rules:
-        sources = {source for source, _ in (*rule.moves, *rule.copies)}
-        targets = {target for _, target in (*rule.moves, *rule.copies)}
-        looked_at |= set(rule.read) | sources | targets
-        if rule.kind is Kind.INTERNAL:
-            watched |= set(rule.read) | sources
-            if len(rule.consume) == 0 or rule.inhibit:
-                watched |= _seen_absent(system, rule)
-            if any(rule.read) or rule.moves:
-                watched |= {p for p, _ in rule.consume}
-    initial = {place for place, _ in system.initial}
-    alive: dict[int, Rule] = dict(enumerate(rules))
+    for transition in transitions:
+        sources = {source for source, _ in (*transition.moves, *transition.copies)}
+        targets = {target for _, target in (*transition.moves, *transition.copies)}
+        looked_at |= set(transition.read) | sources | targets
+        if transition.kind is Kind.INTERNAL:
+            watched |= set(transition.read) | sources
+            if len(transition.consume) == 0 or transition.inhibit:
+                watched |= _seen_absent(net, transition)
+            if any(transition.read) or transition.moves:
+                watched |= {p for p, _ in transition.consume}
+    initial = {place for place, _ in net.initial}
+    alive: dict[int, Transition] = dict(enumerate(transitions))
     producers: dict[int, set[int]] = {}
     consumers: dict[int, set[int]] = {}
-    following = len(rules)
-    for n, rule in alive.items():
-        _note(n, rule, producers, consumers)
-    for place in system.places:
+    following = len(transitions)
+    for n, transition in alive.items():
+        _note(n, transition, producers, consumers)
+    for place in net.places:
         p = place.index
         if place.role not in (Role.ENTERING, Role.TRIGGERED) or p in initial or p in looked_at:
             continue
         eaters = [alive[n] for n in sorted(consumers.get(p, ()))]
         makers = sorted(producers.get(p, ()))
-        if not eaters or not all(_passes(rule, p, watched) for rule in eaters):
+        if not eaters or not all(_passes(transition, p, watched) for transition in eaters):
             continue
-        if any(rule.index in visible for rule in eaters):  # of joined ones, that of the first
+        if any(
+            transition.index in visible for transition in eaters
+        ):  # of joined ones, that of the first
             continue
         if len(eaters) * len(makers) > max(_MOST_PAIRS, len(eaters) + len(makers)):
             continue
-        bound.look(place.element)
+        size_limit.check_time(place.element)
         if any(dict(alive[n].produce)[p] != 1 or n in consumers[p] for n in makers):
             continue
         for n in makers:
@@ -161,43 +174,51 @@ def _fused(
     return list(alive.values())
 
 
-def _seen_absent(system: System, rule: Rule) -> set[int]:
-    """Places whose emptiness a rule looks at, other than with all of its scope's."""
-    if rule.quiet:
+def _seen_absent(net: PetriNet, transition: Transition) -> set[int]:
+    """Places that a transition tests for emptiness, other than with all places of its scope."""
+    if transition.quiet:
         return set()
-    return set(rule.inhibit)
+    return set(transition.inhibit)
 
 
 def _note(
-    n: int, rule: Rule, producers: dict[int, set[int]], consumers: dict[int, set[int]]
+    n: int, transition: Transition, producers: dict[int, set[int]], consumers: dict[int, set[int]]
 ) -> None:
-    for place, _ in rule.produce:
+    for place, _ in transition.produce:
         producers.setdefault(place, set()).add(n)
-    for place, _ in rule.consume:
+    for place, _ in transition.consume:
         consumers.setdefault(place, set()).add(n)
 
 
 def _forget(
-    n: int, rule: Rule, producers: dict[int, set[int]], consumers: dict[int, set[int]]
+    n: int, transition: Transition, producers: dict[int, set[int]], consumers: dict[int, set[int]]
 ) -> None:
-    for place, _ in rule.produce:
+    for place, _ in transition.produce:
         producers[place].discard(n)
-    for place, _ in rule.consume:
+    for place, _ in transition.consume:
         consumers[place].discard(n)
 
 
-def _passes(rule: Rule, place: int, watched: set[int]) -> bool:
-    """Whether a rule only passes a token of a place on, to where nobody watches at once."""
+def _passes(transition: Transition, place: int, watched: set[int]) -> bool:
+    """Whether a transition only passes a token of a place on, to where nothing observes
+    it at once.
+    """
     return (
-        rule.kind is Kind.INTERNAL
-        and rule.consume == ((place, 1),)
-        and not (rule.read or rule.inhibit or rule.kill or rule.moves or rule.copies)
-        and not (rule.guard or rule.assign or rule.flag)
-        and not any(p in watched or p == place for p, _ in rule.produce)
+        transition.kind is Kind.INTERNAL
+        and transition.consume == ((place, 1),)
+        and not (
+            transition.read
+            or transition.inhibit
+            or transition.reset
+            or transition.moves
+            or transition.copies
+        )
+        and not (transition.guard or transition.assign or transition.flag)
+        and not any(p in watched or p == place for p, _ in transition.produce)
     )
 
 
-def _joined(maker: Rule, eater: Rule, place: int) -> Rule:
+def _joined(maker: Transition, eater: Transition, place: int) -> Transition:
     produce = Counter(dict(maker.produce))
     del produce[place]
     produce.update(dict(eater.produce))

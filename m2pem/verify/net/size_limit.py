@@ -1,18 +1,18 @@
-"""How much may be made of one mission: some elements stand for very many rules."""
+"""How large the net of one mission may grow: some elements have very many transitions."""
 
 import time
 from dataclasses import dataclass, field
 
-MOST_RULES = 200_000
-"""More are never searched in any time that somebody waits."""
+MOST_TRANSITIONS = 200_000
+"""Larger nets are not searched within any useful time."""
 MOST_CASES = 500_000
-"""Combinations of values and of truths, all together."""
+"""Combinations of values and of truths that a translation goes through."""
 
 
 class TooLargeError(Exception):
-    """A mission stands for more than can be looked at.
+    """A mission's net is too large to build.
 
-    `element`: what was being spelled out; `late`: it is the time that was too short.
+    `element`: the element that was being translated; `late`: the limit of time was reached.
     """
 
     def __init__(self, element: str, why: str, *, late: bool = False) -> None:
@@ -22,27 +22,29 @@ class TooLargeError(Exception):
 
 
 @dataclass(slots=True)
-class Bound:
-    """`until_s`: by `time.monotonic`; None: whenever."""
+class SizeLimit:
+    """Counts what a translation builds. `until_s`: deadline by `time.monotonic`; None:
+    no deadline.
+    """
 
     until_s: float | None = None
-    most_rules: int = MOST_RULES
-    rules: int = field(default=0, init=False)
+    most_transitions: int = MOST_TRANSITIONS
+    transitions: int = field(default=0, init=False)
     cases: int = field(default=0, init=False)
 
-    def rule(self, element: str) -> None:
-        """A rule is made for an element.
+    def count_transition(self, element: str) -> None:
+        """Count a transition of an element.
 
         Raises:
             TooLargeError: that is too many, or it takes too long.
         """
-        self.rules += 1
-        if self.rules > self.most_rules:
-            raise TooLargeError(element, f"more than {self.most_rules:,} rules")
-        self.look(element)
+        self.transitions += 1
+        if self.transitions > self.most_transitions:
+            raise TooLargeError(element, f"more than {self.most_transitions:,} transitions")
+        self.check_time(element)
 
-    def case(self, element: str) -> None:
-        """One more combination of what an element reads or writes is gone through.
+    def count_case(self, element: str) -> None:
+        """Count a combination of what an element reads or writes.
 
         Raises:
             TooLargeError: that is too many, or it takes too long.
@@ -50,13 +52,9 @@ class Bound:
         self.cases += 1
         if self.cases > MOST_CASES:
             raise TooLargeError(element, f"more than {MOST_CASES:,} combinations of its data")
-        self.look(element)
+        self.check_time(element)
 
-    def look(self, element: str) -> None:
-        """Look at the clock.
-
-        Raises:
-            TooLargeError: it takes too long.
-        """
+    def check_time(self, element: str) -> None:
+        """Raises TooLargeError if the deadline is over."""
         if self.until_s is not None and time.monotonic() > self.until_s:
             raise TooLargeError(element, "the limit of time", late=True)

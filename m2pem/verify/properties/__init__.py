@@ -1,4 +1,4 @@
-"""What is checked of every mission. `ALL` lists the properties, each a function of a `Searched`."""
+"""Properties that are checked of every mission; `ALL` lists them."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from m2pem.verify.properties.events import (
     is_caught,
     prompts_have_decisions,
 )
-from m2pem.verify.properties.results import Result, Searched
+from m2pem.verify.properties.results import Result, SearchedMission
 from m2pem.verify.properties.soundness import (
     can_complete,
     completes_if_fair,
@@ -25,7 +25,7 @@ from m2pem.verify.properties.soundness import (
     proper_completion,
 )
 
-ALL: tuple[Callable[[Searched], Result], ...] = (
+ALL: tuple[Callable[[SearchedMission], Result], ...] = (
     no_deadlock,
     proper_completion,
     can_complete,
@@ -43,4 +43,4 @@ ALL: tuple[Callable[[Searched], Result], ...] = (
     decisions_handled,
 )
 
-__all__ = ["ALL", "Searched"]
+__all__ = ["ALL", "SearchedMission"]

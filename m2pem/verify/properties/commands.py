@@ -8,27 +8,27 @@ behavior begins on that vehicle.
 from collections.abc import Collection
 from dataclasses import replace
 
-from m2pem.verify.net.petri_net import Flag, Place, Role, Rule, System, Trigger
-from m2pem.verify.properties.results import Result, Searched, Violation
+from m2pem.verify.net.petri_net import Flag, PetriNet, Place, Role, Transition, Trigger
+from m2pem.verify.properties.results import Result, SearchedMission, Violation
 
 INTERRUPTED = "interrupted-commanded-again"
-"""The property that is read from rules that also note which vehicles are interrupted."""
+"""The property that is read from the net of `watch_interruptions`."""
 
 
-def _flagged(searched: Searched, flag: Flag, message: str) -> list[Violation]:
-    """The shortest run to each element and matter that has a flag."""
-    found, rules = searched.found, searched.system.rules
+def _flagged(searched: SearchedMission, flag: Flag, message: str) -> list[Violation]:
+    """The shortest run to each element and subject that has a flag."""
+    found, transitions = searched.found, searched.net.transitions
     first: dict[tuple[str, str], tuple[int, int]] = {}
-    for rule, state in sorted(found.of_flag(flag).items(), key=lambda each: each[1]):
-        key = (_thrower(rules[rule].steps), rules[rule].flagged)
-        first.setdefault(key, (rule, state))
+    for transition, state in sorted(found.of_flag(flag).items(), key=lambda each: each[1]):
+        key = (_thrower(transitions[transition].steps), transitions[transition].flagged)
+        first.setdefault(key, (transition, state))
     return [
         Violation(
             message.format(element=searched.label(element), what=what),
-            _held_by(searched, rule, element),
-            (*found.run_to(state), rule),
+            _held_by(searched, transition, element),
+            (*found.run_to(state), transition),
         )
-        for (element, what), (rule, state) in first.items()
+        for (element, what), (transition, state) in first.items()
     ]
 
 
@@ -39,14 +39,16 @@ def _thrower(steps: "tuple[object, ...]") -> str:
     return str(getattr(steps[0], "element", "")) if steps else ""
 
 
-def _held_by(searched: Searched, rule: int, element: str) -> tuple[str, ...]:
-    """The element, and those that hold what it wants."""
-    places = searched.system.places
-    others = [places[p].element for p in searched.system.rules[rule].read if places[p].resources]
+def _held_by(searched: SearchedMission, transition: int, element: str) -> tuple[str, ...]:
+    """The element, and those that hold what it needs."""
+    places = searched.net.places
+    others = [
+        places[p].element for p in searched.net.transitions[transition].read if places[p].resources
+    ]
     return tuple(dict.fromkeys((element, *others)))
 
 
-def one_behavior_each(searched: Searched) -> Result:
+def one_behavior_each(searched: SearchedMission) -> Result:
     """No vehicle or payload is commanded by two behaviors at once."""
     violations = [
         Violation(
@@ -63,7 +65,7 @@ def one_behavior_each(searched: Searched) -> Result:
     )
 
 
-def errors_caught(searched: Searched) -> Result:
+def errors_caught(searched: SearchedMission) -> Result:
     """No error that the model throws ends the run uncaught."""
     violations = _flagged(
         searched, Flag.UNCAUGHT, "error {what} of {element} is caught by nothing: the run fails"
@@ -73,7 +75,7 @@ def errors_caught(searched: Searched) -> Result:
     )
 
 
-def failures_handled(searched: Searched) -> Result:
+def failures_handled(searched: SearchedMission) -> Result:
     """A behavior, service or prompt that may fail has an error boundary event around it."""
     violations = _flagged(
         searched,
@@ -88,7 +90,7 @@ def failures_handled(searched: Searched) -> Result:
     )
 
 
-def interrupted_commanded_again(searched: Searched) -> Result:
+def interrupted_commanded_again(searched: SearchedMission) -> Result:
     """Every vehicle whose behavior was interrupted is commanded again, or stopped, by the model."""
     text = "Every interrupted vehicle is commanded again, or stopped, by the model."
     found = searched.watched
@@ -97,7 +99,7 @@ def interrupted_commanded_again(searched: Searched) -> Result:
     first: dict[str, int] = {}
     for state in found.terminals:
         tokens = found.marking(state).tokens
-        if found.system.failed in tokens:
+        if found.net.failed in tokens:
             continue
         for place, resource in searched.resources.items():
             if place in tokens:
@@ -118,103 +120,103 @@ def interrupted_commanded_again(searched: Searched) -> Result:
 
 
 def _interruption(
-    searched: Searched, found: "object", run: tuple[int, ...], resource: str
+    searched: SearchedMission, found: "object", run: tuple[int, ...], resource: str
 ) -> tuple[str, ...]:
     """The element that interrupted last, and the task that it interrupted."""
     watched = searched.watched
     assert watched is not None
     del found
     places = {p for p, r in searched.resources.items() if r == resource}
-    for rule in reversed(run):
-        each = watched.system.rules[rule]
+    for transition in reversed(run):
+        each = watched.net.transitions[transition]
         marked = {t for _, t in each.copies} | {p for p, _ in each.produce}
         if marked & places:
             held = [
-                watched.system.places[p].element
+                watched.net.places[p].element
                 for p, t in each.copies
-                if t in places and watched.system.places[p].resources
+                if t in places and watched.net.places[p].resources
             ]
             held += [
-                watched.system.places[p].element
+                watched.net.places[p].element
                 for p, _ in each.consume
-                if resource in watched.system.places[p].resources
+                if resource in watched.net.places[p].resources
             ]
             return tuple(dict.fromkeys((each.element, *held)))
     return ()
 
 
 def watch_interruptions(
-    system: System, vehicles: Collection[str]
-) -> tuple[System, dict[int, str]] | None:
-    """The same system, and by place the vehicle; None: no vehicle can be interrupted.
+    net: PetriNet, vehicles: Collection[str]
+) -> tuple[PetriNet, dict[int, str]] | None:
+    """Return the extended net, and by place the vehicle; None: no vehicle can be interrupted.
 
-    Payloads are not looked at: a camera that is left alone does no harm.
+    Payloads are not considered: a camera that no behavior commands does no harm.
     """
     held = {
         p.index: mine
-        for p in system.places
+        for p in net.places
         if (mine := tuple(each for each in p.resources if each in vehicles))
     }
-    if not any(_interrupts(system, rule, held) for rule in system.rules):
+    if not any(_interrupts(net, transition, held) for transition in net.transitions):
         return None
     resources = sorted({r for each in held.values() for r in each})
-    first = len(system.places)
+    first = len(net.places)
     number = {resource: first + n for n, resource in enumerate(resources)}
-    places = [
-        Place(number[r], f"{r}~interrupted", system.process, 0, Role.CONTROL) for r in resources
-    ]
-    rules = [_noting(system, rule, held, number) for rule in system.rules]
-    watched = replace(system, places=(*system.places, *places), rules=tuple(rules), single=None)
+    places = [Place(number[r], f"{r}~interrupted", net.process, 0, Role.CONTROL) for r in resources]
+    transitions = [_noting(net, transition, held, number) for transition in net.transitions]
+    watched = replace(
+        net, places=(*net.places, *places), transitions=tuple(transitions), single=None
+    )
     return watched, {n: resource for resource, n in number.items()}
 
 
 def _interrupts(
-    system: System, rule: Rule, held: dict[int, tuple[str, ...]]
+    net: PetriNet, transition: Transition, held: dict[int, tuple[str, ...]]
 ) -> list[tuple[int, bool]]:
-    """Holding places that a rule takes the token off; whether for sure."""
-    if any(p in system.ends for p, _ in rule.produce):
+    """Holding places that a transition takes the token off; and whether it always does."""
+    if any(p in net.ends for p, _ in transition.produce):
         return []
-    lost = [(p, False) for p in rule.kill if p in held]
-    if rule.trigger not in (Trigger.SUCCEEDS, Trigger.FAILS):
-        lost += [(p, True) for p, _ in rule.consume if p in held]
-    lost += [(s, False) for s, _ in rule.moves if s in held]
+    lost = [(p, False) for p in transition.reset if p in held]
+    if transition.trigger not in (Trigger.SUCCEEDS, Trigger.FAILS):
+        lost += [(p, True) for p, _ in transition.consume if p in held]
+    lost += [(s, False) for s, _ in transition.moves if s in held]
     return lost
 
 
 def _noting(
-    system: System, rule: Rule, held: dict[int, tuple[str, ...]], number: dict[str, int]
-) -> Rule:
-    lost = _interrupts(system, rule, held)
-    begun = {r for p, _ in rule.produce for r in held.get(p, ())}
-    kill, produce = set(rule.kill), dict(rule.produce)
-    copies = list(rule.copies)
+    net: PetriNet, transition: Transition, held: dict[int, tuple[str, ...]], number: dict[str, int]
+) -> Transition:
+    lost = _interrupts(net, transition, held)
+    begun = {r for p, _ in transition.produce for r in held.get(p, ())}
+    reset, produce = set(transition.reset), dict(transition.produce)
+    copies = list(transition.copies)
     for place, sure in lost:
         for resource in held[place]:
             if resource in begun:
                 continue
             note = number[resource]
             if sure:
-                kill.add(note)
+                reset.add(note)
                 produce[note] = 1
             else:
                 copies.insert(0, (place, note))
     for resource in begun:
-        kill.add(number[resource])
+        reset.add(number[resource])
     if not lost and not begun:
-        return rule
-    moved = [pair for pair in rule.moves if pair[0] not in held]
-    held_moves = [pair for pair in rule.moves if pair[0] in held]
+        return transition
+    moved = [pair for pair in transition.moves if pair[0] not in held]
+    held_moves = [pair for pair in transition.moves if pair[0] in held]
     if held_moves:  # the note is made before the token moves
         return replace(
-            rule,
+            transition,
             moves=(),
             copies=(*copies, *held_moves, *moved),
-            kill=tuple(sorted(kill | {a for a, _ in (*held_moves, *moved)})),
+            reset=tuple(sorted(reset | {a for a, _ in (*held_moves, *moved)})),
             produce=tuple(sorted(produce.items())),
         )
     return replace(
-        rule,
+        transition,
         copies=tuple(copies),
-        kill=tuple(sorted(kill)),
+        reset=tuple(sorted(reset)),
         produce=tuple(sorted(produce.items())),
     )

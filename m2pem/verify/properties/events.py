@@ -5,13 +5,13 @@ handled?
 from m2pem.mission import elements as e
 from m2pem.mission.events import MessageEventDefinition, RootElement, SignalEventDefinition
 from m2pem.verify.net.petri_net import Flag, Trigger
-from m2pem.verify.properties.results import Result, Searched, Violation
+from m2pem.verify.properties.results import Result, SearchedMission, Violation
 from m2pem.verify.translate.events import awaited
-from m2pem.verify.translate.mission import messages_from_strangers
+from m2pem.verify.translate.mission import messages_from_black_box_pools
 from m2pem.verify.translate.throwing import thrown_by
 
 
-def _thrown(searched: Searched) -> set[str]:
+def _thrown(searched: SearchedMission) -> set[str]:
     found: set[str] = set()
     for node in searched.mission.nodes:
         signals, messages = thrown_by(node)
@@ -19,10 +19,10 @@ def _thrown(searched: Searched) -> set[str]:
     return found
 
 
-def can_be_triggered(searched: Searched) -> Result:
-    """What waits for a signal or message that nothing sends waits for ever."""
+def can_be_triggered(searched: SearchedMission) -> Result:
+    """Every catcher waits for a signal or message that something sends."""
     mission = searched.mission
-    sent = _thrown(searched) | set(messages_from_strangers(mission))
+    sent = _thrown(searched) | set(messages_from_black_box_pools(mission))
     sent |= {s.id for s in mission.signals.values() if s.from_operator or s.returned}
     sent |= {m.id for m in mission.messages.values() if m.from_operator}
     violations: list[Violation] = []
@@ -52,8 +52,8 @@ def can_be_triggered(searched: Searched) -> Result:
     )
 
 
-def is_caught(searched: Searched) -> Result:
-    """A signal or escalation that is thrown can be caught by something."""
+def is_caught(searched: SearchedMission) -> Result:
+    """Every signal or escalation that is thrown can be caught."""
     mission = searched.mission
     caught: set[str] = set()
     for node in mission.nodes:
@@ -71,15 +71,15 @@ def is_caught(searched: Searched) -> Result:
                     (node.id,),
                 )
             )
-    found, rules = searched.found, searched.system.rules
-    for rule, state in sorted(found.of_flag(Flag.UNHEARD).items(), key=lambda each: each[1]):
-        element = rules[rule].element
+    found, transitions = searched.found, searched.net.transitions
+    for transition, state in sorted(found.of_flag(Flag.UNHEARD).items(), key=lambda each: each[1]):
+        element = transitions[transition].element
         violations.append(
             Violation(
-                f"escalation {rules[rule].flagged} of {searched.label(element)} is caught by"
-                " nothing",
+                f"escalation {transitions[transition].flagged} of {searched.label(element)}"
+                " is caught by nothing",
                 (element,),
-                (*found.run_to(state), rule),
+                (*found.run_to(state), transition),
             )
         )
     return searched.result(
@@ -90,8 +90,8 @@ def is_caught(searched: Searched) -> Result:
     )
 
 
-def prompts_have_decisions(searched: Searched) -> Result:
-    """Every prompt has a decision to choose."""
+def prompts_have_decisions(searched: SearchedMission) -> Result:
+    """Every prompt offers a decision."""
     violations = [
         Violation(f"{searched.label(node.id)} asks, and has no decision to answer with", (node.id,))
         for node in searched.mission.nodes
@@ -102,17 +102,24 @@ def prompts_have_decisions(searched: Searched) -> Result:
     )
 
 
-def decisions_handled(searched: Searched) -> Result:
+def decisions_handled(searched: SearchedMission) -> Result:
     """No decision of an operator leads to a gateway without a flow for it."""
-    found, rules = searched.found, searched.system.rules
+    found, transitions = searched.found, searched.net.transitions
     violations: list[Violation] = []
     seen: set[tuple[str, str]] = set()
-    for rule, state in sorted(found.fired.items(), key=lambda each: each[1]):
-        thrown = [s for s in rules[rule].steps if s.action == "thrown" and s.detail == "NO_FLOW"]
+    for transition, state in sorted(found.fired.items(), key=lambda each: each[1]):
+        thrown = [
+            s
+            for s in transitions[transition].steps
+            if s.action == "thrown" and s.detail == "NO_FLOW"
+        ]
         if not thrown:
             continue
-        run = (*found.run_to(state), rule)
-        asked = next((rules[r] for r in reversed(run) if rules[r].trigger is Trigger.ANSWER), None)
+        run = (*found.run_to(state), transition)
+        asked = next(
+            (transitions[r] for r in reversed(run) if transitions[r].trigger is Trigger.ANSWER),
+            None,
+        )
         if asked is None or (asked.element, thrown[0].element) in seen:
             continue
         seen.add((asked.element, thrown[0].element))

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from m2pem.mission.mission import Mission
-from m2pem.verify.net.petri_net import Role, System
+from m2pem.verify.net.petri_net import PetriNet, Role
 from m2pem.verify.search.explore import Exploration
 
 
 class Verdict(StrEnum):
-    """Three-valued: a search that was cut short has seen no violation, and proved nothing."""
+    """Three-valued: an incomplete search that has seen no violation has proved nothing."""
 
     HOLDS = "holds"
     VIOLATED = "violated"
@@ -20,10 +20,11 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """One way in which a property does not hold.
+    """One way in which a property is violated.
 
-    `elements`: where it shows (ids), the stuck or doubled ones first. `run`: the rules that lead
-    there, by number in the system that was searched; `cycle`: those that then go on for ever.
+    `elements`: where it shows (ids), those that are stuck or have a second token first. `run`: the
+    transitions that lead there, by number in the net that was searched; `cycle`: those that then go
+    on for ever.
     """
 
     message: str
@@ -37,7 +38,7 @@ class Result:
     """The verdict on one property, or on one requirement of the mission's author (`required`).
 
     `property`: its name, or the requirement's id. `text`: what it says. `warning`: a violation of
-    it is a warning, unless strict. `author`: what the author says that a requirement is for.
+    it is a warning, unless strict. `author`: the author's own description of the requirement.
     """
 
     property: str
@@ -46,66 +47,69 @@ class Result:
     violations: tuple[Violation, ...] = ()
     warning: bool = False
     covered: str = ""
-    """Of an undecided one: what was looked at, or what stands in the way. Of one that holds: in
-    what sense, if there is more to say."""
+    """Undecided: what was searched, or why there is no answer. Holds: in what sense, if there is
+    more to say.
+    """
     required: bool = False
     author: str = ""
 
 
 MOST_VIOLATIONS = 10
-"""Of one property: the shortest ways to each place where it shows."""
+"""Most violations of one property: the shortest runs to each place where it shows."""
 
 
 @dataclass(slots=True)
-class Searched:
-    """`watched`: the same, of the rules that also note which resources were interrupted, by place
-    the resource."""
+class SearchedMission:
+    """A mission, its net and its exploration.
+
+    `watched`: the exploration of the net that also notes which vehicles were interrupted;
+    `resources`: the vehicle of each such place.
+    """
 
     mission: Mission
-    system: System
+    net: PetriNet
     found: Exploration
     watched: Exploration | None = None
     resources: dict[int, str] = field(default_factory=dict)
 
     def label(self, element: str) -> str:
-        """What to call an element in front of a person."""
+        """The name of an element for people."""
         known = self.mission.elements.get(element)
         if known is None or not known.name:
             return element
         return f"{element} ({known.name})"
 
     def labels(self, elements: tuple[str, ...]) -> str:
-        """The same, of several."""
+        """The names of several elements."""
         return ", ".join(self.label(each) for each in elements)
 
     def where(self, state: int) -> tuple[str, ...]:
-        """Elements with a token in a state, the innermost of those around each other only."""
-        system = self.system
+        """Elements with a token in a state, without those around other such elements."""
+        net = self.net
         places = [
-            system.places[p]
+            net.places[p]
             for p in self.found.marking(state).tokens
-            if system.places[p].role not in (Role.CONTROL, Role.END)
+            if net.places[p].role not in (Role.CONTROL, Role.END)
         ]
         around: set[tuple[str, ...]] = set()
         for place in places:
-            path = system.scopes[place.scope].path
+            path = net.scopes[place.scope].path
             around |= {path[:n] for n in range(1, len(path) + 1)}
         inner = [
             place
             for place in places
-            if (*system.scopes[place.scope].path, place.element) not in around
+            if (*net.scopes[place.scope].path, place.element) not in around
         ]
         return tuple(dict.fromkeys(self.node_of(place.element) for place in inner))
 
     def node_of(self, element: str) -> str:
-        """A token that waits at a join by a flow is at the join."""
+        """The join at which a token of a flow waits; for other elements, the element itself."""
         known = self.mission.elements.get(element)
         target = getattr(known, "target", None)
         return target.id if target is not None else element
 
     def ended(self, state: int) -> bool:
-        """Whether the run is over in a state."""
-        return bool(self.found.marking(state).tokens.keys() & self.system.ends)
+        return bool(self.found.marking(state).tokens.keys() & self.net.ends)
 
     def result(
         self,
@@ -118,8 +122,10 @@ class Searched:
         found: Exploration | None = None,
         note: str = "",
     ) -> Result:
-        """Violated if there are violations; else it holds, if all was seen. `static`: no search
-        was needed. `note`: in what sense it holds."""
+        """Violated if there are violations; else it holds, if all was seen.
+
+        `static`: no search was needed. `note`: in what sense it holds.
+        """
         if violations:
             return Result(
                 name, text, Verdict.VIOLATED, tuple(violations[:MOST_VIOLATIONS]), warning

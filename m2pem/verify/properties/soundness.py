@@ -5,16 +5,16 @@ from collections.abc import Sequence
 from m2pem.mission import elements as e
 from m2pem.mission.events import CompensateEventDefinition
 from m2pem.verify.net.petri_net import Exactness, Flag, Role, Trigger
-from m2pem.verify.properties.results import Result, Searched, Violation
-from m2pem.verify.search.fairness import FairRounds
+from m2pem.verify.properties.results import Result, SearchedMission, Violation
+from m2pem.verify.search.fairness import FairCycles
 
 
-def proper_completion(searched: Searched) -> Result:
-    """Nothing is left behind, and no end event is reached twice in one instance of its scope."""
+def proper_completion(searched: SearchedMission) -> Result:
+    """No token is left behind, and no end event is reached twice in one instance of its scope."""
     violations: list[Violation] = []
     found = searched.found
     for place in found.overflows:
-        each = searched.system.places[place]
+        each = searched.net.places[place]
         if each.once:
             violations.append(
                 Violation(
@@ -30,12 +30,12 @@ def proper_completion(searched: Searched) -> Result:
     )
 
 
-def one_token_each(searched: Searched) -> Result:
+def one_token_each(searched: SearchedMission) -> Result:
     """No element has two tokens at a time where the mission means one."""
     violations: list[Violation] = []
     found = searched.found
     for place in found.overflows:
-        each = searched.system.places[place]
+        each = searched.net.places[place]
         if each.once:
             continue
         more = " and more and more" if place in found.beyond else ""
@@ -57,15 +57,15 @@ IN_EACH_STATE = (
     "for runs in which that is so of each state that comes again and again: orders that lead to"
     " the same were left out of the search"
 )
-"""In what sense it is proved to end, where not every order was searched."""
+"""The sense in which completion is proved, where the search used a reduction."""
 
 
-def no_deadlock(searched: Searched) -> Result:
-    """There is always something that can happen, until the run is over."""
+def no_deadlock(searched: SearchedMission) -> Result:
+    """Something can always happen, until the run is over."""
     return searched.result("no-deadlock", "No token is stuck for ever.", _stuck(searched))
 
 
-def _stuck(searched: Searched) -> list[Violation]:
+def _stuck(searched: SearchedMission) -> list[Violation]:
     """The nearest state of each set of elements at which a run can be stuck."""
     found = searched.found
     first: dict[tuple[str, ...], int] = {}
@@ -82,20 +82,20 @@ def _stuck(searched: Searched) -> list[Violation]:
     ]
 
 
-def _reaching(searched: Searched, goals: list[int]) -> bytearray:
-    """Which states some of the goals can be reached from, if no work fails uncaught.
+def _reaching(searched: SearchedMission, goals: list[int]) -> bytearray:
+    """The states from which some of the goals can be reached, if no work fails uncaught.
 
-    That a vehicle may fail, and end the run so, is no way out.
+    A failure of a vehicle that ends the run is no way out.
     """
     found = searched.found
     assert found.edge_start is not None
-    assert found.edge_rule is not None
+    assert found.edge_transition is not None
     assert found.edge_state is not None
     count = len(found.states)
     before: list[list[int]] = [[] for _ in range(count)]
     for state in range(count):
         for at in range(found.edge_start[state], found.edge_start[state + 1]):
-            if not _fails(searched, found.edge_rule[at]):
+            if not _fails(searched, found.edge_transition[at]):
                 before[found.edge_state[at]].append(state)
     marked = bytearray(count)
     waiting = list(goals)
@@ -109,20 +109,20 @@ def _reaching(searched: Searched, goals: list[int]) -> bytearray:
     return marked
 
 
-def _fails(searched: Searched, rule: int) -> bool:
-    return searched.system.rules[rule].flag is Flag.UNCAUGHT_FAILURE
+def _fails(searched: SearchedMission, transition: int) -> bool:
+    return searched.net.transitions[transition].flag is Flag.UNCAUGHT_FAILURE
 
 
-def _begins(searched: Searched, rule: int) -> bool:
-    """Whether somebody outside begins a process of their own accord: nobody does so for ever."""
-    each, places = searched.system.rules[rule], searched.system.places
+def _begins(searched: SearchedMission, transition: int) -> bool:
+    """Whether a trigger from outside begins a process: that does not happen for ever."""
+    each, places = searched.net.transitions[transition], searched.net.places
     if each.trigger not in (Trigger.MESSAGE, Trigger.SIGNAL):
         return False
     waiting = [p for p in each.read if places[p].role is not Role.CONTROL]
     return not (each.consume or waiting or each.moves or each.copies)
 
 
-def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
+def _lost(searched: SearchedMission, *, ends_only: bool) -> list[int]:
     """States from which no end (or nothing that ends at all) can be reached, in their order."""
     found = searched.found
     goals = [s for s in found.terminals if not ends_only or searched.ended(s)]
@@ -141,14 +141,14 @@ def _lost(searched: Searched, *, ends_only: bool) -> list[int]:
     return [state for state in range(len(found.states)) if not marked[state]]
 
 
-def can_complete(searched: Searched) -> Result:
-    """From everywhere, the end can be reached."""
+def can_complete(searched: SearchedMission) -> Result:
+    """From every state, the end can be reached."""
     violations: list[Violation] = []
     lost = _lost(searched, ends_only=True)
     if lost:
         stuck = searched.where(lost[0])
         run = tuple(searched.found.run_to(lost[0]))
-        last = searched.system.rules[run[-1]].element if run else ""
+        last = searched.net.transitions[run[-1]].element if run else ""
         message = f"from {searched.labels(stuck)} on, the end cannot be reached any more"
         if last:
             message += f" (since {searched.label(last)})"
@@ -156,19 +156,21 @@ def can_complete(searched: Searched) -> Result:
     return searched.result("can-complete", "From everywhere, the end can be reached.", violations)
 
 
-def completes_if_fair(searched: Searched) -> Result:
-    """It comes to its end when all that can happen again and again happens again and again.
+def completes_if_fair(searched: SearchedMission) -> Result:
+    """The mission completes if all that is possible again and again happens again and again.
 
-    Of a search that left orders out it is known only whether the end can be reached from
-    everywhere, and whether anything goes round at all. If so, it ends in a stronger sense of
-    fairness, and the result says so.
+    With a reduction it is known only whether the end can be reached from everywhere, and whether
+    there are cycles at all. If so, the mission completes in a stronger sense of fairness, and the
+    result says so.
     """
     found = searched.found
-    rounds = FairRounds(found, lambda rule: _fails(searched, rule) or _begins(searched, rule))
+    rounds = FairCycles(
+        found, lambda transition: _fails(searched, transition) or _begins(searched, transition)
+    )
     violations: list[Violation] = []
     note = ""
     if not found.reduced:
-        violations = _stuck(searched)[:1] or _fair_round(searched, rounds)
+        violations = _stuck(searched)[:1] or _fair_cycle(searched, rounds)
     if not violations and (lost := _lost(searched, ends_only=True)):
         violations = [_never_ends(searched, lost[0])]
     elif not violations and found.reduced and found.complete and rounds.any:
@@ -176,7 +178,7 @@ def completes_if_fair(searched: Searched) -> Result:
     return searched.result("completes-if-fair", FAIR, violations, note=note)
 
 
-def _fair_round(searched: Searched, rounds: FairRounds) -> list[Violation]:
+def _fair_cycle(searched: SearchedMission, rounds: FairCycles) -> list[Violation]:
     lasso = rounds.nearest()
     if lasso is None:
         return []
@@ -192,7 +194,7 @@ def _fair_round(searched: Searched, rounds: FairRounds) -> list[Violation]:
     ]
 
 
-def _never_ends(searched: Searched, lost: int) -> Violation:
+def _never_ends(searched: SearchedMission, lost: int) -> Violation:
     """From a state on, no end can be reached."""
     found = searched.found
     stuck = next((s for s in found.terminals if not searched.ended(s)), None)
@@ -209,12 +211,14 @@ def _never_ends(searched: Searched, lost: int) -> Violation:
     )
 
 
-def _elements(searched: Searched, rules: Sequence[int]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(searched.system.rules[rule].element for rule in rules))
+def _elements(searched: SearchedMission, transitions: Sequence[int]) -> tuple[str, ...]:
+    return tuple(
+        dict.fromkeys(searched.net.transitions[transition].element for transition in transitions)
+    )
 
 
-def no_livelock(searched: Searched) -> Result:
-    """It never goes on for ever without a way out."""
+def no_livelock(searched: SearchedMission) -> Result:
+    """The mission never goes on for ever without a way out."""
     found = searched.found
     lost = _lost(searched, ends_only=False)
     violations: list[Violation] = []
@@ -232,29 +236,31 @@ def no_livelock(searched: Searched) -> Result:
     return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
 
 
-def _into_cycle(searched: Searched, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Rules that lead from a state to where it goes round, and those that lead round."""
+def _into_cycle(searched: SearchedMission, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Transitions that lead from a state to a cycle, and those of the cycle."""
     seen: dict[int, int] = {}
-    rules: list[int] = []
+    transitions: list[int] = []
     state = start
     while state not in seen:
-        seen[state] = len(rules)
+        seen[state] = len(transitions)
         steps = (each for each in searched.found.successors(state) if not _fails(searched, each[0]))
-        rule, state = next(steps, (-1, -1))
-        if rule < 0:
-            return tuple(rules), ()
-        rules.append(rule)
-    return tuple(rules[: seen[state]]), tuple(rules[seen[state] :])
+        transition, state = next(steps, (-1, -1))
+        if transition < 0:
+            return tuple(transitions), ()
+        transitions.append(transition)
+    return tuple(transitions[: seen[state]]), tuple(transitions[seen[state] :])
 
 
-def no_dead_element(searched: Searched) -> Result:
+def no_dead_element(searched: SearchedMission) -> Result:
     """Every element is reached in some run."""
-    system, found = searched.system, searched.found
-    reached = {step.element for rule in found.fired for step in system.rules[rule].steps}
-    unknown = {a.element for a in system.approximations if a.exactness is Exactness.BOUNDED}
+    net, found = searched.net, searched.found
+    reached = {
+        step.element for transition in found.fired for step in net.transitions[transition].steps
+    }
+    unknown = {a.element for a in net.approximations if a.exactness is Exactness.BOUNDED}
     violations = [
         Violation(f"{searched.label(element)} is never reached", (element,))
-        for element in system.elements
+        for element in net.elements
         if element not in reached
         and element not in unknown
         and not _undoes(searched.mission.elements.get(element))
@@ -265,7 +271,7 @@ def no_dead_element(searched: Searched) -> Result:
 
 
 def _undoes(element: object) -> bool:
-    """No token comes to the boundary event of a compensation: it says by what it is done."""
+    """Whether an element is the boundary event of a compensation: no token ever comes to it."""
     return isinstance(element, e.BoundaryEvent) and any(
         isinstance(d, CompensateEventDefinition) for d in element.definitions
     )

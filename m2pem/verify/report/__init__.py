@@ -1,1 +1,1 @@
-"""Tells what verification found: to people, in the words of the diagram, and to programs."""
+"""Reports: what verification found, for people in the words of the diagram, and for programs."""

@@ -8,20 +8,19 @@ from collections.abc import Sequence
 from hashlib import sha256
 from typing import Any
 
-from m2pem.verify.report.findings import Findings, Violated
-from m2pem.verify.report.run_steps import Token, Told
+from m2pem.verify.report.findings import DescribedViolation, Findings
+from m2pem.verify.report.run_steps import RunStep, Token
 
 VERSION = 1
 
 
 def as_data(findings: Findings) -> dict[str, Any]:
-    """The whole report."""
     coverage = findings.coverage
     return {
         "version": VERSION,
         "mission": findings.mission.file,
         "sha256": sha256(findings.mission.source).hexdigest(),
-        "process": findings.system.process,
+        "process": findings.net.process,
         "data": dict(findings.given),
         "verdict": findings.verdict.value,
         "strict": findings.strict,
@@ -49,12 +48,12 @@ def as_data(findings: Findings) -> dict[str, Any]:
         "unreached": sorted(findings.unreached),
         "approximations": [
             {"element": each.element, "exactness": each.exactness.value, "what": each.what}
-            for each in findings.system.approximations
+            for each in findings.net.approximations
         ],
     }
 
 
-def _violation(violation: Violated) -> dict[str, Any]:
+def _violation(violation: DescribedViolation) -> dict[str, Any]:
     return {
         "property": violation.answer.property,
         "warning": violation.answer.warning,
@@ -62,28 +61,28 @@ def _violation(violation: Violated) -> dict[str, Any]:
         "text": violation.found.message,
         "elements": [*violation.found.elements],
         "missing": [*violation.missing],
-        "steps": [_step(told) for told in violation.story],
-        "loop": [_step(told) for told in violation.loop],
+        "steps": [_step(run_step) for run_step in violation.run_steps],
+        "loop": [_step(run_step) for run_step in violation.loop],
         "tokens": _tokens(violation.tokens),
     }
 
 
-def _step(told: Told) -> dict[str, Any]:
+def _step(run_step: RunStep) -> dict[str, Any]:
     return {
-        "step": told.number,
-        "text": told.text,
-        "element": told.element,
-        "passes": [*told.passes],
-        "trigger": told.trigger or None,
-        "detail": told.detail,
+        "step": run_step.number,
+        "text": run_step.text,
+        "element": run_step.element,
+        "passes": [*run_step.passes],
+        "trigger": run_step.trigger or None,
+        "detail": run_step.detail,
         "actions": [
             {"element": each.element, "action": each.action.value, "detail": each.detail}
-            for each in told.actions
+            for each in run_step.actions
         ],
-        "tokens": _tokens(told.tokens),
-        "data": dict(told.data),
-        "writes": dict(told.writes),
-        "rules": [*told.rules],
+        "tokens": _tokens(run_step.tokens),
+        "data": dict(run_step.data),
+        "writes": dict(run_step.writes),
+        "rules": [*run_step.transitions],
     }
 
 

@@ -1,4 +1,4 @@
-"""Everything that a report says, worked out once, whatever it is written as."""
+"""The contents of a report, computed once for all output formats."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,9 +9,16 @@ from m2pem.mission.events import CompensateEventDefinition
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.check import Report
-from m2pem.verify.net.petri_net import Action, System
+from m2pem.verify.net.petri_net import Action, PetriNet
 from m2pem.verify.properties.results import Result, Verdict, Violation
-from m2pem.verify.report.run_steps import Token, Told, Words, encoding_of, tell, tokens_of
+from m2pem.verify.report.run_steps import (
+    ElementNames,
+    RunStep,
+    Token,
+    describe_run,
+    encoding_of,
+    tokens_of,
+)
 from m2pem.verify.report.stuck import why_stuck
 
 DEADLOCK = "no-deadlock"
@@ -20,17 +27,17 @@ FOLLOWING = frozenset({"no-dead-element", "can-complete", "completes-if-fair"})
 
 
 @dataclass(frozen=True, slots=True)
-class Violated:
-    """One way in which a property is violated, with its run told.
+class DescribedViolation:
+    """A violation, with its run described.
 
-    `story`: the run; `loop`: what can then follow again and again. `tokens`: where they are at
-    the end. `missing`: flows by which a token is waited for that never comes.
+    `run_steps`: the run; `loop`: what can then follow again and again. `tokens`: where they are at
+    the end. `missing`: flows by which a token is awaited that never comes.
     """
 
     answer: Result
     found: Violation
-    story: tuple[Told, ...]
-    loop: tuple[Told, ...]
+    run_steps: tuple[RunStep, ...]
+    loop: tuple[RunStep, ...]
     tokens: tuple[Token, ...]
     missing: tuple[str, ...] = ()
 
@@ -39,7 +46,7 @@ class Violated:
 class Coverage:
     """How much was searched. `stopped`: why not all, "" if it was all.
 
-    `engine`: who searched; `notes`: what else is to be told of the answers.
+    `engine`: what searched; `notes`: remarks on the answers.
     """
 
     states: int
@@ -52,29 +59,29 @@ class Coverage:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What was found about a mission. `violations`: those that count, then warnings.
+    """What was found about a mission. `violations`: errors first, then warnings.
 
-    `unreached`: what no run gets to, as far as that is known. `given`: the data that the run begins
-    with.
+    `unreached`: elements that no run reaches, as far as that is known. `given`: the data that the
+    run begins with.
     """
 
     mission: Mission
-    system: System
+    net: PetriNet
     results: tuple[Result, ...]
     verdict: Verdict
     coverage: Coverage
-    violations: tuple[Violated, ...]
+    violations: tuple[DescribedViolation, ...]
     unreached: frozenset[str] = frozenset()
     strict: bool = False
     given: Mapping[str, Value] = field(default_factory=dict)
 
     def counts(self, answer: Result) -> bool:
-        """Whether a violation of this property is one, and not a warning."""
+        """Whether a violation of this property is an error, and not a warning."""
         return self.strict or not answer.warning
 
     @property
     def exit_status(self) -> int:
-        """Of the command line."""
+        """The exit status of the command line."""
         return {Verdict.HOLDS: 0, Verdict.VIOLATED: 1, Verdict.UNDECIDED: 3}[self.verdict]
 
 
@@ -85,18 +92,18 @@ def findings_of(
     strict: bool = False,
     given: Mapping[str, Value] | None = None,
 ) -> Findings:
-    """Tells the runs of all that is violated: causes first, then what follows, then warnings."""
-    words = Words(mission)
-    told = []
+    """Describe the runs of all violations: causes first, then consequences, then warnings."""
+    element_names = ElementNames(mission)
+    run_step = []
     for result in report.results:
-        system = report.rules_of(result)
-        told += [_told(system, words, result, each) for each in result.violations]
-    told.sort(key=lambda each: (each.answer.warning, _follows(each.answer)))
+        net = report.transitions_of(result)
+        run_step += [_told(net, element_names, result, each) for each in result.violations]
+    run_step.sort(key=lambda each: (each.answer.warning, _follows(each.answer)))
     found = report.found
     stopped = found.stopped.value if found.stopped is not None else ""
     return Findings(
         mission,
-        report.system,
+        report.net,
         report.results,
         report.judged(strict=strict),
         Coverage(
@@ -107,7 +114,7 @@ def findings_of(
             report.engine,
             report.notes,
         ),
-        tuple(told),
+        tuple(run_step),
         frozenset() if stopped else _unreached(mission, report),
         strict,
         given or {},
@@ -119,12 +126,12 @@ def _follows(answer: Result) -> bool:
 
 
 def _unreached(mission: Mission, report: Report) -> frozenset[str]:
-    """Nodes and flows that no run gets to, of the processes that any run gets to."""
-    rules = report.system.rules
+    """Nodes and flows that no run reaches, of the processes that any run reaches."""
+    transitions = report.net.transitions
     reached = {
         step.element
-        for rule in report.found.fired
-        for step in rules[rule].steps
+        for transition in report.found.fired
+        for step in transitions[transition].steps
         if step.action is not Action.INTERRUPTED
     }
     begun = {node.container.process.id for node in mission.nodes if node.id in reached}
@@ -139,9 +146,11 @@ def _unreached(mission: Mission, report: Report) -> frozenset[str]:
     return frozenset(nodes | flows) - reached - undoing
 
 
-def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Overlays:
-    """What a drawing shows of it."""
-    steps: Sequence[Sequence[str]] = [told.passes for told in (*violation.story, *violation.loop)]
+def marks_of(violation: DescribedViolation, unreached: frozenset[str] = frozenset()) -> Overlays:
+    """What a diagram shows of a violation."""
+    steps: Sequence[Sequence[str]] = [
+        run_step.passes for run_step in (*violation.run_steps, *violation.loop)
+    ]
     wrong = dict.fromkeys(violation.found.elements, violation.found.message)
     waiting = {
         token.flow or token.element: f"{token.count} token{'s' if token.count > 1 else ''} here"
@@ -152,15 +161,17 @@ def marks_of(violation: Violated, unreached: frozenset[str] = frozenset()) -> Ov
     return Overlays(steps, wrong, waiting, tokens, frozenset(violation.missing), unreached)
 
 
-def _told(system: System, words: Words, answer: Result, found: Violation) -> Violated:
+def _told(
+    net: PetriNet, element_names: ElementNames, answer: Result, found: Violation
+) -> DescribedViolation:
     if not found.run and not found.cycle:
-        return Violated(answer, found, (), (), ())
-    story, state = tell(system, words, found.run)
-    loop, state = tell(system, words, found.cycle, begin=len(story), at=state)
-    tokens = tokens_of(encoding_of(system), state)
+        return DescribedViolation(answer, found, (), (), ())
+    run_steps, state = describe_run(net, element_names, found.run)
+    loop, state = describe_run(net, element_names, found.cycle, begin=len(run_steps), at=state)
+    tokens = tokens_of(encoding_of(net), state)
     deadlock = answer.property == DEADLOCK and not answer.required
-    stuck = why_stuck(words, story, tokens) if deadlock else []
+    stuck = why_stuck(element_names, run_steps, tokens) if deadlock else []
     missing = tuple(flow for each in stuck for flow in each.missing)
     if stuck:
         found = replace(found, message="; ".join(each.text for each in stuck))
-    return Violated(answer, found, story, loop, tokens, missing)
+    return DescribedViolation(answer, found, run_steps, loop, tokens, missing)

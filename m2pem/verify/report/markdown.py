@@ -4,20 +4,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from xml.sax.saxutils import escape
 
 from m2pem.verify.properties.results import Verdict
-from m2pem.verify.report.findings import Findings, Violated
-from m2pem.verify.report.run_steps import Told
+from m2pem.verify.report.findings import DescribedViolation, Findings
+from m2pem.verify.report.run_steps import RunStep
 from m2pem.verify.report.text import covered
 
 
 def as_markdown(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> str:
-    """The whole report. `pictures`: by violation, from 0, the names of its pictures' files."""
+    """The whole report. `pictures`: for each violation, from 0, the file names of its diagrams."""
     return "\n".join(_lines(findings, pictures)) + "\n"
 
 
 def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterator[str]:
     yield f"# {_plain(findings.mission.file)}: {findings.verdict.value}"
     yield ""
-    yield f"Process `{findings.system.process}`. {_sentence(covered(findings.coverage))}"
+    yield f"Process `{findings.net.process}`. {_sentence(covered(findings.coverage))}"
     for note in findings.coverage.notes:
         yield _plain(_sentence(note))
     yield ""
@@ -33,7 +33,7 @@ def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterato
     for number, violation in enumerate(findings.violations):
         yield ""
         yield from _violation(violation, pictures.get(number, ()))
-    rough = findings.system.approximations
+    rough = findings.net.approximations
     if rough:
         yield ""
         yield "## Where the rules are not exactly the mission"
@@ -42,7 +42,7 @@ def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterato
             yield f"- `{each.element}` ({each.exactness.value}): {_plain(each.what)}"
 
 
-def _violation(violation: Violated, pictures: Sequence[str]) -> Iterator[str]:
+def _violation(violation: DescribedViolation, pictures: Sequence[str]) -> Iterator[str]:
     kind = "warning" if violation.answer.warning else "violated"
     yield f"## {violation.answer.property}: {kind}"
     yield ""
@@ -53,9 +53,9 @@ def _violation(violation: Violated, pictures: Sequence[str]) -> Iterator[str]:
     for picture in pictures:
         yield ""
         yield f"![{violation.answer.property}]({picture})"
-    if violation.story:
+    if violation.run_steps:
         yield ""
-        yield from _steps(violation.story)
+        yield from _steps(violation.run_steps)
     if violation.loop:
         yield ""
         yield "And then, again and again:"
@@ -63,9 +63,9 @@ def _violation(violation: Violated, pictures: Sequence[str]) -> Iterator[str]:
         yield from _steps(violation.loop)
 
 
-def _steps(story: tuple[Told, ...]) -> Iterator[str]:
-    for told in story:
-        yield f"{told.number}. {_plain(told.text)}"
+def _steps(run_steps: tuple[RunStep, ...]) -> Iterator[str]:
+    for run_step in run_steps:
+        yield f"{run_step.number}. {_plain(run_step.text)}"
 
 
 def _sentence(text: str) -> str:
@@ -73,7 +73,7 @@ def _sentence(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Names come from people's files: nothing in them is to be taken for Markdown or HTML."""
+    """Escape names: they come from people's files, and must not be read as Markdown or HTML."""
     marked = escape(text)
     for sign in "\\`*_[]|#":
         marked = marked.replace(sign, f"\\{sign}")

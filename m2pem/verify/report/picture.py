@@ -1,4 +1,4 @@
-"""The diagrams with what a report says marked on them, one for each file that a run passes."""
+"""The diagrams of a mission with a report's marks, one for each file that a run passes."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,34 +6,35 @@ from dataclasses import dataclass
 from m2pem.diagram import Overlays, draw
 from m2pem.mission.elements import Element
 from m2pem.mission.mission import Mission
-from m2pem.verify.report.findings import Findings, Violated, marks_of
+from m2pem.verify.report.findings import DescribedViolation, Findings, marks_of
 
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """A file of processes. `qualifier`: what the ids of its elements begin with; "" for the
-    mission's own."""
+    """A file of processes. `qualifier`: the prefix of its elements' ids; "" for the mission's own
+    file.
+    """
 
     qualifier: str
     source: bytes
     elements: Mapping[str, Element]
 
     def has(self, element: str) -> bool:
-        """Whether an element is in it; what is no element of a process is in the mission's own."""
+        """Whether an element is in the file; what belongs to no process is in the mission's own."""
         known = self.elements.get(element)
         return (known.qualifier if known is not None else "") == self.qualifier
 
     def local(self, element: str) -> str:
-        """What an element is called in the file."""
+        """The id of an element in the file."""
         known = self.elements.get(element)
         return known.local_id if known is not None else element
 
     def some(self, elements: Iterable[str]) -> list[str]:
-        """Those that are in it, by what they are called there."""
+        """The elements that are in the file, by their ids there."""
         return [self.local(each) for each in elements if self.has(each)]
 
     def marks(self, marks: Overlays) -> Overlays:
-        """What is marked in it. A step keeps its number."""
+        """The marks in the file. A step keeps its number."""
 
         def mine(marked: Mapping[str, str]) -> dict[str, str]:
             return {self.local(each): why for each, why in marked.items() if self.has(each)}
@@ -50,12 +51,12 @@ class _File:
 
 
 def pictures(
-    findings: Findings, violation: Violated | None = None, *, about: str = ""
+    findings: Findings, violation: DescribedViolation | None = None, *, about: str = ""
 ) -> dict[str, str]:
     """SVG of the mission's diagram, by "", and of the other files that a run passes.
 
-    Those are by what the ids of their elements begin with. A violation is shown, or (None) what is
-    never reached.
+    The keys of the others are the prefixes of their elements' ids. A violation is shown, or (None)
+    what is never reached.
 
     Raises:
         ValueError: a file has no diagram, and cannot be laid out.
@@ -76,7 +77,9 @@ def pictures(
     }
 
 
-def picture(findings: Findings, violation: Violated | None = None, *, about: str = "") -> str:
+def picture(
+    findings: Findings, violation: DescribedViolation | None = None, *, about: str = ""
+) -> str:
     """The mission's own diagram as SVG.
 
     Raises:
@@ -86,7 +89,7 @@ def picture(findings: Findings, violation: Violated | None = None, *, about: str
 
 
 def _passed(file: _File, marks: Overlays) -> bool:
-    """Whether a run passes a file, or something is wrong there."""
+    """Whether a run passes a file, or a violation is in it."""
     shown = (*(each for step in marks.steps for each in step), *marks.stuck)
     return any(file.has(each) for each in shown)
 

@@ -12,18 +12,18 @@ from m2pem.mission.values import Value
 from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import (
     BEGINS,
-    UNDOES,
-    UNDONE,
+    COMPENSATION_BEGINS,
+    COMPENSATION_ENDS,
     Action,
     Kind,
-    Rule,
+    PetriNet,
     Step,
-    System,
+    Transition,
     Trigger,
 )
 
 
-class Words:
+class ElementNames:
     """Names of what is in a mission, by id."""
 
     def __init__(self, mission: Mission) -> None:
@@ -41,7 +41,7 @@ class Words:
         return f"{known.kind} {known.id}"
 
     def with_id(self, element: str) -> str:
-        """The name, and the id where the name does not say it."""
+        """The name, and the id where the name does not contain it."""
         name = self.name(element)
         if name.endswith(f" {element}") or _letters(name) == _letters(element):
             return name
@@ -55,7 +55,7 @@ class Words:
         return f"{', '.join(names[:-1])} and {names[-1]}"
 
     def thrown(self, ref: str) -> str:
-        """A signal, message, error or escalation, by its id or code."""
+        """The name of a signal, message, error or escalation, by its id or code."""
         mission = self.mission
         groups: tuple[tuple[str, Mapping[str, RootElement]], ...] = (
             ("signal", mission.signals),
@@ -75,7 +75,7 @@ class Words:
         return f"'{ref}'" if ref else ""
 
     def behavior(self, element: str) -> str:
-        """What a task commands: who begins what; "" for nothing."""
+        """What a task commands: which resource begins what; "" for nothing."""
         behavior = getattr(self.mission.elements.get(element), "behavior", None)
         if not isinstance(behavior, Behavior):
             return ""
@@ -92,16 +92,16 @@ def _letters(text: str) -> str:
 
 
 COMMANDS = "commands"
-"""Detail of the step in which a task's behavior is asked for, after the task was entered."""
+"""Detail of the step in which a task's behavior is requested, after the task was entered."""
 _NUMBERED = re.compile(r"(#\d+|\[\d+\])$")
 _SAME = -1
-"""Index of what belongs to the rule before it."""
+"""Index of a part that belongs to the transition before it."""
 _PASSED = (Action.TAKEN,)
 
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """Tokens on an element. `flow`: they have come to it by that flow, and wait; "" otherwise."""
+    """Tokens on an element. `flow`: the flow by which they came to a join; "" otherwise."""
 
     element: str
     count: int
@@ -109,21 +109,21 @@ class Token:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """A step of a story, numbered from 1.
+class RunStep:
+    """A step of a run, numbered from 1.
 
-    `passes`: elements and flows that it passes; its number stands at the first. `element`: whose
-    step it is. `rules`: those that it is made of. `trigger`: what came from outside, "" for
-    nothing. `actions`: what happens to elements. `tokens`: where they are after it.
-    `data`: what names have then, with the calls that they are in before them; `writes`: what came
-    with the trigger, under the names that the mission knows.
+    `passes`: elements and flows that it passes; its number is shown at the first. `element`: the
+    element that it belongs to. `transitions`: those that it consists of. `trigger`: what came from
+    outside, "" for nothing. `actions`: what happens to elements. `tokens`: where they are after it.
+    `data`: the values after it, by names with the calls that they are in before them; `writes`:
+    what came with the trigger, under the names that the mission has for it.
     """
 
     number: int
     text: str
     element: str
     passes: tuple[str, ...]
-    rules: tuple[int, ...]
+    transitions: tuple[int, ...]
     trigger: str
     detail: str
     actions: tuple[Step, ...]
@@ -132,92 +132,107 @@ class Told:
     writes: Mapping[str, Value]
 
 
-def tell(
-    system: System, words: Words, run: Sequence[int], *, begin: int = 0, at: int | None = None
-) -> tuple[tuple[Told, ...], int]:
-    """The story of a run, and the state in which it ends.
+def describe_run(
+    net: PetriNet,
+    element_names: ElementNames,
+    run: Sequence[int],
+    *,
+    begin: int = 0,
+    at: int | None = None,
+) -> tuple[tuple[RunStep, ...], int]:
+    """Describe a run, and return the state in which it ends too.
 
-    `begin`: how many steps were told before; `at`: the state that those led to, None for the first.
+    `begin`: how many steps were described before; `at`: the state that those led to, None for the
+    first.
     """
-    encoding = encoding_of(system)
+    encoding = encoding_of(net)
     state = encoding.initial if at is None else at
-    told: list[Told] = []
-    waiting: list[Rule] = []
-    rules = [part for index in run for part in _parts(system.rules[index])]
-    commanded = _commanded_later(rules)
-    for number, rule in enumerate(rules):
-        if rule.index != _SAME:
-            state, _ = encoding.fire(rule.index, state)
+    run_step: list[RunStep] = []
+    waiting: list[Transition] = []
+    transitions = [part for index in run for part in _parts(net.transitions[index])]
+    commanded = _commanded_later(transitions)
+    for number, transition in enumerate(transitions):
+        if transition.index != _SAME:
+            state, _ = encoding.fire(transition.index, state)
         if number in commanded.values():
             continue
         if number in commanded:
-            waiting.append(rules[commanded[number]])
-        waiting.append(rule)
-        if number + 1 < len(rules) and _same_step(rule, rules[number + 1]):
+            waiting.append(transitions[commanded[number]])
+        waiting.append(transition)
+        if number + 1 < len(transitions) and _same_step(transition, transitions[number + 1]):
             continue
         if any(each.steps for each in waiting):
-            told.append(_told(begin + len(told) + 1, waiting, words, encoding, state))
+            run_step.append(
+                _told(begin + len(run_step) + 1, waiting, element_names, encoding, state)
+            )
             waiting = []
-    return tuple(told), state
+    return tuple(run_step), state
 
 
-def _parts(rule: Rule) -> list[Rule]:
-    """What of a rule are steps of their own: one that several were made one of has several."""
+def _parts(transition: Transition) -> list[Transition]:
+    """The parts of a transition that are steps of their own: a fused transition has several."""
     groups: list[list[Step]] = []
-    for step in rule.steps:
+    for step in transition.steps:
         moved_on = groups and groups[-1][-1].action is Action.TAKEN
         again = step.action in (Action.COMPLETED, Action.ENTERED)
         if not groups or (moved_on and again) or _beside(groups[-1][-1], step):
             groups.append([])
         groups[-1].append(step)
     if len(groups) < 2:
-        return [rule]
-    first = replace(rule, steps=tuple(groups[0]))
+        return [transition]
+    first = replace(transition, steps=tuple(groups[0]))
     later = [
-        replace(rule, index=_SAME, steps=tuple(group), kind=Kind.INTERNAL, trigger=None, assign=())
+        replace(
+            transition, index=_SAME, steps=tuple(group), kind=Kind.INTERNAL, trigger=None, assign=()
+        )
         for group in groups[1:]
     ]
     return [first, *later]
 
 
 def _beside(one: Step, other: Step) -> bool:
-    """Whether another element is entered: a fork's branches begin each for itself."""
+    """Whether another element is entered: the branches of a fork begin separately."""
     return one.action is other.action is Action.ENTERED and one.element != other.element
 
 
-def _commanded_later(rules: Sequence[Rule]) -> dict[int, int]:
-    """By place in the run where a task commands its vehicles, or begins its work, the place where
-    it was entered.
+def _commanded_later(transitions: Sequence[Transition]) -> dict[int, int]:
+    """By index in the run of each step in which a task begins its work: where the task was entered.
 
     To people that is one step, also when others are in between.
     """
     entered: dict[str, int] = {}
     found: dict[int, int] = {}
-    for number, rule in enumerate(rules):
-        if not rule.steps:
+    for number, transition in enumerate(transitions):
+        if not transition.steps:
             continue
-        first = rule.steps[0]
-        if len(rule.steps) == 1 and first.detail in (COMMANDS, BEGINS):
+        first = transition.steps[0]
+        if len(transition.steps) == 1 and first.detail in (COMMANDS, BEGINS):
             if first.element in entered:
                 found[number] = entered.pop(first.element)
-        elif len(rule.steps) == 1 and first.action is Action.ENTERED and rule.trigger is None:
+        elif (
+            len(transition.steps) == 1
+            and first.action is Action.ENTERED
+            and transition.trigger is None
+        ):
             entered[first.element] = number
         else:
-            for step in rule.steps:
+            for step in transition.steps:
                 entered.pop(step.element, None)
     return found
 
 
-def encoding_of(system: System) -> Encoding:
-    """One with room for several tokens everywhere, so that each run can be followed."""
-    return Encoding(system, {place.index: 3 for place in system.places})
+def encoding_of(net: PetriNet) -> Encoding:
+    """An encoding with room for several tokens on every place, so that every run can
+    be followed.
+    """
+    return Encoding(net, {place.index: 3 for place in net.places})
 
 
 def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
-    """Where tokens of the mission are: those that only the rules need are left out."""
+    """Where tokens of the mission are, without those that only the net needs."""
     found: dict[tuple[str, str], int] = {}
     for index, count in encoding.marking(state).tokens.items():
-        place = encoding.system.places[index]
+        place = encoding.net.places[index]
         if place.role in ("control", "end"):
             continue
         known = place.element
@@ -227,40 +242,46 @@ def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
 
 
 def data_of(encoding: Encoding, state: int) -> dict[str, Value]:
-    """What the names have that the rules know of."""
+    """The values of all followed names."""
     values = encoding.marking(state).values
     return {
         variable.name: variable.values[values[variable.index]]
-        for variable in encoding.system.variables
+        for variable in encoding.net.variables
         if variable.index in values
     }
 
 
-def _same_step(rule: Rule, following: Rule) -> bool:
-    """Whether two rules are one step to people: an event is triggered, and goes on."""
-    if not rule.steps or not following.steps:
-        return not rule.steps
+def _same_step(transition: Transition, following: Transition) -> bool:
+    """Whether two transitions are one step to people: an event is triggered, and goes on."""
+    if not transition.steps or not following.steps:
+        return not transition.steps
     second = following.steps[0]
-    before = {step.action for step in rule.steps if step.element == second.element}
+    before = {step.action for step in transition.steps if step.element == second.element}
     again = second.action is Action.COMPLETED and Action.TRIGGERED in before
     return again and following.trigger is None
 
 
-def _told(number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, state: int) -> Told:
-    rule = next((each for each in rules if each.trigger is not None), rules[-1])
-    actions = tuple(dict.fromkeys(step for each in rules for step in each.steps))
-    element = next(each for each in rules if each.steps).element
+def _told(
+    number: int,
+    transitions: Sequence[Transition],
+    element_names: ElementNames,
+    encoding: Encoding,
+    state: int,
+) -> RunStep:
+    transition = next((each for each in transitions if each.trigger is not None), transitions[-1])
+    actions = tuple(dict.fromkeys(step for each in transitions for step in each.steps))
+    element = next(each for each in transitions if each.steps).element
     taken = [step.element for step in actions if step.action in _PASSED]
     others = [step.element for step in actions if step.action not in _PASSED]
-    writes = _writes(rule, words, encoding.system)
-    return Told(
+    writes = _writes(transition, element_names, encoding.net)
+    return RunStep(
         number,
-        _sentence(rule, actions, words, writes),
+        _sentence(transition, actions, element_names, writes),
         element,
         tuple(dict.fromkeys([*taken, *others])),
-        tuple(each.index for each in rules if each.index != _SAME),
-        rule.trigger.value if rule.trigger is not None else "",
-        rule.detail,
+        tuple(each.index for each in transitions if each.index != _SAME),
+        transition.trigger.value if transition.trigger is not None else "",
+        transition.detail,
         actions,
         tokens_of(encoding, state),
         data_of(encoding, state),
@@ -268,20 +289,20 @@ def _told(number: int, rules: Sequence[Rule], words: Words, encoding: Encoding, 
     )
 
 
-def _writes(rule: Rule, words: Words, system: System) -> dict[str, Value]:
+def _writes(transition: Transition, element_names: ElementNames, net: PetriNet) -> dict[str, Value]:
     """What came with a trigger."""
-    if rule.trigger is None:
+    if transition.trigger is None:
         return {}
     return {
-        _local(words, system.variables[variable].name): system.variables[variable].values[value]
-        for variable, value in rule.assign
+        _local(element_names, net.variables[variable].name): net.variables[variable].values[value]
+        for variable, value in transition.assign
     }
 
 
-def _local(words: Words, name: str) -> str:
+def _local(element_names: ElementNames, name: str) -> str:
     """A variable's name without the calls and processes that it is in."""
     parts = name.split(".")
-    while len(parts) > 1 and _NUMBERED.sub("", parts[0]) in words.mission.elements:
+    while len(parts) > 1 and _NUMBERED.sub("", parts[0]) in element_names.mission.elements:
         parts = parts[1:]
     return ".".join(parts)
 
@@ -290,54 +311,57 @@ def _local(words: Words, name: str) -> str:
 
 
 def _sentence(
-    rule: Rule, actions: Sequence[Step], words: Words, writes: Mapping[str, Value]
+    transition: Transition,
+    actions: Sequence[Step],
+    element_names: ElementNames,
+    writes: Mapping[str, Value],
 ) -> str:
     element = actions[0].element
-    name = words.with_id(element)
-    failed = rule.trigger is Trigger.FAILS
-    if rule.trigger is not None:
-        said = _from_outside(rule, name, words)
-        if rule.trigger is not Trigger.ANSWER and writes:
+    name = element_names.with_id(element)
+    failed = transition.trigger is Trigger.FAILS
+    if transition.trigger is not None:
+        said = _from_outside(transition, name, element_names)
+        if transition.trigger is not Trigger.ANSWER and writes:
             values = " and ".join(f"{key} = {value!r}" for key, value in writes.items())
             said += f", with {values}"
     else:
-        said = _internal(actions[0], actions, words)
-    parts = [said, *_besides(element, actions, words, failed=failed)]
+        said = _internal(actions[0], actions, element_names)
+    parts = [said, *_besides(element, actions, element_names, failed=failed)]
     return "; ".join(part for part in parts if part)
 
 
-def _from_outside(rule: Rule, name: str, words: Words) -> str:
-    match rule.trigger:
+def _from_outside(transition: Transition, name: str, element_names: ElementNames) -> str:
+    match transition.trigger:
         case Trigger.SUCCEEDS:
             return f"{name} succeeds"
         case Trigger.FAILS:
-            return f"{name} fails with {rule.detail or 'an error'}"
+            return f"{name} fails with {transition.detail or 'an error'}"
         case Trigger.ANSWER:
-            return f"{name}: the operator answers '{rule.detail}'"
+            return f"{name}: the operator answers '{transition.detail}'"
         case Trigger.TIMER:
             return f"{name}: the time is up"
         case Trigger.SIGNAL | Trigger.MESSAGE:
-            return f"{name}: {words.thrown(rule.detail)} comes"
+            return f"{name}: {element_names.thrown(transition.detail)} comes"
         case Trigger.CONDITION:
             return f"{name}: its condition becomes true"
         case _:
-            return f"{name}: {rule.detail}" if rule.detail else name
+            return f"{name}: {transition.detail}" if transition.detail else name
 
 
-def _internal(first: Step, actions: Sequence[Step], words: Words) -> str:
-    node = words.mission.elements.get(first.element)
-    name = words.with_id(first.element)
+def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames) -> str:
+    node = element_names.mission.elements.get(first.element)
+    name = element_names.with_id(first.element)
     taken = [step.element for step in actions if step.action is Action.TAKEN]
     if isinstance(node, e.Gateway) and taken:
-        named = [flow for flow in taken if _named(words, flow)]
+        named = [flow for flow in taken if _named(element_names, flow)]
         if len(taken) == 1 and named:
-            return f"{name}: {words.name(taken[0])}"
-        return f"{name}: on to {words.all_of([_target(words, flow) for flow in taken])}"
+            return f"{name}: {element_names.name(taken[0])}"
+        return f"{name}: on to {_targets(element_names, taken)}"
     match first.action:
         case Action.ENTERED if isinstance(node, e.UserTask):
             return f"{name} asks the operator"
         case Action.ENTERED:
-            commands = words.behavior(first.element)
+            commands = element_names.behavior(first.element)
             commanded = any(step.detail == COMMANDS for step in actions)
             return f"{name}: {commands}" if commands and commanded else f"{name} begins"
         case Action.INTERRUPTED:
@@ -345,11 +369,12 @@ def _internal(first: Step, actions: Sequence[Step], words: Words) -> str:
         case Action.THROWN:
             return ""
         case Action.TRIGGERED:
-            return f"{name} {first.detail if first.detail in (UNDOES, UNDONE) else 'is triggered'}"
+            compensation = first.detail in (COMPENSATION_BEGINS, COMPENSATION_ENDS)
+            return f"{name} {first.detail if compensation else 'is triggered'}"
         case Action.COMPLETED if isinstance(node, e.EndEvent):
             return f"{name} is reached"
         case Action.COMPLETED if isinstance(node, e.StartEvent):
-            return f"{name}: on to {words.all_of([_target(words, flow) for flow in taken])}"
+            return f"{name}: on to {_targets(element_names, taken)}"
         case Action.COMPLETED if isinstance(node, e.IntermediateThrowEvent) and len(actions) > 1:
             return ""
         case Action.COMPLETED:
@@ -359,31 +384,35 @@ def _internal(first: Step, actions: Sequence[Step], words: Words) -> str:
 
 
 def _besides(
-    element: str, actions: Sequence[Step], words: Words, *, failed: bool = False
+    element: str, actions: Sequence[Step], element_names: ElementNames, *, failed: bool = False
 ) -> list[str]:
     """What else the step does: it throws, interrupts, triggers."""
     said = []
     for place, step in enumerate(actions):
-        name = words.name(step.element)
+        name = element_names.name(step.element)
         if step.action is Action.THROWN:
             if failed and step.element == element:
                 continue
-            what = words.thrown(step.detail) if step.detail else "its error"
+            what = element_names.thrown(step.detail) if step.detail else "its error"
             said.append(f"{name} throws {what}")
         elif step.action is Action.INTERRUPTED:
             said.append(f"{name} is interrupted")
         elif step.action is Action.TRIGGERED and place and step.element != element:
-            said.append(f"{words.with_id(step.element)} is triggered")
+            said.append(f"{element_names.with_id(step.element)} is triggered")
         elif step.action is Action.COMPLETED and place and step.element != element:
             said.append(f"{name} is over")
     return list(dict.fromkeys(said))
 
 
-def _named(words: Words, flow: str) -> bool:
-    known = words.mission.elements.get(flow)
+def _named(element_names: ElementNames, flow: str) -> bool:
+    known = element_names.mission.elements.get(flow)
     return known is not None and bool(known.name)
 
 
-def _target(words: Words, flow: str) -> str:
-    known = words.mission.elements.get(flow)
+def _targets(element_names: ElementNames, flows: Sequence[str]) -> str:
+    return element_names.all_of([_target(element_names, flow) for flow in flows])
+
+
+def _target(element_names: ElementNames, flow: str) -> str:
+    known = element_names.mission.elements.get(flow)
     return known.target.id if isinstance(known, e.SequenceFlow) else flow

@@ -1,15 +1,15 @@
-"""Why tokens cannot go on: what each waits for, and what in the run made that impossible."""
+"""Deadlocks explained: what each token waits for, and what in the run made that impossible."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from m2pem.mission import elements as e
 from m2pem.verify.net.petri_net import Action
-from m2pem.verify.report.run_steps import Token, Told, Words
+from m2pem.verify.report.run_steps import ElementNames, RunStep, Token
 
 
 @dataclass(frozen=True, slots=True)
-class Stuck:
+class WaitingTokens:
     """Tokens that wait at an element. `missing`: flows by which a token would have to come."""
 
     element: str
@@ -17,41 +17,43 @@ class Stuck:
     missing: tuple[str, ...] = ()
 
 
-def why_stuck(words: Words, story: Sequence[Told], tokens: Sequence[Token]) -> list[Stuck]:
-    """What the tokens that are left wait for, one sentence an element.
+def why_stuck(
+    element_names: ElementNames, run_steps: Sequence[RunStep], tokens: Sequence[Token]
+) -> list[WaitingTokens]:
+    """What the remaining tokens wait for, one sentence for each element.
 
-    An activity that waits for what is inside of it is left out when that is told.
+    An activity that waits for its inside is left out when the inside is described.
     """
     joins: dict[str, list[str]] = {}
-    found: list[Stuck] = []
+    found: list[WaitingTokens] = []
     for token in tokens:
         if token.flow:
-            flow = words.mission.elements.get(token.flow)
+            flow = element_names.mission.elements.get(token.flow)
             if isinstance(flow, e.SequenceFlow):
                 joins.setdefault(flow.target.id, []).append(flow.id)
     for join, arrived in joins.items():
-        found.append(_at_join(words, story, join, arrived))
-    around = {owner for stuck in found for owner in _around(words, stuck.element)}
-    around |= {owner for t in tokens if not t.flow for owner in _around(words, t.element)}
+        found.append(_at_join(element_names, run_steps, join, arrived))
+    around = {owner for stuck in found for owner in _around(element_names, stuck.element)}
+    around |= {owner for t in tokens if not t.flow for owner in _around(element_names, t.element)}
     for token in tokens:
         if not token.flow and token.element not in around:
-            found.append(Stuck(token.element, _waits(words, token.element)))
+            found.append(WaitingTokens(token.element, _waits(element_names, token.element)))
     return found
 
 
-def _around(words: Words, element: str) -> set[str]:
+def _around(element_names: ElementNames, element: str) -> set[str]:
     """The subprocesses and call activities that an element is in, at any depth."""
     found: set[str] = set()
     waiting = [element]
     while waiting:
-        node = words.mission.elements.get(waiting.pop())
+        node = element_names.mission.elements.get(waiting.pop())
         container = node.container if isinstance(node, e.FlowNode) else None
         if isinstance(container, e.SubProcess):
             owners = [container.id]
         elif container is not None:
             owners = [
                 each.id
-                for each in words.mission.nodes
+                for each in element_names.mission.nodes
                 if isinstance(each, e.CallActivity) and each.called is container
             ]
         else:
@@ -61,42 +63,44 @@ def _around(words: Words, element: str) -> set[str]:
     return found
 
 
-def _waits(words: Words, element: str) -> str:
-    node = words.mission.elements.get(element)
-    name = words.with_id(element)
+def _waits(element_names: ElementNames, element: str) -> str:
+    node = element_names.mission.elements.get(element)
+    name = element_names.with_id(element)
     if isinstance(node, e.Event | e.ReceiveTask | e.EventBasedGateway):
         return f"a token waits at {name} for what can no longer come"
     return f"a token stays on {name}"
 
 
-def _at_join(words: Words, story: Sequence[Told], join: str, arrived: Sequence[str]) -> Stuck:
-    node = words.mission.elements[join]
+def _at_join(
+    element_names: ElementNames, run_steps: Sequence[RunStep], join: str, arrived: Sequence[str]
+) -> WaitingTokens:
+    node = element_names.mission.elements[join]
     assert isinstance(node, e.FlowNode)
     missing = tuple(flow.id for flow in node.incoming if flow.id not in arrived)
-    name = words.with_id(join)
+    name = element_names.with_id(join)
     if not missing:
-        return Stuck(join, f"tokens wait at {name}")
+        return WaitingTokens(join, f"tokens wait at {name}")
     sources = [flow.source.id for flow in node.incoming if flow.id in missing]
     plural = "s" if len(arrived) > 1 else ""
-    came = words.all_of([_source(words, flow) for flow in arrived])
+    came = element_names.all_of([_source(element_names, flow) for flow in arrived])
     text = (
         f"token{plural} from {came} wait{'' if plural else 's'} at {name} for "
-        f"{words.all_of(sources)}, which can no longer come"
+        f"{element_names.all_of(sources)}, which can no longer come"
     )
-    reasons = [reason for flow in missing if (reason := _reason(words, story, flow))]
+    reasons = [reason for flow in missing if (reason := _reason(element_names, run_steps, flow))]
     if reasons:
         text += f", because {' and '.join(dict.fromkeys(reasons))}"
-    return Stuck(join, text, missing)
+    return WaitingTokens(join, text, missing)
 
 
-def _source(words: Words, flow: str) -> str:
-    known = words.mission.elements.get(flow)
+def _source(element_names: ElementNames, flow: str) -> str:
+    known = element_names.mission.elements.get(flow)
     return known.source.id if isinstance(known, e.SequenceFlow) else flow
 
 
-def _reason(words: Words, story: Sequence[Told], flow: str) -> str:
-    """What happened upstream of a flow that no token came by: the nearest, told as a cause."""
-    start = words.mission.elements[flow]
+def _reason(element_names: ElementNames, run_steps: Sequence[RunStep], flow: str) -> str:
+    """The nearest event upstream of a flow that explains why no token came by it."""
+    start = element_names.mission.elements[flow]
     assert isinstance(start, e.SequenceFlow)
     seen: set[str] = set()
     waiting: list[tuple[e.FlowNode, str]] = [(start.source, flow)]
@@ -105,31 +109,32 @@ def _reason(words: Words, story: Sequence[Told], flow: str) -> str:
         if node.id in seen:
             continue
         seen.add(node.id)
-        last = _last(story, node.id)
+        last = _last(run_steps, node.id)
         if last is not None:
-            return _cause(words, last, node, towards)
+            return _cause(element_names, last, node, towards)
         if isinstance(node, e.BoundaryEvent):
             waiting.append((node.attached_to, node.id))
         waiting += [(each.source, each.id) for each in node.incoming]
-    return f"nothing leads to {words.name(start.source.id)}"
+    return f"nothing leads to {element_names.name(start.source.id)}"
 
 
-def _last(story: Sequence[Told], element: str) -> Told | None:
+def _last(run_steps: Sequence[RunStep], element: str) -> RunStep | None:
     """The last step in which an element was left."""
     leaves = (Action.COMPLETED, Action.INTERRUPTED)
-    for told in reversed(story):
-        if any(step.element == element and step.action in leaves for step in told.actions):
-            return told
+    for run_step in reversed(run_steps):
+        if any(step.element == element and step.action in leaves for step in run_step.actions):
+            return run_step
     return None
 
 
-def _cause(words: Words, told: Told, node: e.FlowNode, towards: str) -> str:
-    name = words.name(node.id)
-    if towards in words.mission.elements and isinstance(
-        words.mission.elements[towards], e.BoundaryEvent
+def _cause(element_names: ElementNames, run_step: RunStep, node: e.FlowNode, towards: str) -> str:
+    name = element_names.name(node.id)
+    if towards in element_names.mission.elements and isinstance(
+        element_names.mission.elements[towards], e.BoundaryEvent
     ):
-        return f"{name} was over (step {told.number}) before '{words.name(towards)}' was triggered"
-    went = [words.name(flow.id) for flow in node.outgoing if flow.id in told.passes]
-    if went and towards not in told.passes:
-        return f"{name} went on by '{', '.join(went)}' (step {told.number})"
-    return f"{name} was left only once (step {told.number})"
+        event = element_names.name(towards)
+        return f"{name} was over (step {run_step.number}) before '{event}' was triggered"
+    went = [element_names.name(flow.id) for flow in node.outgoing if flow.id in run_step.passes]
+    if went and towards not in run_step.passes:
+        return f"{name} went on by '{', '.join(went)}' (step {run_step.number})"
+    return f"{name} was left only once (step {run_step.number})"

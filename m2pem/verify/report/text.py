@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator
 
 from m2pem.verify.net.petri_net import Exactness
 from m2pem.verify.properties.results import Result, Verdict
-from m2pem.verify.report.findings import Coverage, Findings, Violated
-from m2pem.verify.report.run_steps import Told
+from m2pem.verify.report.findings import Coverage, DescribedViolation, Findings
+from m2pem.verify.report.run_steps import RunStep
 
 _MOST_ROUGH = 5
-"""Places told of at which the rules are not exactly the mission; a file has them all."""
+"""Most approximations that are listed; a report file has them all."""
 _MEANING = {
     Exactness.MORE: "an alarm may be false",
     Exactness.BOUNDED: "what holds, holds up to that",
@@ -19,11 +19,10 @@ Paint = Callable[[str, str], str]
 
 _MARK = {Verdict.HOLDS: ("holds", "green"), Verdict.UNDECIDED: ("undecided", "yellow")}
 _MOST_STEPS = 40
-"""Of a run; the beginning of a longer one is left out."""
+"""Most steps of a run that are printed; the beginning of a longer one is left out."""
 
 
 def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
-    """The whole report."""
     lines = [*_properties(findings, paint)]
     for violation in findings.violations:
         if violation.answer.warning and not findings.strict:
@@ -40,7 +39,7 @@ def as_text(findings: Findings, paint: Paint = lambda text, _: text) -> str:
 
 
 def _rough(findings: Findings) -> Iterator[str]:
-    approximations = findings.system.approximations
+    approximations = findings.net.approximations
     for each in approximations[:_MOST_ROUGH]:
         element = findings.mission.elements.get(each.element)
         name = f" ({element.name})" if element is not None and element.name.strip() else ""
@@ -54,8 +53,8 @@ def _properties(findings: Findings, paint: Paint) -> Iterator[str]:
     for answer in findings.results:
         word, colour = _verdict(findings, answer)
         note = f" ({answer.covered})" if answer.covered else ""
-        told = _shown(f"{answer.property:<{width}}  {answer.text}{note}")
-        yield f"{paint(f'{word:<9}', colour)}  {told}"
+        run_step = _shown(f"{answer.property:<{width}}  {answer.text}{note}")
+        yield f"{paint(f'{word:<9}', colour)}  {run_step}"
         if answer.author:
             yield f"{'':<{width + 13}}for: {_shown(answer.author)}"
 
@@ -66,27 +65,27 @@ def _verdict(findings: Findings, answer: Result) -> tuple[str, str]:
     return _MARK[answer.verdict]
 
 
-def _violation(violation: Violated, paint: Paint) -> Iterator[str]:
+def _violation(violation: DescribedViolation, paint: Paint) -> Iterator[str]:
     yield f"{paint(violation.answer.property, 'red')}: {_shown(violation.found.message)}"
     if violation.found.elements:
         yield f"  at {_shown(', '.join(violation.found.elements))}"
-    if violation.story or violation.loop:
+    if violation.run_steps or violation.loop:
         yield "  the run:"
-        yield from _steps(violation.story)
+        yield from _steps(violation.run_steps)
     if violation.loop:
         yield "  and then, again and again:"
         yield from _steps(violation.loop)
 
 
-def _steps(story: tuple[Told, ...]) -> Iterator[str]:
-    if len(story) > _MOST_STEPS:
-        yield f"       ... {len(story) - _MOST_STEPS} steps before"
-    for told in story[-_MOST_STEPS:]:
-        yield f"  {told.number:>4}. {_shown(told.text)}"
+def _steps(run_steps: tuple[RunStep, ...]) -> Iterator[str]:
+    if len(run_steps) > _MOST_STEPS:
+        yield f"       ... {len(run_steps) - _MOST_STEPS} steps before"
+    for run_step in run_steps[-_MOST_STEPS:]:
+        yield f"  {run_step.number:>4}. {_shown(run_step.text)}"
 
 
 def _shown(text: str) -> str:
-    """Without what would steer a terminal: names come from strangers' files."""
+    """Remove control characters: names come from other people's files."""
     return "".join(each if each.isprintable() else "?" for each in text)
 
 
@@ -108,11 +107,11 @@ def _summary(findings: Findings, paint: Paint) -> str:
         Verdict.VIOLATED: "violated",
         Verdict.UNDECIDED: "undecided",
     }[verdict]
-    process = findings.system.process
+    process = findings.net.process
     summary = f"{_shown(findings.mission.file)}: {process}: {paint(said, colour)}"
     text = f"{summary}; {covered(findings.coverage)}"
-    rough = len(findings.system.approximations)
+    rough = len(findings.net.approximations)
     if rough:
         places = "place" if rough == 1 else "places"
-        text += f"; at {rough} {places} the rules are not exactly the mission (see --report)"
+        text += f"; at {rough} {places} the net is not exactly the mission (see --report)"
     return text

@@ -1,7 +1,9 @@
-"""What authors require of their missions: formulas and patterns, in the mission or beside it."""
+"""Requirements of a mission's author: formulas and patterns, in the mission's file or
+a spec file.
+"""
 
 from m2pem.verify.requirements.collection import (
-    gather,
+    collect,
     parse_spec,
     read_mission_requirements,
     read_spec,
@@ -13,7 +15,7 @@ __all__ = [
     "Names",
     "Requirement",
     "RequirementsError",
-    "gather",
+    "collect",
     "parse_spec",
     "read_mission_requirements",
     "read_spec",

@@ -1,4 +1,4 @@
-"""Whether a mission does what its author requires."""
+"""Check requirements with the built-in search."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,10 +9,10 @@ from m2pem.mission.mission import Mission
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Data, needs_steps
 from m2pem.verify.ltl.model_check import Limits, Progress, Result, Run, Stopped, Verdict, check
-from m2pem.verify.net.petri_net import Rule, System
+from m2pem.verify.net.petri_net import PetriNet, Transition
 from m2pem.verify.net.simplify import simplify
-from m2pem.verify.net.size_limit import Bound
-from m2pem.verify.requirements.propositions import Labels, MissionRuns, UnknownDataError
+from m2pem.verify.net.size_limit import SizeLimit
+from m2pem.verify.requirements.propositions import ExploredRuns, Labels, UnknownDataError
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.search.explore import Exploration, explore
 from m2pem.verify.search.explore import Limits as ExploreLimits
@@ -25,23 +25,25 @@ from m2pem.verify.translate import Options, translate
 class Answer:
     """What is known of one requirement.
 
-    `why`: of an undecided one, what stands in the way. `prefix` and `cycle`: the rules of a run
-    that breaks it, `cycle` again and again; without a cycle it is over then, or broken whatever
-    follows (`run.whatever_follows`).
+    `why`: the reason of an undecided answer. `prefix` and `cycle`: the transitions of a run that
+    violates it, `cycle` again and again; without a cycle the run is over then, or violates it
+    whatever follows (`run.whatever_follows`).
     """
 
     requirement: Requirement
     result: Result
     run: Run | None = None
-    prefix: tuple[Rule, ...] = ()
-    cycle: tuple[Rule, ...] = ()
+    prefix: tuple[Transition, ...] = ()
+    cycle: tuple[Transition, ...] = ()
     why: str = ""
     states: int = 0
     seconds: float = 0.0
 
 
 def conditions(requirements: Sequence[Requirement]) -> tuple[Expression, ...]:
-    """What requirements ask of the data: rules must be derived with them (`Options.conditions`)."""
+    """The conditions on data in requirements: the net must be translated with them
+    (`Options.conditions`).
+    """
     return tuple(
         each.expression
         for requirement in requirements
@@ -50,37 +52,37 @@ def conditions(requirements: Sequence[Requirement]) -> tuple[Expression, ...]:
     )
 
 
-def system_for(
+def net_for(
     mission: Mission,
     fleet: Fleet,
     requirements: Sequence[Requirement],
     *,
     process: str | None = None,
     options: Options | None = None,
-    bound: Bound | None = None,
-) -> System:
-    """The rules that requirements are asked of: as few as say the same to all of them.
+    size_limit: SizeLimit | None = None,
+) -> PetriNet:
+    """The net on which requirements are checked: simplified as far as none of them can observe it.
 
-    Where one of them tells single steps apart, or asks what is fair to each, they stay as they are.
+    If one of them observes single steps, or needs fairness, the net is not simplified.
 
     Raises:
         KeyError: the mission has no such process.
-        TooLargeError: it stands for more than `bound` allows.
+        TooLargeError: its net is larger than `size_limit` allows.
     """
     options = replace(options or Options(), conditions=conditions(requirements))
-    system = translate(mission, fleet, process=process, options=options, bound=bound)
+    net = translate(mission, fleet, process=process, options=options, size_limit=size_limit)
     if any(each.fair or needs_steps(each.formula) for each in requirements):
-        return system
+        return net
     places: frozenset[int] = frozenset()
-    rules: frozenset[int] = frozenset()
+    transitions: frozenset[int] = frozenset()
     for each in requirements:
         try:
-            labels = Labels(system, mission, fleet, propositions(each.formula))
+            labels = Labels(net, mission, fleet, propositions(each.formula))
         except UnknownDataError:
-            continue  # it is going to be undecided, whatever the rules are
+            continue  # it is going to be undecided, whatever the transitions are
         places |= labels.visible_places()
-        rules |= labels.visible_rules()
-    return simplify(system, places, rules, bound)
+        transitions |= labels.visible_transitions()
+    return simplify(net, places, transitions, size_limit)
 
 
 def check_mission(
@@ -93,37 +95,37 @@ def check_mission(
     limits: ExploreLimits | None = None,
     reduce: bool = False,
 ) -> list[Answer]:
-    """Derive, search and check, in one go.
+    """Translate, explore and check in one call.
 
-    With `reduce`, orders that make no difference to a requirement are left out where they can be.
+    With `reduce`, a reduction is used for requirements that allow one.
     """
-    system = system_for(mission, fleet, requirements, process=process, options=options)
+    net = net_for(mission, fleet, requirements, process=process, options=options)
     whole: Exploration | None = None
     answers = []
     for each in requirements:
-        reduction = reduction_for(system, mission, fleet, each) if reduce else None
+        reduction = reduction_for(net, mission, fleet, each) if reduce else None
         if reduction is not None:
-            found = explore(system, limits, reduction=reduction)
+            found = explore(net, limits, reduction=reduction)
         else:
-            found = whole = whole or explore(system, limits)
+            found = whole = whole or explore(net, limits)
         answers.append(check_requirement(found, mission, fleet, each))
     return answers
 
 
 def reduction_for(
-    system: System, mission: Mission, fleet: Fleet, requirement: Requirement
+    net: PetriNet, mission: Mission, fleet: Fleet, requirement: Requirement
 ) -> Reduction | None:
-    """What may be left out of the search for one requirement; None: nothing.
+    """The reduction for the search for one requirement; None: it allows none.
 
-    Runs that put something off for ever, and single steps, are kept only where all is tried.
+    Fair runs and single steps are kept only without a reduction.
     """
     if requirement.fair or needs_steps(requirement.formula):
         return None
     try:
-        labels = Labels(system, mission, fleet, propositions(requirement.formula))
+        labels = Labels(net, mission, fleet, propositions(requirement.formula))
     except UnknownDataError:
         return None
-    return StubbornSets(system, labels.visible_rules())
+    return StubbornSets(net, labels.visible_transitions())
 
 
 def check_requirement(
@@ -135,27 +137,27 @@ def check_requirement(
     limits: Limits | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Answer:
-    """Whether a requirement holds of all that an exploration found; it must have kept its edges.
+    """Check a requirement on an exploration that kept its edges.
 
-    Of a search that was cut short, what was found to be broken is; the rest is undecided.
+    Of an incomplete search, violations are found; the rest is undecided.
     """
     if exploration.stopped is ExploreStopped.TOKENS:
         return Answer(
             requirement, Result.UNDECIDED, why=f"the search stopped at {exploration.stopped}"
         )
-    system = exploration.system
+    net = exploration.net
     asked = propositions(requirement.formula)
     try:
-        runs = MissionRuns(exploration, Labels(system, mission, fleet, asked))
+        runs = ExploredRuns(exploration, Labels(net, mission, fleet, asked))
         fair: Mapping[int, int] | None = runs.outcomes() if requirement.fair else None
         verdict = check(runs, requirement.formula, fair=fair, limits=limits, progress=progress)
     except UnknownDataError as error:
         return Answer(requirement, Result.UNDECIDED, why=str(error))
-    return _answer(requirement, verdict, exploration, system)
+    return _answer(requirement, verdict, exploration, net)
 
 
 def _answer(
-    requirement: Requirement, verdict: Verdict, exploration: Exploration, system: System
+    requirement: Requirement, verdict: Verdict, exploration: Exploration, net: PetriNet
 ) -> Answer:
     why = ""
     if verdict.result is Result.UNDECIDED:
@@ -166,8 +168,8 @@ def _answer(
         requirement,
         verdict.result,
         run,
-        tuple(system.rules[move.rule] for move in run.prefix) if run else (),
-        tuple(system.rules[move.rule] for move in run.cycle) if run else (),
+        tuple(net.transitions[move.transition] for move in run.prefix) if run else (),
+        tuple(net.transitions[move.transition] for move in run.cycle) if run else (),
         why,
         verdict.states,
         verdict.seconds,

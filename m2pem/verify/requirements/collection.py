@@ -14,7 +14,7 @@ from m2pem.findings import Finding, Severity
 from m2pem.fleet.yaml_source import KeyPath, YamlSource, dotted, parse_yaml, read_yaml
 from m2pem.suggestions import suggest
 from m2pem.verify.requirements.names import Names
-from m2pem.verify.requirements.reader import UnusableError, Written, made
+from m2pem.verify.requirements.reader import UnusableError, WrittenRequirement, requirements_of
 from m2pem.verify.requirements.requirement import Requirement, RequirementsError, misread
 
 
@@ -22,7 +22,7 @@ def read_mission_requirements(names: Names) -> list[Requirement]:
     """The requirements in the mission's own file, in its order.
 
     Raises:
-        RequirementsError: one cannot be used; tells all that is wrong.
+        RequirementsError: requirements that cannot be used; it lists all findings.
     """
     mission = names.mission
     document = parse_xml(mission.source)
@@ -53,7 +53,7 @@ def read_mission_requirements(names: Names) -> list[Requirement]:
             error(f"fair='{element.get('fair')}' is neither true nor false")
             continue
         try:
-            found += made(_written(element, name, mission.file, document), names)
+            found += requirements_of(_written(element, name, mission.file, document), names)
         except UnusableError as unusable:
             wrong = unusable.misread
             if wrong is None:
@@ -77,7 +77,9 @@ def _elements(document: Document) -> list[etree._Element]:
     ]
 
 
-def _written(element: etree._Element, name: str, file: str, document: Document) -> Written:
+def _written(
+    element: etree._Element, name: str, file: str, document: Document
+) -> WrittenRequirement:
     arguments: dict[str, Any] = {}
     for each in element.iterchildren(M2PEM + "arg"):
         key, value = each.get("name", ""), each.get("value", "")
@@ -86,7 +88,7 @@ def _written(element: etree._Element, name: str, file: str, document: Document) 
             arguments[key] = [*(earlier if isinstance(earlier, list) else [earlier]), value]
         else:
             arguments[key] = value
-    return Written(
+    return WrittenRequirement(
         name,
         element.get("ltl"),
         element.get("pattern"),
@@ -105,13 +107,13 @@ def read_spec(path: Path, names: Names) -> list[Requirement]:
     """The requirements of a file, in its order.
 
     Raises:
-        RequirementsError: the file, or something in it, cannot be used; tells all that is wrong.
+        RequirementsError: the file, or something in it, cannot be used; it lists all findings.
     """
     return _requirements(read_yaml(path), names)
 
 
 def parse_spec(content: bytes, file: str, names: Names) -> list[Requirement]:
-    """The same, of text from elsewhere; `file` is what findings call it."""
+    """The requirements of a text; findings call it `file`."""
     return _requirements(parse_yaml(content, file), names)
 
 
@@ -135,7 +137,7 @@ def _requirements(source: YamlSource, names: Names) -> list[Requirement]:
                 continue
             seen[written.id] = written.line
             try:
-                found += made(written, names)
+                found += requirements_of(written, names)
             except UnusableError as error:
                 where = (*path, *error.where.split(".", 1)) if error.where else path
                 _note(source, where, written.id, error)
@@ -171,7 +173,7 @@ def _entries(source: YamlSource) -> list[Any]:
     return entries
 
 
-def _item(source: YamlSource, path: KeyPath, entry: Any) -> Written | None:
+def _item(source: YamlSource, path: KeyPath, entry: Any) -> WrittenRequirement | None:
     if not isinstance(entry, dict):
         source.error(
             path, "requirement", "is no requirement", "write 'id:' and 'ltl:' or 'pattern:'"
@@ -202,7 +204,7 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> Written | None:
         source.error((*path, "fair"), "requirement", "'fair' is true or false")
     if wrong:
         return None
-    return Written(
+    return WrittenRequirement(
         entry["id"],
         entry.get("ltl"),
         entry.get("pattern"),
@@ -215,14 +217,14 @@ def _item(source: YamlSource, path: KeyPath, entry: Any) -> Written | None:
 
 
 TEXT_NAME = "requirements.yaml"
-"""What findings call a text that did not come from a file."""
+"""The name in findings of a text that did not come from a file."""
 
 
-def gather(names: Names, spec: Path | bytes | None = None) -> list[Requirement]:
-    """Those in the mission's file, then those of a spec file, or of its text.
+def collect(names: Names, spec: Path | bytes | None = None) -> list[Requirement]:
+    """The requirements in the mission's file, then those of a spec file, or of its text.
 
     Raises:
-        RequirementsError: tells all that is wrong in both, and ids that stand in both.
+        RequirementsError: it lists all findings in both, and ids that are in both.
     """
     found: list[Requirement] = []
     findings: list[Finding] = []

@@ -49,11 +49,11 @@ _STARTS = frozenset(
         *("on", "once", "the", "until", "whatever", "whenever"),
     }
 )
-"""Words of sentences that begin with a capital letter; names of vehicles and data do not."""
+"""First words of sentences that get a capital letter; names of vehicles and data do not."""
 
 
 class English:
-    """Says formulas; `names` is what elements are called, by id."""
+    """Writes formulas in English; `names` are the names of elements, by id."""
 
     def __init__(self, names: Mapping[str, str]) -> None:
         self._names = names
@@ -65,7 +65,7 @@ class English:
         return sentence(self.of(formula))
 
     def element(self, element: str) -> str:
-        """What an element is called."""
+        """The name of an element."""
         name = self._names.get(element) or element
         return f"'{name}' ({element})" if name in self._shared else f"'{name}'"
 

@@ -93,7 +93,7 @@ _WHERE = ("area", "route", "target")
 
 
 class UnknownNameError(ValueError):
-    """A name that stands for nothing here; the message says what may have been meant."""
+    """A name that refers to nothing here; the message suggests what was meant."""
 
 
 class Names:
@@ -106,7 +106,9 @@ class Names:
         service_writes: Mapping[str, Sequence[str]] | None = None,
         data: Iterable[str] = (),
     ) -> None:
-        """`service_writes`: what services write, by class. `data`: names given at the start."""
+        """`service_writes`: what services write, by class. `data`: names with a value
+        at the start.
+        """
         self.mission = mission
         self.fleet = fleet
         self.data_names = data_names(mission, service_writes) | frozenset(data)
@@ -124,7 +126,7 @@ class Names:
     # --- single names ---------------------------------------------------------------------------
 
     def element(self, name: str) -> str:
-        """The id of an element, of which the id or the name was written.
+        """The id of an element, given its id or name.
 
         Raises:
             UnknownNameError: there is none, or there are several of that name.
@@ -161,7 +163,7 @@ class Names:
         """A behavior that the mission uses, or that all arbiters share.
 
         Raises:
-            UnknownNameError: nobody knows it.
+            UnknownNameError: no such behavior is known.
         """
         used = list(dict.fromkeys(behavior.name for _, behavior in self._tasks))
         shared = [shared_name for shared_name, _ in SHARED]
@@ -176,7 +178,7 @@ class Names:
         """A decision that the user task offers.
 
         Raises:
-            UnknownNameError: it offers none such.
+            UnknownNameError: it does not offer that.
         """
         prompt = self._user_task(task).prompt
         known = [each.value for each in prompt.decisions] if prompt else []
@@ -186,7 +188,7 @@ class Names:
         raise UnknownNameError(f"'{task}' has no decision '{value}'; {hint}")
 
     def store_of(self, task: str) -> str:
-        """The name under which a user task's decision is written."""
+        """The name to which a user task's decision is written."""
         prompt = self._user_task(task).prompt
         return prompt.store if prompt else ""
 
@@ -202,12 +204,12 @@ class Names:
         return tuple(self.fleet.vehicles)
 
     def members(self, resource: str) -> frozenset[str]:
-        """What is held when the resource is: a team's members, else itself."""
+        """The resources that are held when a resource is: a team's members, else itself."""
         team = self.fleet.teams.get(resource)
         return frozenset(spelled_out(team)) if team else frozenset({resource})
 
     def places_of(self, resource: str, behavior: str) -> Mapping[str, Sequence[str]]:
-        """By where it is done, the tasks in which a resource does a behavior."""
+        """The tasks in which a resource does a behavior, by location."""
         found: dict[str, list[str]] = {}
         for node, each in self._tasks:
             if each.name == behavior and self.members(resource) <= self._held(each):
@@ -220,10 +222,11 @@ class Names:
     # --- formulas -------------------------------------------------------------------------------
 
     def resolved(self, formula: Formula, text: str) -> Formula:
-        """The formula with the ids of what is named in it. `text`: where positions point into.
+        """The formula with ids in place of the names in it. `text`: the text that positions refer
+        to.
 
         Raises:
-            ExpressionSyntaxError: a name stands for nothing; points at it.
+            ExpressionSyntaxError: a name refers to nothing; it points at the name.
         """
 
         def resolve(each: Formula) -> Formula:

@@ -19,7 +19,7 @@ from m2pem.verify.ltl.formula import (
     Proposition,
 )
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Action, Place, Role, Rule, System, outcomes_of
+from m2pem.verify.net.petri_net import Action, PetriNet, Place, Role, Transition, outcomes_of
 from m2pem.verify.search.explore import Exploration
 from m2pem.verify.translate.domains import tells_apart
 
@@ -28,32 +28,34 @@ _NO_TOKEN = frozenset({Role.CONTROL, Role.END})
 
 
 class UnknownDataError(Exception):
-    """The rules do not know what a formula asks of the data; the message says why."""
+    """The net does not follow the data that a formula reads; the message says why."""
 
 
 class Labels:
-    """Tells which of some propositions are true in the states of a system, and of its rules."""
+    """The labelling of a net: which propositions are true in its states, and when
+    transitions fire.
+    """
 
     def __init__(
-        self, system: System, mission: Mission, fleet: Fleet, propositions: Sequence[Proposition]
+        self, net: PetriNet, mission: Mission, fleet: Fleet, propositions: Sequence[Proposition]
     ) -> None:
-        self.system = system
+        self.net = net
         self.propositions = tuple(propositions)
         self._mission = mission
         self._fleet = fleet
         self._places = [frozenset(self._places_of(each)) for each in self.propositions]
         self._variables = [frozenset(self._variables_of(each)) for each in self.propositions]
-        self.of_rules = [self._of_rule(rule) for rule in system.rules]
-        """By rule, the propositions that are true in the moment in which it fires."""
+        self.of_transitions = [self._of_transition(transition) for transition in net.transitions]
+        """By transition, the propositions that are true in the moment in which it fires."""
 
     def of_states(self, encoding: Encoding) -> Callable[[int], int]:
-        """What tells which propositions are true in a state."""
+        """Return a function that gives the propositions that are true in a state."""
         tests: list[tuple[int, int, dict[int, bool] | None, Data | None]] = []
         for bit, each in enumerate(self.propositions):
             if isinstance(each, Data):
                 mask = 0
                 for variable in self._variables[bit]:
-                    count = len(self.system.variables[variable].values)
+                    count = len(self.net.variables[variable].values)
                     mask |= ((1 << count) - 1) << encoding.value_bit[variable]
                 tests.append((1 << bit, mask, {}, each))
             elif not isinstance(each, Completed):
@@ -82,27 +84,29 @@ class Labels:
         return self._places[number]
 
     def variables_of(self, number: int) -> frozenset[int]:
-        """The variables that a proposition is about."""
+        """The variables that a proposition reads."""
         return self._variables[number]
 
-    def visible_rules(self) -> frozenset[int]:
-        """The rules that may change what is true, or in whose moment something is."""
+    def visible_transitions(self) -> frozenset[int]:
+        """The transitions that may change a proposition, or that one is about."""
         places = frozenset[int]().union(*self._places)
         variables = frozenset[int]().union(*self._variables)
         return frozenset(
-            rule.index
-            for rule, now in zip(self.system.rules, self.of_rules, strict=True)
-            if now or places & _touched(rule) or any(v in variables for v, _ in rule.assign)
+            transition.index
+            for transition, now in zip(self.net.transitions, self.of_transitions, strict=True)
+            if now
+            or places & _touched(transition)
+            or any(v in variables for v, _ in transition.assign)
         )
 
     def visible_places(self) -> frozenset[int]:
-        """The places that propositions are about."""
+        """The places that propositions read."""
         return frozenset[int]().union(*self._places)
 
     # --- propositions ---------------------------------------------------------------------------
 
     def _places_of(self, each: Proposition) -> list[int]:
-        places = self.system.places
+        places = self.net.places
         match each:
             case Active(element):
                 return [p.index for p in places if self._stands_on(p, element)]
@@ -116,16 +120,16 @@ class Labels:
                 ]
             case Ended(outcome):
                 ends = {
-                    "completed": self.system.completed,
-                    "terminated": self.system.terminated,
-                    "failed": self.system.failed,
+                    "completed": self.net.completed,
+                    "terminated": self.net.terminated,
+                    "failed": self.net.failed,
                 }
                 return [ends[outcome]] if outcome else list(ends.values())
             case _:
                 return []
 
     def _stands_on(self, place: Place, element: str) -> bool:
-        if element == self.system.process:
+        if element == self.net.process:
             # The process that the run begins with is active from its beginning to its end.
             return place.role is Role.CONTROL and place.name.endswith(":running")
         if place.role in _NO_TOKEN:
@@ -138,15 +142,15 @@ class Labels:
     def _is_in_process(self, place: Place, process: str) -> bool:
         if not isinstance(self._mission.elements.get(process), Process):
             return False
-        scope = self.system.scopes[place.scope]
+        scope = self.net.scopes[place.scope]
         while scope.element != process and scope.parent is not None:
-            scope = self.system.scopes[scope.parent]
+            scope = self.net.scopes[scope.parent]
         return scope.element == process
 
     def _variables_of(self, each: Proposition) -> list[int]:
         if not isinstance(each, Data):
             return []
-        by_name = {variable.name: variable.index for variable in self.system.variables}
+        by_name = {variable.name: variable.index for variable in self.net.variables}
         for name in sorted(each.expression.names):
             if name not in by_name:
                 raise UnknownDataError(
@@ -157,7 +161,7 @@ class Labels:
 
     def _holds(self, data: Data, encoding: Encoding, state: int) -> bool:
         values = encoding.marking(state).values
-        by_name = {variable.name: variable for variable in self.system.variables}
+        by_name = {variable.name: variable for variable in self.net.variables}
         exact = True
         read = {}
         for name in data.expression.names:
@@ -175,8 +179,8 @@ class Labels:
         except ExpressionError:
             return False
 
-    def _of_rule(self, rule: Rule) -> int:
-        completed = {step.element for step in rule.steps if step.action is Action.COMPLETED}
+    def _of_transition(self, transition: Transition) -> int:
+        completed = {step.element for step in transition.steps if step.action is Action.COMPLETED}
         return sum(
             1 << bit
             for bit, each in enumerate(self.propositions)
@@ -184,17 +188,17 @@ class Labels:
         )
 
 
-def _touched(rule: Rule) -> frozenset[int]:
-    pairs = (*rule.moves, *rule.copies)
+def _touched(transition: Transition) -> frozenset[int]:
+    pairs = (*transition.moves, *transition.copies)
     return frozenset(
-        {place for place, _ in (*rule.consume, *rule.produce)}
+        {place for place, _ in (*transition.consume, *transition.produce)}
         | {place for pair in pairs for place in pair}
-        | set(rule.kill)
+        | set(transition.reset)
     )
 
 
-class MissionRuns:
-    """States are those of an exploration that kept its edges, by their numbers there."""
+class ExploredRuns:
+    """An exploration that kept its edges, as a `LabelledSystem`. Its states keep their numbers."""
 
     def __init__(self, exploration: Exploration, labels: Labels) -> None:
         self._exploration = exploration
@@ -204,37 +208,32 @@ class MissionRuns:
 
     @property
     def propositions(self) -> Sequence[Proposition]:
-        """What the bits stand for."""
         return self._labels.propositions
 
     @property
     def reduced(self) -> bool:
-        """Whether the exploration left rules out."""
+        """Whether the exploration used a reduction."""
         return self._exploration.reduced
 
     def initial(self) -> Sequence[int]:
-        """The first state."""
         return (0,)
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
-        """The rules that can fire in a state, each with the state after it."""
         return tuple(self._exploration.successors(state))
 
     def is_open(self, state: int) -> bool:
-        """Whether the exploration stopped before it looked at what follows."""
+        """Whether the exploration stopped before it expanded a state."""
         if self._exploration.complete or state in self._terminals:
             return False
         return not self.successors(state)
 
     def true_in(self, state: int) -> int:
-        """The propositions that are true in a state."""
         return self._true_in(self._exploration.states[state])
 
-    def true_when(self, rule: int) -> int:
-        """The propositions that are true in the moment in which a rule fires."""
-        return self._labels.of_rules[rule]
+    def true_when(self, transition: int) -> int:
+        return self._labels.of_transitions[transition]
 
     def outcomes(self) -> Mapping[int, int]:
-        """For fairness: the outcome that each rule stands for; joins, which only wait, for none."""
-        found = outcomes_of(self._exploration.system)
-        return {rule: outcomes[0] for rule, outcomes in found.items() if outcomes}
+        """For fairness: the outcome of each transition. Joins only wait, and have none."""
+        found = outcomes_of(self._exploration.net)
+        return {transition: outcomes[0] for transition, outcomes in found.items() if outcomes}

@@ -1,4 +1,4 @@
-"""From what an author wrote to requirements: the part that the spec file and BPMN files share."""
+"""The reader of requirements: what spec files and BPMN files have in common."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -24,9 +24,9 @@ _CONSTANTS = ("true", "false", "ended")
 
 
 class UnusableError(Exception):
-    """Something is wrong with one requirement. `where`: its key ("ltl", "pattern", "args.x").
+    """One requirement cannot be used. `where`: the key with the error ("ltl", "pattern", "args.x").
 
-    `misread`: if it is in a formula, where.
+    `misread`: the position, if it is in a formula.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class UnusableError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenRequirement:
     """A requirement as written. `arguments`: texts, numbers, flags and lists of texts, by name."""
 
     id: str
@@ -57,8 +57,8 @@ class Written:
     line: int = 0
 
 
-def made(written: Written, names: Names) -> Iterator[Requirement]:
-    """The requirements that something written stands for: one, or one for each vehicle.
+def requirements_of(written: WrittenRequirement, names: Names) -> Iterator[Requirement]:
+    """The requirements that a written one gives: one, or one for each vehicle.
 
     Raises:
         UnusableError: it cannot be read, or names what the mission or fleet lacks.
@@ -92,7 +92,9 @@ def made(written: Written, names: Names) -> Iterator[Requirement]:
     yield from _of_pattern(written, pattern, names)
 
 
-def _of_pattern(written: Written, pattern: Pattern, names: Names) -> Iterator[Requirement]:
+def _of_pattern(
+    written: WrittenRequirement, pattern: Pattern, names: Names
+) -> Iterator[Requirement]:
     values, scope = _values(written, pattern, names)
     resource = pattern.argument("resource")
     each = resource is not None and values["resource"] == EACH
@@ -136,7 +138,7 @@ def _checked(requirement: Requirement, where: str) -> Requirement:
 
 
 def _values(
-    written: Written, pattern: Pattern, names: Names
+    written: WrittenRequirement, pattern: Pattern, names: Names
 ) -> tuple[dict[str, Any], dict[str, Formula | None]]:
     scopes = [name for name in SCOPES if pattern.scoped and pattern.argument(name) is None]
     known = [*(each.name for each in pattern.arguments), *scopes]
@@ -225,7 +227,7 @@ def _listed(value: Any, where: str) -> list[str]:
 
 
 def _split(text: str) -> list[str]:
-    """The parts between the commas that stand in no parentheses."""
+    """The parts between commas that are not inside parentheses."""
     parts, depth = [""], 0
     for character in text:
         depth += (character in "([") - (character in ")]")

@@ -1,4 +1,4 @@
-"""One thing that an author requires of a mission."""
+"""A requirement, and what is wrong with one that cannot be used."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from m2pem.findings import Finding, Severity
 from m2pem.verify.ltl.formula import Formula
 
 _MOST_SHOWN = 90
-"""Characters of a formula around the one that is pointed at."""
+"""Characters of a formula that are shown around an error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Misread(Finding):
-    """What is wrong with a formula; the character at `position` is pointed at, below it."""
+    """An error in a formula; it shows the character at `position`."""
 
     formula: str = ""
     position: int = 0
@@ -25,7 +25,7 @@ class Misread(Finding):
 def misread(
     file: str, line: int, element: str, message: str, formula: str, position: int
 ) -> Misread:
-    """The finding. `position` counts from 0, in the whole formula."""
+    """Return the finding. `position` counts from 0, in the whole formula."""
     before = formula[:position]
     column = f"column {len(before.rpartition(chr(10))[2]) + 1}"
     if "\n" in formula.strip():
@@ -37,7 +37,7 @@ def misread(
 
 
 def pointed_at(text: str, position: int) -> str:
-    """The line of a text that a position is in, with a `^` below the position."""
+    """The line of a text with a position, and a `^` below the position."""
     begin = text.rfind("\n", 0, position) + 1
     line, at = text[begin:].partition("\n")[0], position - begin
     cut = max(at - _MOST_SHOWN // 2, 0) if len(line) > _MOST_SHOWN else 0
@@ -48,7 +48,7 @@ def pointed_at(text: str, position: int) -> str:
 
 
 class RequirementsError(FindingsError):
-    """Requirements cannot be read, or do not fit the mission; tells all that is wrong with them."""
+    """Requirements cannot be read, or do not fit the mission; it lists all findings."""
 
     def __init__(self, findings: Sequence[Finding]) -> None:
         super().__init__("the requirements cannot be used:", findings)
@@ -58,10 +58,9 @@ class RequirementsError(FindingsError):
 class Requirement:
     """A requirement, ready to be checked.
 
-    `text` is what its author said of it, "" if nothing; `english` says its formula. `pattern`: the
-    name of its pattern, "" for a formula as written. `resource`: for which vehicle it was made, if
-    it was for each. `fair`: runs that pass over something possible for ever do not count.
-    `line` counts from 1.
+    `text`: the author's description, "" if there is none; `english`: the formula in words.
+    `pattern`: the name of its pattern, "" for a formula as written. `resource`: the vehicle it was
+    made for, if it was made for each. `fair`: only fair runs count. `line` counts from 1.
     """
 
     id: str

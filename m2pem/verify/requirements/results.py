@@ -1,26 +1,26 @@
-"""Requirements as results of a report, beside the properties of every mission."""
+"""The results of requirements in a report, next to the properties of every mission."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
-from m2pem.verify.check import Report, bound_of, full_states
+from m2pem.verify.check import Report, full_states, size_limit_of
 from m2pem.verify.ltl import model_check, propositions
 from m2pem.verify.ltl.formula import Active, Completed
-from m2pem.verify.net.petri_net import System
+from m2pem.verify.net.petri_net import PetriNet
 from m2pem.verify.properties.results import Result, Verdict, Violation
 from m2pem.verify.requirements.check import (
     Answer,
     check_requirement,
+    net_for,
     reduction_for,
-    system_for,
 )
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.search.explore import Exploration, Limits, Progress, Stopped, explore
 from m2pem.verify.spin import ltl_claims
 from m2pem.verify.spin.queries import Storage
-from m2pem.verify.spin.search import Found, Wanted
+from m2pem.verify.spin.search import SpinExploration, WantedRuns
 from m2pem.verify.spin.search import search as search_with_spin
 from m2pem.verify.translate import Options, TooLargeError
 
@@ -29,14 +29,14 @@ Show = Callable[[Progress], None] | None
 
 @dataclass(slots=True)
 class _Asking:
-    """Searches of one system, each done when it is first needed.
+    """Searches of one net, each done when it is first needed.
 
-    `interrupted`: a person has ended one, and no other is to be begun.
+    `interrupted`: a person has ended one, so no other one begins.
     """
 
     mission: Mission
     fleet: Fleet
-    system: System
+    net: PetriNet
     limits: Limits
     progress: Show
     small: Exploration | None = None
@@ -50,18 +50,18 @@ class _Asking:
         return check_requirement(found, self.mission, self.fleet, requirement, limits=limits)
 
     def _search(self, requirement: Requirement) -> Exploration:
-        """All of it if it is small; else, if that can be, without orders that lead to the same."""
+        """Explore all if it is small, else with a reduction if the requirement allows one."""
         if self.small is None:
-            least = min(self.limits.states, full_states(self.system))
+            least = min(self.limits.states, full_states(self.net))
             limits = replace(self.limits, states=least)
-            self.small = explore(self.system, limits, progress=self.progress)
+            self.small = explore(self.net, limits, progress=self.progress)
         if self.small.stopped is not Stopped.STATES or len(self.small.states) > self.limits.states:
             return self.small
-        reduction = reduction_for(self.system, self.mission, self.fleet, requirement)
+        reduction = reduction_for(self.net, self.mission, self.fleet, requirement)
         if reduction is not None:
-            return explore(self.system, self.limits, reduction=reduction, progress=self.progress)
+            return explore(self.net, self.limits, reduction=reduction, progress=self.progress)
         if self.whole is None:
-            self.whole = explore(self.system, self.limits, progress=self.progress)
+            self.whole = explore(self.net, self.limits, progress=self.progress)
         return self.whole
 
 
@@ -77,23 +77,23 @@ def with_requirements(
     storage: Storage = Storage.EXACT,
     progress: Show = None,
 ) -> Report:
-    """The report, with a result for each requirement after those of the properties.
+    """Return the report with a result for each requirement added.
 
-    The report's engine searches; what Spin cannot be asked, the built-in search answers, and a note
-    says so. If a person has ended the search before, nothing more is searched.
+    The report's engine searches. What Spin cannot answer, the built-in search does, and a note says
+    so. If a person has interrupted a search, no other one begins.
 
     Raises:
         KeyError: the mission has no such process.
         SpinMissingError: Spin or a compiler is not installed.
-        InternalError: Spin says something that is not so.
+        InternalError: Spin's answer is wrong.
     """
     if not requirements:
         return report
     limits = limits or Limits(tokens=3)
     try:
-        bound = bound_of(limits)
-        system = system_for(
-            mission, fleet, requirements, process=process, options=options, bound=bound
+        size_limit = size_limit_of(limits)
+        net = net_for(
+            mission, fleet, requirements, process=process, options=options, size_limit=size_limit
         )
     except TooLargeError as error:
         why = f"too large to search: {error}"
@@ -101,28 +101,28 @@ def with_requirements(
         return replace(
             report, results=(*report.results, *(_result(each, mission) for each in answers))
         )
-    asking = _Asking(mission, fleet, system, limits, progress)
-    spins: Found | None = None
+    queries = _Asking(mission, fleet, net, limits, progress)
+    spins: SpinExploration | None = None
     results: list[Result] = []
     instead: list[str] = []
     stopped = report.found.stopped is Stopped.INTERRUPTED or any(
         each.covered.endswith(Stopped.INTERRUPTED) for each in report.results
     )
     for each in requirements:
-        if stopped or asking.interrupted:
+        if stopped or queries.interrupted:
             why = f"not begun, after {Stopped.INTERRUPTED}"
             results.append(_result(Answer(each, model_check.Result.UNDECIDED, why=why), mission))
             continue
         if report.engine != "spin":
-            answer = asking.answer(each)
+            answer = queries.answer(each)
             stopped = answer.why.endswith(Stopped.INTERRUPTED)
             results.append(_result(answer, mission))
             continue
         if spins is None:
             spins = search_with_spin(
-                system,
+                net,
                 limits,
-                wanted=Wanted(frozenset(), stuck=False),
+                wanted=WantedRuns(frozenset(), stuck=False),
                 storage=storage,
                 progress=progress,
             )
@@ -131,13 +131,13 @@ def with_requirements(
         )
         if answer.why in ltl_claims.BEYOND_SPIN:
             instead.append(each.id)
-            answer = asking.answer(each)
+            answer = queries.answer(each)
         stopped = spins.stopped is Stopped.INTERRUPTED or answer.why.endswith(Stopped.INTERRUPTED)
         results.append(_result(answer, mission))
     notes = report.notes
     if instead:
         notes = (*notes, f"Spin cannot answer {', '.join(instead)}: the built-in search did")
-    return replace(report, results=(*report.results, *results), asked=system, notes=notes)
+    return replace(report, results=(*report.results, *results), asked=net, notes=notes)
 
 
 def _result(answer: Answer, mission: Mission) -> Result:
@@ -173,6 +173,6 @@ def _violation(answer: Answer, mission: Mission) -> Violation:
     return Violation(
         f"{how}: {requirement.english.rstrip('.')}",
         tuple(dict.fromkeys(named)),
-        tuple(move.rule for move in run.prefix),
-        tuple(move.rule for move in run.cycle),
+        tuple(move.transition for move in run.prefix),
+        tuple(move.transition for move in run.cycle),
     )

@@ -1,9 +1,9 @@
-"""Searching all that a system's rules can lead to, state by state, shortest runs first.
+"""Searching all that a net can lead to, state by state, shortest runs first.
 
-    found = explore(system)
+    found = explore(net)
     found.complete                    # whether that was all
-    found.terminals                   # states in which no rule can fire
-    found.run_to(state)               # the rules that lead there
+    found.terminals                   # states in which no transition can fire
+    found.run_to(state)               # the transitions that lead there
 
 `Exploration` is what properties are read from. A place that gets more tokens than it has room for
 is noted (`overflows`), and the search begins anew with more room for it, up to `Limits.tokens`.
@@ -17,26 +17,27 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from m2pem.verify.net.encoding import Encoding, Marking
-from m2pem.verify.net.petri_net import Flag, Kind, System
-from m2pem.verify.search.read_write_sets import affected_rules, as_sets, tests_of
-from m2pem.verify.search.stubborn_sets import Reduction, ignoring
+from m2pem.verify.net.petri_net import Flag, Kind, PetriNet
+from m2pem.verify.search.read_write_sets import affected_transitions, as_sets, tests_of
+from m2pem.verify.search.stubborn_sets import Reduction, states_to_expand
 
 _LOOK_EVERY = 128
-"""States between two looks at the clock; of those that take longer, fewer."""
+"""States between two readings of the clock; states that take longer count more."""
 _LOOK_EVERY_STEPS = 10_000
 _LOOK_EVERY_CHOICE = 4
-"""The same, where what is tried in a state has to be chosen first."""
+"""The same with a reduction, which takes longer for each state."""
 _BYTES_A_STATE = 250
-"""About what a state costs in memory, beside its own bits; until it is searched, more."""
+"""Approximate memory of a state beside its own bits; a state that waits to be searched takes more.
+"""
 _BYTES_A_WAITING_STATE = 56
-_BYTES_A_RULE = 8
-"""Of each that may fire there."""
+_BYTES_A_TRANSITION = 8
+"""Of each transition that is enabled in a waiting state."""
 _BYTES_AN_EDGE = 16
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Where a check stops undecided. `tokens`: on one place, where one is meant."""
+    """Limits of a check; beyond, it is undecided. `tokens`: on a place where one is meant."""
 
     states: int = 2_000_000
     seconds: float = 600.0
@@ -51,7 +52,7 @@ class Stopped(StrEnum):
     TIME = "the limit of time"
     MEMORY = "the limit of memory"
     TOKENS = "a place that gets more and more tokens"
-    RULES = "the limit of rules"
+    TRANSITIONS = "the limit of transitions"
     DEPTH = "the limit of depth"
     BITSTATE = "a table that may take a new state for a known one"
     INTERRUPTED = "an interruption by hand"
@@ -70,13 +71,13 @@ class Progress:
 class Exploration:
     """What a search has seen. States are numbered in the order in which they were found.
 
-    `fired`: by rule, the first state in which it fired. `flagged`: those of them that have a
-    flag. `overflows`: by place, the first state and rule at which a token came to a place that
-    had one, where one is meant. `beyond`: places that got more than `Limits.tokens`.
-    `edges`: successors of each state as (rule, state), if they were kept.
+    `fired`: by transition, the first state in which it fired. `flagged`: those of them that have a
+    flag. `overflows`: by place, the first state and transition at which a token came to a place
+    that had one, where one is meant. `beyond`: places that got more than `Limits.tokens`. `edges`:
+    successors of each state as (transition, state), if they were kept.
     """
 
-    system: System
+    net: PetriNet
     encoding: Encoding
     states: list[int]
     parents: "array[int]"
@@ -90,58 +91,58 @@ class Exploration:
     overflow_runs: dict[int, tuple[int, ...]] = field(default_factory=dict)
     beyond: frozenset[int] = frozenset()
     edge_start: "array[int] | None" = None
-    edge_rule: "array[int] | None" = None
+    edge_transition: "array[int] | None" = None
     edge_state: "array[int] | None" = None
     reduced: bool = False
 
     @property
     def complete(self) -> bool:
-        """Whether everything that can happen was seen, within the rules' approximations."""
+        """Whether everything that can happen was seen, within the net's approximations."""
         return self.stopped is None
 
     @property
     def flagged(self) -> dict[int, int]:
-        """By rule that should never fire, the first state in which it did."""
-        return {r: at for r, at in self.fired.items() if self.system.rules[r].flag is not None}
+        """By transition that should never fire, the first state in which it did."""
+        return {r: at for r, at in self.fired.items() if self.net.transitions[r].flag is not None}
 
     def of_flag(self, flag: Flag) -> dict[int, int]:
         """The same, of one flag."""
-        return {r: at for r, at in self.fired.items() if self.system.rules[r].flag is flag}
+        return {r: at for r, at in self.fired.items() if self.net.transitions[r].flag is flag}
 
     def run_to(self, number: int) -> list[int]:
-        """The rules that lead to a state from the beginning, one of the shortest runs."""
-        rules: list[int] = []
+        """The transitions that lead to a state from the initial one: one of the shortest runs."""
+        transitions: list[int] = []
         while number:
-            rules.append(self.via[number])
+            transitions.append(self.via[number])
             number = self.parents[number]
-        return rules[::-1]
+        return transitions[::-1]
 
     def marking(self, number: int) -> Marking:
-        """A state in words."""
+        """Decode a state."""
         return self.encoding.marking(self.states[number])
 
     def successors(self, number: int) -> Iterator[tuple[int, int]]:
-        """Rule and state of each step from a state; only when edges were kept."""
+        """The steps from a state as (transition, state); only when edges were kept."""
         assert self.edge_start is not None
-        assert self.edge_rule is not None
+        assert self.edge_transition is not None
         assert self.edge_state is not None
         for at in range(self.edge_start[number], self.edge_start[number + 1]):
-            yield self.edge_rule[at], self.edge_state[at]
+            yield self.edge_transition[at], self.edge_state[at]
 
 
 def explore(
-    system: System,
+    net: PetriNet,
     limits: Limits | None = None,
     *,
     reduction: Reduction | None = None,
     keep_edges: bool = True,
     progress: Callable[[Progress], None] | None = None,
 ) -> Exploration:
-    """Search a system. `reduction`: which rules need not be tried now; None tries all.
+    """Explore the states of a net, nearest first.
 
-    With a reduction, edges are always kept: it needs them.
-
-    KeyboardInterrupt ends the search; what was seen until then is returned (`Stopped`).
+    `reduction` chooses the transitions that are tried in a state; None tries all. A reduction needs
+    edges, so they are always kept with one. KeyboardInterrupt ends the search; what was seen until
+    then is returned (`Stopped`).
     """
     limits = limits or Limits()
     wider: dict[int, int] = {}
@@ -150,18 +151,18 @@ def explore(
     began = time.monotonic()
     while True:
         edges = keep_edges or reduction is not None
-        search = _Search(system, Encoding(system, wider), limits, began, edges)
+        search = _Search(net, Encoding(net, wider), limits, began, edges)
         found = search.run(reduction, progress)
         while found.stopped is None and search.puts_off_for_ever(found):
             found = search.run(reduction, progress)
         again = False
-        for place, (state, rule) in found.overflows.items():
+        for place, (state, transition) in found.overflows.items():
             if not _exact(found, found.run_to(state), limits):
                 continue
-            if place not in overflows and not system.places[place].several:
-                overflows[place] = (state, rule)
-                runs[place] = (*found.run_to(state), rule)
-            if system.places[place].once:
+            if place not in overflows and not net.places[place].several:
+                overflows[place] = (state, transition)
+                runs[place] = (*found.run_to(state), transition)
+            if net.places[place].once:
                 continue
             bits = found.encoding.width[place] + 1
             if found.stopped in (None, Stopped.TOKENS) and (1 << bits) - 1 <= limits.tokens:
@@ -169,7 +170,7 @@ def explore(
                 again = True
         if not again:
             found.beyond = frozenset(
-                place for place in found.overflows if not system.places[place].once
+                place for place in found.overflows if not net.places[place].once
             )
             if found.beyond and found.stopped is None:
                 found.stopped = Stopped.TOKENS
@@ -179,23 +180,23 @@ def explore(
 
 
 def _exact(found: Exploration, run: Sequence[int], limits: Limits) -> bool:
-    """Whether no token was lost on a run for want of room that the next search will have.
+    """Whether no token on a run was lost for want of room that the next search will have.
 
     What comes after such a loss need not be a run: it may miss a step that had to come first.
     """
     encoding = found.encoding
     state = encoding.initial
-    for rule in run:
-        state, full = encoding.fire(rule, state)
+    for transition in run:
+        state, full = encoding.fire(transition, state)
         for place in encoding.places_in(full) if full else ():
             widest = (1 << (encoding.width[place] + 1)) - 1 > limits.tokens
-            if not widest and not found.system.places[place].once:
+            if not widest and not found.net.places[place].once:
                 return False
     return True
 
 
 def _complete_only(*columns: "list[int] | array[int]") -> None:
-    """Leave out the last row if it is there in part: interruptions come between any two steps."""
+    """Drop the last row if it is incomplete: an interrupt comes between any two instructions."""
     rows = min(map(len, columns))
     for column in columns:
         del column[rows:]
@@ -203,26 +204,26 @@ def _complete_only(*columns: "list[int] | array[int]") -> None:
 
 class _Search:
     def __init__(
-        self, system: System, encoding: Encoding, limits: Limits, began: float, keep_edges: bool
+        self, net: PetriNet, encoding: Encoding, limits: Limits, began: float, keep_edges: bool
     ) -> None:
-        self.system = system
+        self.net = net
         self.encoding = encoding
         self.limits = limits
         self.began = began
         self.keep_edges = keep_edges
         self.whole: set[int] = set()
-        """States that are on a circle: there, nothing may be put off, or it would be for ever."""
+        """States on a cycle, in which nothing may be deferred (the ignoring proviso)."""
         self.partly: set[int] = set()
         self.inner: set[int] = set()
         self.goes_back = False
-        rules = encoding.rules
-        self.affected = affected_rules(encoding)
+        transitions = encoding.transitions
+        self.affected = affected_transitions(encoding)
         self.affected_sets = as_sets(self.affected)
         self.rank = [
-            0 if rule.kind is Kind.INTERNAL else 1 if rule.kind is Kind.JOIN else 2
-            for rule in system.rules
+            0 if transition.kind is Kind.INTERNAL else 1 if transition.kind is Kind.JOIN else 2
+            for transition in net.transitions
         ]
-        self.masks = [(c.test, c.need, ~c.clear, c.put, c.plain) for c in rules]
+        self.masks = [(c.test, c.need, ~c.clear, c.put, c.plain) for c in transitions]
 
     def run(
         self, reduction: Reduction | None, progress: Callable[[Progress], None] | None
@@ -231,9 +232,9 @@ class _Search:
         states: list[int] = [encoding.initial]
         index: dict[int, int] = {encoding.initial: 0}
         parents, via = array("q", [0]), array("i", [-1])
-        edge_start, edge_rule, edge_state = array("q"), array("i"), array("q")
+        edge_start, edge_transition, edge_state = array("q"), array("i"), array("q")
         found = Exploration(
-            self.system,
+            self.net,
             encoding,
             states,
             parents,
@@ -244,7 +245,7 @@ class _Search:
             [],
             {},
             edge_start=edge_start if self.keep_edges else None,
-            edge_rule=edge_rule if self.keep_edges else None,
+            edge_transition=edge_transition if self.keep_edges else None,
             edge_state=edge_state if self.keep_edges else None,
             reduced=reduction is not None,
         )
@@ -259,13 +260,13 @@ class _Search:
         except KeyboardInterrupt:
             found.stopped = Stopped.INTERRUPTED
             _complete_only(states, parents, via)
-            _complete_only(edge_rule, edge_state)
+            _complete_only(edge_transition, edge_state)
         finally:
             if collecting:
                 gc.enable()
         if self.keep_edges:
             while len(edge_start) <= len(states):
-                edge_start.append(len(edge_rule))
+                edge_start.append(len(edge_transition))
         found.seconds = time.monotonic() - self.began
         return found
 
@@ -283,7 +284,11 @@ class _Search:
         encoding, masks, rank = self.encoding, self.masks, self.rank
         affected, affected_sets = self.affected, self.affected_sets
         fired, overflows, terminals = found.fired, found.overflows, found.terminals
-        edge_start, edge_rule, edge_state = found.edge_start, found.edge_rule, found.edge_state
+        edge_start, edge_transition, edge_state = (
+            found.edge_start,
+            found.edge_transition,
+            found.edge_state,
+        )
         enabled_now, fire = encoding.enabled, encoding.fire
         fast = [(keep, put) if plain else None for _, _, keep, put, plain in masks]
         tests = tests_of(affected, masks)
@@ -354,19 +359,21 @@ class _Search:
                     wait(tuple(new))
                 elif known <= at:
                     self.goes_back = True
-                if edge_rule is not None:
-                    edge_rule.append(number)
+                if edge_transition is not None:
+                    edge_transition.append(number)
                     edge_state.append(known)  # type: ignore[union-attr]
             at += 1
         found.transitions = transitions
 
     def puts_off_for_ever(self, found: Exploration) -> bool:
-        """Whether a reduced search would; if so, it is to begin anew, and then puts off less."""
+        """Whether the search defers a transition for ever. If so, it begins anew and
+        defers less.
+        """
         if not self.partly or not self.goes_back:
             return False
         count = len(found.states)
         targets = [[state for _, state in found.successors(n)] for n in range(count)]
-        more = ignoring(targets, self.inner, self.partly)
+        more = states_to_expand(targets, self.inner, self.partly)
         self.whole.update(found.states[n] for n in more)
         return bool(more)
 
@@ -386,7 +393,9 @@ class _Search:
             size += found.transitions * _BYTES_AN_EDGE
         # What may fire in those that wait: about as much as in the first and the last of them.
         ends = [len(each) for each in (waiting[done], waiting[-1]) if each is not None]
-        size += (states - done) * (_BYTES_A_WAITING_STATE + _BYTES_A_RULE * sum(ends) // len(ends))
+        size += (states - done) * (
+            _BYTES_A_WAITING_STATE + _BYTES_A_TRANSITION * sum(ends) // len(ends)
+        )
         if states > self.limits.states:
             found.stopped = Stopped.STATES
         elif seconds > self.limits.seconds:

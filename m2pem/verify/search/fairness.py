@@ -1,6 +1,6 @@
-"""Runs that go round for ever though nothing that can happen again and again is put off for ever.
+"""Fair infinite runs: runs that never end though no outcome is passed over for ever.
 
-In such a round each outcome (`Transition.outcomes`) that can come in one of its states comes.
+On a fair cycle, each outcome (`Transition.outcomes`) that is possible in one of its states happens.
 """
 
 from collections import deque
@@ -12,43 +12,45 @@ from m2pem.verify.net.petri_net import outcomes_of
 from m2pem.verify.search.explore import Exploration, Stopped
 
 _Step = tuple[int, int]
-"""A rule, and the state after it."""
+"""A transition, and the state after it."""
 _MOST_BEGINNINGS = 20
-"""States of which the one with the shortest run is taken."""
+"""Most states of a component among which the one with the shortest run is looked for."""
 _LARGE = 2_000
-"""States among which any run is short enough."""
+"""States up to which the shortest run is looked for at all."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lasso:
-    """A run to `state`, and the rules of a round that begins and ends there."""
+    """A run to `state`, and the transitions of a cycle that begins and ends there."""
 
     state: int
     prefix: tuple[int, ...]
     cycle: tuple[int, ...]
 
 
-class FairRounds:
+class FairCycles:
     """The states of a search in which fair runs can stay for ever.
 
-    The search must have kept its edges, and left no rule out. `ignored`: rules that no run needs
-    to take, and that none of those looked for takes.
+    The search must have kept its edges, and used no reduction. `ignored`: transitions that no run
+    needs to take, and that none of the runs found takes.
     """
 
     def __init__(self, found: Exploration, ignored: Callable[[int], bool]) -> None:
         self._found = found
-        self._ignored = [ignored(rule.index) for rule in found.system.rules]
-        outcomes = outcomes_of(found.system)
-        self._outcomes = [frozenset(outcomes[rule.index]) for rule in found.system.rules]
+        self._ignored = [ignored(transition.index) for transition in found.net.transitions]
+        outcomes = outcomes_of(found.net)
+        self._outcomes = [
+            frozenset(outcomes[transition.index]) for transition in found.net.transitions
+        ]
         self._open = _last_expanded(found) if found.stopped is Stopped.INTERRUPTED else -1
 
     @property
     def any(self) -> bool:
-        """Whether anything goes round at all, fair or not."""
+        """Whether there is any cycle, fair or not."""
         return any(self._goes_round(part) for part in self._parts(range(self._size)))
 
     def nearest(self) -> Lasso | None:
-        """A run that ends nowhere and puts nothing off for ever; None if there is none."""
+        """A fair run that never ends; None if there is none."""
         parts = sorted(self._fair(), key=min)
         if not parts:
             return None
@@ -72,8 +74,10 @@ class FairRounds:
                     yield step
 
     def _possible(self, state: int) -> frozenset[int]:
-        """The outcomes that can come in a state."""
-        return frozenset[int]().union(*(self._outcomes[rule] for rule, _ in self._steps(state)))
+        """The outcomes that are possible in a state."""
+        return frozenset[int]().union(
+            *(self._outcomes[transition] for transition, _ in self._steps(state))
+        )
 
     def _fair(self) -> Iterator[frozenset[int]]:
         waiting: list[Collection[int]] = [range(self._size)]
@@ -83,9 +87,9 @@ class FairRounds:
                     continue
                 passed: set[int] = set()
                 for state in part:
-                    for rule, to in self._steps(state):
+                    for transition, to in self._steps(state):
                         if to in part:
-                            passed |= self._outcomes[rule]
+                            passed |= self._outcomes[transition]
                 kept = [state for state in part if self._possible(state) <= passed]
                 if len(kept) == len(part):
                     yield part
@@ -107,16 +111,18 @@ class FairRounds:
     # --- one such run ---------------------------------------------------------------------------
 
     def _lasso(self, part: frozenset[int], start: int) -> Lasso:
-        """Passes what could come in the states that it passes, and no more than it must."""
+        """Return a fair lasso that takes each outcome that is possible in its states, and little
+        else.
+        """
         cycle: list[int] = []
         possible = set(self._possible(start))
         passed: set[int] = set()
         at = start
         while not cycle or at != start or possible - passed:
             missing = frozenset(possible - passed)
-            for rule, state in self._way(part, at, missing, start):
-                cycle.append(rule)
-                passed |= self._outcomes[rule]
+            for transition, state in self._way(part, at, missing, start):
+                cycle.append(transition)
+                passed |= self._outcomes[transition]
                 possible |= self._possible(state)
                 at = state
         return Lasso(start, tuple(self._found.run_to(start)), tuple(cycle))
@@ -124,28 +130,28 @@ class FairRounds:
     def _way(
         self, part: frozenset[int], start: int, missing: frozenset[int], back_to: int
     ) -> list[_Step]:
-        """The shortest way to one of some outcomes, or, if none is missing, back."""
+        """The shortest way to one of some outcomes, or, if none is missing, back to the start."""
         came: dict[int, tuple[int, _Step]] = {}
         waiting = deque([start])
         while waiting:
             state = waiting.popleft()
-            for rule, to in self._steps(state):
+            for transition, to in self._steps(state):
                 if to not in part:
                     continue
-                if self._outcomes[rule] & missing if missing else to == back_to:
-                    way = [(rule, to)]
+                if self._outcomes[transition] & missing if missing else to == back_to:
+                    way = [(transition, to)]
                     while state != start:
                         state, step = came[state]
                         way.append(step)
                     return way[::-1]
                 if to not in came and to != start:
-                    came[to] = (state, (rule, to))
+                    came[to] = (state, (transition, to))
                     waiting.append(to)
         raise AssertionError("the states of a round reach each other")
 
 
 def _last_expanded(found: Exploration) -> int:
-    """The state at which a search was interrupted: not all of its steps may be known."""
+    """The state at which a search was interrupted: its steps may be incomplete."""
     starts = found.edge_start
     assert starts is not None
     return max((n for n in range(len(found.states)) if starts[n + 1] > starts[n]), default=-1)

@@ -19,31 +19,32 @@ from dataclasses import dataclass, field
 
 from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import Kind
-from m2pem.verify.search.read_write_sets import Footprints, Union, bits_of
+from m2pem.verify.search.read_write_sets import ReadWriteSets, Union, bits_of
 
 _MOST_STATES = 64
-"""Of the internal steps that one rule may cause; of more, nothing is said."""
+"""Most states of the internal steps that one transition may cause; larger macro steps are unknown.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """An internal rule or join that a macro alone does not cause, but may cause with others.
+    """An internal transition or join that a macro step alone does not cause, but may with others.
 
-    It waits for bits that are `missing` or `present`, which the macro does not change; or, if those
-    are none, for some of a field of bits each of `fields`.
+    It waits for bits that are `missing` or `present`, which the macro step does not change; or, if
+    there are none, for some of a field of bits each of `fields`.
     """
 
-    rule: int
+    transition: int
     missing: int
     present: int
     fields: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)
-class Macro:
-    """What all its rules need, forbid, clear and set, taken together.
+class MacroStep:
+    """What all transitions of a macro step need, forbid, clear and set, taken together.
 
-    `alone`: it is one rule that causes nothing.
+    `alone`: it is one transition that causes nothing.
     """
 
     needs: int = 0
@@ -54,32 +55,34 @@ class Macro:
     feeds: list[Feed] = field(default_factory=list)
 
 
-class Macros:
-    """Works out macros. Of one that has a visible rule in it, nothing is said."""
+class MacroSteps:
+    """Computes macro steps. One with a visible transition in it is unknown."""
 
-    def __init__(self, encoding: Encoding, prints: Footprints, visible: int) -> None:
-        """`visible`: rules, as a mask of their numbers."""
+    def __init__(self, encoding: Encoding, read_write: ReadWriteSets, visible: int) -> None:
+        """`visible`: transitions, as a mask of their numbers."""
         self.encoding = encoding
-        self.prints = prints
-        rules = encoding.system.rules
-        self._visible = bytearray(visible >> rule.index & 1 for rule in rules)
-        self._internal_rules = [r.index for r in rules if r.kind is Kind.INTERNAL]
-        self._join_rules = [r.index for r in rules if r.kind is Kind.JOIN]
-        self._is_internal = bytearray(rule.kind is Kind.INTERNAL for rule in rules)
+        self.read_write = read_write
+        transitions = encoding.net.transitions
+        self._visible = bytearray(visible >> transition.index & 1 for transition in transitions)
+        self._internal_transitions = [r.index for r in transitions if r.kind is Kind.INTERNAL]
+        self._join_transitions = [r.index for r in transitions if r.kind is Kind.JOIN]
+        self._is_internal = bytearray(
+            transition.kind is Kind.INTERNAL for transition in transitions
+        )
         self._wanting: dict[int, int] = {}
         self._barred: dict[int, int] = {}
-        for rule in rules:
-            if rule.kind is not Kind.OUTSIDE:
-                self._register(rule.index)
+        for transition in transitions:
+            if transition.kind is not Kind.OUTSIDE:
+                self._register(transition.index)
         self._wanting_any = Union(self._wanting)
         self._barred_any = Union(self._barred)
         self._readers: dict[int, list[int]] = {}
-        for number in self._internal_rules:
-            for low in bits_of(prints.needs[number] | prints.forbids[number]):
+        for number in self._internal_transitions:
+            for low in bits_of(read_write.needs[number] | read_write.forbids[number]):
                 self._readers.setdefault(low, []).append(number)
 
     def _register(self, number: int) -> None:
-        c = self.encoding.rules[number]
+        c = self.encoding.transitions[number]
         wants, barred = c.need, c.test & ~c.need
         for mask in (*c.any_of, *(mask for mask, _, _ in c.at_least)):
             wants |= mask
@@ -88,30 +91,30 @@ class Macros:
         for low in bits_of(barred):
             self._barred[low] = self._barred.get(low, 0) | 1 << number
 
-    def of(self, number: int, state: int) -> Macro | None:
-        """The macro of a rule that may fire in a state.
+    def of(self, number: int, state: int) -> MacroStep | None:
+        """Return the macro step of a transition that is enabled in a state.
 
         None: something in it is visible, it is too large, or it can go on for ever.
         """
         if self._visible[number]:
             return None
-        macro = Macro()
-        self._add(macro, number)
+        macro_step = MacroStep()
+        self._add(macro_step, number)
         if self._is_internal[number]:
-            return macro
+            return macro_step
         after, _ = self.encoding.fire(number, state)
-        prints = self.prints
+        read_write = self.read_write
         following: dict[int, list[int]] = {after: []}
-        waiting = [(after, prints.clears[number] | prints.sets[number])]
+        waiting = [(after, read_write.clears[number] | read_write.sets[number])]
         again = False
         while waiting:
             now, changed = waiting.pop()
-            self._feed(macro, state, now)
+            self._feed(macro_step, state, now)
             for each in self._caused(now, changed) or self._joining(now):
                 if self._visible[each]:
                     return None
-                macro.alone = False
-                self._add(macro, each)
+                macro_step.alone = False
+                self._add(macro_step, each)
                 then, _ = self.encoding.fire(each, now)
                 following[now].append(then)
                 if then in following:
@@ -120,34 +123,34 @@ class Macros:
                 if len(following) > _MOST_STATES:
                     return None
                 following[then] = []
-                waiting.append((then, changed | prints.clears[each] | prints.sets[each]))
+                waiting.append((then, changed | read_write.clears[each] | read_write.sets[each]))
         if again and _goes_round(following):
             return None
-        return macro
+        return macro_step
 
-    def _add(self, macro: Macro, number: int) -> None:
-        prints = self.prints
-        macro.needs |= prints.needs[number]
-        macro.forbids |= prints.forbids[number]
-        macro.clears |= prints.clears[number]
-        macro.sets |= prints.sets[number]
+    def _add(self, macro_step: MacroStep, number: int) -> None:
+        read_write = self.read_write
+        macro_step.needs |= read_write.needs[number]
+        macro_step.forbids |= read_write.forbids[number]
+        macro_step.clears |= read_write.clears[number]
+        macro_step.sets |= read_write.sets[number]
 
     def _caused(self, state: int, changed: int) -> list[int]:
         enabled = self.encoding.enabled
-        if changed.bit_count() > len(self._internal_rules):
-            return [n for n in self._internal_rules if enabled(n, state)]
+        if changed.bit_count() > len(self._internal_transitions):
+            return [n for n in self._internal_transitions if enabled(n, state)]
         asked: set[int] = set()
         for low in bits_of(changed):
             asked.update(self._readers.get(low, ()))
         return [n for n in asked if enabled(n, state)]
 
     def _joining(self, state: int) -> list[int]:
-        return [n for n in self._join_rules if self.encoding.enabled(n, state)]
+        return [n for n in self._join_transitions if self.encoding.enabled(n, state)]
 
-    def _feed(self, macro: Macro, before: int, now: int) -> None:
-        """Note what does not fire in a state on the way, but may where others have fired first.
+    def _feed(self, macro_step: MacroStep, before: int, now: int) -> None:
+        """Note the transitions that are disabled in a state on the way, but may fire after others.
 
-        What the macro's own changes keep from firing, they keep from it there too.
+        What the macro step's own changes disable here, they disable there too.
         """
         changed = before ^ now
         fed = self._wanting_any(now & changed) | self._barred_any(before & changed)
@@ -155,21 +158,20 @@ class Macros:
             low = fed & -fed
             fed ^= low
             number = low.bit_length() - 1
-            c = self.encoding.rules[number]
+            c = self.encoding.transitions[number]
             missing, present = c.need & ~now, c.test & ~c.need & now
             if (missing | present) & changed:
                 continue
             if missing or present:
-                macro.feeds.append(Feed(number, missing, present))
+                macro_step.feeds.append(Feed(number, missing, present))
                 continue
             fields = [mask for mask in c.any_of if not now & mask]
             fields += [mask for mask, offset, n in c.at_least if (now & mask) >> offset < n]
             if fields:
-                macro.feeds.append(Feed(number, 0, 0, tuple(fields)))
+                macro_step.feeds.append(Feed(number, 0, 0, tuple(fields)))
 
 
 def _goes_round(following: dict[int, list[int]]) -> bool:
-    """Whether a graph has a circle."""
     coming = dict.fromkeys(following, 0)
     for targets in following.values():
         for each in targets:
@@ -185,136 +187,145 @@ def _goes_round(following: dict[int, list[int]]) -> bool:
     return left > 0
 
 
-class Relays:
-    """Finds last rules that can wait."""
+class DeferrableArrivals:
+    """Finds last transitions that can be deferred."""
 
     def __init__(
-        self, encoding: Encoding, prints: Footprints, visible: int, safe: frozenset[int]
+        self, encoding: Encoding, read_write: ReadWriteSets, visible: int, safe: frozenset[int]
     ) -> None:
-        """`visible`: rules, as a mask; `safe`: places that never have two tokens."""
+        """`visible`: transitions, as a mask; `safe`: places that never have two tokens."""
         self.encoding = encoding
-        self.prints = prints
+        self.read_write = read_write
         self._visible = visible
-        places = encoding.system.places
+        places = encoding.net.places
         self._safe = encoding.places_mask(
             p.index for p in places if p.index in safe and encoding.width[p.index] == 1
         )
         self._come: dict[int, bool] = {}
         self._gone: dict[int, bool] = {}
 
-    def excused(self, macro: Macro, state: int, left_out: int) -> list[Feed]:
-        """The feeds of a macro for which somebody else can wait, or that must wait for such.
+    def excused(self, macro_step: MacroStep, state: int, left_out: int) -> list[Feed]:
+        """The feeds of a macro step in whose place another arrival can wait, or that need such a
+        feed.
 
-        `left_out`: interruptions after which it makes no difference what the macro did.
+        `left_out`: interruptions after which it makes no difference what the macro step did.
         """
-        if not macro.alone:
+        if not macro_step.alone:
             return []
-        for feed in macro.feeds:
+        for feed in macro_step.feeds:
             if self._waits(feed, state, left_out):
-                after = 1 << feed.rule | left_out
-                return [e for e in macro.feeds if e is feed or self._only_after(e, after)]
+                after = 1 << feed.transition | left_out
+                return [e for e in macro_step.feeds if e is feed or self._only_after(e, after)]
         return []
 
     def _waits(self, feed: Feed, state: int, left_out: int) -> bool:
-        return any(self._comes_last(low, feed.rule) for low in bits_of(feed.missing)) or any(
-            self._goes_last(low, feed.rule) and self._unseen(low, feed.rule, state, left_out)
+        return any(self._comes_last(low, feed.transition) for low in bits_of(feed.missing)) or any(
+            self._goes_last(low, feed.transition)
+            and self._unseen(low, feed.transition, state, left_out)
             for low in bits_of(feed.present)
         )
 
     def _only_after(self, feed: Feed, after: int) -> bool:
-        """Whether what a rule waits for is brought about by certain rules alone."""
-        prints = self.prints
-        return any(not prints.setting.get(low, 0) & ~after for low in bits_of(feed.missing)) or any(
-            not prints.clearing.get(low, 0) & ~after for low in bits_of(feed.present)
-        )
+        """Whether only certain transitions bring about what a feed waits for."""
+        read_write = self.read_write
+        return any(
+            not read_write.setting.get(low, 0) & ~after for low in bits_of(feed.missing)
+        ) or any(not read_write.clearing.get(low, 0) & ~after for low in bits_of(feed.present))
 
     def _comes_last(self, bit: int, join: int) -> bool:
-        """Whether a token is brought to a place, for one join alone, by rules that can wait."""
+        """Whether only deferrable transitions bring a token to a place that one join
+        alone reads.
+        """
         known = self._come.get(bit)
         if known is None:
             known = self._come[bit] = self._is_brought(bit)
-        return known and self.prints.needing.get(bit, 0) == 1 << join
+        return known and self.read_write.needing.get(bit, 0) == 1 << join
 
     def _goes_last(self, bit: int, end: int) -> bool:
-        """Whether a token is taken off a place by rules that can wait."""
+        """Whether only deferrable transitions take a token off a place."""
         known = self._gone.get(bit)
         if known is None:
             known = self._gone[bit] = self._is_taken(bit)
-        return known and bool(self.prints.forbidding.get(bit, 0) >> end & 1)
+        return known and bool(self.read_write.forbidding.get(bit, 0) >> end & 1)
 
     def _is_brought(self, bit: int) -> bool:
         """See `_comes_last`.
 
-        What needs the source cannot come while its token is at `bit`, or, with a rule that waits,
-        there would be two at the source. So it makes no difference what that does to `bit`.
+        A transition that needs the source cannot fire while its token is at `bit`; otherwise, with
+        a deferred transition, there would be two tokens at the source. So its effect on `bit` makes
+        no difference.
         """
-        prints = self.prints
-        needing = prints.needing.get(bit, 0)
+        read_write = self.read_write
+        needing = read_write.needing.get(bit, 0)
         if not bit & self._safe or not needing or needing & (needing - 1):
             return False
-        if not bit & self.encoding.rules[needing.bit_length() - 1].need:
+        if not bit & self.encoding.transitions[needing.bit_length() - 1].need:
             return False
-        makers = prints.setting.get(bit, 0)
+        makers = read_write.setting.get(bit, 0)
         return bool(makers) and all(
             (source := self._source(low.bit_length() - 1)) != 0
-            and prints.sets[low.bit_length() - 1] == bit
-            and prints.forbidding.get(source, 0) == prints.forbidding.get(bit, 0)
-            and self._emptying(source) == self._emptying(bit) & ~prints.needing[source]
+            and read_write.sets[low.bit_length() - 1] == bit
+            and read_write.forbidding.get(source, 0) == read_write.forbidding.get(bit, 0)
+            and self._emptying(source) == self._emptying(bit) & ~read_write.needing[source]
             for low in bits_of(makers)
         )
 
     def _is_taken(self, bit: int) -> bool:
-        prints = self.prints
-        takers = prints.clearing.get(bit, 0) & prints.needing.get(bit, 0)
+        read_write = self.read_write
+        takers = read_write.clearing.get(bit, 0) & read_write.needing.get(bit, 0)
         return bool(takers) and all(
             self._source(low.bit_length() - 1) == bit
-            and all(self._tells_nothing(b, bit) for b in bits_of(prints.sets[low.bit_length() - 1]))
+            and all(
+                self._tells_nothing(b, bit) for b in bits_of(read_write.sets[low.bit_length() - 1])
+            )
             for low in bits_of(takers)
         )
 
     def _tells_nothing(self, bit: int, source: int) -> bool:
-        """Whether nobody looks at a bit, and it goes when the place its token came from does."""
-        prints = self.prints
+        """Whether no transition reads a bit, and it is cleared with the place its token
+        came from.
+        """
+        read_write = self.read_write
         return (
             bool(bit & self._safe)
-            and not prints.needing.get(bit, 0)
-            and not prints.forbidding.get(bit, 0)
-            and prints.clearing.get(bit, 0) == self._emptying(source)
+            and not read_write.needing.get(bit, 0)
+            and not read_write.forbidding.get(bit, 0)
+            and read_write.clearing.get(bit, 0) == self._emptying(source)
         )
 
     def _emptying(self, bit: int) -> int:
-        """The rules that take a token away without looking whether it is there."""
-        return self.prints.clearing.get(bit, 0) & ~self.prints.needing.get(bit, 0)
+        """The transitions that take a token away without testing whether it is there."""
+        return self.read_write.clearing.get(bit, 0) & ~self.read_write.needing.get(bit, 0)
 
     def _source(self, number: int) -> int:
-        """The bit from which a rule that can wait takes its token; 0: it is no such rule."""
-        prints, rules = self.prints, self.encoding.system.rules
-        rule, c = rules[number], self.encoding.rules[number]
-        if self._visible >> number & 1 or rule.kind is not Kind.OUTSIDE or not c.plain:
+        """The bit from which a deferrable transition takes its token; 0: it is not deferrable."""
+        read_write, transitions = self.read_write, self.encoding.net.transitions
+        transition, c = transitions[number], self.encoding.transitions[number]
+        if self._visible >> number & 1 or transition.kind is not Kind.OUTSIDE or not c.plain:
             return 0
-        source = prints.needs[number]
-        if source & (source - 1) or not source & self._safe or prints.clears[number] != source:
+        source = read_write.needs[number]
+        if source & (source - 1) or not source & self._safe or read_write.clears[number] != source:
             return 0
-        if prints.forbids[number] or rule.flag is not None:
+        if read_write.forbids[number] or transition.flag is not None:
             return 0
-        users = prints.needing.get(source, 0)
+        users = read_write.needing.get(source, 0)
         for low in bits_of(users):
             user = low.bit_length() - 1
-            outside = rules[user].kind is Kind.OUTSIDE
-            if not outside or not source & self.encoding.rules[user].need:
+            outside = transitions[user].kind is Kind.OUTSIDE
+            if not outside or not source & self.encoding.transitions[user].need:
                 return 0
         return source
 
     def _unseen(self, bit: int, end: int, state: int, left_out: int) -> bool:
-        """Whether all who wait for a token to go must wait for the same end anyway."""
-        prints = self.prints
+        """Whether all that wait for a token to go must wait for the same end anyway."""
+        read_write = self.read_write
         kept = 0
-        for low in bits_of(self.encoding.rules[end].need & state):
-            if not prints.clearing.get(low, 0) & ~(1 << end | left_out):
+        for low in bits_of(self.encoding.transitions[end].need & state):
+            if not read_write.clearing.get(low, 0) & ~(1 << end | left_out):
                 kept |= low
-        others = prints.forbidding.get(bit, 0) & ~(1 << end)
+        others = read_write.forbidding.get(bit, 0) & ~(1 << end)
         for low in bits_of(others):
-            c = self.encoding.rules[low.bit_length() - 1]
+            c = self.encoding.transitions[low.bit_length() - 1]
             if not c.test & ~c.need & kept:
                 return False
         return True

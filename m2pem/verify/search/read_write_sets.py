@@ -11,27 +11,27 @@ from collections.abc import Iterable, Mapping, Sequence
 from m2pem.verify.net.encoding import Encoding
 
 
-class Footprints:
-    """By rule, bits of states; by bit, rules as a mask of their numbers.
+class ReadWriteSets:
+    """By transition, bits of states; by bit, transitions as a mask of their numbers.
 
-    A rule `needs` bits that must be set or whose tokens it moves on, and `forbids` bits that must
-    not be set or, for the same reason, bear on what it does. It `clears` and `sets` bits, and the
-    places of `kill` are emptied whatever they hold.
+    A transition `needs` bits that must be set or whose tokens it moves on, and `forbids` bits that
+    must not be set or, for the same reason, affect what it does. It `clears` and `sets` bits, and
+    the places of `reset` are emptied whatever they hold.
     """
 
     def __init__(self, encoding: Encoding) -> None:
-        count = len(encoding.rules)
+        count = len(encoding.transitions)
         self.encoding = encoding
         self.needs, self.forbids = [0] * count, [0] * count
         self.clears, self.sets = [0] * count, [0] * count
-        self.kill = [rule.kill for rule in encoding.rules]
+        self.reset = [transition.reset for transition in encoding.transitions]
         for number in range(count):
             self._look_at(number)
         self.needing = _registered(self.needs)
         self.forbidding = _registered(self.forbids)
-        self.clearing = _registered(self.clears, self.kill)
+        self.clearing = _registered(self.clears, self.reset)
         self.setting = _registered(self.sets)
-        self.killing = _registered(self.kill, self.kill)
+        self.resetting = _registered(self.reset, self.reset)
         self.needing_any = Union(self.needing)
         self.forbidding_any = Union(self.forbidding)
         self.clearing_any = Union(self.clearing)
@@ -39,7 +39,7 @@ class Footprints:
 
     def _look_at(self, number: int) -> None:
         encoding = self.encoding
-        c = encoding.rules[number]
+        c = encoding.transitions[number]
         needs, forbids = c.need, c.test & ~c.need
         for mask in c.any_of:
             needs |= mask
@@ -64,13 +64,14 @@ class Footprints:
 _PART = 64
 _FULL = (1 << _PART) - 1
 _FEW = 8
-"""Bits of a mask that are looked up one by one."""
+"""Masks of so few bits are looked up bit by bit."""
 
 
 class Union:
-    """Of a register, the rules of any bit of a mask.
+    """The transitions of any bit of a mask, from a register by bit.
 
-    The same few masks are asked for again, and others that differ from them in few bits.
+    Few masks are looked up, again and again, and others differ from them in few bits. So results
+    are cached, for whole masks and for parts of masks.
     """
 
     def __init__(self, register: Mapping[int, int]) -> None:
@@ -79,7 +80,7 @@ class Union:
         self._parts: dict[tuple[int, int], int] = {}
 
     def __call__(self, mask: int) -> int:
-        """Those rules, as a mask of their numbers."""
+        """Return those transitions, as a mask of their numbers."""
         known = self._known.get(mask)
         if known is None:
             few = mask.bit_count() <= _FEW
@@ -107,23 +108,24 @@ class Union:
         return found
 
 
-def _registered(masks: Sequence[int], kill: Sequence[int] = ()) -> dict[int, int]:
-    """By bit, the rules whose masks have it.
+def _registered(masks: Sequence[int], reset: Sequence[int] = ()) -> dict[int, int]:
+    """By bit, the transitions whose masks have it.
 
-    What rules `kill` differs little from one to the other, if at all: what they leave is noted.
+    The places that transitions `reset` differ little from one transition to the other, if at all.
+    So only the places that they do not reset are noted one by one.
     """
     found: dict[int, int] = {}
     leaving: dict[int, int] = {}
     whole = most = 0
-    for each in kill:
+    for each in reset:
         whole |= each
     for number, mask in enumerate(masks):
         own = mask
-        if kill and kill[number] and not kill[number] & ~mask:
+        if reset and reset[number] and not reset[number] & ~mask:
             most |= 1 << number
-            for low in bits_of(whole & ~kill[number]):
+            for low in bits_of(whole & ~reset[number]):
                 leaving[low] = leaving.get(low, 0) | 1 << number
-            own &= ~kill[number]
+            own &= ~reset[number]
         for low in bits_of(own):
             found[low] = found.get(low, 0) | 1 << number
     if most:
@@ -141,11 +143,11 @@ def bits_of(mask: int) -> Iterable[int]:
 
 
 _MOST_NAMED = 4_000_000
-"""Rules that are named to be tested after others, all together; each takes about 100 bytes."""
+"""Most entries in all lists of affected transitions; each takes about 100 bytes."""
 
 
 def as_sets(affected: list[list[int]]) -> list[frozenset[int]]:
-    """The same as sets; lists that are shared give sets that are."""
+    """The same lists as sets; shared lists give shared sets."""
     made = {key: frozenset(each) for key, each in _apart(affected).items()}
     return [made[id(each)] for each in affected]
 
@@ -153,40 +155,39 @@ def as_sets(affected: list[list[int]]) -> list[frozenset[int]]:
 def tests_of(
     affected: list[list[int]], masks: list[tuple[int, int, int, int, bool]]
 ) -> list[list[tuple[int, int, int, bool]]]:
-    """By rule, what to test after it: the number of each rule, its masks and whether they say it
-    all."""
+    """By transition, what to test after it: (number, masks, whether the masks say it all)."""
     of = [(n, test, need, plain) for n, (test, need, _, _, plain) in enumerate(masks)]
     made = {key: [of[n] for n in each] for key, each in _apart(affected).items()}
     return [made[id(each)] for each in affected]
 
 
 def _apart(affected: list[list[int]]) -> dict[int, list[int]]:
-    """Each list once, however many rules share it."""
+    """Each list once, by identity, however many transitions share it."""
     return {id(each): each for each in affected}
 
 
-def affected_rules(encoding: Encoding) -> list[list[int]]:
-    """By rule, those whose tests may look at something that it changes.
+def affected_transitions(encoding: Encoding) -> list[list[int]]:
+    """By transition, those whose tests may read something that it changes.
 
-    One that changes most of all there is, such as the end of the run, may affect any rule; where
-    there is no more room to say which ones a rule affects, it is taken to affect all.
+    A transition that changes most of the state, such as the end of the run, may affect any other.
+    Where there is no more room for lists, a transition is taken to affect all.
     """
     readers: dict[int, list[int]] = {}
-    for number, rule in enumerate(encoding.rules):
-        for low in bits_of(rule.reads):
+    for number, transition in enumerate(encoding.transitions):
+        for low in bits_of(transition.reads):
             readers.setdefault(low, []).append(number)
-    every = list(range(len(encoding.rules)))
+    every = list(range(len(encoding.transitions)))
     known: dict[int, list[int]] = {}
     named = 0
-    for rule in encoding.rules:
-        if rule.changes in known:
+    for transition in encoding.transitions:
+        if transition.changes in known:
             continue
-        if rule.changes.bit_count() * 2 > encoding.bits or named > _MOST_NAMED:
-            known[rule.changes] = every
+        if transition.changes.bit_count() * 2 > encoding.bits or named > _MOST_NAMED:
+            known[transition.changes] = every
             continue
         touched: set[int] = set()
-        for low in bits_of(rule.changes):
+        for low in bits_of(transition.changes):
             touched.update(readers.get(low, ()))
-        known[rule.changes] = sorted(touched)
+        known[transition.changes] = sorted(touched)
         named += len(touched)
-    return [known[rule.changes] for rule in encoding.rules]
+    return [known[transition.changes] for transition in encoding.transitions]

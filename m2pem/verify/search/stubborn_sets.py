@@ -24,7 +24,7 @@ absorbs as well, visible or not: the step before it is invisible, and undone. It
 requirements that a finite run violates as for those that only an infinite one does, as nothing is
 deferred for ever.
 
-The *ignoring proviso* ensures that. A run that goes round a cycle on which a transition is always
+The *ignoring proviso* ensures that. A run that cycles a cycle on which a transition is always
 left out never comes to that transition. So every cycle must have a state in which nothing was
 deferred (`states_to_expand`). External transitions can only be deferred in a state that has no
 others, and internal ones only in a state with such transitions: both kinds of state are looked at
@@ -38,21 +38,21 @@ from typing import Protocol
 from m2pem.verify.ltl.automaton import components
 from m2pem.verify.net.concurrency import Concurrency, is_small
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Kind, System
-from m2pem.verify.search.macro_steps import Feed, Macro, Macros, Relays
-from m2pem.verify.search.read_write_sets import Footprints, bits_of
+from m2pem.verify.net.petri_net import Kind, PetriNet
+from m2pem.verify.search.macro_steps import DeferrableArrivals, Feed, MacroStep, MacroSteps
+from m2pem.verify.search.read_write_sets import ReadWriteSets, bits_of
 
 _A_FEW = 500
-"""Of so many states that lie on circles together, one is chosen at a time."""
+"""For each so many states of a component, one more is chosen."""
 
 
-def ignoring(
+def states_to_expand(
     targets: Sequence[Sequence[int]], inner: Collection[int], partly: Collection[int]
 ) -> set[int]:
-    """States in which nothing may be put off, so that nothing is put off for ever; few of them.
+    """Return few states in which nothing may be deferred, so that nothing is deferred for ever.
 
-    `targets`: by state, those after it. `inner`: states with internal steps or joins. `partly`:
-    states in which something was put off. Empty: all is well.
+    `targets`: by state, its successors. `inner`: states with internal transitions or joins.
+    `partly`: states in which something was deferred. Empty: the proviso holds.
     """
     inside = {state for state in partly if state in inner}
     outside = {state for state in partly if state not in inner}
@@ -62,7 +62,9 @@ def ignoring(
 def _breaking(
     targets: Sequence[Sequence[int]], states: Collection[int], partly: Collection[int]
 ) -> set[int]:
-    """Of `partly`, such that each circle with one of these, of `states` alone, has a found one."""
+    """Choose states of `partly` such that each cycle within `states` that has one of `partly` has a
+    chosen one.
+    """
     found: set[int] = set()
     waiting = [sorted(states)] if partly else []
     while waiting:
@@ -75,7 +77,7 @@ def _breaking(
 
 
 def _circles(targets: Sequence[Sequence[int]], states: list[int]) -> Iterator[list[int]]:
-    """Some states, in parts of which each can reach each other, without those on no circle."""
+    """The strongly connected components of some states, without states on no cycle."""
     place = {state: at for at, state in enumerate(states)}
     among = [[place[each] for each in targets[state] if each in place] for state in states]
     parts: dict[int, list[int]] = {}
@@ -87,68 +89,70 @@ def _circles(targets: Sequence[Sequence[int]], states: list[int]) -> Iterator[li
 
 
 Choose = Callable[[int, Sequence[int]], Sequence[int]]
-"""Of the rules that may fire in a state, those to try."""
+"""Chooses, of the transitions enabled in a state, those to try."""
 
 _MOST_SEEDS = 12
-"""Rules of a state that are tried as the one to begin with."""
+"""Most transitions that are tried as the seed of a set."""
 
 
 class Reduction(Protocol):
-    """Chooses, in each state, which of the rules that may fire are tried."""
+    """Chooses, in each state, which of the enabled transitions are tried."""
 
     def bind(self, encoding: Encoding) -> Choose:
-        """Get ready for one way of writing the system's states."""
+        """Prepare the choice for one encoding of the net's states."""
         ...
 
 
 class StubbornSets:
-    """The reduction of this module."""
+    """The reduction by stubborn sets."""
 
-    def __init__(self, system: System, visible: Iterable[int] = ()) -> None:
-        """`visible`: rules that may change what the property looks at, or are what it looks at."""
+    def __init__(self, net: PetriNet, visible: Iterable[int] = ()) -> None:
+        """`visible`: transitions that may change what the property observes, or are observed."""
         self.visible = frozenset(visible)
-        self.safe = safe_places(system)
+        self.safe = safe_places(net)
 
     def bind(self, encoding: Encoding) -> Choose:
         """See `Reduction`."""
-        return _Bound(encoding, self.visible, self.safe).choose
+        return _Chooser(encoding, self.visible, self.safe).choose
 
 
-def safe_places(system: System) -> frozenset[int]:
-    """Places that the structure proves to have one token at most, or to get them from one rule."""
-    if system.single is not None:
-        return system.single
-    if is_small(system):
-        return Concurrency(system).single
+def safe_places(net: PetriNet) -> frozenset[int]:
+    """Places that the structure proves to have one token at most, or to get tokens from one
+    transition.
+    """
+    if net.single is not None:
+        return net.single
+    if is_small(net):
+        return Concurrency(net).single
     producers: dict[int, int] = {}
-    for rule in system.rules:
-        made = {place for place, _ in rule.produce}
-        for place in made | {target for _, target in (*rule.moves, *rule.copies)}:
+    for transition in net.transitions:
+        made = {place for place, _ in transition.produce}
+        for place in made | {target for _, target in (*transition.moves, *transition.copies)}:
             producers[place] = producers.get(place, 0) + 1
-    return frozenset(p.index for p in system.places if producers.get(p.index, 0) <= 1)
+    return frozenset(p.index for p in net.places if producers.get(p.index, 0) <= 1)
 
 
-class _Bound:
+class _Chooser:
     def __init__(self, encoding: Encoding, visible: frozenset[int], safe: frozenset[int]) -> None:
         self.encoding = encoding
-        system = encoding.system
-        self.rules = system.rules
+        net = encoding.net
+        self.transitions = net.transitions
         seen = _mask(visible)
-        self.prints = prints = Footprints(encoding)
-        self.macros = Macros(encoding, prints, seen)
-        self.relays = Relays(encoding, prints, seen, safe)
+        self.read_write = read_write = ReadWriteSets(encoding)
+        self.macro_steps = MacroSteps(encoding, read_write, seen)
+        self.deferrable = DeferrableArrivals(encoding, read_write, seen, safe)
         self.seen = seen
-        self.internal = _mask(r.index for r in self.rules if r.kind is Kind.INTERNAL)
-        self.outside = _mask(r.index for r in self.rules if r.kind is Kind.OUTSIDE)
-        self.every = (1 << len(self.rules)) - 1
-        self.unsafe = encoding.places_mask(p.index for p in system.places if p.index not in safe)
-        self._bit = [1 << rule.index for rule in self.rules]
-        self._visible = bytearray(rule.index in visible for rule in self.rules)
-        self.joins = _mask(r.index for r in self.rules if r.kind is Kind.JOIN)
+        self.internal = _mask(r.index for r in self.transitions if r.kind is Kind.INTERNAL)
+        self.outside = _mask(r.index for r in self.transitions if r.kind is Kind.OUTSIDE)
+        self.every = (1 << len(self.transitions)) - 1
+        self.unsafe = encoding.places_mask(p.index for p in net.places if p.index not in safe)
+        self._bit = [1 << transition.index for transition in self.transitions]
+        self._visible = bytearray(transition.index in visible for transition in self.transitions)
+        self.joins = _mask(r.index for r in self.transitions if r.kind is Kind.JOIN)
         # The same in all states: what goes on at once is gone through branch by branch.
-        self._rank = [0] * len(self.rules)
-        kills = [each.bit_count() for each in prints.kill]
-        for rank, number in enumerate(sorted(range(len(kills)), key=kills.__getitem__)):
+        self._rank = [0] * len(self.transitions)
+        resets = [each.bit_count() for each in read_write.reset]
+        for rank, number in enumerate(sorted(range(len(resets)), key=resets.__getitem__)):
             self._rank[number] = rank
         self._rivals_of: dict[int, int] = {}
         self._all_bits = (1 << encoding.bits) - 1
@@ -156,8 +160,8 @@ class _Bound:
     # --- choosing -------------------------------------------------------------------------------
 
     def choose(self, state: int, usable: Sequence[int]) -> Sequence[int]:
-        """The smallest set found, or all."""
-        first = self.rules[usable[0]].kind
+        """Return the smallest set found, or all enabled transitions."""
+        first = self.transitions[usable[0]].kind
         if first is Kind.JOIN:
             return usable
         visible = self._visible
@@ -179,26 +183,28 @@ class _Bound:
         return best
 
     def _rivals(self, number: int) -> int:
-        """Rules that need what a rule takes, itself among them: they are in its set in any case."""
+        """Transitions that need what a transition takes, and itself: they are in its set in any
+        case.
+        """
         found = self._rivals_of.get(number)
         if found is None:
-            taken = self.prints.clears[number] & ~self.prints.kill[number]
-            found = self._rivals_of[number] = self.prints.needing_any(taken)
+            taken = self.read_write.clears[number] & ~self.read_write.reset[number]
+            found = self._rivals_of[number] = self.read_write.needing_any(taken)
         return found
 
     def _close(self, state: int, seed: int, usable: int, candidates: int, most: int) -> int | None:
-        """The stubborn set of a rule; None: it is not smaller than `most`.
+        """Return the stubborn set of a transition; None: it is not smaller than `most`.
 
-        Interruptions that absorb the seed are left out of account: whatever comes before one of
-        them, the seed could have come first, and what else is tried need not bear with them.
+        Interruptions that absorb the seed are left out: whatever comes before one of them, the seed
+        could have come first, and what else is tried need not commute with them.
         """
-        macro = self.macros.of(seed, state)
-        if macro is None:
+        macro_step = self.macro_steps.of(seed, state)
+        if macro_step is None:
             return None
-        add, left_out = self._disturbed(macro)
+        add, left_out = self._disturbed(macro_step)
         candidates &= ~left_out
-        closed, clears, sets = 1 << seed, macro.clears, macro.sets
-        fed = self._fed(macro, state, left_out)
+        closed, clears, sets = 1 << seed, macro_step.clears, macro_step.sets
+        fed = self._fed(macro_step, state, left_out)
         waiting: list[int] = []
         while True:
             add &= candidates & ~closed
@@ -211,45 +217,48 @@ class _Bound:
                     return closed
                 add = self._feeding(fed.pop(), closed, candidates)
             elif usable >> (number := waiting.pop()) & 1:
-                macro = self.macros.of(number, state)
-                if macro is None:
+                macro_step = self.macro_steps.of(number, state)
+                if macro_step is None:
                     return None
-                clears, sets = clears | macro.clears, sets | macro.sets
-                add = self._disturbed(macro)[0] & (candidates | self.joins) & ~closed
-                add &= ~self._undone_by(number, macro, add)
-                fed += self._fed(macro, state, left_out)
+                clears, sets = clears | macro_step.clears, sets | macro_step.sets
+                add = self._disturbed(macro_step)[0] & (candidates | self.joins) & ~closed
+                add &= ~self._undone_by(number, macro_step, add)
+                fed += self._fed(macro_step, state, left_out)
             else:
                 add = self._enabling(number, state, closed, (clears, sets), candidates)
 
-    def _fed(self, macro: Macro, state: int, left_out: int) -> list[Feed]:
-        """What a macro might cause with others, unless somebody else can wait."""
-        if not macro.feeds:
+    def _fed(self, macro_step: MacroStep, state: int, left_out: int) -> list[Feed]:
+        """The feeds of a macro step, unless another arrival can wait in their place."""
+        if not macro_step.feeds:
             return []
-        excused = self.relays.excused(macro, state, left_out)
-        return [each for each in macro.feeds if each not in excused]
+        excused = self.deferrable.excused(macro_step, state, left_out)
+        return [each for each in macro_step.feeds if each not in excused]
 
     def _feeding(self, feed: Feed, closed: int, candidates: int) -> int:
-        """Rules one of which must fire before what a macro might cause can be: few new ones."""
-        prints = self.prints
+        """A small set of transitions, one of which must fire before a feed can."""
+        read_write = self.read_write
         best = -1
-        for register, bits in ((prints.setting, feed.missing), (prints.clearing, feed.present)):
+        for register, bits in (
+            (read_write.setting, feed.missing),
+            (read_write.clearing, feed.present),
+        ):
             for low in bits_of(bits):
                 found = register.get(low, 0) & ~closed & candidates
                 if best < 0 or found.bit_count() < best.bit_count():
                     best = found
                     if not best & (best - 1):
                         return best
-        return best if best >= 0 else prints.setting_any(feed.fields[0])
+        return best if best >= 0 else read_write.setting_any(feed.fields[0])
 
     def _enabling(
         self, number: int, state: int, closed: int, own: tuple[int, int], candidates: int
     ) -> int:
-        """Rules one of which must fire before a disabled one can: few that are not in already.
+        """A small set of transitions, one of which must fire before a disabled one can.
 
-        `own`: bits that the rules that are in already clear, and set.
+        `own`: bits that the transitions that are in the set already clear, and set.
         """
-        c = self.encoding.rules[number]
-        clearing, setting = self.prints.clearing, self.prints.setting
+        c = self.encoding.transitions[number]
+        clearing, setting = self.read_write.clearing, self.read_write.setting
         present, missing = c.test & ~c.need & state, c.need & ~state
         for register, bits in ((clearing, present & own[0]), (setting, missing & own[1])):
             for low in bits_of(bits):
@@ -269,59 +278,61 @@ class _Bound:
             return best
         for mask in c.any_of:
             if not state & mask:
-                return self.prints.setting_any(mask)
+                return self.read_write.setting_any(mask)
         for mask, offset, count in c.at_least:
             if (state & mask) >> offset < count:
-                return self.prints.setting_any(mask)
+                return self.read_write.setting_any(mask)
         return 0
 
     # --- what a step disturbs -------------------------------------------------------------------
 
-    def _disturbed(self, macro: Macro) -> tuple[int, int]:
-        """Rules whose order with a step matters, and interruptions that absorb it."""
-        prints = self.prints
-        clears, sets = macro.clears, macro.sets
-        found = prints.needing_any(clears) | prints.setting_any(clears | macro.forbids)
-        found |= prints.forbidding_any(sets) | prints.setting_any(sets & self.unsafe)
-        killers = prints.clearing_any(sets) | prints.clearing_any(macro.needs)
-        absorbing = self._absorbing(clears | sets) & killers & ~found
-        return found | (killers & ~absorbing), absorbing
+    def _disturbed(self, macro_step: MacroStep) -> tuple[int, int]:
+        """Transitions whose order with a step matters, and interruptions that absorb it."""
+        read_write = self.read_write
+        clears, sets = macro_step.clears, macro_step.sets
+        found = read_write.needing_any(clears) | read_write.setting_any(clears | macro_step.forbids)
+        found |= read_write.forbidding_any(sets) | read_write.setting_any(sets & self.unsafe)
+        resetters = read_write.clearing_any(sets) | read_write.clearing_any(macro_step.needs)
+        absorbing = self._absorbing(clears | sets) & resetters & ~found
+        return found | (resetters & ~absorbing), absorbing
 
     def _absorbing(self, changes: int) -> int:
-        """Interruptions that make a step before them undone, and are not kept from coming."""
-        prints = self.prints
+        """Interruptions that undo a step before them, and are not disabled by it."""
+        read_write = self.read_write
         found = self.every
         for low in bits_of(changes):
-            found &= prints.killing.get(low, 0)
+            found &= read_write.resetting.get(low, 0)
             if not found:
                 return 0
-        return found & ~(prints.needing_any(changes) | prints.forbidding_any(changes))
+        return found & ~(read_write.needing_any(changes) | read_write.forbidding_any(changes))
 
-    def _undone_by(self, number: int, macro: Macro, disturbed: int) -> int:
-        """Of the rules that a step disturbs, those that it makes undone if it interrupts.
+    def _undone_by(self, number: int, macro_step: MacroStep, disturbed: int) -> int:
+        """Of the transitions that a step disturbs, those that it undoes if it is an interruption.
 
-        Whether they come before it or not at all, the state after it is the same, and it can come
-        just as well. The seed of a set must not count on that: it would put them off for ever.
+        Whether they come before it or not, the state after it is the same, and it is enabled just
+        as well. The seed of a set must not count on that: it would defer them for ever.
         """
-        prints = self.prints
-        kill = prints.kill[number]
-        if not kill:
+        read_write = self.read_write
+        reset = read_write.reset[number]
+        if not reset:
             return 0
-        bearing = prints.needs[number] | prints.forbids[number]
-        found = disturbed & self._within(kill) & ~self.seen
-        found &= ~(prints.clearing_any(bearing) | prints.setting_any(bearing))
+        bearing = read_write.needs[number] | read_write.forbids[number]
+        found = disturbed & self._within(reset) & ~self.seen
+        found &= ~(read_write.clearing_any(bearing) | read_write.setting_any(bearing))
         # What happens by itself must not happen after the interruption in place of before it.
-        found &= self.outside | prints.needing_any(kill & ~macro.sets)
+        found &= self.outside | read_write.needing_any(reset & ~macro_step.sets)
         return 0 if disturbed & self.joins & ~found else found
 
-    def _within(self, kill: int) -> int:
-        """The rules that change nothing but what an interruption takes away."""
-        beside = self._all_bits & ~kill
-        return self.every & ~(self.prints.clearing_any(beside) | self.prints.setting_any(beside))
+    def _within(self, reset: int) -> int:
+        """The transitions that change nothing but what an interruption resets."""
+        beside = self._all_bits & ~reset
+        return self.every & ~(
+            self.read_write.clearing_any(beside) | self.read_write.setting_any(beside)
+        )
 
 
-def _mask(rules: Iterable[int]) -> int:
+def _mask(transitions: Iterable[int]) -> int:
     found = 0
-    for number in rules:
+    for number in transitions:
         found |= 1 << number
     return found

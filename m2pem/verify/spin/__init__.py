@@ -1,1 +1,3 @@
-"""The model checker Spin as an engine: rules as PROMELA, Spin's answers in the mission's words."""
+"""The model checker Spin as an engine: the net as PROMELA, and Spin's answers in the mission's
+words.
+"""

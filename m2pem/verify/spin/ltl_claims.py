@@ -1,4 +1,4 @@
-"""Asking Spin whether a mission does what its author requires."""
+"""LTL claims: ask Spin whether a mission meets its author's requirements."""
 
 import time
 from collections.abc import Callable
@@ -14,13 +14,12 @@ from m2pem.verify.requirements.check import Answer
 from m2pem.verify.requirements.propositions import Labels, UnknownDataError
 from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.search.explore import Limits, Progress, Stopped
-from m2pem.verify.spin.never_claim import Watch
-from m2pem.verify.spin.programs import TooLongError, Workshop
-from m2pem.verify.spin.promela import Asks, text_of
-from m2pem.verify.spin.queries import Asking, Storage
-from m2pem.verify.spin.queries import Found as Kind
-from m2pem.verify.spin.search import Found
-from m2pem.verify.spin.trail import Trail, Walking, check_cycle, replay
+from m2pem.verify.spin.never_claim import NeverClaim
+from m2pem.verify.spin.programs import CheckerFolder, TooLongError
+from m2pem.verify.spin.promela import Assertions, text_of
+from m2pem.verify.spin.queries import ErrorKind, SpinQueries, Storage
+from m2pem.verify.spin.search import SpinExploration
+from m2pem.verify.spin.trail import Trail, TrailSystem, check_cycle, replay
 from m2pem.verify.spin.trail import read as read_trail
 
 _STEPS = "it is about single steps, which Spin is not asked: the built-in engine is"
@@ -30,11 +29,11 @@ _FAIRNESS = (
 )
 
 BEYOND_SPIN = frozenset({_STEPS, _FAIRNESS})
-"""What stands in the way of an answer where the built-in engine has one."""
+"""Reasons for which Spin has no answer but the built-in search has."""
 
 
 def check_requirement(
-    found: Found,
+    found: SpinExploration,
     mission: Mission,
     fleet: Fleet,
     requirement: Requirement,
@@ -43,14 +42,14 @@ def check_requirement(
     storage: Storage = Storage.EXACT,
     progress: Callable[[Progress], None] | None = None,
 ) -> Answer:
-    """Whether a requirement holds of a system that Spin has searched.
+    """Check whether a requirement holds of a net that Spin has searched.
 
-    Runs that pass over something for ever are not left out by Spin: if all runs keep to a
-    requirement, so do the fair ones; if one breaks it, it is looked at whether that one is fair.
+    Spin does not leave unfair runs out. If all runs meet a requirement, so do the fair ones; if one
+    violates it, that run is checked for fairness.
 
     Raises:
         SpinMissingError: Spin or a compiler is not installed.
-        InternalError: Spin says something that is not so.
+        InternalError: Spin's answer is wrong.
     """
     if found.stopped is Stopped.TOKENS:
         why = f"the search stopped at {found.stopped}"
@@ -58,43 +57,43 @@ def check_requirement(
     if needs_steps(requirement.formula):
         return Answer(requirement, Result.UNDECIDED, why=_STEPS)
     try:
-        labels = Labels(found.system, mission, fleet, propositions(requirement.formula))
-        asker = _Asker(found.encoding, labels, requirement)
-        return asker.ask(limits or Limits(), storage, progress)
+        labels = Labels(found.net, mission, fleet, propositions(requirement.formula))
+        asker = _ClaimQuery(found.encoding, labels, requirement)
+        return asker.query(limits or Limits(), storage, progress)
     except UnknownDataError as error:
         return Answer(requirement, Result.UNDECIDED, why=str(error))
 
 
-class _Asker:
+class _ClaimQuery:
     def __init__(self, encoding: Encoding, labels: Labels, requirement: Requirement) -> None:
         self.encoding = encoding
         self.labels = labels
         self.requirement = requirement
-        self.watch = Watch(requirement.formula, labels, encoding)
+        self.watch = NeverClaim(requirement.formula, labels, encoding)
 
-    def ask(
+    def query(
         self, limits: Limits, storage: Storage, progress: Callable[[Progress], None] | None
     ) -> Answer:
-        system = self.encoding.system
-        model = text_of(system, self.encoding, Asks(), self.watch)
-        with Workshop() as shop:
-            asking = Asking(shop, limits, storage, time.monotonic(), progress)
+        net = self.encoding.net
+        model = text_of(net, self.encoding, Assertions(), self.watch)
+        with CheckerFolder() as shop:
+            queries = SpinQueries(shop, limits, storage, time.monotonic(), progress)
             try:
-                told = asking.ask(model, cycles=True)
+                result = queries.query(model, cycles=True)
             except TooLongError as error:
                 return Answer(self.requirement, Result.UNDECIDED, why=str(error))
-            states, seconds = told.report.states, asking.began_ago()
-            if told.report.found is None:
-                if told.stopped is None:
+            states, seconds = result.report.states, queries.began_ago()
+            if result.report.found is None:
+                if result.stopped is None:
                     return self._answer(Result.HOLDS, states, seconds)
-                why = f"the search stopped at {told.stopped}"
+                why = f"the search stopped at {result.stopped}"
                 return self._answer(Result.UNDECIDED, states, seconds, why)
-            trail = read_trail(shop.trail(), model.rule_at)
-        run = self._run(trail, whatever=told.report.found is Kind.ASSERTION)
+            trail = read_trail(shop.trail(), model.transition_at)
+        run = self._run(trail, whatever=result.report.found is ErrorKind.ASSERTION)
         if (
             self.requirement.fair
             and run.cycle
-            and not Walking(self.encoding, self.labels).fair(run)
+            and not TrailSystem(self.encoding, self.labels).fair(run)
         ):
             return self._answer(Result.UNDECIDED, states, seconds, _FAIRNESS)
         return self._answer(Result.VIOLATED, states, seconds, run=run)
@@ -103,13 +102,13 @@ class _Asker:
         check_cycle(self.encoding, trail)
         states = replay(self.encoding, trail.prefix + trail.cycle)
         moves = [
-            Move(rule, state)
-            for rule, state in zip(trail.prefix + trail.cycle, states[1:], strict=True)
+            Move(transition, state)
+            for transition, state in zip(trail.prefix + trail.cycle, states[1:], strict=True)
         ]
         back_to = len(trail.prefix)
         run = Run(states[0], tuple(moves[:back_to]), tuple(moves[back_to:]), whatever)
         if not breaks(
-            Walking(self.encoding, self.labels), self.requirement.formula, run, steps=False
+            TrailSystem(self.encoding, self.labels), self.requirement.formula, run, steps=False
         ):
             raise InternalError("Spin found a run that does not break the formula")
         return run
@@ -117,13 +116,13 @@ class _Asker:
     def _answer(
         self, result: Result, states: int, seconds: float, why: str = "", run: Run | None = None
     ) -> Answer:
-        rules = self.encoding.system.rules
+        transitions = self.encoding.net.transitions
         return Answer(
             self.requirement,
             result,
             run,
-            tuple(rules[move.rule] for move in run.prefix) if run else (),
-            tuple(rules[move.rule] for move in run.cycle) if run else (),
+            tuple(transitions[move.transition] for move in run.prefix) if run else (),
+            tuple(transitions[move.transition] for move in run.cycle) if run else (),
             why,
             states,
             seconds,

@@ -1,9 +1,9 @@
-"""What a formula looks at, in PROMELA: bits that each moment of a run sets, and the formula.
+"""Never claims: a formula in PROMELA, and the bits of each moment that it reads.
 
-`is_N` and `now_N`: a proposition of states, or of rules, is true. What a rule completes is true in
-a moment of its own; a quiet moment follows, in which the `now_N` go. `past_N`, `count_N` and
-`held_N`: what operators of the past remember. All are set with the state itself, so that they tell
-no states apart but those that the formula must tell apart.
+`is_N` and `now_N`: a proposition of states, or of transitions, is true. What a transition completes
+is true in a moment of its own; a quiet moment follows, in which the `now_N` are cleared. `past_N`,
+`count_N` and `held_N`: the memory of operators of the past. All are set with the state itself, so
+they distinguish no states but those that the formula must distinguish.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,11 +18,11 @@ _COUNTED = {True: "byte", False: "int"}
 _BYTE = 250
 
 
-class Watch:
-    """A formula without `Next`, and what it needs.
+class NeverClaim:
+    """A formula without `Next`, and the bits that it needs.
 
     Raises:
-        UnknownDataError: the rules do not know what it asks of the data.
+        UnknownDataError: the net does not follow the data that the formula reads.
     """
 
     def __init__(self, formula: f.Formula, labels: Labels, encoding: Encoding) -> None:
@@ -31,14 +31,14 @@ class Watch:
         self._encoding = encoding
         self._true_in = labels.of_states(encoding)
         self._names: dict[f.Formula, str] = {}
-        self._rules: dict[int, list[str]] = {}
+        self._transitions: dict[int, list[str]] = {}
         for number, each in enumerate(labels.propositions):
             completed = isinstance(each, f.Completed)
             self._names[each] = f"now_{number}" if completed else f"is_{number}"
             if completed:
-                for rule, bits in enumerate(labels.of_rules):
+                for transition, bits in enumerate(labels.of_transitions):
                     if bits >> number & 1:
-                        self._rules.setdefault(rule, []).append(self._names[each])
+                        self._transitions.setdefault(transition, []).append(self._names[each])
         self._past: list[f.Formula] = []
         self._find_past(formula)
         for number, past in enumerate(self._past):
@@ -46,7 +46,7 @@ class Watch:
             self._names[past] = f"{word}_{number}"
 
     def _find_past(self, formula: f.Formula) -> None:
-        """Those inside others come first."""
+        """Operators inside others come first."""
         for each in f.children(formula):
             self._find_past(each)
         if isinstance(formula, f.PAST) and formula not in self._past:
@@ -61,11 +61,11 @@ class Watch:
 
     @property
     def needs_quiet(self) -> bool:
-        """Whether anything is true in the moments of rules alone."""
-        return bool(self._rules)
+        """Whether propositions of transitions need a quiet moment."""
+        return bool(self._transitions)
 
     def declarations(self, places: Sequence[str], variables: Sequence[str]) -> list[str]:
-        """The bits with what they are at first, and what each moment does to them."""
+        """The bits with their initial values, and what each moment does to them."""
         lines: list[str] = []
         first = self._true_in(self._encoding.initial)
         moment = [p for n, p in enumerate(self._labels.propositions) if first >> n & 1]
@@ -117,26 +117,26 @@ class Watch:
             names = [places[p] for p in sorted(self._labels.places_of(number))]
             return "(" + (" || ".join(f"{name} > 0" for name in names) or "false") + ")"
         asked = sorted(self._labels.variables_of(number))
-        system, encoding = self._encoding.system, self._encoding
+        net, encoding = self._encoding.net, self._encoding
         true: list[str] = []
-        for values in product(*(range(len(system.variables[v].values)) for v in asked)):
+        for values in product(*(range(len(net.variables[v].values)) for v in asked)):
             state = encoding.initial
             for variable, value in zip(asked, values, strict=True):
                 base = encoding.value_bit[variable]
-                state &= ~(((1 << len(system.variables[variable].values)) - 1) << base)
+                state &= ~(((1 << len(net.variables[variable].values)) - 1) << base)
                 state |= 1 << (base + value)
             if self._true_in(state) >> number & 1:
                 has = [f"{variables[v]} == {n}" for v, n in zip(asked, values, strict=True)]
                 true.append("(" + (" && ".join(has) or "true") + ")")
         return "(" + (" || ".join(true) or "false") + ")"
 
-    def after_rule(self, rule: int) -> list[str]:
-        """What a rule does beside its own."""
-        return [*(f"{name} = 1" for name in self._rules.get(rule, ())), "moment()"]
+    def after_transition(self, transition: int) -> list[str]:
+        """What a transition does to the bits."""
+        return [*(f"{name} = 1" for name in self._transitions.get(transition, ())), "moment()"]
 
     def quiet_line(self) -> str:
-        """The quiet moment, as one more rule."""
-        names = sorted({name for each in self._rules.values() for name in each})
+        """The quiet moment, as one more transition."""
+        names = sorted({name for each in self._transitions.values() for name in each})
         gone = "; ".join(f"{name} = 0" for name in names)
         return f":: {' || '.join(names)} -> d_step {{ {gone}; moment() }} /* a quiet moment */"
 
@@ -145,7 +145,7 @@ class Watch:
         return f"ltl required {{ {self.text(self.formula)} }}"
 
     def text(self, formula: f.Formula) -> str:
-        """A formula in Spin's words."""
+        """A formula in Spin's syntax."""
         if isinstance(formula, f.Count):
             return f"({self._names[formula]} {formula.operator} {formula.number})"
         if isinstance(formula, f.PROPOSITIONS) or formula in self._names:

@@ -1,8 +1,8 @@
-"""Running Spin, a C compiler, and the checker that Spin writes: in a folder that goes away.
+"""Run Spin, a C compiler, and the checker that Spin writes, in a temporary folder.
 
-Spin writes a program in C for each model. tcc compiles it in an instant; what a search would win by
-gcc is less than what gcc takes, unless the search is long: then gcc compiles the same once more
-while it runs, and what gcc made begins anew. Every program is ended when its time is over, and when
+Spin writes a program in C for each model. tcc compiles it in an instant. gcc takes longer than its
+optimization saves, unless the search is long: then gcc compiles the same code while the search
+runs, and the optimized checker begins anew. Every program is ended when its time is over, and when
 a person interrupts.
 """
 
@@ -22,25 +22,25 @@ from typing import Self
 from m2pem.errors import InternalError, M2pemError
 
 LONG_SEARCH_S = 2.0
-"""After so long a search is worth compiling with optimization."""
+"""Seconds after which a search is worth compiling with optimization."""
 _COMPILE_S = 120.0
 _QUICK = "tcc"
 _THOROUGH = ("gcc", "cc", "clang")
 _POLL_S = 0.02
 _AS_WRITTEN = ("-o1", "-o2")
-"""No variable is left out of states for never being read: they are counted as they are."""
+"""Keep variables that are never read in the states, so that states are counted as they are."""
 _ENDING_S = 10.0
-"""How long a checker may take to sum up when it is told to end."""
+"""Seconds that a checker may take to print its summary when it is ended."""
 
 
 class SpinMissingError(M2pemError):
-    """Spin, or a compiler for what it writes, is not installed."""
+    """Spin, or a C compiler, is not installed."""
 
     exit_status = 2
 
 
 class TooLongError(M2pemError):
-    """Spin, or a compiler, takes too long over a model."""
+    """Spin, or a compiler, takes too long for a model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +53,10 @@ class Tools:
 
     @classmethod
     def find(cls) -> "Tools":
-        """Those on this machine's path.
+        """Find the programs on the path.
 
         Raises:
-            SpinMissingError: not all that is needed is there; tells what to install.
+            SpinMissingError: a program is missing; says what to install.
         """
         spin = shutil.which("spin")
         quick = shutil.which(_QUICK)
@@ -75,19 +75,19 @@ class Tools:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What a checker printed. `ended`: why it was told to end, "" if it came to its own end."""
+class CheckerOutput:
+    """What a checker printed. `ended`: why it was ended, "" if it finished by itself."""
 
     text: str
     ended: str
 
 
 Watching = Callable[[str, float], str]
-"""Given what was printed so far, and the seconds: why to end the search, or ""."""
+"""Given the output so far, and the seconds: why to end the search, or ""."""
 
 
-class Workshop:
-    """A folder, and the programs in it. Use it as a context manager."""
+class CheckerFolder:
+    """A temporary folder with a model's checker. Use it as a context manager."""
 
     MODEL = "mission.pml"
 
@@ -118,8 +118,10 @@ class Workshop:
         if not (self.folder / "pan.c").exists() or "Error" in done:
             raise InternalError(f"Spin does not take the model: {done.strip()[-500:]}")
 
-    def search(self, defines: Sequence[str], arguments: Sequence[str], watch: Watching) -> Told:
-        """Compile the checker and run it to its end, or until `watch` wants it to end."""
+    def search(
+        self, defines: Sequence[str], arguments: Sequence[str], watch: Watching
+    ) -> CheckerOutput:
+        """Compile the checker and run it until it finishes, or until `watch` ends it."""
         first = self.tools.quick or self.tools.thorough
         assert first is not None
         optimizing = "-O1" if first == self.tools.thorough else "-w"
@@ -139,7 +141,7 @@ class Workshop:
         defines: Sequence[str],
         arguments: Sequence[str],
         watch: Watching,
-    ) -> Told:
+    ) -> CheckerOutput:
         began = time.monotonic()
         printed = self.folder / "printed"
         checker = self._start(["./pan", *arguments], printed)
@@ -166,19 +168,19 @@ class Workshop:
                     running.append(checker)
         except KeyboardInterrupt:
             return self._sum_up(checker, printed, INTERRUPTED)
-        return Told(_read(printed), "")
+        return CheckerOutput(_read(printed), "")
 
-    def _sum_up(self, checker: "subprocess.Popen[bytes]", printed: Path, why: str) -> Told:
-        """On an interrupt, a checker prints what it has seen."""
+    def _sum_up(self, checker: "subprocess.Popen[bytes]", printed: Path, why: str) -> CheckerOutput:
+        """Interrupt a checker: it then prints what it has seen."""
         checker.send_signal(signal.SIGINT)
         with suppress(subprocess.TimeoutExpired):
             checker.wait(_ENDING_S)
-        return Told(_read(printed), why)
+        return CheckerOutput(_read(printed), why)
 
     def trail(self, number: int = 0) -> str:
-        """The steps to the error that the checker found, as Spin tells them; "" if there is none.
+        """The steps to an error that the checker found, as Spin prints them; "" if there is none.
 
-        `number`: from 1 on, of several.
+        `number`: from 1 on, if there are several.
         """
         file = f"{self.MODEL}{number or ''}.trail"
         if not (self.folder / file).exists():
@@ -209,7 +211,9 @@ class Workshop:
         return done.stdout.decode(errors="replace")
 
     def _start(self, command: Sequence[str], printed: Path) -> "subprocess.Popen[bytes]":
-        """In a session of its own: Ctrl-C reaches this process alone, which then ends the other."""
+        """Start a program in a session of its own: Ctrl-C reaches only this process, which then
+        ends the program.
+        """
         with printed.open("wb") as file:
             return subprocess.Popen(
                 command,
@@ -230,7 +234,7 @@ def _read(file: Path) -> str:
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """With those that it began: a compiler is several programs."""
+    """End a program with those that it started: a compiler is several programs."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()

@@ -5,8 +5,8 @@ line, with a comment that says what it is in the mission. A place where one toke
 one that was given more room, and a variable, is a number. The states of the model are those of the
 net, one for one.
 
-`text_of` gives the text and what its lines stand for. What it asserts is chosen (`Asks`), because
-Spin ends a search at what it finds first.
+`text_of` gives the text and what its lines stand for. What it asserts is chosen (`Assertions`),
+because Spin ends a search at what it finds first.
 """
 
 import re
@@ -14,17 +14,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Flag, Kind, Rule, System
-from m2pem.verify.spin.never_claim import Watch
+from m2pem.verify.net.petri_net import Flag, Kind, PetriNet, Transition
+from m2pem.verify.spin.never_claim import NeverClaim
 
 _MARKS = {"!": "_active", ">": "_waiting", "~": "_", "/": "_"}
 _LONGEST = 60
 
 
 def identifiers(prefix: str, names: Iterable[str]) -> list[str]:
-    """An identifier for each name, all different.
+    """A distinct identifier for each name.
 
-    The prefix keeps them apart from words of PROMELA and of C, which Spin writes them into.
+    The prefix keeps them apart from keywords of PROMELA and of C, into which Spin translates them.
     """
     found: list[str] = []
     used: set[str] = set()
@@ -41,14 +41,16 @@ def identifiers(prefix: str, names: Iterable[str]) -> list[str]:
 
 
 def comment(text: str) -> str:
-    """A text as a comment of one line; what would end the comment, or mean more in C, is spaced."""
+    """A text as a comment of one line. What would end the comment, or has a meaning in C, is
+    spaced.
+    """
     line = " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *").replace("\\", "\\ ")
     return f"/* {line} */"
 
 
 _WARNINGS = (Flag.UNCAUGHT_FAILURE,)
 _SHARED_CLEARS = 4
-"""Places that are cleared together by several rules get a name together from so many on."""
+"""Transitions that reset the same places share a macro from so many places on."""
 _HEADINGS = {
     Kind.INTERNAL: "what the executive does by itself",
     Kind.JOIN: "joins that wait until nothing else can move",
@@ -57,35 +59,36 @@ _HEADINGS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Asks:
-    """What is asserted: that places are not `full` when a token comes, that `rules` never fire,
-    that no run gets `stuck`, that nothing is `left` on places where a run stops, unless it failed.
+class Assertions:
+    """Assertions: places are not `full` when a token comes, `transitions` never fire, no run gets
+    `stuck`, and no token is `left` on these places where a run stops, unless it failed.
     """
 
     full: frozenset[int] = frozenset()
-    rules: frozenset[int] = frozenset()
+    transitions: frozenset[int] = frozenset()
     stuck: bool = False
     left: frozenset[int] = frozenset()
 
     @classmethod
-    def all_of(cls, system: System) -> "Asks":
-        """What a reader of the model would ask: everything but what is only a warning."""
+    def all_of(cls, net: PetriNet) -> "Assertions":
+        """The assertions for a reader of the model: everything that is not only a warning."""
         return cls(
-            frozenset(place.index for place in system.places if not place.several),
-            frozenset(r.index for r in system.rules if r.flag and r.flag not in _WARNINGS),
+            frozenset(place.index for place in net.places if not place.several),
+            frozenset(r.index for r in net.transitions if r.flag and r.flag not in _WARNINGS),
             True,
         )
 
 
 @dataclass(slots=True)
 class Model:
-    """`rule_at`: the rules by line, from 1 on. `stuck_line`: where a run is that is stuck.
+    """A model. `transition_at`: the transitions by line, from 1 on. `stuck_line`: the line that a
+    stuck run reaches.
 
-    `size_bytes`: an upper bound of what a state takes.
+    `size_bytes`: an upper bound of the size of a state.
     """
 
     text: str
-    rule_at: Mapping[int, int]
+    transition_at: Mapping[int, int]
     stuck_line: int
     size_bytes: int
 
@@ -105,26 +108,28 @@ class _Lines:
 
 
 class Writer:
-    """Writes one system; `encoding` says how many tokens each place has room for."""
+    """Writes one net; `encoding` says how many tokens each place has room for."""
 
-    def __init__(self, system: System, encoding: Encoding, asks: Asks, watch: Watch | None) -> None:
-        self.system = system
-        self.asks = asks
+    def __init__(
+        self, net: PetriNet, encoding: Encoding, assertions: Assertions, watch: NeverClaim | None
+    ) -> None:
+        self.net = net
+        self.assertions = assertions
         self.watch = watch
         self.most = [(1 << width) - 1 for width in encoding.width]
-        self.places = identifiers("at_", [place.name for place in system.places])
-        self.variables = identifiers("data_", [each.name for each in system.variables])
+        self.places = identifiers("at_", [place.name for place in net.places])
+        self.variables = identifiers("data_", [each.name for each in net.variables])
         self._clears: dict[tuple[int, ...], str] = {}
         self._out = _Lines()
 
     def write(self) -> Model:
-        """The whole text."""
-        out, system = self._out, self.system
-        name = system.elements.get(system.process) or system.process
+        """Return the whole text."""
+        out, net = self._out, self.net
+        name = net.elements.get(net.process) or net.process
         out.add(
             comment(
-                f"{system.mission}, {name}: {len(system.places)} places, "
-                f"{len(system.variables)} variables, {len(system.rules)} rules"
+                f"{net.mission}, {name}: {len(net.places)} places, "
+                f"{len(net.variables)} variables, {len(net.transitions)} transitions"
             ),
             comment("at_X: tokens on X; data_X: which of its values X has"),
             "",
@@ -135,11 +140,11 @@ class Writer:
         self._shared_clears()
         out.add("active proctype mission()", "{", "end:", "  do")
         out.add("  :: atomic {")
-        rule_at, stuck_line = self._rules()
+        transition_at, stuck_line = self._transitions()
         out.add("  } od", "}")
         if self.watch is not None:
             out.add("", self.watch.claim())
-        return Model("\n".join(out.lines) + "\n", rule_at, stuck_line, self._size_bytes())
+        return Model("\n".join(out.lines) + "\n", transition_at, stuck_line, self._size_bytes())
 
     def _size_bytes(self) -> int:
         watched = self.watch.size_bytes if self.watch is not None else 0
@@ -149,15 +154,15 @@ class Writer:
     # --- what there is --------------------------------------------------------------------------
 
     def _declare(self) -> None:
-        begin = dict(self.system.initial)
-        for place, name, most in zip(self.system.places, self.places, self.most, strict=True):
+        begin = dict(self.net.initial)
+        for place, name, most in zip(self.net.places, self.places, self.most, strict=True):
             kind = "bit" if most == 1 else _number(most)
             said = f"{place.element}, {place.role.value}"
             if place.resources:
                 said += f": {place.behavior} holds {', '.join(place.resources)}"
             first = f" = {begin[place.index]}" if place.index in begin else ""
             self._out.add(f"{kind} {name}{first}; {comment(said)}")
-        for variable, name in zip(self.system.variables, self.variables, strict=True):
+        for variable, name in zip(self.net.variables, self.variables, strict=True):
             values = ", ".join(
                 f"{n}: {value!r}" if exact else f"{n}: such as {value!r}"
                 for n, (value, exact) in enumerate(
@@ -170,112 +175,116 @@ class Writer:
         self._out.add("")
 
     def _shared_clears(self) -> None:
-        users: dict[tuple[int, ...], list[Rule]] = {}
-        for rule in self.system.rules:
-            if len(rule.kill) >= _SHARED_CLEARS:
-                users.setdefault(rule.kill, []).append(rule)
-        for number, (places, rules) in enumerate(users.items()):
-            if len(rules) > 1:
+        users: dict[tuple[int, ...], list[Transition]] = {}
+        for transition in self.net.transitions:
+            if len(transition.reset) >= _SHARED_CLEARS:
+                users.setdefault(transition.reset, []).append(transition)
+        for number, (places, transitions) in enumerate(users.items()):
+            if len(transitions) > 1:
                 name = self._clears[places] = f"clear_{number + 1}"
                 body = " ".join(f"{self.places[p]} = 0;" for p in places)
-                said = comment(f"by {', '.join(dict.fromkeys(r.element for r in rules))}")
+                said = comment(f"by {', '.join(dict.fromkeys(r.element for r in transitions))}")
                 self._out.add(f"inline {name}() {{ {body} }} {said}")
         if self._clears:
             self._out.add("")
 
-    # --- rules ----------------------------------------------------------------------------------
+    # --- transitions --------
 
-    def _rules(self) -> tuple[dict[int, int], int]:
+    def _transitions(self) -> tuple[dict[int, int], int]:
         out = self._out
-        rule_at: dict[int, int] = {}
+        transition_at: dict[int, int] = {}
         depth = 0
         if self.watch is not None and self.watch.needs_quiet:
             out.add("    if", f"    {self.watch.quiet_line()}", "    :: else ->")
             depth += 1
         for kind in Kind:
-            rules = [rule for rule in self.system.rules if rule.kind is kind]
-            if not rules:
+            transitions = [
+                transition for transition in self.net.transitions if transition.kind is kind
+            ]
+            if not transitions:
                 continue
             out.add("    if", f"    {comment(_HEADINGS[kind])}")
-            for rule in rules:
-                out.add(f"    {self.line_of(rule)}")
-                rule_at[out.last] = rule.index
+            for transition in transitions:
+                out.add(f"    {self.line_of(transition)}")
+                transition_at[out.last] = transition.index
             out.add("    :: else ->")
             depth += 1
-        ends = " || ".join(self.places[p] for p in sorted(self.system.ends))
-        left = " || ".join(self.places[p] for p in sorted(self.asks.left))
-        over = f"assert({self.places[self.system.failed]} || !({left}))" if left else "skip"
+        ends = " || ".join(self.places[p] for p in sorted(self.net.ends))
+        left = " || ".join(self.places[p] for p in sorted(self.assertions.left))
+        over = f"assert({self.places[self.net.failed]} || !({left}))" if left else "skip"
         out.add("    if", f"    :: {ends} -> {over} {comment('the run is over')}")
-        stuck = "assert(false)" if self.asks.stuck else over
+        stuck = "assert(false)" if self.assertions.stuck else over
         out.add(f"    :: else -> {stuck} {comment('the run is stuck')}")
         stuck_line = out.last
         out.add("    fi " + "fi " * depth)
-        return rule_at, stuck_line
+        return transition_at, stuck_line
 
-    def line_of(self, rule: Rule) -> str:
-        """One rule."""
+    def line_of(self, transition: Transition) -> str:
+        """The line of a transition."""
         said = "; ".join(
             f"{step.element} {step.action.value}" + (f" {step.detail}" if step.detail else "")
-            for step in rule.steps
+            for step in transition.steps
         )
-        if rule.trigger is not None:
-            said = f"{rule.trigger.value} {rule.detail}".strip() + f": {said}"
-        if rule.flag is not None:
-            said += f" ({rule.flag.value}: {rule.flagged})"
-        guard = " && ".join(self._tests(rule)) or "true"
-        effects = "; ".join(self._effects(rule))
-        return f":: {guard} -> d_step {{ {effects} }} {comment(f'{rule.index} {said}')}"
+        if transition.trigger is not None:
+            said = f"{transition.trigger.value} {transition.detail}".strip() + f": {said}"
+        if transition.flag is not None:
+            said += f" ({transition.flag.value}: {transition.flagged})"
+        guard = " && ".join(self._tests(transition)) or "true"
+        effects = "; ".join(self._effects(transition))
+        return f":: {guard} -> d_step {{ {effects} }} {comment(f'{transition.index} {said}')}"
 
-    def _tests(self, rule: Rule) -> list[str]:
+    def _tests(self, transition: Transition) -> list[str]:
         places = self.places
-        consumed = {p for p, _ in rule.consume}
+        consumed = {p for p, _ in transition.consume}
         tests = [
             "false" if n > self.most[p] else places[p] if n == 1 else f"{places[p]} >= {n}"
-            for p, n in rule.consume
+            for p, n in transition.consume
         ]
-        tests += [places[p] for p in rule.read if p not in consumed]
-        tests += [f"!{places[p]}" for p in rule.inhibit]
-        for variable, allowed in rule.guard:
-            count = len(self.system.variables[variable].values)
+        tests += [places[p] for p in transition.read if p not in consumed]
+        tests += [f"!{places[p]}" for p in transition.inhibit]
+        for variable, allowed in transition.guard:
+            count = len(self.net.variables[variable].values)
             if len(allowed) < count:
                 tests.append(one_of(self.variables[variable], sorted(allowed), count))
         return tests
 
-    def _effects(self, rule: Rule) -> list[str]:
-        """In the order that `m2pem.verify.net.petri_net` tells."""
+    def _effects(self, transition: Transition) -> list[str]:
+        """In the order of `m2pem.verify.net.petri_net`."""
         places, most = self.places, self.most
         effects: list[str] = []
-        if rule.index in self.asks.rules:
+        if transition.index in self.assertions.transitions:
             effects.append("assert(false)")
-        for p, n in rule.consume:
+        for p, n in transition.consume:
             effects.append(
                 f"{places[p]} = 0" if most[p] == 1 else f"{places[p]} = {places[p]} - {n}"
             )
-        for pairs, gone in ((rule.moves, True), (rule.copies, False)):
+        for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
                 then = f"{places[source]} = 0; " if gone else ""
                 then += self._one_more(target)
                 effects.append(f"if :: {places[source]} -> {then} :: else fi")
-        if rule.kill in self._clears:
-            effects.append(f"{self._clears[rule.kill]}()")
+        if transition.reset in self._clears:
+            effects.append(f"{self._clears[transition.reset]}()")
         else:
-            effects += [f"{places[p]} = 0" for p in rule.kill]
-        refilled = {target for _, target in (*rule.moves, *rule.copies)}
-        emptied = {p for p, _ in rule.consume if most[p] == 1} - refilled | set(rule.kill)
-        for p, n in rule.produce:
-            if p in self.asks.full and not (p in emptied and n <= most[p]):
+            effects += [f"{places[p]} = 0" for p in transition.reset]
+        refilled = {target for _, target in (*transition.moves, *transition.copies)}
+        emptied = {p for p, _ in transition.consume if most[p] == 1} - refilled | set(
+            transition.reset
+        )
+        for p, n in transition.produce:
+            if p in self.assertions.full and not (p in emptied and n <= most[p]):
                 effects.append(f"assert({places[p]} <= {most[p] - n})")
             effects.append(self._more(p, n))
-        effects += [f"{self.variables[v]} = {value}" for v, value in rule.assign]
+        effects += [f"{self.variables[v]} = {value}" for v, value in transition.assign]
         if self.watch is not None:
-            effects += self.watch.after_rule(rule.index)
+            effects += self.watch.after_transition(transition.index)
         return effects or ["skip"]
 
     def _one_more(self, p: int) -> str:
         return self._more(p, 1)
 
     def _more(self, p: int, n: int) -> str:
-        """So many tokens more, up to those that there is room for."""
+        """Add tokens, up to the number that there is room for."""
         name, most = self.places[p], self.most[p]
         if most <= n:
             return f"{name} = {most}"
@@ -283,18 +292,18 @@ class Writer:
 
 
 def text_of(
-    system: System,
+    net: PetriNet,
     encoding: Encoding | None = None,
-    asks: Asks | None = None,
-    watch: Watch | None = None,
+    assertions: Assertions | None = None,
+    watch: NeverClaim | None = None,
 ) -> Model:
-    """The model, by default with everything asserted that is a violation."""
-    encoding = encoding or Encoding(system)
-    return Writer(system, encoding, asks or Asks.all_of(system), watch).write()
+    """Return the model; by default everything that is a violation is asserted."""
+    encoding = encoding or Encoding(net)
+    return Writer(net, encoding, assertions or Assertions.all_of(net), watch).write()
 
 
 def one_of(variable: str, allowed: Sequence[int], count: int) -> str:
-    """That a variable has one of some of its `count` values."""
+    """The condition that a variable has one of some of its `count` values."""
     if not allowed:
         return "false"
     missing = sorted(set(range(count)) - set(allowed))

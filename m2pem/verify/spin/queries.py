@@ -13,18 +13,18 @@ from enum import StrEnum
 
 from m2pem.errors import InternalError
 from m2pem.verify.search.explore import Limits, Progress, Stopped
-from m2pem.verify.spin.programs import INTERRUPTED, Workshop
+from m2pem.verify.spin.programs import INTERRUPTED, CheckerFolder
 from m2pem.verify.spin.promela import Model
 
 
-class Found(StrEnum):
+class ErrorKind(StrEnum):
     """What a checker reports as an error."""
 
     ASSERTION = "assertion violated"
     CYCLE = "acceptance cycle"
 
 
-class Cut(StrEnum):
+class CutReason(StrEnum):
     """Why a search was cut short."""
 
     DEPTH = "depth"
@@ -33,19 +33,19 @@ class Cut(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """What was printed. `assertion`: the first one violated.
+class CheckerReport:
+    """The output of a checker. `assertion`: the first one violated.
 
-    `unreached`: lines of rules that never fire; `unreached_skips`: lines that do nothing, and that
-    no run comes to. Both are told of whole searches only.
+    `unreached`: lines of transitions that never fire; `unreached_skips`: lines that do nothing, and
+    that no run reaches. Both are known of complete searches only.
     """
 
     states: int
     transitions: int
     errors: int
-    found: Found | None
+    found: ErrorKind | None
     assertion: str
-    cut: Cut | None
+    cut: CutReason | None
     unreached: frozenset[int]
     unreached_skips: frozenset[int]
 
@@ -62,11 +62,11 @@ _STATES = re.compile(r"States=\s*([\d.e+]+)")
 _HARMLESS = ("elapsed time", "rate ", "wrote ", "resizing hashtable", "aborting", "avg transition")
 
 
-def read(text: str) -> Report:
-    """What a checker printed.
+def read(text: str) -> CheckerReport:
+    """Parse the output of a checker.
 
     Raises:
-        InternalError: it is not what a checker prints.
+        InternalError: it is not the output of a checker.
     """
     errors, stored = _ERRORS.search(text), _STORED.search(text)
     transitions = _TRANSITIONS.search(text)
@@ -75,37 +75,37 @@ def read(text: str) -> Report:
     found, assertion, cut = None, "", None
     for problem in _PROBLEM.findall(text):
         if problem.startswith("assertion violated"):
-            found = found or Found.ASSERTION
+            found = found or ErrorKind.ASSERTION
             assertion = assertion or re.sub(r" \(at depth \d+\)$", "", problem[19:])
         elif problem.startswith("acceptance cycle"):
-            found = found or Found.CYCLE
+            found = found or ErrorKind.CYCLE
         elif problem.startswith(("reached -DMEMLIM", "out of memory")):
-            cut = Cut.MEMORY
+            cut = CutReason.MEMORY
         elif not problem.startswith(_HARMLESS):
-            raise InternalError(f"Spin's checker reports what nobody asked: {problem}")
+            raise InternalError(f"Spin's checker reports what it was not asked: {problem}")
     if "max search depth too small" in text:
-        cut = cut or Cut.DEPTH
+        cut = cut or CutReason.DEPTH
     elif "Search not completed" in text:
-        cut = cut or Cut.UNFINISHED
+        cut = cut or CutReason.UNFINISHED
     if int(errors[1]) and found is None:
         raise InternalError(f"Spin's checker found an error that it does not name: {text[:500]}")
-    return Report(
+    return CheckerReport(
         round(float(stored[1])),
         round(float(transitions[1])),
         int(errors[1]),
         found,
         assertion,
         # A search ends at its error, and calls that not completed.
-        cut if found is None or cut is not Cut.UNFINISHED else None,
+        cut if found is None or cut is not CutReason.UNFINISHED else None,
         frozenset(int(line) for line in _UNREACHED.findall(text)),
         frozenset(int(line) for line in _UNREACHED_SKIP.findall(text)),
     )
 
 
 def states_so_far(text: str) -> int:
-    """How many states a checker that still runs has told of."""
-    told = _STATES.findall(text)
-    return round(float(told[-1])) if told else 0
+    """How many states a running checker has reported."""
+    output = _STATES.findall(text)
+    return round(float(output[-1])) if output else 0
 
 
 class Storage(StrEnum):
@@ -113,9 +113,9 @@ class Storage(StrEnum):
 
     EXACT = "exact"
     COLLAPSE = "collapse"
-    """Compressed: less memory for large states, and slower."""
+    """Compressed: less memory for large states, but slower."""
     BITSTATE = "bitstate"
-    """As a few bits in a table of fixed size: finds violations, but proves nothing."""
+    """A few bits per state in a table of fixed size: finds violations, but proves nothing."""
 
 
 _DEFINES = {
@@ -130,7 +130,11 @@ _BITSTATE_BITS = 30
 _FIRST_DEPTH = 100_000
 _MOST_DEPTH = 20_000_000
 _LEAST_VECTOR_BYTES = 1024
-_CUTS = {Cut.DEPTH: Stopped.DEPTH, Cut.MEMORY: Stopped.MEMORY, Cut.UNFINISHED: Stopped.TIME}
+_CUTS = {
+    CutReason.DEPTH: Stopped.DEPTH,
+    CutReason.MEMORY: Stopped.MEMORY,
+    CutReason.UNFINISHED: Stopped.TIME,
+}
 _ENDINGS = {
     INTERRUPTED: Stopped.INTERRUPTED,
     "states": Stopped.STATES,
@@ -139,24 +143,24 @@ _ENDINGS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What Spin said to one question. `stopped`: why it did not see all, if it found nothing."""
+class QueryResult:
+    """Spin's answer to one query. `stopped`: why it did not see all, if it found nothing."""
 
-    report: Report
+    report: CheckerReport
     stopped: Stopped | None
 
 
 @dataclass(slots=True)
-class Asking:
-    """Asks, within limits that hold for all questions together. `began` is monotonic seconds."""
+class SpinQueries:
+    """Queries to Spin, within limits for all of them together. `began` is in monotonic seconds."""
 
-    shop: Workshop
+    shop: CheckerFolder
     limits: Limits
     storage: Storage
     began: float
     progress: Callable[[Progress], None] | None = None
 
-    def ask(
+    def query(
         self,
         model: Model,
         *,
@@ -164,10 +168,10 @@ class Asking:
         cycles: bool = False,
         errors: int = 1,
         seconds: float | None = None,
-    ) -> Told:
-        """Have a model searched. `shortest`: nearest first; `cycles`: for rounds as well.
+    ) -> QueryResult:
+        """Search a model. `shortest`: nearest first; `cycles`: look for acceptance cycles as well.
 
-        `errors`: how many are looked for. `seconds`: a limit for this question.
+        `errors`: how many are looked for. `seconds`: a limit for this query.
         """
         self.shop.generate(model.text)
         defines = ["-DNOREDUCE", f"-DMEMLIM={max(round(self.limits.memory_mb), 1)}"]
@@ -186,13 +190,13 @@ class Asking:
             arguments = [f"-w{bits}", f"-m{depth}", f"-c{errors}"]
             arguments += ["-a"] if cycles else []
             arguments += ["-e"] if errors != 1 else []
-            told = self.shop.search(defines, arguments, self._watch(seconds))
-            report = read(told.text)
-            too_deep = report.found is None and report.cut is Cut.DEPTH and not told.ended
+            output = self.shop.search(defines, arguments, self._watch(seconds))
+            report = read(output.text)
+            too_deep = report.found is None and report.cut is CutReason.DEPTH and not output.ended
             if too_deep and depth < _MOST_DEPTH:
                 depth *= 10
                 continue
-            return Told(report, self._stopped(report, told.ended, shortest=shortest))
+            return QueryResult(report, self._stopped(report, output.ended, shortest=shortest))
 
     def _watch(self, seconds: float | None) -> Callable[[str, float], str]:
         def watch(printed: str, taken: float) -> str:
@@ -207,10 +211,10 @@ class Asking:
         return watch
 
     def began_ago(self) -> float:
-        """Seconds since the first question."""
+        """Seconds since the first query."""
         return time.monotonic() - self.began
 
-    def _stopped(self, report: Report, ended: str, *, shortest: bool) -> Stopped | None:
+    def _stopped(self, report: CheckerReport, ended: str, *, shortest: bool) -> Stopped | None:
         if report.found is not None:
             return None
         if ended:

@@ -1,11 +1,8 @@
-"""All that a system's rules can lead to, as Spin sees it.
+"""The exploration of a net with Spin.
 
-    found = search(system)
-    found.states, found.fired, found.overflow_runs, found.rule_runs, found.stuck_runs
-
-Spin sees all once, which tells the rules that ever fire; for each that should not, and for what
-else is wrong, it is asked again for a run that leads there. Every run is fired again, rule by rule,
-before it is believed.
+One search of all states tells which transitions ever fire. For each that should not, and for other
+violations, another query asks for a run that leads there. Every run is fired again, transition by
+transition, before it is believed.
 """
 
 import time
@@ -14,44 +11,44 @@ from dataclasses import dataclass, field
 
 from m2pem.errors import InternalError
 from m2pem.verify.net.encoding import Encoding
-from m2pem.verify.net.petri_net import Action, System
+from m2pem.verify.net.petri_net import Action, PetriNet
 from m2pem.verify.search.explore import Limits, Progress, Stopped
-from m2pem.verify.spin.programs import Workshop
-from m2pem.verify.spin.promela import Asks, Model, identifiers, text_of
-from m2pem.verify.spin.queries import Asking, Storage, Told
+from m2pem.verify.spin.programs import CheckerFolder
+from m2pem.verify.spin.promela import Assertions, Model, identifiers, text_of
+from m2pem.verify.spin.queries import QueryResult, SpinQueries, Storage
 from m2pem.verify.spin.trail import may_fire, replay
 from m2pem.verify.spin.trail import read as read_trail
 
 _MOST_SHORTEST = 200_000
-"""States up to which a shortest run is asked for: searching nearest first takes more memory."""
+"""Most states for which a shortest run is asked for: a breadth-first search takes more memory."""
 _SHORTEST_S = 20.0
 _STUCK_RUNS = 5
 _NO_FLOW = "NO_FLOW"
 
 Run = tuple[int, ...]
-"""Rules, one after the other."""
+"""A run: transitions, one after the other."""
 
 
 @dataclass(slots=True)
-class Found:
-    """What Spin saw. Runs are rules from the beginning.
+class SpinExploration:
+    """What Spin saw. Runs are transitions from the initial state.
 
-    `fired`: rules that ever fire, if all was seen. `rule_runs`: to each of the rules that runs
-    were wanted to, if it fires; it is the run's last. `overflow_runs`: to a second token on a place
-    where one is meant. `beyond`: places that get more tokens than the limit. `stuck_runs`: to
-    states in which nothing can fire and the run is not over, one or a few. `left_runs`: to where a
-    run stops with a token on the place.
+    `fired`: transitions that ever fire, if all was seen. `transition_runs`: to each transition that
+    runs were wanted to, if it fires; it is the run's last. `overflow_runs`: to a second token on a
+    place where one is meant. `beyond`: places that get more tokens than the limit. `stuck_runs`: to
+    deadlocks before the end of the run, one or a few. `left_runs`: to where a run stops with a
+    token on the place.
     """
 
-    system: System
+    net: PetriNet
     encoding: Encoding
-    wanted: "Wanted"
+    wanted: "WantedRuns"
     states: int = 0
     transitions: int = 0
     seconds: float = 0.0
     stopped: Stopped | None = None
     fired: frozenset[int] = frozenset()
-    rule_runs: dict[int, Run] = field(default_factory=dict)
+    transition_runs: dict[int, Run] = field(default_factory=dict)
     overflow_runs: dict[int, Run] = field(default_factory=dict)
     beyond: set[int] = field(default_factory=set)
     stuck_runs: list[Run] = field(default_factory=list)
@@ -59,118 +56,122 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What runs are wanted to: rules, being stuck, places where a token is left at the end."""
+class WantedRuns:
+    """What runs are wanted to: transitions, deadlocks, places where a token is left at the end."""
 
-    rules: frozenset[int]
+    transitions: frozenset[int]
     stuck: bool = True
     left: tuple[int, ...] = ()
 
     @classmethod
-    def of(cls, system: System) -> "Wanted":
-        """To what can be a violation: rules with a flag, and gateways without a way on."""
+    def of(cls, net: PetriNet) -> "WantedRuns":
+        """Everything that can be a violation: transitions with a flag, and gateways without a way
+        on.
+        """
         return cls(
             frozenset(
-                rule.index
-                for rule in system.rules
-                if rule.flag is not None
-                or any(s.action is Action.THROWN and s.detail == _NO_FLOW for s in rule.steps)
+                transition.index
+                for transition in net.transitions
+                if transition.flag is not None
+                or any(s.action is Action.THROWN and s.detail == _NO_FLOW for s in transition.steps)
             )
         )
 
 
 def search(
-    system: System,
+    net: PetriNet,
     limits: Limits | None = None,
     *,
-    wanted: Wanted | None = None,
+    wanted: WantedRuns | None = None,
     storage: Storage = Storage.EXACT,
     progress: Callable[[Progress], None] | None = None,
-) -> Found:
-    """Have Spin search a system. `wanted`: by default, what can be a violation.
+) -> SpinExploration:
+    """Search a net with Spin. `wanted`: by default, everything that can be a violation.
 
     Raises:
         SpinMissingError: Spin or a compiler is not installed.
-        InternalError: Spin says something that is not so.
+        InternalError: Spin's answer is wrong.
     """
     limits = limits or Limits()
-    with Workshop() as shop:
-        asking = Asking(shop, limits, storage, time.monotonic(), progress)
-        searching = _Search(system, wanted or Wanted.of(system), asking)
+    with CheckerFolder() as shop:
+        queries = SpinQueries(shop, limits, storage, time.monotonic(), progress)
+        searching = _Search(net, wanted or WantedRuns.of(net), queries)
         try:
             searching.run()
         except KeyboardInterrupt:
             searching.found.stopped = Stopped.INTERRUPTED
-        searching.found.seconds = asking.began_ago()
+        searching.found.seconds = queries.began_ago()
         return searching.found
 
 
 class _Search:
-    def __init__(self, system: System, wanted: Wanted, asking: Asking) -> None:
-        self.system = system
+    def __init__(self, net: PetriNet, wanted: WantedRuns, queries: SpinQueries) -> None:
+        self.net = net
         self.wanted = wanted
-        self.asking = asking
-        self.encoding = Encoding(system)
-        self.found = Found(system, self.encoding, wanted)
+        self.queries = queries
+        self.encoding = Encoding(net)
+        self.found = SpinExploration(net, self.encoding, wanted)
         self._by_name = {
             name: place.index
             for place, name in zip(
-                system.places,
-                identifiers("at_", [place.name for place in system.places]),
+                net.places,
+                identifiers("at_", [place.name for place in net.places]),
                 strict=True,
             )
         }
 
     def run(self) -> None:
         found = self.found
-        told, model = self._see_all()
-        found.stopped = told.stopped
-        found.states, found.transitions = told.report.states, told.report.transitions
-        complete = told.stopped in (None, Stopped.BITSTATE)
+        result, model = self._see_all()
+        found.stopped = result.stopped
+        found.states, found.transitions = result.report.states, result.report.transitions
+        complete = result.stopped in (None, Stopped.BITSTATE)
         if complete:
-            reached = set(model.rule_at) - told.report.unreached
-            found.fired = frozenset(model.rule_at[line] for line in reached)
-            if self.wanted.stuck and model.stuck_line not in told.report.unreached_skips:
+            reached = set(model.transition_at) - result.report.unreached
+            found.fired = frozenset(model.transition_at[line] for line in reached)
+            if self.wanted.stuck and model.stuck_line not in result.report.unreached_skips:
                 self._get_stuck()
-            for rule in sorted(found.fired & self.wanted.rules):
+            for transition in sorted(found.fired & self.wanted.transitions):
                 if self._in_time():
-                    self._lead_to(rule)
+                    self._lead_to(transition)
             for place in self.wanted.left:
                 if self._in_time():
                     self._leave(place)
-        elif told.stopped is not Stopped.INTERRUPTED:
+        elif result.stopped is not Stopped.INTERRUPTED:
             self._anything()
         if found.beyond and found.stopped is None:
             found.stopped = Stopped.TOKENS
 
     def _in_time(self) -> bool:
-        """Whether there is time for another question: each has a large model translated anew."""
-        if self.asking.began_ago() <= self.asking.limits.seconds:
+        """Whether there is time for another query: each translates a large model anew."""
+        if self.queries.began_ago() <= self.queries.limits.seconds:
             return True
         self.found.stopped = self.found.stopped or Stopped.TIME
         return False
 
     # --- all there is ---------------------------------------------------------------------------
 
-    def _see_all(self) -> tuple[Told, Model]:
-        """Give places more room until none gets more tokens than it has room for."""
-        limits, found = self.asking.limits, self.found
+    def _see_all(self) -> tuple[QueryResult, Model]:
+        """Search all states; give places more room until none gets more tokens than it has room
+        for.
+        """
+        limits, found = self.queries.limits, self.found
         most_bits = max((limits.tokens + 1).bit_length() - 1, 1)
         wider: dict[int, int] = {}
         told_once: set[int] = set()
         while True:
-            self.encoding = found.encoding = Encoding(self.system, wider)
-            asked = frozenset(p.index for p in self.system.places) - found.beyond - told_once
-            model = self._model(Asks(full=asked))
-            told = self.asking.ask(model)
-            if told.report.found is None:
-                return told, model
-            place = self._place_of(told.report.assertion)
+            self.encoding = found.encoding = Encoding(self.net, wider)
+            asked = frozenset(p.index for p in self.net.places) - found.beyond - told_once
+            model = self._model(Assertions(full=asked))
+            result = self.queries.query(model)
+            if result.report.found is None:
+                return result, model
+            place = self._place_of(result.report.assertion)
             run = self._runs(model)[0]
-            if not self.system.places[place].several and place not in found.overflow_runs:
-                asks = Asks(full=frozenset({place}))
-                found.overflow_runs[place] = self._short(asks, told) or run
-            if self.system.places[place].once:
+            if not self.net.places[place].several and place not in found.overflow_runs:
+                assertions = Assertions(full=frozenset({place}))
+                found.overflow_runs[place] = self._short(assertions, result) or run
+            if self.net.places[place].once:
                 told_once.add(place)
             elif self.encoding.width[place] < most_bits:
                 wider[place] = most_bits
@@ -180,16 +181,16 @@ class _Search:
     def _place_of(self, assertion: str) -> int:
         words = assertion.strip("( )").replace("<=", " ").split()
         if not words or words[0] not in self._by_name:
-            raise InternalError(f"Spin names an assertion that nobody made: {assertion}")
+            raise InternalError(f"Spin names an assertion that is not in the model: {assertion}")
         return self._by_name[words[0]]
 
     # --- what is wrong --------------------------------------------------------------------------
 
     def _get_stuck(self) -> None:
-        model = self._model(Asks(stuck=True))
-        told = self._ask_nearest(model, _STUCK_RUNS)
-        if told.report.found is None:
-            if told.stopped is None:
+        model = self._model(Assertions(stuck=True))
+        result = self._ask_nearest(model, _STUCK_RUNS)
+        if result.report.found is None:
+            if result.stopped is None:
                 raise InternalError("Spin finds no run that is stuck, and says that there is one")
             return
         self.found.stuck_runs = self._runs(model)
@@ -197,7 +198,7 @@ class _Search:
             self._see_stuck(run)
 
     def _leave(self, place: int) -> None:
-        model = self._model(Asks(left=frozenset({place})))
+        model = self._model(Assertions(left=frozenset({place})))
         if self._ask_nearest(model).report.found is None:
             return
         run = self.found.left_runs[place] = self._runs(model)[0]
@@ -207,32 +208,34 @@ class _Search:
 
     def _see_stuck(self, run: Run) -> None:
         state = replay(self.encoding, run)[-1]
-        ends = self.encoding.places_mask(self.system.ends)
+        ends = self.encoding.places_mask(self.net.ends)
         if state & ends or may_fire(self.encoding, state):
             raise InternalError("Spin says that a run is stuck that can go on")
 
-    def _lead_to(self, rule: int) -> None:
-        model = self._model(Asks(rules=frozenset({rule})))
-        told = self._ask_nearest(model)
-        if told.report.found is None:
-            if told.stopped is None:
-                raise InternalError(f"Spin finds no run to rule {rule}, which it says can fire")
+    def _lead_to(self, transition: int) -> None:
+        model = self._model(Assertions(transitions=frozenset({transition})))
+        result = self._ask_nearest(model)
+        if result.report.found is None:
+            if result.stopped is None:
+                raise InternalError(
+                    f"Spin finds no run to transition {transition}, which it says can fire"
+                )
             return
         run = self._runs(model)[0]
-        if run[-1:] != (rule,):
-            raise InternalError(f"Spin's run to rule {rule} does not end with it")
-        self.found.rule_runs[rule] = run
+        if run[-1:] != (transition,):
+            raise InternalError(f"Spin's run to transition {transition} does not end with it")
+        self.found.transition_runs[transition] = run
 
     def _anything(self) -> None:
-        """After a search that did not see all: the first thing that is wrong, if it is found."""
-        flagged = self.wanted.rules
-        model = self._model(Asks(rules=flagged, stuck=self.wanted.stuck))
-        told = self.asking.ask(model, seconds=_SHORTEST_S)
-        if told.report.found is None:
+        """After an incomplete search: look for any violation that is found soon."""
+        flagged = self.wanted.transitions
+        model = self._model(Assertions(transitions=flagged, stuck=self.wanted.stuck))
+        result = self.queries.query(model, seconds=_SHORTEST_S)
+        if result.report.found is None:
             return
         run = self._runs(model)[0]
         if run and run[-1] in flagged:
-            self.found.rule_runs[run[-1]] = run
+            self.found.transition_runs[run[-1]] = run
             self.found.fired = frozenset(run)
         else:
             self._see_stuck(run)
@@ -240,42 +243,42 @@ class _Search:
 
     # --- runs -----------------------------------------------------------------------------------
 
-    def _model(self, asks: Asks) -> Model:
-        return text_of(self.system, self.encoding, asks)
+    def _model(self, assertions: Assertions) -> Model:
+        return text_of(self.net, self.encoding, assertions)
 
-    def _ask_nearest(self, model: Model, errors: int = 1) -> Told:
-        """A shortest run if that does not take too much, else any.
+    def _ask_nearest(self, model: Model, errors: int = 1) -> QueryResult:
+        """Ask for a shortest run if that is cheap enough, else for any.
 
-        One that was not found, and not shown to be missing, leaves the whole undecided.
+        A run that was neither found nor excluded leaves the whole undecided.
         """
         if self.found.states <= _MOST_SHORTEST:
-            told = self.asking.ask(model, shortest=True, errors=errors, seconds=_SHORTEST_S)
-            if told.stopped is None:
-                return told
-            self._go_on(told)
-        told = self.asking.ask(model, errors=errors)
-        self._go_on(told)
-        self.found.stopped = self.found.stopped or told.stopped
-        return told
+            result = self.queries.query(model, shortest=True, errors=errors, seconds=_SHORTEST_S)
+            if result.stopped is None:
+                return result
+            self._go_on(result)
+        result = self.queries.query(model, errors=errors)
+        self._go_on(result)
+        self.found.stopped = self.found.stopped or result.stopped
+        return result
 
-    def _go_on(self, told: Told) -> None:
-        if told.stopped is Stopped.INTERRUPTED:
+    def _go_on(self, result: QueryResult) -> None:
+        if result.stopped is Stopped.INTERRUPTED:
             raise KeyboardInterrupt
 
-    def _short(self, asks: Asks, told: Told) -> Run | None:
-        """A shortest run to what `told` found, if it is not too far."""
-        if told.report.states > _MOST_SHORTEST:
+    def _short(self, assertions: Assertions, result: QueryResult) -> Run | None:
+        """A shortest run to what `result` found, if it is not too long."""
+        if result.report.states > _MOST_SHORTEST:
             return None
-        model = self._model(asks)
-        again = self.asking.ask(model, shortest=True, seconds=_SHORTEST_S)
+        model = self._model(assertions)
+        again = self.queries.query(model, shortest=True, seconds=_SHORTEST_S)
         self._go_on(again)
         return self._runs(model)[0] if again.report.found is not None else None
 
     def _runs(self, model: Model) -> list[Run]:
         """The runs that Spin has left, fired again."""
-        shop = self.asking.shop
+        shop = self.queries.shop
         texts: Sequence[str] = [shop.trail(n) for n in range(_STUCK_RUNS + 1)]
-        runs = [read_trail(text, model.rule_at).prefix for text in texts if text]
+        runs = [read_trail(text, model.transition_at).prefix for text in texts if text]
         if not runs:
             raise InternalError("Spin found an error, and left no trail to it")
         for run in runs:

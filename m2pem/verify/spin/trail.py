@@ -2,7 +2,7 @@
 
 Each trail is checked by firing its transitions again.
 
-`Walking` gives the states along a trail as a `LabelledSystem`, without an exploration.
+`TrailSystem` gives the states along a trail as a `LabelledSystem`, without an exploration.
 """
 
 import re
@@ -23,7 +23,7 @@ _RANK = {Kind.INTERNAL: 0, Kind.JOIN: 1, Kind.OUTSIDE: 2}
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """Rules that fire one after the other, then those of `cycle` again and again.
+    """Transitions that fire one after the other, then those of `cycle` again and again.
 
     An empty cycle: the trail ends, or nothing more happens after it.
     """
@@ -32,11 +32,11 @@ class Trail:
     cycle: tuple[int, ...] = ()
 
 
-def read(text: str, rule_at: Mapping[int, int]) -> Trail:
-    """The rules of a trail, as `spin -t -p` tells it.
+def read(text: str, transition_at: Mapping[int, int]) -> Trail:
+    """Parse the transitions of a trail from the output of `spin -t -p`.
 
-    A rule takes two steps, its test and what it does; Spin tells each part of the second. A cycle
-    may begin between the two.
+    A transition takes two steps, its test and its effect; Spin prints each part of the second. A
+    cycle may begin between the two.
     """
     fired: list[int] = []
     tested = False
@@ -44,16 +44,16 @@ def read(text: str, rule_at: Mapping[int, int]) -> Trail:
     back_to: int | None = None
     for line in text.splitlines():
         if _CYCLE in line:
-            # In the midst of a rule, the cycle begins with it.
+            # In the midst of a transition, the cycle begins with it.
             back_to = len(fired) - tested
             continue
-        told = _STEP.match(line)
-        if told is None or int(told[1]) == last_step:
+        step = _STEP.match(line)
+        if step is None or int(step[1]) == last_step:
             continue
-        last_step = int(told[1])
-        if (rule := rule_at.get(int(told[2]))) is not None:
+        last_step = int(step[1])
+        if (transition := transition_at.get(int(step[2]))) is not None:
             if not tested:
-                fired.append(rule)
+                fired.append(transition)
             tested = not tested
     if back_to is None:
         return Trail(tuple(fired))
@@ -63,26 +63,28 @@ def read(text: str, rule_at: Mapping[int, int]) -> Trail:
 
 
 def may_fire(encoding: Encoding, state: int) -> list[int]:
-    """The rules that may fire in a state: of the first kind that has any."""
-    rules = encoding.system.rules
-    enabled = [rule.index for rule in rules if encoding.enabled(rule.index, state)]
-    first = min((_RANK[rules[each].kind] for each in enabled), default=0)
-    return [each for each in enabled if _RANK[rules[each].kind] == first]
+    """The transitions that may fire in a state: those of the first kind that has any enabled."""
+    transitions = encoding.net.transitions
+    enabled = [
+        transition.index for transition in transitions if encoding.enabled(transition.index, state)
+    ]
+    first = min((_RANK[transitions[each].kind] for each in enabled), default=0)
+    return [each for each in enabled if _RANK[transitions[each].kind] == first]
 
 
-def replay(encoding: Encoding, rules: Sequence[int], start: int | None = None) -> list[int]:
-    """The states that rules lead through, the first one included.
+def replay(encoding: Encoding, transitions: Sequence[int], start: int | None = None) -> list[int]:
+    """Return the states that transitions lead through, the first one included.
 
     Raises:
         InternalError: one of them cannot fire where Spin says that it does.
     """
     state = encoding.initial if start is None else start
     states = [state]
-    for number in rules:
-        rule = encoding.system.rules[number]
+    for number in transitions:
+        transition = encoding.net.transitions[number]
         if number not in may_fire(encoding, state):
             raise InternalError(
-                f"Spin lets rule {number} ({rule.name}) fire where it cannot: "
+                f"Spin lets transition {number} ({transition.name}) fire where it cannot: "
                 f"after {len(states) - 1} steps"
             )
         state, _ = encoding.fire(number, state)
@@ -91,7 +93,7 @@ def replay(encoding: Encoding, rules: Sequence[int], start: int | None = None) -
 
 
 def check_cycle(encoding: Encoding, trail: Trail) -> None:
-    """See that the cycle of a trail comes back to where it began.
+    """Check that the cycle of a trail returns to where it began.
 
     Raises:
         InternalError: it does not.
@@ -101,7 +103,7 @@ def check_cycle(encoding: Encoding, trail: Trail) -> None:
         raise InternalError("Spin's cycle does not come back to where it began")
 
 
-class Walking:
+class TrailSystem:
     """A `LabelledSystem` whose states are those of the encoding."""
 
     reduced = False
@@ -113,20 +115,20 @@ class Walking:
 
     @property
     def propositions(self) -> Sequence[Proposition]:
-        """What the bits stand for."""
         return self._labels.propositions
 
     def initial(self) -> Sequence[int]:
-        """The first state."""
         return (self._encoding.initial,)
 
     def successors(self, state: int) -> Sequence[tuple[int, int]]:
-        """The rules that can fire in a state, each with the state after it."""
+        """The transitions that can fire in a state, each with the state after it."""
         encoding = self._encoding
-        return [(rule, encoding.fire(rule, state)[0]) for rule in may_fire(encoding, state)]
+        return [
+            (transition, encoding.fire(transition, state)[0])
+            for transition in may_fire(encoding, state)
+        ]
 
     def is_open(self, state: int) -> bool:
-        """Nothing is left out."""
         del state
         return False
 
@@ -134,17 +136,19 @@ class Walking:
         """The propositions that are true in a state."""
         return self._true_in(state)
 
-    def true_when(self, rule: int) -> int:
-        """The propositions that are true in the moment in which a rule fires."""
-        return self._labels.of_rules[rule]
+    def true_when(self, transition: int) -> int:
+        """The propositions that are true in the moment in which a transition fires."""
+        return self._labels.of_transitions[transition]
 
     def fair(self, run: Run) -> bool:
-        """Whether all that can come in the cycle of a run comes in it; joins only wait."""
-        outcomes = outcomes_of(self._encoding.system)
+        """Whether each outcome that is possible in the cycle of a run happens in it; joins only
+        wait.
+        """
+        outcomes = outcomes_of(self._encoding.net)
         possible = {
             outcome
             for move in run.cycle
-            for rule, _ in self.successors(move.state)
-            for outcome in outcomes[rule]
+            for transition, _ in self.successors(move.state)
+            for outcome in outcomes[transition]
         }
-        return possible <= {outcome for move in run.cycle for outcome in outcomes[move.rule]}
+        return possible <= {outcome for move in run.cycle for outcome in outcomes[move.transition]}

@@ -1,7 +1,7 @@
-"""From a mission, and the fleet that it commands, to the rules that the checker searches."""
+"""The translation of a mission, on the fleet that it commands, to a Petri net."""
 
-from m2pem.verify.net.size_limit import Bound, TooLargeError
+from m2pem.verify.net.size_limit import SizeLimit, TooLargeError
 from m2pem.verify.translate.mission import translate
 from m2pem.verify.translate.options import Options
 
-__all__ = ["Bound", "Options", "TooLargeError", "translate"]
+__all__ = ["Options", "SizeLimit", "TooLargeError", "translate"]

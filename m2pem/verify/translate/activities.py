@@ -1,4 +1,4 @@
-"""Tasks and other activities: their beginning, their work, and how it ends."""
+"""Tasks and other activities: how they begin, work and end."""
 
 from dataclasses import replace
 
@@ -10,96 +10,109 @@ from m2pem.units import Dimension, UnitError, quantity
 from m2pem.verify.net.petri_net import BEGINS, Action, Exactness, Flag, Kind, Role, Step, Trigger
 from m2pem.verify.translate import subprocesses
 from m2pem.verify.translate.catching import boundaries, caught_before_work
-from m2pem.verify.translate.compensation import noted
-from m2pem.verify.translate.context import Host, Making, behavior_of, catching, held_by, resources
+from m2pem.verify.translate.compensation import note_completion
+from m2pem.verify.translate.context import (
+    ActivityInstance,
+    TranslationContext,
+    behavior_of,
+    held_by,
+    register_catcher,
+    resources,
+)
 from m2pem.verify.translate.loops import looped
-from m2pem.verify.translate.net_builder import Area, Effect, at, product
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
 from m2pem.verify.translate.sequence_flows import leave
 from m2pem.verify.translate.throwing import (
     catchable,
     interrupting_places,
     message_effects,
-    parted,
+    split_by_places,
     throw_error,
 )
 from m2pem.verify.translate.timers import due_us, runs, written
 
 
-def activity(making: Making, node: e.FlowNode, area: Area) -> None:
-    """A token comes to an activity, works, and leaves."""
+def activity(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """Translate an activity: a token enters it, works, and leaves."""
     assert isinstance(node, e.Activity)
-    net = making.net
-    inside = net.area(node, area)
-    inside.several = area.several or node in making.repeated
-    held, behavior = held_by(making, node)
-    repeated = node in making.repeated
-    active = net.place(node, area, Role.ACTIVE, several=repeated, resources=held, behavior=behavior)
-    host = Host(node, area, inside, active, lambda: [])
-    host.done = lambda: pass_on(making, host)
-    host.cut = lambda: pass_on(making, host, well=False)
-    inside.host = host
-    boundaries(making, host)
+    net = context.net
+    inside = net.scope(node, scope)
+    inside.several = scope.several or node in context.repeated
+    held, behavior = held_by(context, node)
+    repeated = node in context.repeated
+    active = net.place(
+        node, scope, Role.ACTIVE, several=repeated, resources=held, behavior=behavior
+    )
+    instance = ActivityInstance(node, scope, inside, active, lambda: [])
+    instance.done = lambda: pass_on(context, instance)
+    instance.cut = lambda: pass_on(context, instance, well=False)
+    inside.instance = instance
+    boundaries(context, instance)
     come = Effect(
         steps=(Step(node.id, Action.ENTERED),),
-        consume=(at(net, node, area),) * node.start_quantity,
+        consume=(entry_place(net, node, scope),) * node.start_quantity,
     )
     waits = waits_when_entered(node)
-    host.armed_before = waits is Waits.AT_ITS_BOUNDARY and not isinstance(node, e.UserTask)
-    begun = looped(making, host, work) if node.loop is not None else work(making, host)
-    if host.armed_before:
-        _arm_before_work(making, host, come, begun)
+    instance.armed_before = waits is Waits.AT_ITS_BOUNDARY and not isinstance(node, e.UserTask)
+    begun = looped(context, instance, work) if node.loop is not None else work(context, instance)
+    if instance.armed_before:
+        _arm_before_work(context, instance, come, begun)
         return
-    making.rules(product([come], begun))
+    context.transitions(product([come], begun))
     if waits is not Waits.NOTHING:
-        net.at_once.add(at(net, node, area))
+        net.at_once.add(entry_place(net, node, scope))
 
 
-def _arm_before_work(making: Making, host: Host, come: Effect, begun: list[Effect]) -> None:
-    """The boundary events are armed as the token comes, and the work begins in its turn."""
-    net, node = making.net, host.node
-    net.at_once.add(at(net, node, host.outer))
+def _arm_before_work(
+    context: TranslationContext, instance: ActivityInstance, come: Effect, begun: list[Effect]
+) -> None:
+    """Arm the boundary events when the token enters; the work begins in a later step."""
+    net, node = context.net, instance.node
+    net.at_once.add(entry_place(net, node, instance.outer))
     later = begun[0].produce if len(begun) == 1 else ()
     only_brings = len(begun) == 1 and begun[0] == Effect(produce=later)
-    if only_brings and host.active in later:
+    if only_brings and instance.active in later:
         # Its instances begin each in its turn: what interrupts it finds it at work already.
-        making.rules(product([replace(come, produce=tuple(host.armed))], begun))
+        context.transitions(product([replace(come, produce=tuple(instance.armed))], begun))
         return
     if only_brings and len(later) == 1:
         due = later[0]  # a behavior or message: its work is to begin as it is
     else:
-        due = net.place(node, host.outer, Role.ENTERING, f":due{host.inside.index}")
+        due = net.place(node, instance.outer, Role.ENTERING, f":due{instance.inside.index}")
         for effect in begun:
-            over = host.active not in effect.produce
-            ended = frozenset({host.inside.index}) if over else frozenset()
+            over = instance.active not in effect.produce
+            ended = frozenset({instance.inside.index}) if over else frozenset()
             begins = () if effect.steps else (Step(node.id, Action.ENTERED, BEGINS),)
-            making.rules(product([Effect(begins, (due,), kill_scopes=ended)], [effect]))
-    armed = come.then(Effect(produce=(due, *host.armed)))
+            context.transitions(product([Effect(begins, (due,), reset_scopes=ended)], [effect]))
+    armed = come.then(Effect(produce=(due, *instance.armed)))
     assert armed is not None
-    net.rule(armed)
-    caught_before_work(making, replace(host, active=due, armed=[]))
+    net.transition(armed)
+    caught_before_work(context, replace(instance, active=due, armed=[]))
 
 
-def pass_on(making: Making, host: Host, *, well: bool = True) -> list[Effect]:
-    """An activity is done: it leaves by its flows. Its token is taken off already.
+def pass_on(
+    context: TranslationContext, instance: ActivityInstance, *, well: bool = True
+) -> list[Effect]:
+    """An activity is done: it leaves by its sequence flows. Its token is removed already.
 
-    `well`: it was not ended early, so that it can be undone.
+    `well`: it completed, and was not ended early, so it can be compensated.
     """
-    node = host.node
-    ways = [noted(making, host) if well else Effect()]
+    node = instance.node
+    ways = [note_completion(context, instance) if well else Effect()]
     for mapping in node.data_flow.outputs:
-        ways = making.data.write(ways, mapping.target, None, host.outer, node)
+        ways = context.data.write(ways, mapping.target, None, instance.outer, node)
     if node.for_compensation:
         return ways
     out = leave(
-        making,
-        host.outer,
+        context,
+        instance.outer,
         node,
         node.default,
-        lambda code: throw_error(making, host.outer, node, host, code),
+        lambda code: throw_error(context, instance.outer, node, instance, code),
         times=node.completion_quantity,
     )
     if isinstance(node.container, e.AdHocSubProcess):
-        asked = making.net.place(node.container, host.outer, Role.ENTERING, ":asked")
+        asked = context.net.place(node.container, instance.outer, Role.ENTERING, ":asked")
         if node.container.active_elements is None and node.container.entries:
             ways = product(ways, [Effect(produce=(asked,))])
     return product(ways, out)
@@ -108,80 +121,81 @@ def pass_on(making: Making, host: Host, *, well: bool = True) -> list[Effect]:
 # --- work ---------------------------------------------------------------------------------------
 
 
-def work(making: Making, host: Host) -> list[Effect]:
+def work(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
     """What an activity, or an instance of one, does when it begins."""
-    node = host.node
+    node = instance.node
     behavior = behavior_of(node)
     if behavior is not None:
-        return _behavior(making, host, behavior)
+        return _behavior(context, instance, behavior)
     match node:
         case e.UserTask():
-            return _user_task(making, host, node)
+            return _user_task(context, instance, node)
         case e.ScriptTask():
-            return _script(making, host, node)
+            return _script(context, instance, node)
         case e.ServiceTask(call=call) if call is not None:
-            return _outside_work(making, host)
+            return _outside_work(context, instance)
         case e.SendTask(message=message) if message is not None:
-            return _send(making, host, message.id)
+            return _send(context, instance, message.id)
         case e.ReceiveTask(message=message) if message is not None:
-            return _receive(making, host, node)
+            return _receive(context, instance, node)
         case e.AdHocSubProcess():
-            return subprocesses.ad_hoc(making, host)
+            return subprocesses.ad_hoc(context, instance)
         case e.SubProcess():
-            return subprocesses.subprocess(making, host)
+            return subprocesses.subprocess(context, instance)
         case e.CallActivity():
-            return subprocesses.call(making, host)
+            return subprocesses.call(context, instance)
         case _:
-            return _at_once(host)
+            return _at_once(instance)
 
 
-def _at_once(host: Host) -> list[Effect]:
-    stop = Effect(steps=(Step(host.node.id, Action.COMPLETED),))
-    return product([stop], host.done())
+def _at_once(instance: ActivityInstance) -> list[Effect]:
+    stop = Effect(steps=(Step(instance.node.id, Action.COMPLETED),))
+    return product([stop], instance.done())
 
 
-def failing(making: Making, host: Host, code: str, flag: Flag) -> list[Effect]:
-    """An activity fails, its token being taken off already."""
-    return throw_error(making, host.outer, host.node, host, code, flag)
+def failing(
+    context: TranslationContext, instance: ActivityInstance, code: str, flag: Flag
+) -> list[Effect]:
+    """An activity fails. Its token is removed already."""
+    return throw_error(context, instance.outer, instance.node, instance, code, flag)
 
 
-def _behavior(making: Making, host: Host, behavior: Behavior) -> list[Effect]:
-    net = making.net
+def _behavior(
+    context: TranslationContext, instance: ActivityInstance, behavior: Behavior
+) -> list[Effect]:
+    net = context.net
     if not behavior.roles and behavior.name == "hold":
-        done = _ended(host, host.leave())
+        done = _ended(instance, instance.leave())
         after_us = _hold_us(behavior)
         made = [
-            net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=after_us)
-            for effect in product([done], host.done())
+            net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=after_us)
+            for effect in product([done], instance.done())
         ]
-        runs(making, host.active, after_us, (host.active,), made)
-        return [host.begin()]
-    held = resources(making, behavior)
+        runs(context, instance.active, after_us, (instance.active,), made)
+        return [instance.begin()]
+    held = resources(context, behavior)
     if not held:
-        return failing(making, host, "RESOURCE_UNAVAILABLE", Flag.UNCAUGHT)
-    _outside_work(making, host)
-    wants = net.place(node_of(host), host.outer, Role.ENTERING, f":wants{host.inside.index}")
-    making.contended.append((host, wants, held))
+        return failing(context, instance, "RESOURCE_UNAVAILABLE", Flag.UNCAUGHT)
+    _outside_work(context, instance)
+    wants = net.place(
+        instance.node, instance.outer, Role.ENTERING, f":wants{instance.inside.index}"
+    )
+    context.contended.append((instance, wants, held))
     return [Effect(produce=(wants,))]
 
 
-def node_of(host: Host) -> e.Activity:
-    """The activity itself."""
-    return host.node
-
-
-def contend(making: Making) -> None:
-    """A behavior begins when nobody holds what it wants; else it fails at once."""
-    net = making.net
-    for host, wants, held in making.contended:
+def translate_contention(context: TranslationContext) -> None:
+    """A behavior begins when no other behavior holds its resources; else it fails at once."""
+    net = context.net
+    for instance, wants, held in context.contended:
         holders = {n: r for r in held for n in net.holders.get(r, ())}
         begins = Effect(
-            steps=(Step(host.node.id, Action.ENTERED, "commands"),),
+            steps=(Step(instance.node.id, Action.ENTERED, "commands"),),
             consume=(wants,),
             inhibit=frozenset(holders),
-        ).then(host.begin())
+        ).then(instance.begin())
         assert begins is not None
-        net.rule(begins)
+        net.transition(begins)
         for holder, resource in holders.items():
             refused = Effect(
                 consume=(wants,),
@@ -189,9 +203,9 @@ def contend(making: Making) -> None:
                 flag=Flag.CONFLICT,
                 flagged=resource,
             )
-            fails = failing(making, host, "RESOURCE_UNAVAILABLE", Flag.CONFLICT)
+            fails = failing(context, instance, "RESOURCE_UNAVAILABLE", Flag.CONFLICT)
             for effect in product([refused], fails):
-                net.rule(effect)
+                net.transition(effect)
 
 
 def _hold_us(behavior: Behavior) -> int | None:
@@ -204,53 +218,57 @@ def _hold_us(behavior: Behavior) -> int | None:
     return 0 if not any(p.name == "duration" for p in behavior.parameters) else None
 
 
-def _ended(host: Host, effect: Effect) -> Effect:
-    return effect.saying(host.node.id, Action.COMPLETED)
+def _ended(instance: ActivityInstance, effect: Effect) -> Effect:
+    return effect.with_step(instance.node.id, Action.COMPLETED)
 
 
-def _outside_work(making: Making, host: Host) -> list[Effect]:
-    """A behavior or service: it ends well or badly, when its report comes."""
-    net = making.net
-    well = [_ended(host, host.leave())]
-    badly = Effect(consume=(host.active,))
-    for key in making.data.written_anyhow(host.node):
-        well = making.data.write(well, key, None, host.outer, host.node)
-    for effect in product(well, host.done()):
-        net.rule(effect, Kind.OUTSIDE, Trigger.SUCCEEDS)
-    if making.options.failures:
-        codes = dict.fromkeys((*catchable(making, host.outer, host), "FAILED"))
+def _outside_work(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
+    """A behavior or service call: it succeeds or fails when its report comes."""
+    net = context.net
+    well = [_ended(instance, instance.leave())]
+    badly = Effect(consume=(instance.active,))
+    for key in context.data.written_anyhow(instance.node):
+        well = context.data.write(well, key, None, instance.outer, instance.node)
+    for effect in product(well, instance.done()):
+        net.transition(effect, Kind.OUTSIDE, Trigger.SUCCEEDS)
+    if context.options.failures:
+        codes = dict.fromkeys((*catchable(context, instance.outer, instance), "FAILED"))
         for code in codes:
-            for effect in failing(making, host, code, Flag.UNCAUGHT_FAILURE):
+            for effect in failing(context, instance, code, Flag.UNCAUGHT_FAILURE):
                 both = badly.then(effect)
                 if both is not None:
-                    net.rule(both, Kind.OUTSIDE, Trigger.FAILS, code)
-    return [host.begin()]
+                    net.transition(both, Kind.OUTSIDE, Trigger.FAILS, code)
+    return [instance.begin()]
 
 
-def _user_task(making: Making, host: Host, node: e.UserTask) -> list[Effect]:
-    net = making.net
+def _user_task(
+    context: TranslationContext, instance: ActivityInstance, node: e.UserTask
+) -> list[Effect]:
+    net = context.net
     assert node.prompt is not None
     prompt = node.prompt
     for decision in prompt.decisions:
-        answered = [_ended(host, host.leave())]
-        answered = making.data.write(
-            answered, prompt.store, literal(decision.value), host.outer, node
+        answered = [_ended(instance, instance.leave())]
+        answered = context.data.write(
+            answered, prompt.store, literal(decision.value), instance.outer, node
         )
-        for effect in product(answered, host.done()):
-            net.rule(effect, Kind.OUTSIDE, Trigger.ANSWER, decision.value)
+        for effect in product(answered, instance.done()):
+            net.transition(effect, Kind.OUTSIDE, Trigger.ANSWER, decision.value)
     if prompt.timeout is not None:
-        late = Effect(consume=(host.active,))
+        late = Effect(consume=(instance.active,))
         made = [
-            net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=due_us(prompt.timeout))
+            net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=due_us(prompt.timeout))
             for effect in product(
-                [late], failing(making, host, "PROMPT_TIMEOUT", Flag.UNCAUGHT_FAILURE)
+                [late], failing(context, instance, "PROMPT_TIMEOUT", Flag.UNCAUGHT_FAILURE)
             )
         ]
-        runs(making, host.active, written(prompt.timeout), (host.active,), made)
-    return [host.begin()]
+        runs(context, instance.active, written(prompt.timeout), (instance.active,), made)
+    return [instance.begin()]
 
 
-def _script(making: Making, host: Host, node: e.ScriptTask) -> list[Effect]:
+def _script(
+    context: TranslationContext, instance: ActivityInstance, node: e.ScriptTask
+) -> list[Effect]:
     ways = [Effect()]
     unable: list[Effect] = []
     thrown = ""
@@ -258,46 +276,54 @@ def _script(making: Making, host: Host, node: e.ScriptTask) -> list[Effect]:
         if not isinstance(statement, Assignment):
             thrown = statement.code
             break
-        if making.data.is_blurred(statement.key):
-            making.net.approximate(
+        if context.data.is_blurred(statement.key):
+            context.net.approximate(
                 node, Exactness.MORE, f"'{statement.key}' has more values than are told apart"
             )
-        ways = making.data.write(
-            ways, statement.key, statement.expression, host.outer, node, unable=unable
+        ways = context.data.write(
+            ways, statement.key, statement.expression, instance.outer, node, unable=unable
         )
-    over = failing(making, host, thrown, Flag.UNCAUGHT) if thrown else _at_once(host)
+    over = failing(context, instance, thrown, Flag.UNCAUGHT) if thrown else _at_once(instance)
     if not unable:
         return product(ways, over)
-    wrong = failing(making, host, "EXPRESSION", Flag.UNCAUGHT)
+    wrong = failing(context, instance, "EXPRESSION", Flag.UNCAUGHT)
     return [*product(ways, over), *product(unable, wrong)]
 
 
-def _send(making: Making, host: Host, message: str) -> list[Effect]:
-    """Between coming and leaving, so that who receives is known when it is thrown."""
-    thrown = making.net.place(host.node, host.outer, Role.ENTERING, f":sends{host.inside.index}")
+def _send(context: TranslationContext, instance: ActivityInstance, message: str) -> list[Effect]:
+    """A send task throws after it was entered and before it leaves: its catchers are
+    known by then.
+    """
+    thrown = context.net.place(
+        instance.node, instance.outer, Role.ENTERING, f":sends{instance.inside.index}"
+    )
 
-    def spell_out() -> None:
-        sends = Effect(steps=(Step(host.node.id, Action.THROWN, message),), consume=(thrown,))
-        over = Effect(kill_scopes=frozenset({host.inside.index}))
-        around = interrupting_places(making, "message", message, host.outer)
-        ended, gone_on = parted(product([sends], message_effects(making, message)), around)
+    def translate_later() -> None:
+        sends = Effect(steps=(Step(instance.node.id, Action.THROWN, message),), consume=(thrown,))
+        over = Effect(reset_scopes=frozenset({instance.inside.index}))
+        around = interrupting_places(context, "message", message, instance.outer)
+        ended, gone_on = split_by_places(
+            product([sends], message_effects(context, message)), around
+        )
         ended += [
-            replace(sends, produce=(catcher.told,))
-            for catcher in making.messages.get(message, ())
+            replace(sends, produce=(catcher.caught,))
+            for catcher in context.messages.get(message, ())
             if catcher.waiting == thrown and not catcher.keeps
         ]
-        making.rules(ended)
-        making.rules(product(product(gone_on, [over]), _at_once(host)))
+        context.transitions(ended)
+        context.transitions(product(product(gone_on, [over]), _at_once(instance)))
 
-    making.later.append(spell_out)
+    context.later.append(translate_later)
     return [Effect(produce=(thrown,))]
 
 
-def _receive(making: Making, host: Host, node: e.ReceiveTask) -> list[Effect]:
-    told = making.net.place(node, host.outer, Role.TRIGGERED, f":{host.inside.index}")
+def _receive(
+    context: TranslationContext, instance: ActivityInstance, node: e.ReceiveTask
+) -> list[Effect]:
+    caught = context.net.place(node, instance.outer, Role.TRIGGERED, f":{instance.inside.index}")
     assert node.message is not None
-    catching(making, "message", node.message.id, host.active, told, False, node)
-    stop = Effect(consume=(told,), kill_scopes=frozenset({host.inside.index}))
-    come = making.data.receive([_ended(host, stop)], host.outer, node)
-    making.rules(product(come, host.done()))
-    return [host.begin()]
+    register_catcher(context, "message", node.message.id, instance.active, caught, False, node)
+    stop = Effect(consume=(caught,), reset_scopes=frozenset({instance.inside.index}))
+    come = context.data.receive([_ended(instance, stop)], instance.outer, node)
+    context.transitions(product(come, instance.done()))
+    return [instance.begin()]

@@ -1,4 +1,4 @@
-"""What waits for something: boundary events, the starts of event subprocesses, catch events."""
+"""Catching: boundary events, start events of event subprocesses, and event-based catching."""
 
 from dataclasses import replace
 
@@ -15,11 +15,22 @@ from m2pem.mission.events import (
 )
 from m2pem.mission.expression import Expression
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step, Trigger
-from m2pem.verify.translate.context import Host, Making, catching, first, what_and_ref
+from m2pem.verify.translate.context import (
+    ActivityInstance,
+    TranslationContext,
+    first,
+    register_catcher,
+    what_and_ref,
+)
 from m2pem.verify.translate.data import ERROR
-from m2pem.verify.translate.net_builder import Area, Effect, at, is_join, product
-from m2pem.verify.translate.parallel_multiple import Gathering, all_must_come, gather, gathering
-from m2pem.verify.translate.scopes import handler_host
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, is_join, product
+from m2pem.verify.translate.parallel_multiple import (
+    TriggerPlaces,
+    all_must_come,
+    await_all,
+    trigger_places,
+)
+from m2pem.verify.translate.scopes import handler_instance
 from m2pem.verify.translate.sequence_flows import leave
 from m2pem.verify.translate.throwing import begin_handler, throw_error
 from m2pem.verify.translate.timers import fixed, holder_of, runs, timer_us
@@ -27,153 +38,181 @@ from m2pem.verify.translate.timers import fixed, holder_of, runs, timer_us
 # --- boundary events ----------------------------------------------------------------------------
 
 
-def boundaries(making: Making, host: Host) -> None:
-    """Everything that can come to the boundary of an activity from outside of it."""
-    for event in host.node.boundary:
-        making.net.knows(event)
-        out = at(making.net, event, host.outer)
-        _leave_boundary(making, host, event, out)
+def boundaries(context: TranslationContext, instance: ActivityInstance) -> None:
+    """Translate the triggers that come from outside to the boundary events of an activity."""
+    for event in instance.node.boundary:
+        context.net.add_element(event)
+        out = entry_place(context.net, event, instance.outer)
+        _leave_boundary(context, instance, event, out)
         if all_must_come(event):
-            _gathered(making, host, event, out)
+            _all_triggers(context, instance, event, out)
             continue
         for number, definition in enumerate(event.definitions):
-            _boundary(making, host, event, definition, out, number)
+            _boundary(context, instance, event, definition, out, number)
 
 
-def caught_before_work(making: Making, host: Host) -> None:
-    """What can come to the boundary of an activity whose work has not begun: nothing from outside,
-    for that begins before."""
-    for event in host.node.boundary:
-        out = at(making.net, event, host.outer)
+def caught_before_work(context: TranslationContext, instance: ActivityInstance) -> None:
+    """Translate what an armed boundary event catches before the activity's work begins.
+
+    Nothing comes from outside then, because the work begins before.
+    """
+    for event in instance.node.boundary:
+        out = entry_place(context.net, event, instance.outer)
         if all_must_come(event):
-            _all_came(making, host, event, out, gathering(making, event, host.inside))
+            _all_came(
+                context, instance, event, out, trigger_places(context, event, instance.inside)
+            )
             continue
         for number, definition in enumerate(event.definitions):
             match definition:
                 case SignalEventDefinition() | MessageEventDefinition():
-                    told = making.net.place(event, host.outer, Role.TRIGGERED, f":{number}")
+                    caught = context.net.place(event, instance.outer, Role.TRIGGERED, f":{number}")
                     what, ref = what_and_ref(definition)
-                    catching(making, what, ref, host.active, told, not event.interrupting, event)
+                    register_catcher(
+                        context, what, ref, instance.active, caught, not event.interrupting, event
+                    )
                 case ConditionalEventDefinition(condition=condition):
-                    if making.data.is_followed([condition], event):
-                        comes, _ = _comes(host, event, out)
-                        _boundary_condition(making, host, event, condition, comes, number)
+                    if context.data.is_followed([condition], event):
+                        comes, _ = _comes(instance, event, out)
+                        _boundary_condition(context, instance, event, condition, comes, number)
                 case _:
                     pass
 
 
-def _leave_boundary(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> None:
+def _leave_boundary(
+    context: TranslationContext, instance: ActivityInstance, event: e.BoundaryEvent, out: int
+) -> None:
     if any(isinstance(d, CompensateEventDefinition) for d in event.definitions):
         return
     come = Effect(steps=(Step(event.id, Action.COMPLETED),), consume=(out,))
     ways = leave(
-        making,
-        host.outer,
+        context,
+        instance.outer,
         event,
         None,
-        lambda code: throw_error(making, host.outer, event, None, code),
+        lambda code: throw_error(context, instance.outer, event, None, code),
     )
-    making.rules(product([come], ways))
+    context.transitions(product([come], ways))
 
 
 def _boundary(
-    making: Making,
-    host: Host,
+    context: TranslationContext,
+    instance: ActivityInstance,
     event: e.BoundaryEvent,
     definition: EventDefinition,
     out: int,
     number: int,
 ) -> None:
-    net = making.net
-    comes, told_comes = _comes(host, event, out)
+    net = context.net
+    comes, caught_comes = _comes(instance, event, out)
     match definition:
         case TimerEventDefinition():
-            running = host.active
+            running = instance.active
             if not event.interrupting and definition.kind is TimerKind.CYCLE:
-                comes = _again(making, host, event, comes)
+                comes = _again(context, instance, event, comes)
             elif not event.interrupting:
-                running = net.place(event, host.inside, Role.CONTROL, f":armed{number}")
-                comes = _once(host, comes, running)
-            made = net.rule(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
-            runs(making, host.active, fixed(definition), (running,), [made])
+                running = net.place(event, instance.inside, Role.CONTROL, f":armed{number}")
+                comes = _once(instance, comes, running)
+            made = net.transition(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            runs(context, instance.active, fixed(definition), (running,), [made])
         case SignalEventDefinition() | MessageEventDefinition():
-            told = net.place(event, host.outer, Role.TRIGGERED, f":{number}")
+            caught = net.place(event, instance.outer, Role.TRIGGERED, f":{number}")
             what, ref = what_and_ref(definition)
-            catching(making, what, ref, host.active, told, not event.interrupting, event)
-            both = told_comes.then(Effect(consume=(told,)))
+            register_catcher(
+                context, what, ref, instance.active, caught, not event.interrupting, event
+            )
+            both = caught_comes.then(Effect(consume=(caught,)))
             assert both is not None
-            making.rules(making.data.receive([both], host.outer, event))
+            context.transitions(context.data.receive([both], instance.outer, event))
         case ConditionalEventDefinition(condition=condition):
-            _boundary_condition(making, host, event, condition, comes, number)
+            _boundary_condition(context, instance, event, condition, comes, number)
         case CancelEventDefinition():
             pass  # its transaction comes here by itself
         case _:
             pass  # errors and escalations look for their catcher
 
 
-def _comes(host: Host, event: e.BoundaryEvent, out: int) -> tuple[Effect, Effect]:
-    """What follows when the trigger comes; and when it has taken the activity's token already."""
+def _comes(instance: ActivityInstance, event: e.BoundaryEvent, out: int) -> tuple[Effect, Effect]:
+    """(effect when the trigger comes, effect when the trigger has taken the activity's token
+    already).
+    """
     caught = Step(event.id, Action.TRIGGERED)
     if not event.interrupting:
-        comes = Effect(steps=(caught,), read=frozenset({host.active}), produce=(out,))
+        comes = Effect(steps=(caught,), read=frozenset({instance.active}), produce=(out,))
         return comes, Effect(steps=(caught,), produce=(out,))
-    stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
-    told_comes = Effect(steps=(caught, *stop.steps), kill_scopes=stop.kill_scopes, produce=(out,))
-    return replace(told_comes, consume=stop.consume), told_comes
+    stop = instance.leave().with_step(instance.node.id, Action.INTERRUPTED)
+    caught_comes = Effect(
+        steps=(caught, *stop.steps), reset_scopes=stop.reset_scopes, produce=(out,)
+    )
+    return replace(caught_comes, consume=stop.consume), caught_comes
 
 
-def _gathered(making: Making, host: Host, event: e.BoundaryEvent, out: int) -> None:
-    """All of its triggers must come; what does not interrupt then awaits them all anew."""
-    places = gather(making, event, host.outer, host.inside)
-    host.armed += places.awaited
-    _all_came(making, host, event, out, places)
+def _all_triggers(
+    context: TranslationContext, instance: ActivityInstance, event: e.BoundaryEvent, out: int
+) -> None:
+    """All triggers of a parallel multiple event must come. A non-interrupting one then awaits them
+    all again.
+    """
+    places = await_all(context, event, instance.outer, instance.inside)
+    instance.armed += places.awaited
+    _all_came(context, instance, event, out, places)
 
 
 def _all_came(
-    making: Making, host: Host, event: e.BoundaryEvent, out: int, places: Gathering
+    context: TranslationContext,
+    instance: ActivityInstance,
+    event: e.BoundaryEvent,
+    out: int,
+    places: TriggerPlaces,
 ) -> None:
     caught = Effect(steps=(Step(event.id, Action.TRIGGERED),), consume=places.came, produce=(out,))
     if event.interrupting:
-        stop = host.leave().saying(host.node.id, Action.INTERRUPTED)
+        stop = instance.leave().with_step(instance.node.id, Action.INTERRUPTED)
     else:
-        stop = Effect(read=frozenset({host.active}), produce=places.again)
-    making.rules(product(making.data.receive([caught], host.outer, event), [stop]))
+        stop = Effect(read=frozenset({instance.active}), produce=places.again)
+    context.transitions(product(context.data.receive([caught], instance.outer, event), [stop]))
 
 
-def _once(host: Host, comes: Effect, armed: int) -> Effect:
-    """What does not interrupt comes once for each token on the activity."""
-    host.armed.append(armed)
+def _once(instance: ActivityInstance, comes: Effect, armed: int) -> Effect:
+    """A non-interrupting event happens once for each token on the activity."""
+    instance.armed.append(armed)
     both = comes.then(Effect(consume=(armed,)))
     assert both is not None
     return both
 
 
-def _again(making: Making, host: Host, event: e.BoundaryEvent, comes: Effect) -> Effect:
-    """What does not interrupt, and comes again and again: one handling at a time."""
-    making.net.approximate(
+def _again(
+    context: TranslationContext, instance: ActivityInstance, event: e.BoundaryEvent, comes: Effect
+) -> Effect:
+    """A non-interrupting event that happens again and again: one handling at a time."""
+    context.net.approximate(
         event, Exactness.BOUNDED, "it comes again only when what it began has ended"
     )
     region = handled(event)
     found: set[int] = set()
-    both = comes.then(Effect(inhibit=_Late(making, host.outer, region, found)))
+    both = comes.then(Effect(inhibit=_Late(context, instance.outer, region, found)))
     assert both is not None
     return both
 
 
 class _Late(frozenset[int]):
-    """Places of some nodes, known when all are made."""
+    """Places of some nodes, computed when all nodes are translated."""
 
     __slots__ = ()
 
     def __new__(
-        cls, making: Making, area: Area, nodes: frozenset[e.FlowNode], found: set[int]
+        cls,
+        context: TranslationContext,
+        scope: ScopeDraft,
+        nodes: frozenset[e.FlowNode],
+        found: set[int],
     ) -> "_Late":
         del found
-        return super().__new__(cls, {at(making.net, node, area) for node in nodes})
+        return super().__new__(cls, {entry_place(context.net, node, scope) for node in nodes})
 
 
 def handled(event: e.BoundaryEvent) -> frozenset[e.FlowNode]:
-    """The event's own first steps: what follows it until something else joins."""
+    """The event's own first steps: what follows it until another path joins."""
     found: set[e.FlowNode] = {event}
     waiting: list[e.FlowNode] = [event]
     while waiting:
@@ -186,147 +225,157 @@ def handled(event: e.BoundaryEvent) -> frozenset[e.FlowNode]:
 
 
 def _boundary_condition(
-    making: Making,
-    host: Host,
+    context: TranslationContext,
+    instance: ActivityInstance,
     event: e.BoundaryEvent,
     condition: Expression,
     comes: Effect,
     number: int,
 ) -> None:
-    net = making.net
-    if not making.data.is_followed([condition], event):
+    net = context.net
+    if not context.data.is_followed([condition], event):
         net.approximate(event, Exactness.MORE, "its condition may become true at any time")
         if not event.interrupting:
-            comes = _again(making, host, event, comes)
-        net.rule(comes, Kind.OUTSIDE, Trigger.CONDITION)
+            comes = _again(context, instance, event, comes)
+        net.transition(comes, Kind.OUTSIDE, Trigger.CONDITION)
         return
-    for guard, truth in making.data.cases([condition], host.outer, event, first):
+    for guard, truth in context.data.cases([condition], instance.outer, event, first):
         if event.interrupting:
             if truth is True:
-                making.rules(product([comes], [Effect(guard=guard)]))
+                context.transitions(product([comes], [Effect(guard=guard)]))
             continue
-        ready = net.place(event, host.inside, Role.CONTROL, f":ready{number}")
-        if ready not in host.armed:
-            host.armed.append(ready)
+        ready = net.place(event, instance.inside, Role.CONTROL, f":ready{number}")
+        if ready not in instance.armed:
+            instance.armed.append(ready)
         if truth is True:
-            making.rules(product([comes], [Effect(guard=guard, consume=(ready,))]))
+            context.transitions(product([comes], [Effect(guard=guard, consume=(ready,))]))
         else:
             reset = Effect(
                 steps=(Step(event.id, Action.ENTERED, "its condition is false"),),
                 guard=guard,
-                read=frozenset({host.active}),
+                read=frozenset({instance.active}),
                 inhibit=frozenset({ready}),
                 produce=(ready,),
             )
-            net.rule(reset)
+            net.transition(reset)
 
 
 # --- event subprocesses -------------------------------------------------------------------------
 
 
-def arm_handler(making: Making, area: Area, start: e.StartEvent) -> None:
-    """What begins an event subprocess from outside of its area."""
-    net = making.net
-    assert area.open is not None
+def arm_handler(context: TranslationContext, scope: ScopeDraft, start: e.StartEvent) -> None:
+    """Translate the triggers of an event subprocess that come from outside of its scope."""
+    net = context.net
+    assert scope.open is not None
     if all_must_come(start):
-        _gathered_start(making, area, start)
+        _start_by_all_triggers(context, scope, start)
         return
     for number, definition in enumerate(start.definitions):
-        begun = begin_handler(making, area, start)
-        when = Effect(read=frozenset({area.open}))
+        begun = begin_handler(context, scope, start)
+        when = Effect(read=frozenset({scope.open}))
         match definition:
             case TimerEventDefinition():
                 running: tuple[int, ...] = ()
                 if not start.interrupting:
                     if definition.kind is TimerKind.CYCLE:
-                        when = when.then(_once_at_a_time(making, area, start)) or when
+                        when = when.then(_once_at_a_time(context, scope, start)) or when
                     else:
-                        armed = net.place(start, area, Role.CONTROL, f":armed{number}")
+                        armed = net.place(start, scope, Role.CONTROL, f":armed{number}")
                         when = when.then(Effect(consume=(armed,))) or when
                         running = (armed,)
                 made = [
-                    net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                    net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
                     for effect in product([when], begun)
                 ]
-                holder = holder_of(making, area)
-                runs(making, holder, fixed(definition), (area.open, *running), made)
+                holder = holder_of(context, scope)
+                runs(context, holder, fixed(definition), (scope.open, *running), made)
             case SignalEventDefinition() | MessageEventDefinition():
-                told = net.place(start, area, Role.TRIGGERED, f":told{number}")
+                caught = net.place(start, scope, Role.TRIGGERED, f":told{number}")
                 what, ref = what_and_ref(definition)
-                catching(making, what, ref, area.open, told, not start.interrupting, start)
-                come = Effect(steps=(Step(start.id, Action.TRIGGERED),), consume=(told,))
+                register_catcher(
+                    context, what, ref, scope.open, caught, not start.interrupting, start
+                )
+                come = Effect(steps=(Step(start.id, Action.TRIGGERED),), consume=(caught,))
                 if not start.interrupting:
-                    come = come.then(_once_at_a_time(making, area, start)) or come
-                    host = _host_of(making, area, start)
-                    net.rule(
-                        Effect(steps=come.steps, consume=(told,), read=frozenset({host.active}))
+                    come = come.then(_once_at_a_time(context, scope, start)) or come
+                    instance = _instance_of(context, scope, start)
+                    net.transition(
+                        Effect(
+                            steps=come.steps, consume=(caught,), read=frozenset({instance.active})
+                        )
                     )
-                making.rules(product(making.data.receive([come], area, start), begun))
+                context.transitions(product(context.data.receive([come], scope, start), begun))
             case ConditionalEventDefinition(condition=condition):
-                _handler_condition(making, area, start, condition, when, begun, number)
+                _handler_condition(context, scope, start, condition, when, begun, number)
             case _:
                 pass
 
 
-def _gathered_start(making: Making, area: Area, start: e.StartEvent) -> None:
-    """All of its triggers must come; what does not interrupt then awaits them all anew."""
-    assert area.open is not None
-    places = gather(making, start, area, area)
-    come = Effect(read=frozenset({area.open}), consume=places.came)
+def _start_by_all_triggers(
+    context: TranslationContext, scope: ScopeDraft, start: e.StartEvent
+) -> None:
+    """All triggers of a parallel multiple start event must come. A non-interrupting one then awaits
+    them all again.
+    """
+    assert scope.open is not None
+    places = await_all(context, start, scope, scope)
+    come = Effect(read=frozenset({scope.open}), consume=places.came)
     if not start.interrupting:
         missed = Effect(
             steps=(Step(start.id, Action.TRIGGERED),),
             consume=places.came,
-            read=frozenset({_host_of(making, area, start).active}),
+            read=frozenset({_instance_of(context, scope, start).active}),
             produce=places.again,
         )
-        making.net.rule(missed)
+        context.net.transition(missed)
         again = replace(come, produce=places.again)
-        alone = again.then(_once_at_a_time(making, area, start))
+        alone = again.then(_once_at_a_time(context, scope, start))
         assert alone is not None
         come = alone
-    ways = making.data.receive([come], area, start)
-    making.rules(product(ways, begin_handler(making, area, start)))
+    ways = context.data.receive([come], scope, start)
+    context.transitions(product(ways, begin_handler(context, scope, start)))
 
 
-def _once_at_a_time(making: Making, area: Area, start: e.StartEvent) -> Effect:
-    making.net.approximate(start, Exactness.BOUNDED, "it begins again only when it has ended")
-    return Effect(inhibit=frozenset({_host_of(making, area, start).active}))
+def _once_at_a_time(context: TranslationContext, scope: ScopeDraft, start: e.StartEvent) -> Effect:
+    context.net.approximate(start, Exactness.BOUNDED, "it begins again only when it has ended")
+    return Effect(inhibit=frozenset({_instance_of(context, scope, start).active}))
 
 
-def _host_of(making: Making, area: Area, start: e.StartEvent) -> Host:
+def _instance_of(
+    context: TranslationContext, scope: ScopeDraft, start: e.StartEvent
+) -> ActivityInstance:
     assert isinstance(start.container, e.SubProcess)
-    return handler_host(making, area, start.container)
+    return handler_instance(context, scope, start.container)
 
 
 def _handler_condition(
-    making: Making,
-    area: Area,
+    context: TranslationContext,
+    scope: ScopeDraft,
     start: e.StartEvent,
     condition: Expression,
     when: Effect,
     begun: list[Effect],
     number: int,
 ) -> None:
-    net = making.net
-    armed = net.place(start, area, Role.CONTROL, f":armed{number}")
-    if not making.data.is_followed([condition], start):
+    net = context.net
+    armed = net.place(start, scope, Role.CONTROL, f":armed{number}")
+    if not context.data.is_followed([condition], start):
         net.approximate(start, Exactness.MORE, "its condition may become true at any time")
         if not start.interrupting:
-            when = when.then(_once_at_a_time(making, area, start)) or when
+            when = when.then(_once_at_a_time(context, scope, start)) or when
         for effect in product([when], begun):
-            net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
+            net.transition(effect, Kind.OUTSIDE, Trigger.CONDITION)
         return
-    for guard, truth in making.data.cases([condition], area, start, first):
+    for guard, truth in context.data.cases([condition], scope, start, first):
         asked = when.then(Effect(guard=guard))
         assert asked is not None
         if truth is True:
             if not start.interrupting:
                 asked = asked.then(Effect(consume=(armed,)))
                 assert asked is not None
-                asked = asked.then(_once_at_a_time(making, area, start))
+                asked = asked.then(_once_at_a_time(context, scope, start))
                 assert asked is not None
-            making.rules(product([asked], begun))
+            context.transitions(product([asked], begun))
         elif not start.interrupting and truth != ERROR:
             reset = asked.then(
                 Effect(
@@ -336,4 +385,4 @@ def _handler_condition(
                 )
             )
             assert reset is not None
-            net.rule(reset)
+            net.transition(reset)

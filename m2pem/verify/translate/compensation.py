@@ -19,38 +19,50 @@ from m2pem.mission import elements as e
 from m2pem.mission.events import CancelEventDefinition, CompensateEventDefinition
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.reach import following
-from m2pem.verify.net.petri_net import UNDOES, UNDONE, Action, Exactness, Role, Step
-from m2pem.verify.translate.context import Host, Making, Undoing, Way
-from m2pem.verify.translate.net_builder import Area, Effect, at, product
-from m2pem.verify.translate.scopes import begin_event_subprocess, handler_host, quiet
+from m2pem.verify.net.petri_net import (
+    COMPENSATION_BEGINS,
+    COMPENSATION_ENDS,
+    Action,
+    Exactness,
+    Role,
+    Step,
+)
+from m2pem.verify.translate.context import (
+    ActivityInstance,
+    CompensatedBy,
+    CompensationEffects,
+    TranslationContext,
+)
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
+from m2pem.verify.translate.scopes import begin_event_subprocess, handler_instance, when_empty
 
 
-def way_back(making: Making, node: e.Activity) -> Way | None:
-    """By what an activity can be undone; None: by nothing."""
-    if node not in making.ways:
-        making.ways[node] = None  # while it is looked at: a process may call itself
-        making.ways[node] = _way_back(making, node)
-    return making.ways[node]
+def compensated_by(context: TranslationContext, node: e.Activity) -> CompensatedBy | None:
+    """What compensates an activity; None: nothing does."""
+    if node not in context.compensated_by:
+        context.compensated_by[node] = None  # while it is looked at: a process may call itself
+        context.compensated_by[node] = _find_compensation(context, node)
+    return context.compensated_by[node]
 
 
-def _way_back(making: Making, node: e.Activity) -> Way | None:
+def _find_compensation(context: TranslationContext, node: e.Activity) -> CompensatedBy | None:
     if node.for_compensation or is_compensation_handler(node):
         return None
     if node.compensation is not None:
-        return Way.ACTIVITY
+        return CompensatedBy.ACTIVITY
     inside = container_in(node)
     if inside is None:
         return None
     activities = [each for each in inside.nodes if isinstance(each, e.Activity)]
     if compensation_handler(inside) is not None or any(
-        way_back(making, each) for each in activities
+        compensated_by(context, each) for each in activities
     ):
-        return Way.INSIDE
+        return CompensatedBy.INSIDE
     return None
 
 
 def container_in(node: e.FlowNode) -> e.Container | None:
-    """What an activity holds: itself, or the process that it calls."""
+    """The container that an activity holds: itself, or the process that it calls."""
     if isinstance(node, e.CallActivity):
         return node.called
     return node if isinstance(node, e.SubProcess) else None
@@ -59,63 +71,76 @@ def container_in(node: e.FlowNode) -> e.Container | None:
 # --- notes --------------------------------------------------------------------------------------
 
 
-def kept(making: Making, area: Area) -> Area:
-    """Where it is noted what was done in an area: outside of all that may be over by then."""
-    home = area
-    while home.parent is not None and home.parent is not making.everything:
+def notes_scope(context: TranslationContext, scope: ScopeDraft) -> ScopeDraft:
+    """The scope with the notes of what completed in a scope: it outlives that scope."""
+    home = scope
+    while home.parent is not None and home.parent is not context.everything:
         home = home.parent
-    if home.index not in making.kept:
-        made = making.net.area(home.element, making.everything, step=f"{home.path[-1]}~done")
-        making.kept[home.index] = made
-    return making.kept[home.index]
+    if home.index not in context.notes_scopes:
+        made = context.net.scope(home.element, context.everything, step=f"{home.path[-1]}~done")
+        context.notes_scopes[home.index] = made
+    return context.notes_scopes[home.index]
 
 
-def done(making: Making, area: Area, node: e.Activity, number: int | None = None) -> int:
-    """The place that says that an activity of an area (or an instance of it) can be undone."""
+def completion_note(
+    context: TranslationContext, scope: ScopeDraft, node: e.Activity, number: int | None = None
+) -> int:
+    """The place that says that an activity of a scope (or an instance of it) can be compensated."""
     which = "" if number is None else f"[{number}]"
-    return making.net.place(node, kept(making, area), Role.CONTROL, f":done{area.index}{which}")
+    return context.net.place(
+        node, notes_scope(context, scope), Role.CONTROL, f":done{scope.index}{which}"
+    )
 
 
-def noted(making: Making, host: Host) -> Effect:
-    """What the completion of an activity notes."""
-    if way_back(making, host.node) is None:
+def note_completion(context: TranslationContext, instance: ActivityInstance) -> Effect:
+    """Note that an activity has completed."""
+    if compensated_by(context, instance.node) is None:
         return Effect()
-    _tell(making, host.outer, host.node, again=_comes_again(making, host.outer, host.node))
-    return _note(done(making, host.outer, host.node))
+    _note_approximations(
+        context,
+        instance.outer,
+        instance.node,
+        again=_comes_again(context, instance.outer, instance.node),
+    )
+    return _note(completion_note(context, instance.outer, instance.node))
 
 
-def noted_instance(making: Making, host: Host, number: int) -> Effect:
-    """What the completion of an instance notes: a compensation activity undoes the whole alone."""
-    if way_back(making, host.node) is not Way.INSIDE:
+def note_instance_completion(
+    context: TranslationContext, instance: ActivityInstance, number: int
+) -> Effect:
+    """Note that an instance has completed. A compensation activity compensates only the whole."""
+    if compensated_by(context, instance.node) is not CompensatedBy.INSIDE:
         return Effect()
-    loop = host.node.loop
+    loop = instance.node.loop
     in_turn = not isinstance(loop, MultiInstance) or loop.sequential
-    _tell(making, host.outer, host.node, again=in_turn)
-    return _note(done(making, host.outer, host.node, number))
+    _note_approximations(context, instance.outer, instance.node, again=in_turn)
+    return _note(completion_note(context, instance.outer, instance.node, number))
 
 
 def _note(place: int) -> Effect:
-    return Effect(kill=frozenset({place}), produce=(place,))
+    return Effect(reset=frozenset({place}), produce=(place,))
 
 
-def _tell(making: Making, area: Area, node: e.Activity, *, again: bool) -> None:
-    around = container_of(area)
+def _note_approximations(
+    context: TranslationContext, scope: ScopeDraft, node: e.Activity, *, again: bool
+) -> None:
+    around = container_of(scope)
     others = [
         each
         for each in (around.nodes if around is not None else ())
-        if isinstance(each, e.Activity) and each is not node and way_back(making, each)
+        if isinstance(each, e.Activity) and each is not node and compensated_by(context, each)
     ]
-    if others or is_loop(area):
-        making.net.approximate(
+    if others or is_loop(scope):
+        context.net.approximate(
             node, Exactness.MORE, "it and what else was done is undone in any order"
         )
     if again:
-        making.net.approximate(node, Exactness.BOUNDED, "done several times, it is undone once")
+        context.net.approximate(node, Exactness.BOUNDED, "done several times, it is undone once")
 
 
-def _comes_again(making: Making, area: Area, node: e.Activity) -> bool:
-    """Whether it can complete more than once in an instance of its scope."""
-    if area.several or node in making.repeated or isinstance(node.container, e.AdHocSubProcess):
+def _comes_again(context: TranslationContext, scope: ScopeDraft, node: e.Activity) -> bool:
+    """Whether it can complete more than once in one instance of its scope."""
+    if scope.several or node in context.repeated or isinstance(node.container, e.AdHocSubProcess):
         return True
     if isinstance(node, e.SubProcess) and node.triggered_by_event:
         return any(not start.interrupting for start in node.starts)
@@ -130,288 +155,332 @@ def _comes_again(making: Making, area: Area, node: e.Activity) -> bool:
     return False
 
 
-def forget(making: Making, area: Area, container: e.Container) -> Effect:
-    """What was done in a scope before it begins again is not done in it."""
+def forget_completions(
+    context: TranslationContext, scope: ScopeDraft, container: e.Container
+) -> Effect:
+    """Remove the notes of a scope before it begins again."""
     return Effect(
-        kill=frozenset(
-            done(making, area, node)
+        reset=frozenset(
+            completion_note(context, scope, node)
             for node in container.nodes
-            if isinstance(node, e.Activity) and way_back(making, node)
+            if isinstance(node, e.Activity) and compensated_by(context, node)
         )
     )
 
 
-def forget_instances(making: Making, whole: Host, count: int) -> Effect:
-    """The same, of the instances of an activity."""
-    if way_back(making, whole.node) is not Way.INSIDE:
+def forget_instance_completions(
+    context: TranslationContext, whole: ActivityInstance, count: int
+) -> Effect:
+    """Remove the notes of an activity's instances."""
+    if compensated_by(context, whole.node) is not CompensatedBy.INSIDE:
         return Effect()
-    places = [done(making, whole.inside, whole.node, number) for number in range(count)]
-    return Effect(kill=frozenset(places))
+    places = [completion_note(context, whole.inside, whole.node, number) for number in range(count)]
+    return Effect(reset=frozenset(places))
 
 
 # --- what has not completed ---------------------------------------------------------------------
 
 
-def cut_short(making: Making, area: Area) -> tuple[int, ...]:
-    """The place that says that an event subprocess has interrupted an area, if that matters."""
-    host = area.host
-    if not isinstance(host, Host) or host.cut is None or way_back(making, host.node) is None:
+def cut_short(context: TranslationContext, scope: ScopeDraft) -> tuple[int, ...]:
+    """The place that says that an event subprocess has interrupted a scope, if that matters."""
+    instance = scope.instance
+    if (
+        not isinstance(instance, ActivityInstance)
+        or instance.cut is None
+        or compensated_by(context, instance.node) is None
+    ):
         return ()
-    return (making.net.place(area.element, area, Role.CONTROL, ":cut"),)
+    return (context.net.place(scope.element, scope, Role.CONTROL, ":cut"),)
 
 
-def ended(making: Making, host: Host, area: Area, over: list[Effect]) -> list[Effect]:
-    """How an activity goes on when its inside `area` is over: cut short, it cannot be undone."""
-    container = container_of(area)
+def on_inside_end(
+    context: TranslationContext, instance: ActivityInstance, scope: ScopeDraft, over: list[Effect]
+) -> list[Effect]:
+    """How an activity goes on when its inside `scope` is over. If it was interrupted, it cannot be
+    compensated.
+    """
+    container = container_of(scope)
     interrupts = container is not None and any(
         start.interrupting
         for each in container.event_subprocesses
         if not is_compensation_handler(each)
         for start in each.starts
     )
-    cut = cut_short(making, area) if interrupts else ()
-    if not cut or host.cut is None:
-        return product(over, host.done())
+    cut = cut_short(context, scope) if interrupts else ()
+    if not cut or instance.cut is None:
+        return product(over, instance.done())
     well = product(over, [Effect(inhibit=frozenset(cut))])
     early = product(over, [Effect(read=frozenset(cut))])
-    return [*product(well, host.done()), *product(early, host.cut())]
+    return [*product(well, instance.done()), *product(early, instance.cut())]
 
 
-# --- areas --------------------------------------------------------------------------------------
+# --- scopes --------------------------------------------------------------------------------------
 
 
-def is_loop(area: Area) -> bool:
-    """Whether it is where the instances of an activity are, and not the inside of one."""
-    host = area.host
+def is_loop(scope: ScopeDraft) -> bool:
+    """Whether a scope holds the instances of an activity, and is not the inside of one."""
+    instance = scope.instance
     return (
-        isinstance(host, Host)
-        and host.inside is area
-        and host.boundary
-        and host.node.loop is not None
+        isinstance(instance, ActivityInstance)
+        and instance.inside is scope
+        and instance.boundary
+        and instance.node.loop is not None
     )
 
 
-def container_of(area: Area) -> e.Container | None:
-    """What an area is an instance of."""
-    element = area.element
+def container_of(scope: ScopeDraft) -> e.Container | None:
+    """The container that a scope is an instance of."""
+    element = scope.element
     if isinstance(element, e.CallActivity):
-        return element.called if area.frame == area.path else None
-    if isinstance(element, e.Process | e.SubProcess) and not is_loop(area):
+        return element.called if scope.frame == scope.path else None
+    if isinstance(element, e.Process | e.SubProcess) and not is_loop(scope):
         return element
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class _Point:
-    """An activity, or an instance of one, that can be undone while there is a token on `done`."""
+    """An activity, or an instance of one, that can be compensated while there is a
+    token on `note`.
+    """
 
-    host: Host
-    done: int
+    instance: ActivityInstance
+    note: int
 
 
 # --- throwing -----------------------------------------------------------------------------------
 
 
 def compensate(
-    making: Making,
+    context: TranslationContext,
     node: e.FlowNode,
-    area: Area,
+    scope: ScopeDraft,
     definition: CompensateEventDefinition,
     begun: list[Effect],
     ways: list[Effect],
 ) -> tuple[list[Effect], list[Effect]]:
-    """(effects that end with the throw waiting, effects that go on at once)."""
+    """Return (effects after which the throw event waits, effects after which it goes on
+    at once).
+    """
     name = definition.activity
     if name and node.qualifier:
         name = f"{node.qualifier}:{name}"
-    named = making.mission.elements.get(name) if name else None
-    target = _target(making, area, named)
-    found = _points(making, target)
+    named = context.mission.elements.get(name) if name else None
+    target = _target(context, scope, named)
+    found = _points(context, target)
     if named is not None and named is not container_of(target):
-        found = [point for point in found if point.host.node is named]
-    undoing = _undo(making, node, f"{area.index}{name or ''}", target, found)
-    thrown = undoing.thrown.saying(node.id, Action.THROWN, "compensation")
-    over = undoing.over.saying(node.id, Action.TRIGGERED, UNDONE)
+        found = [point for point in found if point.instance.node is named]
+    compensating = _compensate_points(context, node, f"{scope.index}{name or ''}", target, found)
+    thrown = compensating.thrown.with_step(node.id, Action.THROWN, "compensation")
+    over = compensating.over.with_step(node.id, Action.TRIGGERED, COMPENSATION_ENDS)
     if not definition.wait:
-        making.net.rule(over)
+        context.net.transition(over)
         return [], product(begun, [thrown])
-    waiting = making.net.place(node, area, Role.ACTIVE, ":undoes")
+    waiting = context.net.place(node, scope, Role.ACTIVE, ":undoes")
     last = Step(node.id, Action.COMPLETED, "all is undone")
-    goes_on = replace(undoing.over, steps=(last,), consume=(*undoing.over.consume, waiting))
-    making.rules(product([goes_on], ways))
-    if target is not area:  # the event subprocess that threw may be over before
-        making.rules(product([over], [Effect(inhibit=frozenset({waiting}))]))
+    goes_on = replace(
+        compensating.over, steps=(last,), consume=(*compensating.over.consume, waiting)
+    )
+    context.transitions(product([goes_on], ways))
+    if target is not scope:  # the event subprocess that threw may be over before
+        context.transitions(product([over], [Effect(inhibit=frozenset({waiting}))]))
     return product(begun, product([thrown], [Effect(produce=(waiting,))])), []
 
 
-def _target(making: Making, area: Area, named: e.Element | None) -> Area:
-    """The scope in which something is to be undone, as in the engine."""
-    here = area
+def _target(context: TranslationContext, scope: ScopeDraft, named: e.Element | None) -> ScopeDraft:
+    """The scope in which a throw event compensates, as in the engine."""
+    here = scope
     if named is None:
-        if isinstance(area.element, e.SubProcess) and area.element.triggered_by_event:
-            assert isinstance(area.host, Host)
-            here = area.host.outer
+        if isinstance(scope.element, e.SubProcess) and scope.element.triggered_by_event:
+            assert isinstance(scope.instance, ActivityInstance)
+            here = scope.instance.outer
         return here
     homes: tuple[e.Element, ...] = (named,)
     if isinstance(named, e.Activity):
         homes = (named, named.container)
     while container_of(here) not in homes:
-        if not isinstance(here.host, Host):
-            return area
-        here = here.host.outer
+        if not isinstance(here.instance, ActivityInstance):
+            return scope
+        here = here.instance.outer
     return here
 
 
-def cancel(making: Making, node: e.EndEvent, area: Area) -> list[Effect]:
-    """A transaction is cancelled: all in it ends, what was done is undone, and it is left."""
-    host = area.host
-    assert isinstance(host, Host)
-    while not host.boundary:  # an instance: the whole is left
-        assert isinstance(host.outer.host, Host)
-        host = host.outer.host
-    left = host.leave()
-    for boundary in host.node.boundary:
+def cancel(context: TranslationContext, node: e.EndEvent, scope: ScopeDraft) -> list[Effect]:
+    """Cancel a transaction: all in it ends, what completed is compensated, and a token
+    leaves it.
+    """
+    instance = scope.instance
+    assert isinstance(instance, ActivityInstance)
+    while not instance.boundary:  # an instance: the whole is left
+        assert isinstance(instance.outer.instance, ActivityInstance)
+        instance = instance.outer.instance
+    left = instance.leave()
+    for boundary in instance.node.boundary:
         if any(isinstance(d, CancelEventDefinition) for d in boundary.definitions):
             out = Effect(
                 steps=(Step(boundary.id, Action.TRIGGERED),),
-                produce=(at(making.net, boundary, host.outer),),
+                produce=(entry_place(context.net, boundary, instance.outer),),
             )
             both = left.then(out)
             assert both is not None
             left = both
             break
-    undoing = _undo(making, node, "", area, _points(making, area))
-    over = undoing.over.saying(node.id, Action.COMPLETED, "all is undone")
-    making.rules(product([over], [left]))
-    ended = making.net.place(node, area, Role.TRIGGERED, ":cancelled")
-    begins = Effect(steps=(Step(node.id, Action.TRIGGERED, UNDOES),), consume=(ended,))
-    making.rules(product([begins], [undoing.thrown]))
-    return [Effect(kill_scopes=frozenset({area.index}), produce=(ended,))]
+    compensating = _compensate_points(context, node, "", scope, _points(context, scope))
+    over = compensating.over.with_step(node.id, Action.COMPLETED, "all is undone")
+    context.transitions(product([over], [left]))
+    ended = context.net.place(node, scope, Role.TRIGGERED, ":cancelled")
+    begins = Effect(steps=(Step(node.id, Action.TRIGGERED, COMPENSATION_BEGINS),), consume=(ended,))
+    context.transitions(product([begins], [compensating.thrown]))
+    return [Effect(reset_scopes=frozenset({scope.index}), produce=(ended,))]
 
 
 # --- undoing ------------------------------------------------------------------------------------
 
 
-def _points(making: Making, area: Area) -> list[_Point]:
-    """What can be undone in an area, if it was done."""
-    if is_loop(area):
-        assert isinstance(area.host, Host)
-        node = area.host.node
-        if way_back(making, node) is not Way.INSIDE:
+def _points(context: TranslationContext, scope: ScopeDraft) -> list[_Point]:
+    """What can be compensated in a scope, if it has completed."""
+    if is_loop(scope):
+        assert isinstance(scope.instance, ActivityInstance)
+        node = scope.instance.node
+        if compensated_by(context, node) is not CompensatedBy.INSIDE:
             return []
-        instances = [each for each in _hosts(area) if not each.boundary]
-        return [_Point(each, done(making, area, node, n)) for n, each in enumerate(instances)]
-    around = container_of(area)
+        instances = [each for each in _activity_instances(scope) if not each.boundary]
+        return [
+            _Point(each, completion_note(context, scope, node, n))
+            for n, each in enumerate(instances)
+        ]
+    around = container_of(scope)
     nodes = around.nodes if around is not None else ()
-    hosts = {host.node: host for host in _hosts(area)}
+    activity_instances = {instance.node: instance for instance in _activity_instances(scope)}
     return [
-        _Point(hosts[node], done(making, area, node))
+        _Point(activity_instances[node], completion_note(context, scope, node))
         for node in nodes
-        if isinstance(node, e.Activity) and node in hosts and way_back(making, node)
+        if isinstance(node, e.Activity)
+        and node in activity_instances
+        and compensated_by(context, node)
     ]
 
 
-def _hosts(area: Area) -> list[Host]:
+def _activity_instances(scope: ScopeDraft) -> list[ActivityInstance]:
     return [
-        child.host
-        for child in area.children
-        if isinstance(child.host, Host) and child.host.inside is child
+        child.instance
+        for child in scope.children
+        if isinstance(child.instance, ActivityInstance) and child.instance.inside is child
     ]
 
 
-def _undo(
-    making: Making, thrower: e.FlowNode, mark: str, area: Area, points: Sequence[_Point]
-) -> Undoing:
-    """Undo some points of an area, one after the other, while a token says that it is done.
+def _compensate_points(
+    context: TranslationContext,
+    thrower: e.FlowNode,
+    mark: str,
+    scope: ScopeDraft,
+    points: Sequence[_Point],
+) -> CompensationEffects:
+    """Compensate points of a scope one after the other, while a token says that the throw is
+    active.
 
-    It is the area's: when that ends, or is interrupted, it undoes nothing more.
+    That token is in the scope: when the scope ends, or is interrupted, nothing more is compensated.
     """
-    net = making.net
-    undoing = net.place(thrower, area, Role.TRIGGERED, f":undoes{mark}")
+    net = context.net
+    compensating = net.place(thrower, scope, Role.TRIGGERED, f":undoes{mark}")
     what = f"{thrower.id}:{mark}"
     claimed: list[tuple[int, int]] = []
     busy: list[int] = []
     for number, point in enumerate(points):
-        node = point.host.node
-        claimed.append((point.done, net.place(node, area, Role.CONTROL, f":for{what}.{number}")))
-        busy.append(net.place(node, area, Role.CONTROL, f":by{what}.{number}"))
+        node = point.instance.node
+        claimed.append((point.note, net.place(node, scope, Role.CONTROL, f":for{what}.{number}")))
+        busy.append(net.place(node, scope, Role.CONTROL, f":by{what}.{number}"))
     for point, (_, claim), mine in zip(points, claimed, busy, strict=True):
-        node = point.host.node
+        node = point.instance.node
         begins = Effect(
-            steps=(Step(node.id, Action.TRIGGERED, UNDOES),),
-            read=frozenset({undoing}),
+            steps=(Step(node.id, Action.TRIGGERED, COMPENSATION_BEGINS),),
+            read=frozenset({compensating}),
             inhibit=frozenset(busy),
             consume=(claim,),
             produce=(mine,),
         )
-        starts, over = _undone(making, area, point)
-        making.rules(product([begins], starts))
-        is_over = Effect(steps=(Step(node.id, Action.TRIGGERED, UNDONE),), consume=(mine,))
-        making.rules(product([is_over], [over]))
-    making.claims.setdefault(area.index, []).extend((claim, noted) for noted, claim in claimed)
-    return Undoing(
-        Effect(kill=frozenset({undoing}), produce=(undoing,), moves=tuple(claimed)),
-        Effect(consume=(undoing,), inhibit=frozenset({*busy, *(claim for _, claim in claimed)})),
+        starts, over = _compensation_of(context, scope, point)
+        context.transitions(product([begins], starts))
+        is_over = Effect(
+            steps=(Step(node.id, Action.TRIGGERED, COMPENSATION_ENDS),), consume=(mine,)
+        )
+        context.transitions(product([is_over], [over]))
+    context.claims.setdefault(scope.index, []).extend(
+        (claim, note_completion) for note_completion, claim in claimed
+    )
+    return CompensationEffects(
+        Effect(reset=frozenset({compensating}), produce=(compensating,), moves=tuple(claimed)),
+        Effect(
+            consume=(compensating,), inhibit=frozenset({*busy, *(claim for _, claim in claimed)})
+        ),
     )
 
 
-def _undone(making: Making, area: Area, point: _Point) -> tuple[list[Effect], Effect]:
-    """What undoes one of them: how it begins, and when it is over."""
-    host = point.host
-    handler = host.node.compensation
+def _compensation_of(
+    context: TranslationContext, scope: ScopeDraft, point: _Point
+) -> tuple[list[Effect], Effect]:
+    """What compensates a point: (how it begins, when it is over)."""
+    instance = point.instance
+    handler = instance.node.compensation
     if handler is not None:
-        (undoes,) = [each for each in _hosts(area) if each.node is handler]
+        (compensates,) = [each for each in _activity_instances(scope) if each.node is handler]
         tokens = [
             place
-            for place in area.places
-            if making.net.places[place].element == handler.id
-            and making.net.places[place].role is not Role.CONTROL
+            for place in scope.places
+            if context.net.places[place].element == handler.id
+            and context.net.places[place].role is not Role.CONTROL
         ]
-        over = quiet(undoes.inside).then(Effect(inhibit=frozenset(tokens)))
+        over = when_empty(compensates.inside).then(Effect(inhibit=frozenset(tokens)))
         assert over is not None
-        return [Effect(produce=(at(making.net, handler, area),))], over
-    inner = _inside(host)
+        return [Effect(produce=(entry_place(context.net, handler, scope),))], over
+    inner = _inside(instance)
     if inner is None:  # a process that calls itself: the inner call is not seen
         return [Effect()], Effect()
     container = container_of(inner)
     by_itself = compensation_handler(container) if container is not None else None
     if by_itself is not None:
-        begun = begin_event_subprocess(making, inner, by_itself, by_itself.starts)
-        forgotten = forget(making, handler_host(making, inner, by_itself).inside, by_itself)
-        return product([forgotten], [begun]), quiet(host.inside)
-    return [_undo_all(making, host.node, inner).thrown], quiet(host.inside)
+        begun = begin_event_subprocess(context, inner, by_itself, by_itself.starts)
+        forgotten = forget_completions(
+            context, handler_instance(context, inner, by_itself).inside, by_itself
+        )
+        return product([forgotten], [begun]), when_empty(instance.inside)
+    return [_compensate_inside(context, instance.node, inner).thrown], when_empty(instance.inside)
 
 
-def _undo_all(making: Making, node: e.Activity, inner: Area) -> Undoing:
-    """Undo an activity by undoing all that was done in it."""
-    known = making.undoing.get(inner.index)
+def _compensate_inside(
+    context: TranslationContext, node: e.Activity, inner: ScopeDraft
+) -> CompensationEffects:
+    """Compensate an activity by compensating all that completed in it."""
+    known = context.compensating.get(inner.index)
     if known is None:
-        known = _undo(making, node, "all", inner, _points(making, inner))
-        making.undoing[inner.index] = known
-        making.net.rule(known.over.saying(node.id, Action.TRIGGERED, UNDONE))
+        known = _compensate_points(context, node, "all", inner, _points(context, inner))
+        context.compensating[inner.index] = known
+        context.net.transition(known.over.with_step(node.id, Action.TRIGGERED, COMPENSATION_ENDS))
     return known
 
 
-def _inside(host: Host) -> Area | None:
-    """Where what was done in an activity was done."""
-    if is_loop(host.inside) or container_in(host.node) is host.node:
-        return host.inside
-    return next((a for a in host.inside.children if container_of(a) is not None), None)
+def _inside(instance: ActivityInstance) -> ScopeDraft | None:
+    """The scope in which the contents of an activity completed."""
+    if is_loop(instance.inside) or container_in(instance.node) is instance.node:
+        return instance.inside
+    return next((a for a in instance.inside.children if container_of(a) is not None), None)
 
 
 # --- the end ------------------------------------------------------------------------------------
 
 
-def give_back(making: Making) -> None:
-    """What was claimed in a scope and not begun can be undone again when the scope is interrupted
-    or its transaction is cancelled."""
-    for index, claims in making.claims.items():
-        container = container_of(making.net.areas[index])
+def release_claims(context: TranslationContext) -> None:
+    """When a scope is interrupted or its transaction cancelled, claimed notes can be claimed anew.
+
+    That concerns claims whose compensation has not begun.
+    """
+    for index, claims in context.claims.items():
+        container = container_of(context.net.scopes[index])
         if container is None:
             continue
         ends = {start.id for each in container.event_subprocesses for start in each.starts}
         ends |= {node.id for node in container.nodes if isinstance(node, e.EndEvent)}
-        for draft in making.net.drafts:
+        for draft in context.net.drafts:
             effect = draft.effect
-            if index in effect.kill_scopes and any(step.element in ends for step in effect.steps):
+            if index in effect.reset_scopes and any(step.element in ends for step in effect.steps):
                 draft.effect = replace(effect, moves=(*claims, *effect.moves))

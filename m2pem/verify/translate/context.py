@@ -1,8 +1,8 @@
 """The context of a translation: what the modules of all element families share.
 
-`Host` is an activity with a token on it. `catching` registers what waits for signals and messages,
-so that those who throw them know their catchers. `held_by` says which vehicles and payloads an
-activity's behavior holds.
+`ActivityInstance` is an activity with a token on it. `register_catcher` registers what waits for
+signals and messages, so that those who throw them know their catchers. `held_by` says which
+vehicles and payloads an activity's behavior holds.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,26 +17,26 @@ from m2pem.mission.events import EventDefinition, MessageEventDefinition, Signal
 from m2pem.mission.mission import Mission
 from m2pem.mission.reach import following
 from m2pem.verify.net.petri_net import Kind, Role
-from m2pem.verify.net.size_limit import Bound
+from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate.data import Data, Truth
-from m2pem.verify.translate.net_builder import Area, Effect, Net
+from m2pem.verify.translate.net_builder import Effect, NetBuilder, ScopeDraft
 from m2pem.verify.translate.options import Options
 
 
 @dataclass(slots=True, eq=False)
-class Host:
-    """An activity in an area, or one instance of it, while a token is on it.
+class ActivityInstance:
+    """An activity in a scope, or one instance of it, while a token is on it.
 
-    `outer`: the area that the token is in. `inside`: that of what belongs to the activity alone.
-    `active`: the token's place. `done`: what happens when its work has ended, its token being
-    taken off already. `cut`: the same, of work that was ended early. `armed`: places that get a
-    token when it begins. `boundary`: whether its boundary events are asked for errors (not those of
-    an instance: they are the whole's).
+    `outer`: the scope that the token is in. `inside`: the scope of what belongs to the activity
+    alone. `active`: the token's place. `done`: what happens when its work has completed; its token
+    is removed already. `cut`: the same, of work that was ended early. `armed`: places that get a
+    token when it begins. `boundary`: whether its boundary events catch errors (not those of an
+    instance: they belong to the whole).
     """
 
     node: e.Activity
-    outer: Area
-    inside: Area
+    outer: ScopeDraft
+    inside: ScopeDraft
     active: int
     done: Callable[[], list[Effect]]
     boundary: bool = True
@@ -46,109 +46,115 @@ class Host:
     cut: Callable[[], list[Effect]] | None = None
 
     def begin(self) -> Effect:
-        """The token comes to work."""
+        """The token begins to work."""
         return Effect(produce=(self.active, *(() if self.armed_before else self.armed)))
 
     def leave(self) -> Effect:
-        """The token is taken off, with all that belongs to the activity."""
-        return Effect(consume=(self.active,), kill_scopes=frozenset({self.inside.index}))
+        """Remove the token, with all that belongs to the activity."""
+        return Effect(consume=(self.active,), reset_scopes=frozenset({self.inside.index}))
 
 
 @dataclass(frozen=True, slots=True)
 class Catcher:
-    """Something that a signal or message reaches: the token of `waiting` goes to, or puts another
-    on, `told`."""
+    """A place that a signal or message reaches. The token of `waiting` moves to `caught`, or, if
+    the catcher `keeps` it, a token is added there.
+    """
 
     waiting: int
-    told: int
+    caught: int
     keeps: bool
     element: str
 
 
-class Way(StrEnum):
-    """By what an activity is undone."""
+class CompensatedBy(StrEnum):
+    """What compensates an activity."""
 
     ACTIVITY = "its compensation activity"
     INSIDE = "what is in it"
 
 
 @dataclass(frozen=True, slots=True)
-class Undoing:
-    """What undoes the points of an area: how it begins, and when it is over."""
+class CompensationEffects:
+    """What compensates the points of a scope: how it begins, and when it is over."""
 
     thrown: Effect
     over: Effect
 
 
-class Making:
-    """A derivation under way.
+class TranslationContext:
+    """A translation in progress.
 
-    Of compensation: `ways` has by what each activity is undone; by index of an area, `kept` where
-    is noted what was done in it, `claims` which notes are claimed and as what, and `undoing` how
-    all in it is undone.
+    Compensation: `compensated_by` says what compensates each activity. By index of a scope,
+    `notes_scopes` has the scope with the notes of what completed in it, `claims` the notes that are
+    claimed and by which places, and `compensating` how all in it is compensated.
     """
 
     def __init__(
-        self, mission: Mission, process: e.Process, fleet: Fleet, options: Options, bound: Bound
+        self,
+        mission: Mission,
+        process: e.Process,
+        fleet: Fleet,
+        options: Options,
+        size_limit: SizeLimit,
     ) -> None:
         self.mission = mission
         self.process = process
         self.fleet = fleet
         self.options = options
-        self.net = Net(bound)
-        self.data = Data(mission, options, bound)
-        self.world = self.net.area(process, None)
+        self.net = NetBuilder(size_limit)
+        self.data = Data(mission, options, size_limit)
+        self.world = self.net.scope(process, None)
         self.world.path = ()
         self.world.frame = ()
         self.running = self.net.place(process, self.world, Role.CONTROL, ":running")
         self.completed = self.net.place(process, self.world, Role.END, ":completed")
         self.terminated = self.net.place(process, self.world, Role.END, ":terminated")
         self.failed = self.net.place(process, self.world, Role.END, ":failed")
-        self.everything = self.net.area(process, self.world, "everything")
+        self.everything = self.net.scope(process, self.world, "everything")
         self.everything.path = ()
-        self.build_node: Callable[[Making, e.FlowNode, Area], None] = _nothing
+        self.build_node: Callable[[TranslationContext, e.FlowNode, ScopeDraft], None] = _nothing
         self.signals: dict[str, list[Catcher]] = {}
         self.messages: dict[str, list[Catcher]] = {}
         self.begins: dict[tuple[str, str], list[list[Effect]]] = {}
         self.later: list[Callable[[], None]] = []
-        self.contended: list[tuple[Host, int, tuple[str, ...]]] = []
-        self.choices: list[tuple[Effect, e.FlowNode, Area]] = []
-        self.ways: dict[e.Activity, Way | None] = {}
-        self.kept: dict[int, Area] = {}
+        self.contended: list[tuple[ActivityInstance, int, tuple[str, ...]]] = []
+        self.choices: list[tuple[Effect, e.FlowNode, ScopeDraft]] = []
+        self.compensated_by: dict[e.Activity, CompensatedBy | None] = {}
+        self.notes_scopes: dict[int, ScopeDraft] = {}
         self.claims: dict[int, list[tuple[int, int]]] = {}
-        self.undoing: dict[int, Undoing] = {}
+        self.compensating: dict[int, CompensationEffects] = {}
         self.root = self.everything
         self.repeated = _repeated_nodes(mission)
         self.again = _ends_reached_again(mission)
 
     def end_run(self, place: int) -> Effect:
-        """The run ends, and all in it."""
+        """End the run, and all in it."""
         return Effect(
             consume=(self.running,),
-            kill_scopes=frozenset({self.everything.index}),
+            reset_scopes=frozenset({self.everything.index}),
             produce=(place,),
         )
 
-    def reached(self, node: e.EndEvent, area: Area) -> Effect:
-        """An end event is reached: twice in one instance of its scope is a finding."""
+    def reached(self, node: e.EndEvent, scope: ScopeDraft) -> Effect:
+        """Note that an end event is reached: twice in one instance of its scope is a finding."""
         if node not in self.again:
             return Effect()
-        seen = self.net.place(node, area, Role.CONTROL, ":reached")
+        seen = self.net.place(node, scope, Role.CONTROL, ":reached")
         self.net.places[seen] = replace(self.net.places[seen], once=True)
         return Effect(produce=(seen,))
 
-    def rules(self, effects: list[Effect], kind: Kind = Kind.INTERNAL) -> None:
-        """A rule for each effect."""
+    def transitions(self, effects: list[Effect], kind: Kind = Kind.INTERNAL) -> None:
+        """Add a transition for each effect."""
         for effect in effects:
-            self.net.rule(effect, kind)
+            self.net.transition(effect, kind)
 
 
-def _nothing(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Until it is said how nodes are built."""
+def _nothing(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """The default until the translation of nodes is registered."""
 
 
 def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
-    """Nodes that only what does not interrupt, and can come again, leads to."""
+    """Nodes that are reached only from non-interrupting events that can happen again."""
     begun: set[e.FlowNode] = set()
     waiting: list[e.FlowNode] = []
     for node in mission.nodes:
@@ -184,7 +190,7 @@ def _repeated_nodes(mission: Mission) -> frozenset[e.FlowNode]:
 
 
 def _ends_reached_again(mission: Mission) -> frozenset[e.FlowNode]:
-    """End events that two tokens of one scope might come to."""
+    """End events that two tokens of one scope may reach."""
     waiting = [node for node in mission.nodes if forks(node)]
     reached: set[e.FlowNode] = set()
     while waiting:
@@ -196,7 +202,7 @@ def _ends_reached_again(mission: Mission) -> frozenset[e.FlowNode]:
 
 
 def forks(node: e.FlowNode) -> bool:
-    """Whether one token can become several there."""
+    """Whether one token can become several at a node."""
     if isinstance(node, e.ExclusiveGateway | e.EventBasedGateway):
         return False
     if isinstance(node, e.Activity) and (
@@ -208,22 +214,22 @@ def forks(node: e.FlowNode) -> bool:
     return len(node.outgoing) > 1
 
 
-def catching(
-    making: Making,
+def register_catcher(
+    context: TranslationContext,
     what: str,
     ref: str,
     waiting: int,
-    told: int,
+    caught: int,
     keeps: bool,
     node: e.FlowNode,
 ) -> None:
-    """A signal or message of that id reaches a token on `waiting`."""
-    register = making.signals if what == "signal" else making.messages
-    register.setdefault(ref, []).append(Catcher(waiting, told, keeps, node.id))
+    """Register that a signal or message with that id reaches a token on `waiting`."""
+    register = context.signals if what == "signal" else context.messages
+    register.setdefault(ref, []).append(Catcher(waiting, caught, keeps, node.id))
 
 
 def what_and_ref(definition: EventDefinition) -> tuple[str, str]:
-    """("signal" or "message", its id)."""
+    """Return ("signal" or "message", its id)."""
     if isinstance(definition, SignalEventDefinition):
         return "signal", definition.signal.id
     assert isinstance(definition, MessageEventDefinition)
@@ -231,16 +237,18 @@ def what_and_ref(definition: EventDefinition) -> tuple[str, str]:
 
 
 def first(truths: Sequence[Truth]) -> Truth:
-    """Of one condition, whether it is true."""
+    """The truth of a single condition."""
     return truths[0]
 
 
-def held_by(making: Making, node: e.Activity) -> tuple[tuple[str, ...], str]:
-    """What a token on an activity holds, and by which behavior; nothing, of a loop's whole."""
+def held_by(context: TranslationContext, node: e.Activity) -> tuple[tuple[str, ...], str]:
+    """Return (resources that a token on an activity holds, the behavior's name). The whole of a
+    loop holds nothing.
+    """
     behavior = behavior_of(node)
     if behavior is None or node.loop is not None:
         return (), ""
-    held = resources(making, behavior)
+    held = resources(context, behavior)
     return held or (), behavior.name if held else ""
 
 
@@ -251,9 +259,9 @@ def behavior_of(node: e.Activity) -> Behavior | None:
     return None
 
 
-def resources(making: Making, behavior: Behavior) -> tuple[str, ...] | None:
-    """What a behavior holds; None: the fleet lacks it."""
+def resources(context: TranslationContext, behavior: Behavior) -> tuple[str, ...] | None:
+    """The resources that a behavior holds; None: the fleet lacks them."""
     try:
-        return tuple(allocate(behavior, making.fleet).resources)
+        return tuple(allocate(behavior, context.fleet).resources)
     except AllocationError:
         return None

@@ -1,4 +1,4 @@
-"""What the rules know of a mission's data: a variable for each followed name of each process."""
+"""Data in the net: a variable for each followed name of each process instance."""
 
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
@@ -15,25 +15,27 @@ from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, St
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.net.petri_net import Variable
-from m2pem.verify.net.size_limit import Bound
+from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate.domains import MOST_COMBINATIONS, Domains, Write, tells_apart
-from m2pem.verify.translate.net_builder import Area, Effect
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft
 from m2pem.verify.translate.options import Options
 from m2pem.verify.translate.payloads import Payloads
 
 ERROR = "error"
-"""Instead of a truth: the condition cannot be evaluated."""
+"""In place of a truth: the condition cannot be evaluated."""
 
 Truth = bool | str
 Outcome = TypeVar("Outcome", bound=Hashable)
 
 
 class Data:
-    """The followed names of a mission."""
+    """The followed names of a mission, and what reads and writes them."""
 
-    def __init__(self, mission: Mission, options: Options, bound: Bound | None = None) -> None:
+    def __init__(
+        self, mission: Mission, options: Options, size_limit: SizeLimit | None = None
+    ) -> None:
         self._mission = mission
-        self._bound = bound or Bound()
+        self._size_limit = size_limit or SizeLimit()
         self._options = options
         self._hidden: dict[e.FlowNode, frozenset[str]] = {}
         self._initial = dict(_flat(options.data))
@@ -45,7 +47,7 @@ class Data:
     # --- names ----------------------------------------------------------------------------------
 
     def hidden(self, node: e.FlowNode) -> frozenset[str]:
-        """Names that are not the process's at a node: data of activities and their instances."""
+        """Names at a node that are not the process's: data of activities and of their instances."""
         found = self._hidden.get(node)
         if found is None:
             names: set[str] = set()
@@ -88,14 +90,14 @@ class Data:
     def cases(
         self,
         conditions: Sequence[Expression],
-        area: Area,
+        scope: ScopeDraft,
         node: e.FlowNode,
         choose: Callable[[Sequence[Truth]], Outcome],
         own: frozenset[str] = frozenset(),
     ) -> list[tuple[dict[int, frozenset[int]], Outcome]]:
-        """What `choose` makes of the truths of some conditions, and when.
+        """Return (guard, outcome) pairs: what `choose` makes of the truths of some conditions.
 
-        A condition that is not known counts once as true and once as false.
+        An unknown condition counts once as true and once as false.
         """
         hidden = self.hidden(node) | own
         names = sorted({n for c in conditions for n in c.names if self._follows(n, hidden)})
@@ -106,11 +108,11 @@ class Data:
         for combination in itertools.product(*ranges):
             options = [self._truths(c, names, combination, hidden) for c in conditions]
             for truths in itertools.product(*options):
-                self._bound.case(node.id)
+                self._size_limit.count_case(node.id)
                 where = chosen.setdefault(choose(truths), [])
                 if not where or where[-1] != combination:
                     where.append(combination)
-        variables = [self.variable(name, area.frame) for name in names]
+        variables = [self.variable(name, scope.frame) for name in names]
         return [
             (dict(zip(variables, box, strict=True)), outcome)
             for outcome, combinations in chosen.items()
@@ -146,7 +148,7 @@ class Data:
             return (ERROR,)
 
     def is_followed(self, conditions: Iterable[Expression], node: e.FlowNode) -> bool:
-        """Whether all that some conditions read is followed, value by value."""
+        """Whether all names that some conditions read are followed, value by value."""
         hidden = self.hidden(node)
         names = {name for condition in conditions for name in condition.names}
         return all(self._follows(name, hidden) for name in names) and self._small(names)
@@ -158,7 +160,7 @@ class Data:
         )
 
     def is_blurred(self, key: str) -> bool:
-        """Whether a name is followed, but with values that stand for many."""
+        """Whether a name is followed, but with values that represent many."""
         return key in self.domains.of and not self.domains.of[key].closed
 
     # --- writing --------------------------------------------------------------------------------
@@ -168,24 +170,24 @@ class Data:
         effects: Iterable[Effect],
         key: str,
         source: Expression | None,
-        area: Area,
+        scope: ScopeDraft,
         node: e.FlowNode,
         into: tuple[str, ...] | None = None,
         unable: list[Effect] | None = None,
     ) -> list[Effect]:
-        """Effects that also write a name; several where what is written is not known.
+        """Return the effects with a write to a name added; several effects if the value is unknown.
 
-        `into`: the process instance whose name it is, when it is not the area's own. `unable` gets
-        those after which there is no value to write.
+        `into`: the process instance that has the name, when it is not the scope's own. `unable`
+        gets the effects after which the value cannot be evaluated.
         """
         hidden = self.hidden(node) if into is None else frozenset()
         if not self._follows(key, hidden):
             return list(effects)
-        target = self.variable(key, area.frame if into is None else into)
+        target = self.variable(key, scope.frame if into is None else into)
         found: list[Effect] = []
         for effect in effects:
-            for guard, value in self._values(effect, key, source, area, node):
-                self._bound.case(node.id)
+            for guard, value in self._values(effect, key, source, scope, node):
+                self._size_limit.count_case(node.id)
                 assign = {} if value is None else {target: value}
                 both = effect.then(Effect(guard=guard, assign=assign))
                 if both is not None and value is not None:
@@ -194,30 +196,32 @@ class Data:
                     unable.append(both)
         return found
 
-    def receive(self, effects: list[Effect], area: Area, node: e.FlowNode) -> list[Effect]:
-        """Effects that also write what a signal or message brings to who catches it."""
-        for each in self._payloads.brought(node):
+    def receive(self, effects: list[Effect], scope: ScopeDraft, node: e.FlowNode) -> list[Effect]:
+        """Return the effects with writes of what a signal or message brings to its catcher."""
+        for each in self._payloads.received_values(node):
             if self._follows(each.key, self.hidden(node)):
                 found = list(effects) if each.perhaps else []
                 for source in each.sources:
-                    found += self.write(effects, each.key, source, area, node)
+                    found += self.write(effects, each.key, source, scope, node)
                 effects = found
         return effects
 
     def receives(self, node: e.FlowNode) -> bool:
-        """Whether anything that is followed may come to it with a signal or message."""
+        """Whether a signal or message may write a followed name at a node."""
         hidden = self.hidden(node)
-        return any(self._follows(each.key, hidden) for each in self._payloads.brought(node))
+        return any(self._follows(each.key, hidden) for each in self._payloads.received_values(node))
 
     def _values(
         self,
         effect: Effect,
         key: str,
         source: Expression | None,
-        area: Area,
+        scope: ScopeDraft,
         node: e.FlowNode | None,
     ) -> Iterator[tuple[dict[int, frozenset[int]], int | None]]:
-        """Values (by number) and when; None: there is none, since it cannot be evaluated."""
+        """Return (value's number, guard) pairs. None in place of a number: it cannot be
+        evaluated.
+        """
         domain = self.domains.of[key]
         anything = range(len(domain.values))
         hidden = self.hidden(node) if node is not None else frozenset()
@@ -228,7 +232,7 @@ class Data:
         if not self._small(names):
             yield from (({}, number) for number in anything)
             return
-        variables = [self.variable(name, area.frame) for name in names]
+        variables = [self.variable(name, scope.frame) for name in names]
         choices = []
         for variable in variables:
             allowed: Iterable[int] = range(len(self.variables[variable].values))
@@ -259,11 +263,11 @@ class Data:
         effects: Iterable[Effect],
         key: str,
         source: Expression,
-        inside: Area,
-        outer: Area,
+        inside: ScopeDraft,
+        outer: ScopeDraft,
         node: e.FlowNode,
     ) -> list[Effect]:
-        """Write what a called process gives: its own names are read, the caller's written."""
+        """Write an output of a called process: its own names are read, the caller's are written."""
         if not self._follows(key, self.hidden(node)):
             return list(effects)
         target = self.variable(key, outer.frame)
@@ -272,7 +276,7 @@ class Data:
             for guard, value in self._values(effect, key, source, inside, None):
                 if value is None:
                     continue
-                self._bound.case(node.id)
+                self._size_limit.count_case(node.id)
                 both = effect.then(Effect(guard=guard, assign={target: value}))
                 if both is not None:
                     found.append(both)
@@ -286,7 +290,7 @@ class Data:
     # --- the mission's own ----------------------------------------------------------------------
 
     def follow(self, frame: tuple[str, ...]) -> None:
-        """Make the variables that the options' conditions read, of one process instance."""
+        """Create the variables that the options' conditions read, of one process instance."""
         for condition in self._options.conditions:
             for name in sorted(condition.names):
                 if self._follows(name, frozenset()):
@@ -325,9 +329,9 @@ class Data:
         if isinstance(node, e.Activity):
             for mapping in node.data_flow.outputs:
                 yield Write(mapping.target, None)
-        for brought in self._payloads.brought(node):
-            for source in brought.sources:
-                yield Write(brought.key, source)
+        for received_values in self._payloads.received_values(node):
+            for source in received_values.sources:
+                yield Write(received_values.key, source)
         loop = node.loop if isinstance(node, e.Activity) else None
         if isinstance(loop, MultiInstance) and loop.output_collection:
             yield Write(loop.output_collection, None)
@@ -348,7 +352,7 @@ class Data:
                 pass
 
     def written_anyhow(self, node: e.FlowNode) -> tuple[str, ...]:
-        """Names that an element writes whatever it likes under."""
+        """Names to which an element may write any value."""
         behavior: Behavior | None = getattr(node, "behavior", None)
         if behavior is not None:
             spec = SHARED.get((behavior.name, behavior.type))
@@ -370,7 +374,7 @@ def _flat(data: object, prefix: str = "") -> Iterator[tuple[str, Value]]:
 def boxes(
     combinations: Sequence[tuple[int, ...]], sizes: Sequence[int]
 ) -> Iterator[tuple[frozenset[int], ...]]:
-    """Combinations as few products of sets: what differs in one place only is put together."""
+    """Combinations as few products of sets: those that differ in one position only are merged."""
     current: list[tuple[frozenset[int], ...]] = [
         tuple(frozenset({number}) for number in each) for each in dict.fromkeys(combinations)
     ]

@@ -1,8 +1,8 @@
-"""Which values the names that conditions read can have (finite domains).
+"""Finite domains: which values the names that conditions read can have.
 
-A name is *followed* when the mission says all that is ever written under it, or says what its
-conditions compare it with. A value is then either exact, or stands for all values that those
-comparisons cannot tell from it. What is not followed is unknown: every condition on it may be
+A name is *followed* when the mission states all that is ever written to it, or what its conditions
+compare it with. A value is then either exact, or represents all values that those comparisons
+cannot distinguish from it. A name that is not followed is unknown: every condition on it may be
 true and may be false.
 """
 
@@ -16,7 +16,7 @@ from m2pem.mission.expression import tree as t
 from m2pem.mission.values import Value
 
 MOST_VALUES = 40
-"""Of one name; a name that is given more is not followed value by value."""
+"""Most values of one name; a name with more is not followed value by value."""
 MOST_COMBINATIONS = 512
 
 
@@ -31,7 +31,7 @@ UNKNOWN = Unknown()
 
 @dataclass(slots=True)
 class Domain:
-    """The values of one name; `exact` says which stand only for themselves."""
+    """The values of one name; `exact` says which represent only themselves."""
 
     values: list[Value] = field(default_factory=list)
     exact: list[bool] = field(default_factory=list)
@@ -52,7 +52,7 @@ class Domain:
         return self._index.get((type(value).__name__, repr(value), exact))
 
     def like(self, value: Value) -> list[int]:
-        """Numbers of all that may stand for a value, of which it may be that none is its own."""
+        """The numbers of all values that may represent a value, which may have none of its own."""
         known = self.find(value)
         if known is not None:
             return [known]
@@ -70,7 +70,7 @@ class Domain:
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Something that gives a name a value: an expression over other names, or anything (None)."""
+    """A write to a name: the value of an expression over other names, or anything (None)."""
 
     key: str
     source: Expression | None
@@ -78,7 +78,7 @@ class Write:
 
 
 def constants(expression: Expression) -> dict[str, set[tuple[str, Value]]]:
-    """By name, what an expression compares it with, each as (type, value)."""
+    """By name, the constants that an expression compares it with, each as (type, value)."""
     found: dict[str, set[tuple[str, Value]]] = {}
     for node, _ in t.walk(expression.tree):
         if isinstance(node, t.Compare):
@@ -99,7 +99,7 @@ def constants(expression: Expression) -> dict[str, set[tuple[str, Value]]]:
 
 
 def tells_apart(node: t.Node) -> bool:
-    """Whether values that compare alike with its constants give it the same truth."""
+    """Whether the truth of an expression depends only on how values compare with its constants."""
     match node:
         case t.And(operands=operands) | t.Or(operands=operands):
             return all(tells_apart(each) for each in operands)
@@ -122,9 +122,9 @@ def tells_apart(node: t.Node) -> bool:
 
 
 def representatives(compared: Iterable[tuple[str, Value]]) -> list[tuple[Value, bool]]:
-    """A value of each kind that comparisons with these can tell apart; whether it is exact.
+    """Return a value of each kind that comparisons can distinguish; and whether it is exact.
 
-    One that is not exact stands for all that are neither equal to, nor between, those compared.
+    One that is not exact represents all that are neither equal to, nor between, those compared.
     """
     compared = list(compared)
     texts = {v for k, v in compared if k == "str"}
@@ -156,7 +156,7 @@ def representatives(compared: Iterable[tuple[str, Value]]) -> list[tuple[Value, 
 
 
 class Domains:
-    """The domains of all followed names, by key; found by trying what writes them."""
+    """The domains of all followed names, by key; found by evaluating what writes them."""
 
     def __init__(
         self,
@@ -229,7 +229,7 @@ class Domains:
         )
 
     def open(self, key: str) -> None:
-        """Anything may be written there: it gets a value of each kind."""
+        """Anything may be written to a name: it gets a value of each kind."""
         self._open.add(key)
         for value, exact in representatives(self._compared.get(key, ())):
             self.of[key].add(value, exact)
@@ -252,7 +252,7 @@ class Domains:
         return results
 
     def combinations(self, names: Iterable[str]) -> Iterator[tuple[dict[str, Value], bool]]:
-        """Every choice of values for some names, and whether all of it is exact."""
+        """Every combination of values of some names, and whether all of it is exact."""
         names = list(names)
         ranges = [range(len(self.of[name].values)) for name in names]
         for choice in itertools.islice(itertools.product(*ranges), MOST_COMBINATIONS):

@@ -1,4 +1,4 @@
-"""Events that are entered: starts, ends, catches, throws, and the event-based gateway."""
+"""Start, end, intermediate catch and throw events, and the event-based gateway."""
 
 from dataclasses import replace
 
@@ -17,144 +17,168 @@ from m2pem.mission.events import (
 )
 from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step, Trigger
 from m2pem.verify.translate.compensation import cancel, compensate
-from m2pem.verify.translate.context import Host, Making, catching, first, what_and_ref
-from m2pem.verify.translate.net_builder import Area, Draft, Effect, at, product
-from m2pem.verify.translate.parallel_multiple import Gathering, all_must_come, gather
+from m2pem.verify.translate.context import (
+    ActivityInstance,
+    TranslationContext,
+    first,
+    register_catcher,
+    what_and_ref,
+)
+from m2pem.verify.translate.net_builder import (
+    Effect,
+    ScopeDraft,
+    TransitionDraft,
+    entry_place,
+    product,
+)
+from m2pem.verify.translate.parallel_multiple import TriggerPlaces, all_must_come, await_all
 from m2pem.verify.translate.sequence_flows import along, leave
 from m2pem.verify.translate.throwing import (
     interrupting_places,
     message_effects,
-    parted,
     signal_effects,
+    split_by_places,
     throw_error,
     throw_escalation,
 )
 from m2pem.verify.translate.timers import fixed, runs, timer_us
 
 
-def _leave(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
-    return leave(making, area, node, None, lambda code: throw_error(making, area, node, None, code))
+def _leave(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> list[Effect]:
+    return leave(
+        context, scope, node, None, lambda code: throw_error(context, scope, node, None, code)
+    )
 
 
-def _come(making: Making, node: e.FlowNode, area: Area, action: Action) -> Effect:
-    return Effect(steps=(Step(node.id, action),), consume=(at(making.net, node, area),))
+def _come(
+    context: TranslationContext, node: e.FlowNode, scope: ScopeDraft, action: Action
+) -> Effect:
+    return Effect(steps=(Step(node.id, action),), consume=(entry_place(context.net, node, scope),))
 
 
 # --- catching -----------------------------------------------------------------------------------
 
 
-def start(making: Making, node: e.FlowNode, area: Area) -> None:
-    """A plain start goes on at once; so does one whose trigger has made its instance."""
+def start(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """A none start event goes on at once; so does one whose trigger has created its instance."""
     assert isinstance(node, e.StartEvent)
     container = node.container
     begun = isinstance(container, e.SubProcess) and container.triggered_by_event
-    begun = begun or (area.parent is making.everything and container is not making.process)
+    begun = begun or (scope.parent is context.everything and container is not context.process)
     if node.definitions and not begun:
-        _wait(making, node, area)
-    elif area.parent is making.everything and all_must_come(node):
-        waiting = making.net.place(node, area, Role.ACTIVE)  # for the others of its triggers
-        _all_have_come(making, node, area, waiting, gather(making, node, area, area))
+        _wait(context, node, scope)
+    elif scope.parent is context.everything and all_must_come(node):
+        waiting = context.net.place(node, scope, Role.ACTIVE)  # for the others of its triggers
+        _all_have_come(context, node, scope, waiting, await_all(context, node, scope, scope))
     else:
-        come = _come(making, node, area, Action.COMPLETED)
-        making.rules(product([come], _leave(making, node, area)))
+        come = _come(context, node, scope, Action.COMPLETED)
+        context.transitions(product([come], _leave(context, node, scope)))
 
 
-def catch(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Waits for its trigger; the target of a link has none."""
+def catch(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """A catch event waits for its trigger; the target of a link has none."""
     assert isinstance(node, e.IntermediateCatchEvent)
     if not node.definitions or node.linked_from:
-        come = _come(making, node, area, Action.COMPLETED)
-        making.rules(product([come], _leave(making, node, area)))
+        come = _come(context, node, scope, Action.COMPLETED)
+        context.transitions(product([come], _leave(context, node, scope)))
         return
-    _wait(making, node, area)
+    _wait(context, node, scope)
 
 
-def _wait(making: Making, node: e.Event, area: Area) -> None:
-    net = making.net
-    waiting = net.place(node, area, Role.ACTIVE, several=node in making.repeated)
+def _wait(context: TranslationContext, node: e.Event, scope: ScopeDraft) -> None:
+    net = context.net
+    waiting = net.place(node, scope, Role.ACTIVE, several=node in context.repeated)
     if all_must_come(node):
-        gathering = gather(making, node, area, area)
-        _enter(making, node, area, (waiting, *gathering.awaited))
-        _all_have_come(making, node, area, waiting, gathering)
+        trigger_places = await_all(context, node, scope, scope)
+        _enter(context, node, scope, (waiting, *trigger_places.awaited))
+        _all_have_come(context, node, scope, waiting, trigger_places)
         return
-    _enter(making, node, area, (waiting,))
+    _enter(context, node, scope, (waiting,))
     for number, definition in enumerate(node.definitions):
-        _trigger(making, node, area, definition, waiting, _leave(making, node, area), number)
+        _trigger(context, node, scope, definition, waiting, _leave(context, node, scope), number)
 
 
-def _enter(making: Making, node: e.FlowNode, area: Area, places: tuple[int, ...]) -> None:
-    """A token that comes waits at once."""
-    come = _come(making, node, area, Action.ENTERED).then(Effect(produce=places))
+def _enter(
+    context: TranslationContext, node: e.FlowNode, scope: ScopeDraft, places: tuple[int, ...]
+) -> None:
+    """A token that enters the event waits at once."""
+    come = _come(context, node, scope, Action.ENTERED).then(Effect(produce=places))
     assert come is not None
-    making.net.rule(come)
-    making.net.at_once.add(at(making.net, node, area))
+    context.net.transition(come)
+    context.net.at_once.add(entry_place(context.net, node, scope))
 
 
 def _all_have_come(
-    making: Making, node: e.Event, area: Area, waiting: int, gathering: Gathering
+    context: TranslationContext,
+    node: e.Event,
+    scope: ScopeDraft,
+    waiting: int,
+    trigger_places: TriggerPlaces,
 ) -> None:
-    done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *gathering.came))
-    ways = making.data.receive([done], area, node)
-    making.rules(product(ways, _leave(making, node, area)))
+    done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(waiting, *trigger_places.came))
+    ways = context.data.receive([done], scope, node)
+    context.transitions(product(ways, _leave(context, node, scope)))
 
 
 def _trigger(
-    making: Making,
+    context: TranslationContext,
     node: e.FlowNode,
-    area: Area,
+    scope: ScopeDraft,
     definition: EventDefinition,
     waiting: int,
     ways: list[Effect],
     number: int,
-) -> list[Draft]:
-    """The token of `waiting` goes on when the trigger comes. Answers with a timer's rules."""
-    net = making.net
+) -> list[TransitionDraft]:
+    """The token of `waiting` goes on when the trigger comes. Returns the transitions of a timer."""
+    net = context.net
     came = Effect(steps=(Step(node.id, Action.TRIGGERED),), consume=(waiting,))
     match definition:
         case TimerEventDefinition():
             return [
-                net.rule(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
                 for effect in product([came], ways)
             ]
         case SignalEventDefinition() | MessageEventDefinition():
-            told = net.place(node, area, Role.TRIGGERED, f":{number}:{waiting}")
+            caught = net.place(node, scope, Role.TRIGGERED, f":{number}:{waiting}")
             what, ref = what_and_ref(definition)
-            catching(making, what, ref, waiting, told, False, node)
-            came = Effect(steps=came.steps, consume=(told,))
-            making.rules(product(making.data.receive([came], area, node), ways))
+            register_catcher(context, what, ref, waiting, caught, False, node)
+            came = Effect(steps=came.steps, consume=(caught,))
+            context.transitions(product(context.data.receive([came], scope, node), ways))
         case ConditionalEventDefinition(condition=condition):
-            if not making.data.is_followed([condition], node):
+            if not context.data.is_followed([condition], node):
                 net.approximate(node, Exactness.MORE, "its condition may become true at any time")
                 for effect in product([came], ways):
-                    net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
+                    net.transition(effect, Kind.OUTSIDE, Trigger.CONDITION)
                 return []
-            for guard, truth in making.data.cases([condition], area, node, first):
+            for guard, truth in context.data.cases([condition], scope, node, first):
                 if truth is True:
-                    making.rules(product(product([came], [Effect(guard=guard)]), ways))
+                    context.transitions(product(product([came], [Effect(guard=guard)]), ways))
         case _:
-            making.rules(product([came], ways))
+            context.transitions(product([came], ways))
     return []
 
 
-def _true_or_never(making: Making, node: e.FlowNode, area: Area, ways: list[Effect]) -> None:
-    """A condition on what nothing in the mission writes: it is true at once, or never."""
-    come = _come(making, node, area, Action.TRIGGERED)
-    making.rules(product([come], ways))
+def _true_or_never(
+    context: TranslationContext, node: e.FlowNode, scope: ScopeDraft, ways: list[Effect]
+) -> None:
+    """A condition on data that nothing in the mission writes is true at once, or never."""
+    come = _come(context, node, scope, Action.TRIGGERED)
+    context.transitions(product([come], ways))
 
 
-def event_based(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Waits for the first of the events behind it."""
+def event_based(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """An event-based gateway waits for the first of the events behind it."""
     assert isinstance(node, e.EventBasedGateway)
-    net = making.net
-    waiting = net.place(node, area, Role.ACTIVE, several=node in making.repeated)
-    _enter(making, node, area, (waiting,))
+    net = context.net
+    waiting = net.place(node, scope, Role.ACTIVE, several=node in context.repeated)
+    _enter(context, node, scope, (waiting,))
     number = 0
     for flow in node.outgoing:
         target = flow.target
         taken = Effect(steps=(Step(flow.id, Action.TAKEN),))
-        ways = product([taken], after(making, target, area))
+        ways = product([taken], after(context, target, scope))
         for definition in awaited(target):
-            made = _trigger(making, target, area, definition, waiting, ways, number)
+            made = _trigger(context, target, scope, definition, waiting, ways, number)
             number += 1
             together = isinstance(target, e.Event) and all_must_come(target)
             if together:
@@ -162,85 +186,85 @@ def event_based(making: Making, node: e.FlowNode, area: Area) -> None:
                     target, Exactness.MORE, "one of its triggers is enough, not all of them"
                 )
             if isinstance(definition, TimerEventDefinition) and not (node.parallel or together):
-                runs(making, waiting, fixed(definition), (waiting,), made)
+                runs(context, waiting, fixed(definition), (waiting,), made)
 
 
 def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:
-    """What triggers a catch event or receive task."""
+    """The triggers of a catch event or receive task."""
     if isinstance(node, e.ReceiveTask):
         return (MessageEventDefinition(node.line, node.message),) if node.message else ()
     return node.definitions if isinstance(node, e.Event) else ()
 
 
-def after(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
+def after(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> list[Effect]:
     """What follows a catch event or receive task whose trigger has come already."""
     if isinstance(node, e.Activity):
         done = [Effect(steps=(Step(node.id, Action.COMPLETED),))]
         for mapping in node.data_flow.outputs:
-            done = making.data.write(done, mapping.target, None, area, node)
+            done = context.data.write(done, mapping.target, None, scope, node)
         out = leave(
-            making,
-            area,
+            context,
+            scope,
             node,
             node.default,
-            lambda code: throw_error(making, area, node, None, code),
+            lambda code: throw_error(context, scope, node, None, code),
             times=node.completion_quantity,
         )
         return product(done, out)
-    return _leave(making, node, area)
+    return _leave(context, node, scope)
 
 
 # --- throwing -----------------------------------------------------------------------------------
 
 
-def throw(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Throws, and goes on."""
+def throw(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """A throw event throws, and goes on."""
     assert isinstance(node, e.IntermediateThrowEvent)
     if node.links_to is not None:
-        link = Effect(produce=(at(making.net, node.links_to, area),))
-        come = _come(making, node, area, Action.COMPLETED)
-        making.rules(product([come], [link]))
+        link = Effect(produce=(entry_place(context.net, node.links_to, scope),))
+        come = _come(context, node, scope, Action.COMPLETED)
+        context.transitions(product([come], [link]))
         return
-    making.later.append(
-        lambda: making.rules(
-            _throw_all(making, node, area, node.definitions, _leave(making, node, area))
+    context.later.append(
+        lambda: context.transitions(
+            _throw_all(context, node, scope, node.definitions, _leave(context, node, scope))
         )
     )
 
 
 def _throw_all(
-    making: Making,
+    context: TranslationContext,
     node: e.Event,
-    area: Area,
+    scope: ScopeDraft,
     definitions: tuple[EventDefinition, ...],
     ways: list[Effect],
 ) -> list[Effect]:
-    """What several definitions throw, one after the other, and then `ways`."""
-    begun = [_come(making, node, area, Action.COMPLETED)]
+    """What several event definitions throw, one after the other, and then `ways`."""
+    begun = [_come(context, node, scope, Action.COMPLETED)]
     ended: list[Effect] = []
     for definition in definitions:
         match definition:
             case SignalEventDefinition(signal=signal):
                 thrown = Effect(steps=(Step(node.id, Action.THROWN, signal.id),))
-                begun = product(product(begun, [thrown]), signal_effects(making, signal.id))
-                around = interrupting_places(making, "signal", signal.id, area)
+                begun = product(product(begun, [thrown]), signal_effects(context, signal.id))
+                around = interrupting_places(context, "signal", signal.id, scope)
                 caught = [Effect(read=frozenset({place})) for place in sorted(around)]
                 ended += _interrupted(node, product(begun, caught))
                 begun = product(begun, [Effect(inhibit=around)])
             case MessageEventDefinition(message=message):
                 thrown = Effect(steps=(Step(node.id, Action.THROWN, message.id),))
-                sent = product(product(begun, [thrown]), message_effects(making, message.id))
-                around = interrupting_places(making, "message", message.id, area)
-                cut, begun = parted(sent, around)
+                sent = product(product(begun, [thrown]), message_effects(context, message.id))
+                around = interrupting_places(context, "message", message.id, scope)
+                cut, begun = split_by_places(sent, around)
                 ended += _interrupted(node, cut)
             case EscalationEventDefinition(escalation=escalation):
                 assert escalation is not None
                 going: list[Effect] = []
-                for effect, goes_on in throw_escalation(making, area, node, escalation.code):
+                for effect, goes_on in throw_escalation(context, scope, node, escalation.code):
                     (going if goes_on else ended).extend(product(begun, [effect]))
                 begun = going
             case CompensateEventDefinition():
-                waited, begun = compensate(making, node, area, definition, begun, ways)
+                waited, begun = compensate(context, node, scope, definition, begun, ways)
                 ended += waited
             case _:
                 pass
@@ -248,7 +272,7 @@ def _throw_all(
 
 
 def _interrupted(node: e.Event, thrown: list[Effect]) -> list[Effect]:
-    """What it throws interrupts what is around it: it does not complete."""
+    """What the event throws interrupts a scope around it: the event does not complete."""
     done, cut = Step(node.id, Action.COMPLETED), Step(node.id, Action.INTERRUPTED)
     return [
         replace(each, steps=tuple(cut if step == done else step for step in each.steps))
@@ -256,40 +280,40 @@ def _interrupted(node: e.Event, thrown: list[Effect]) -> list[Effect]:
     ]
 
 
-def end(making: Making, node: e.FlowNode, area: Area) -> None:
-    """The token ends here, perhaps throwing something."""
+def end(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """An end event consumes the token, and may throw something."""
     assert isinstance(node, e.EndEvent)
-    making.later.append(lambda: making.rules(_end(making, node, area)))
+    context.later.append(lambda: context.transitions(_end(context, node, scope)))
 
 
-def _end(making: Making, node: e.EndEvent, area: Area) -> list[Effect]:
-    last: list[Effect] = [making.reached(node, area)]
+def _end(context: TranslationContext, node: e.EndEvent, scope: ScopeDraft) -> list[Effect]:
+    last: list[Effect] = [context.reached(node, scope)]
     thrown = []
     for definition in node.definitions:
         match definition:
             case TerminateEventDefinition():
-                last = _terminate(making, area)
+                last = _terminate(context, scope)
             case CancelEventDefinition():
-                last = cancel(making, node, area)
+                last = cancel(context, node, scope)
             case ErrorEventDefinition(error=error):
                 assert error is not None
-                last = throw_error(making, area, node, None, error.code, Flag.UNCAUGHT)
+                last = throw_error(context, scope, node, None, error.code, Flag.UNCAUGHT)
             case _:
                 thrown.append(definition)
-    return _throw_all(making, node, area, tuple(thrown), last)
+    return _throw_all(context, node, scope, tuple(thrown), last)
 
 
-def _terminate(making: Making, area: Area) -> list[Effect]:
-    """The scope ends at once; the process that the run began with, and the run with it."""
-    if area is making.root:
-        return [making.end_run(making.terminated)]
-    stop = Effect(kill_scopes=frozenset({area.index}))
-    host = area.host
-    if not isinstance(host, Host):
+def _terminate(context: TranslationContext, scope: ScopeDraft) -> list[Effect]:
+    """End the scope at once. For the process that the run began with, that ends the run."""
+    if scope is context.root:
+        return [context.end_run(context.terminated)]
+    stop = Effect(reset_scopes=frozenset({scope.index}))
+    instance = scope.instance
+    if not isinstance(instance, ActivityInstance):
         return [stop]
-    left = host.leave().then(stop)
+    left = instance.leave().then(stop)
     assert left is not None
-    return product([left], host.cut() if host.cut is not None else host.done())
+    return product([left], instance.cut() if instance.cut is not None else instance.done())
 
 
 __all__ = ["along", "catch", "end", "event_based", "start", "throw"]

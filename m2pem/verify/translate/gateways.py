@@ -1,4 +1,4 @@
-"""Gateways: where tokens part and join."""
+"""Gateways: where tokens fork and join."""
 
 import itertools
 
@@ -6,82 +6,84 @@ from m2pem.errors import ExpressionError
 from m2pem.mission import elements as e
 from m2pem.mission.upstream import upstream
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step, Trigger
-from m2pem.verify.translate.context import Making
-from m2pem.verify.translate.net_builder import Area, Effect, arrival, at, product
+from m2pem.verify.translate.context import TranslationContext
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival, entry_place, product
 from m2pem.verify.translate.sequence_flows import any_of, is_free_choice, leave
 from m2pem.verify.translate.throwing import throw_error
 
 MOST_INCOMING = 8
-"""Flows of an inclusive or complex join whose every combination is looked at."""
+"""Most incoming flows of an inclusive or complex join for which every combination is translated."""
 
 
-def _come(making: Making, node: e.FlowNode, area: Area) -> Effect:
-    return Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(at(making.net, node, area),))
+def _come(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> Effect:
+    return Effect(
+        steps=(Step(node.id, Action.COMPLETED),), consume=(entry_place(context.net, node, scope),)
+    )
 
 
-def exclusive(making: Making, node: e.FlowNode, area: Area) -> None:
-    """The first true flow, else the default one; every token passes."""
+def exclusive(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """Take the first true flow, else the default one; every token passes."""
     assert isinstance(node, e.ExclusiveGateway)
     if is_free_choice(node):
-        ways = any_of(making, area, node, one=True)
+        ways = any_of(context, scope, node, one=True)
     else:
         ways = leave(
-            making,
-            area,
+            context,
+            scope,
             node,
             node.default,
-            lambda code: throw_error(making, area, node, None, code),
+            lambda code: throw_error(context, scope, node, None, code),
             first_only=True,
         )
-    making.rules(product([_come(making, node, area)], ways))
+    context.transitions(product([_come(context, node, scope)], ways))
 
 
-def parallel(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Goes on when every incoming flow has a token, by every outgoing one."""
+def parallel(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """When every incoming flow has a token, put one on every outgoing flow."""
     if len(node.incoming) > 1:
         come = Effect(
             steps=(Step(node.id, Action.COMPLETED),),
-            consume=tuple(arrival(making.net, flow, area) for flow in node.incoming),
+            consume=tuple(arrival(context.net, flow, scope) for flow in node.incoming),
         )
     else:
-        come = _come(making, node, area)
+        come = _come(context, node, scope)
     out = Effect(
         steps=tuple(Step(flow.id, Action.TAKEN) for flow in node.outgoing),
-        produce=tuple(arrival(making.net, flow, area) for flow in node.outgoing),
+        produce=tuple(arrival(context.net, flow, scope) for flow in node.outgoing),
     )
-    making.rules(product([come], [out]))
+    context.transitions(product([come], [out]))
 
 
-def inclusive(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Every true flow; a join waits for what can still come."""
+def inclusive(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """Take every true flow. A join waits for all tokens that can still come."""
     assert isinstance(node, e.InclusiveGateway)
     if is_free_choice(node):
-        ways = any_of(making, area, node, one=False)
+        ways = any_of(context, scope, node, one=False)
     else:
         ways = leave(
-            making,
-            area,
+            context,
+            scope,
             node,
             node.default,
-            lambda code: throw_error(making, area, node, None, code),
+            lambda code: throw_error(context, scope, node, None, code),
         )
     if len(node.incoming) <= 1:
-        making.rules(product([_come(making, node, area)], ways))
+        context.transitions(product([_come(context, node, scope)], ways))
         return
 
-    def spell_out() -> None:
-        for come in joined(making, node, area):
-            making.rules(product([come], ways), Kind.JOIN)
+    def translate_later() -> None:
+        for come in joined(context, node, scope):
+            context.transitions(product([come], ways), Kind.JOIN)
 
-    making.later.append(spell_out)
+    context.later.append(translate_later)
 
 
-def joined(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
+def joined(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> list[Effect]:
     """An inclusive join with the tokens of some flows, when nothing can come by another."""
     flows = node.incoming
-    places = [arrival(making.net, flow, area) for flow in flows]
+    places = [arrival(context.net, flow, scope) for flow in flows]
     if len(flows) > MOST_INCOMING:
-        making.net.approximate(
+        context.net.approximate(
             node, Exactness.MORE, "whether more can come is not looked at: too many flows come in"
         )
         return [
@@ -89,7 +91,7 @@ def joined(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
             for each in ([*((p,) for p in places), tuple(places)])
         ]
     reach = upstream(node)
-    tokens = _tokens_by_node(making, area)
+    tokens = _tokens_by_node(context, scope)
     found: list[Effect] = []
     for size in range(1, len(flows) + 1):
         for chosen in itertools.combinations(range(len(flows)), size):
@@ -111,12 +113,12 @@ def joined(making: Making, node: e.FlowNode, area: Area) -> list[Effect]:
     return found
 
 
-def _tokens_by_node(making: Making, area: Area) -> dict[e.FlowNode, set[int]]:
-    """Where in an area a token on each node can be."""
-    elements = making.mission.elements
+def _tokens_by_node(context: TranslationContext, scope: ScopeDraft) -> dict[e.FlowNode, set[int]]:
+    """The places in a scope where a token on each node can be."""
+    elements = context.mission.elements
     found: dict[e.FlowNode, set[int]] = {}
-    for number in area.places:
-        place = making.net.places[number]
+    for number in scope.places:
+        place = context.net.places[number]
         if place.role in (Role.CONTROL, Role.END):
             continue
         element = elements.get(place.element)
@@ -127,25 +129,25 @@ def _tokens_by_node(making: Making, area: Area) -> dict[e.FlowNode, set[int]]:
     return found
 
 
-def complex_gateway(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Joins when its condition says so, then waits to reset."""
+def complex_gateway(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """Join when the activation condition is true, then wait for the reset."""
     assert isinstance(node, e.ComplexGateway)
     own = frozenset({"activationCount", "waitingForStart", *(f.local_id for f in node.incoming)})
-    making.net.approximate(
+    context.net.approximate(
         node, Exactness.MORE, "flows that depend on its phase may be taken or not"
     )
     ways = leave(
-        making,
-        area,
+        context,
+        scope,
         node,
         node.default,
-        lambda code: throw_error(making, area, node, None, code),
+        lambda code: throw_error(context, scope, node, None, code),
         own=own,
     )
-    places = [arrival(making.net, flow, area) for flow in node.incoming]
-    resetting = making.net.place(node, area, Role.CONTROL, ":resets")
+    places = [arrival(context.net, flow, scope) for flow in node.incoming]
+    resetting = context.net.place(node, scope, Role.CONTROL, ":resets")
 
-    def spell_out() -> None:
+    def translate_later() -> None:
         subsets = [
             chosen
             for size in range(1, len(places) + 1)
@@ -158,11 +160,11 @@ def complex_gateway(making: Making, node: e.FlowNode, area: Area) -> None:
             if active is False:
                 continue
             if active is None:
-                making.net.approximate(
+                context.net.approximate(
                     node, Exactness.MORE, "its activation condition may become true at any time"
                 )
             whole = len(chosen) == len(places)
-            used = [making.net.place(node, area, Role.CONTROL, f":used{n}") for n in chosen]
+            used = [context.net.place(node, scope, Role.CONTROL, f":used{n}") for n in chosen]
             come = Effect(
                 steps=(Step(node.id, Action.COMPLETED),),
                 consume=tuple(places[n] for n in chosen),
@@ -173,13 +175,13 @@ def complex_gateway(making: Making, node: e.FlowNode, area: Area) -> None:
             )
             for effect in product([come], ways):
                 if active is None:
-                    making.net.rule(effect, Kind.OUTSIDE, Trigger.CONDITION)
+                    context.net.transition(effect, Kind.OUTSIDE, Trigger.CONDITION)
                 else:
-                    making.net.rule(effect)
+                    context.net.transition(effect)
         if len(places) > 1:
-            _reset(making, node, area, places, resetting)
+            _reset(context, node, scope, places, resetting)
 
-    making.later.append(spell_out)
+    context.later.append(translate_later)
 
 
 def _activates(node: e.ComplexGateway, chosen: tuple[int, ...]) -> bool | None:
@@ -199,18 +201,24 @@ def _activates(node: e.ComplexGateway, chosen: tuple[int, ...]) -> bool | None:
 
 
 def _reset(
-    making: Making, node: e.ComplexGateway, area: Area, places: list[int], resetting: int
+    context: TranslationContext,
+    node: e.ComplexGateway,
+    scope: ScopeDraft,
+    places: list[int],
+    resetting: int,
 ) -> None:
-    """The second phase: what came meanwhile is used up, and some flows are taken again."""
-    net = making.net
-    used = [net.place(node, area, Role.CONTROL, f":used{n}") for n in range(len(places))]
+    """The second phase: tokens that came meanwhile are consumed, and some flows are taken again."""
+    net = context.net
+    used = [net.place(node, scope, Role.CONTROL, f":used{n}") for n in range(len(places))]
     second: list[Effect] = [Effect()]
     for flow in node.outgoing:
         if flow.condition is not None or flow is node.default:
-            more = Effect(steps=(Step(flow.id, Action.TAKEN),), produce=(arrival(net, flow, area),))
+            more = Effect(
+                steps=(Step(flow.id, Action.TAKEN),), produce=(arrival(net, flow, scope),)
+            )
             second = [*second, *(both for s in second if (both := s.then(more)) is not None)]
     reach = upstream(node)
-    tokens = _tokens_by_node(making, area)
+    tokens = _tokens_by_node(context, scope)
     if len(places) > MOST_INCOMING:
         return
     for taken in itertools.product((0, 1), repeat=len(places)):
@@ -240,4 +248,4 @@ def _reset(
                     | {used[n] for n in range(len(places)) if not taken[n]}
                 ),
             )
-            making.rules(product([come], second), Kind.JOIN)
+            context.transitions(product([come], second), Kind.JOIN)

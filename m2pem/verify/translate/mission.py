@@ -13,20 +13,26 @@ from m2pem.mission.events import (
     TimerEventDefinition,
 )
 from m2pem.mission.mission import Mission
-from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step, System, Trigger
-from m2pem.verify.net.size_limit import Bound
+from m2pem.verify.net.petri_net import Action, Exactness, Kind, PetriNet, Role, Step, Trigger
+from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate import activities, events, gateways, subprocesses
-from m2pem.verify.translate.activities import contend
-from m2pem.verify.translate.compensation import give_back
-from m2pem.verify.translate.context import Catcher, Making, what_and_ref
+from m2pem.verify.translate.activities import translate_contention
+from m2pem.verify.translate.compensation import release_claims
+from m2pem.verify.translate.context import Catcher, TranslationContext, what_and_ref
 from m2pem.verify.translate.events import after, awaited
-from m2pem.verify.translate.net_builder import Area, Effect, at, enter_at_once, product
+from m2pem.verify.translate.net_builder import (
+    Effect,
+    ScopeDraft,
+    enter_at_once,
+    entry_place,
+    product,
+)
 from m2pem.verify.translate.options import Options
-from m2pem.verify.translate.parallel_multiple import AWAITED, all_must_come, gathering
+from m2pem.verify.translate.parallel_multiple import AWAITED, all_must_come, trigger_places
 from m2pem.verify.translate.scopes import begin
-from m2pem.verify.translate.subprocesses import build, choose
+from m2pem.verify.translate.subprocesses import build, translate_choices
 from m2pem.verify.translate.throwing import (
-    deliver_kept,
+    deliver_stored,
     message_effects,
     signal_effects,
     thrown_by,
@@ -40,94 +46,96 @@ def translate(
     *,
     process: str | None = None,
     options: Options | None = None,
-    bound: Bound | None = None,
-) -> System:
-    """The rules of a mission that begins with a process (else its main one), on a fleet.
+    size_limit: SizeLimit | None = None,
+) -> PetriNet:
+    """Return the net of a mission that begins with a process (else its main one), on a fleet.
 
-    Without a fleet, one is made up from the mission's roles.
+    Without a fleet, one is made from the mission's roles.
 
     Raises:
         KeyError: the mission has no such process.
-        TooLargeError: it stands for more than `bound` allows.
+        TooLargeError: its net is larger than `size_limit` allows.
     """
     root = mission.process(process)
-    bound = bound or Bound()
-    making = Making(mission, root, fleet or fleet_for(mission), options or Options(), bound)
-    making.build_node = build_node
-    making.root = making.net.area(root, making.everything, step=root.id, frame=(root.id,))
-    making.data.follow(making.root.frame)
-    build(making, root, making.root)
-    others = _others(making)
+    size_limit = size_limit or SizeLimit()
+    context = TranslationContext(
+        mission, root, fleet or fleet_for(mission), options or Options(), size_limit
+    )
+    context.build_node = build_node
+    context.root = context.net.scope(root, context.everything, step=root.id, frame=(root.id,))
+    context.data.follow(context.root.frame)
+    build(context, root, context.root)
+    others = _triggered_processes(context)
     for other in others:
-        _instances(making, other)
-    first = begin(making, root, making.root)
-    initial = (making.running, *first.produce)
-    for late in making.later:
+        _instances(context, other)
+    first = begin(context, root, context.root)
+    initial = (context.running, *first.produce)
+    for late in context.later:
         late()
-    contend(making)
-    choose(making)
-    _outside(making)
-    give_back(making)
-    if making.options.timers_in_order:
-        put_in_order(making)
-    _completes(making)
-    initial = enter_at_once(making.net, initial)
-    return making.net.finish(
+    translate_contention(context)
+    translate_choices(context)
+    _outside(context)
+    release_claims(context)
+    if context.options.timers_in_order:
+        put_in_order(context)
+    _completes(context)
+    initial = enter_at_once(context.net, initial)
+    return context.net.finish(
         mission.file,
         root.id,
-        tuple(making.data.variables),
+        tuple(context.data.variables),
         initial,
-        (making.completed, making.terminated, making.failed),
+        (context.completed, context.terminated, context.failed),
     )
 
 
-def _completes(making: Making) -> None:
-    """The run is over when no token is left anywhere."""
+def _completes(context: TranslationContext) -> None:
+    """The run completes when no token is left anywhere."""
     over = Effect(
-        steps=(Step(making.process.id, Action.COMPLETED),),
-        quiet_scopes=frozenset({making.everything.index}),
-    ).then(making.end_run(making.completed))
+        steps=(Step(context.process.id, Action.COMPLETED),),
+        empty_scopes=frozenset({context.everything.index}),
+    ).then(context.end_run(context.completed))
     assert over is not None
-    making.net.rule(over)
+    context.net.transition(over)
 
 
 # --- processes that triggers begin --------------------------------------------------------------
 
 
-def _others(making: Making) -> list[e.Process]:
+def _triggered_processes(context: TranslationContext) -> list[e.Process]:
     """Processes that neither the run begins with nor a call activity calls."""
-    called = {n.called for n in making.mission.nodes if isinstance(n, e.CallActivity)}
-    return [p for p in making.mission.processes if p is not making.process and p not in called]
+    called = {n.called for n in context.mission.nodes if isinstance(n, e.CallActivity)}
+    return [p for p in context.mission.processes if p is not context.process and p not in called]
 
 
-def _instances(making: Making, process: e.Process) -> None:
-    """One area for each instance that may be active at a time."""
+def _instances(context: TranslationContext, process: e.Process) -> None:
+    """Translate a process once for each instance that may be active at a time."""
     starts = [start for entry in process.entries for start in _triggered(entry)]
     if not starts:
         return
-    making.net.approximate(
+    context.net.approximate(
         process,
         Exactness.BOUNDED,
-        f"checked with up to {making.options.instances} instances at a time",
+        f"checked with up to {context.options.instances} instances at a time",
     )
-    areas = []
-    for number in range(making.options.instances):
+    scopes = []
+    for number in range(context.options.instances):
         step = f"{process.id}#{number + 1}"
-        area = making.net.area(process, making.everything, step=step, frame=(process.id, step))
-        build(making, process, area)
-        alive = making.net.place(process, area, Role.CONTROL, ":alive")
-        notes = making.kept.get(area.index, area)
+        scope = context.net.scope(process, context.everything, step=step, frame=(process.id, step))
+        build(context, process, scope)
+        alive = context.net.place(process, scope, Role.CONTROL, ":alive")
+        notes = context.notes_scopes.get(scope.index, scope)
         over = Effect(
             steps=(Step(process.id, Action.COMPLETED),),
             consume=(alive,),
-            kill_scopes=frozenset({area.index, notes.index}),
-            quiet_scopes=frozenset({area.index}),
+            reset_scopes=frozenset({scope.index, notes.index}),
+            empty_scopes=frozenset({scope.index}),
         )
-        making.net.rule(over)
-        areas.append((area, alive))
+        context.net.transition(over)
+        scopes.append((scope, alive))
     for start in starts:
         for definition in awaited(start):
-            _begun_by(making, process, start, definition, areas)
+            _begun_by(context, process, start, definition, scopes)
 
 
 def _triggered(entry: e.FlowNode) -> list[e.FlowNode]:
@@ -139,40 +147,40 @@ def _triggered(entry: e.FlowNode) -> list[e.FlowNode]:
 
 
 def _begun_by(
-    making: Making,
+    context: TranslationContext,
     process: e.Process,
     start: e.FlowNode,
     definition: EventDefinition,
-    areas: list[tuple[Area, int]],
+    scopes: list[tuple[ScopeDraft, int]],
 ) -> None:
     brings = isinstance(definition, SignalEventDefinition | MessageEventDefinition)
     ways: list[Effect] = []
-    for number, (area, alive) in enumerate(areas):
+    for number, (scope, alive) in enumerate(scopes):
         free = Effect(
             steps=(Step(start.id, Action.TRIGGERED),),
-            read=frozenset(other for _, other in areas[:number]),
+            read=frozenset(other for _, other in scopes[:number]),
             inhibit=frozenset({alive}),
             produce=(alive,),
         )
-        inside = [Effect(produce=tuple(begin_without_entries(making, process, area)))]
+        inside = [Effect(produce=tuple(begin_without_entries(context, process, scope)))]
         if isinstance(start, e.StartEvent) and all_must_come(start):
-            more = [_first_of_several(making, start, definition, area)]
+            more = [_first_of_several(context, start, definition, scope)]
         elif isinstance(start, e.StartEvent):
-            more = [Effect(produce=(at(making.net, start, area),))]
+            more = [Effect(produce=(entry_place(context.net, start, scope),))]
         else:
-            more = after(making, start, area)
-        come = making.data.receive([free], area, start) if brings else [free]
+            more = after(context, start, scope)
+        come = context.data.receive([free], scope, start) if brings else [free]
         ways += product(product(come, inside), more)
-    full = Effect(read=frozenset(alive for _, alive in areas))
+    full = Effect(read=frozenset(alive for _, alive in scopes))
     match definition:
         case SignalEventDefinition() | MessageEventDefinition():
             what, ref = what_and_ref(definition)
-            making.begins.setdefault((what, ref), []).append([*ways, full])
+            context.begins.setdefault((what, ref), []).append([*ways, full])
         case TimerEventDefinition() | ConditionalEventDefinition():
             timer = isinstance(definition, TimerEventDefinition)
             due = timer_us(definition) if isinstance(definition, TimerEventDefinition) else None
-            for effect in product([Effect(read=frozenset({making.running}))], ways):
-                making.net.rule(
+            for effect in product([Effect(read=frozenset({context.running}))], ways):
+                context.net.transition(
                     effect,
                     Kind.OUTSIDE,
                     Trigger.TIMER if timer else Trigger.CONDITION,
@@ -183,11 +191,11 @@ def _begun_by(
 
 
 def _first_of_several(
-    making: Making, start: e.StartEvent, definition: EventDefinition, area: Area
+    context: TranslationContext, start: e.StartEvent, definition: EventDefinition, scope: ScopeDraft
 ) -> Effect:
-    """One of the triggers that must all come has come: the others are awaited in the instance."""
-    places = gathering(making, start, area)
-    waiting = making.net.place(start, area, Role.ACTIVE)
+    """One of the triggers that must all come has come; the others are awaited in the instance."""
+    places = trigger_places(context, start, scope)
+    waiting = context.net.place(start, scope, Role.ACTIVE)
     triggers = [each for each in awaited(start) if isinstance(each, AWAITED)]
     came = [
         there if each is definition else yet
@@ -196,40 +204,42 @@ def _first_of_several(
     return Effect(produce=(waiting, *came))
 
 
-def begin_without_entries(making: Making, process: e.Process, area: Area) -> list[int]:
-    """What an instance begins with beside the token of its start event."""
-    entries = {at(making.net, entry, area) for entry in process.entries}
-    return [n for n in begin(making, process, area).produce if n not in entries]
+def begin_without_entries(
+    context: TranslationContext, process: e.Process, scope: ScopeDraft
+) -> list[int]:
+    """The places with a token when an instance begins, without that of its start event."""
+    entries = {entry_place(context.net, entry, scope) for entry in process.entries}
+    return [n for n in begin(context, process, scope).produce if n not in entries]
 
 
 # --- signals and messages from outside ----------------------------------------------------------
 
 
-def _outside(making: Making) -> None:
-    mission = making.mission
+def _outside(context: TranslationContext) -> None:
+    mission = context.mission
     thrown_signals: set[str] = set()
     thrown_messages: set[str] = set()
     for node in mission.nodes:
         signals, messages = thrown_by(node)
         thrown_signals |= signals
         thrown_messages |= messages
-    for message in sorted(thrown_messages & set(making.messages)):
-        deliver_kept(making, message)
+    for message in sorted(thrown_messages & set(context.messages)):
+        deliver_stored(context, message)
     for signal in mission.signals.values():
-        if making.options.open_world or signal.from_operator or signal.returned:
-            _from_outside(making, "signal", signal.id)
-    strangers = messages_from_strangers(mission)
+        if context.options.open_world or signal.from_operator or signal.returned:
+            _from_outside(context, "signal", signal.id)
+    black_box_messages = messages_from_black_box_pools(mission)
     for message_id, message_element in mission.messages.items():
         if (
-            making.options.open_world
+            context.options.open_world
             or message_element.from_operator
-            or (message_id in strangers and message_id not in thrown_messages)
+            or (message_id in black_box_messages and message_id not in thrown_messages)
         ):
-            _from_outside(making, "message", message_id)
+            _from_outside(context, "message", message_id)
 
 
-def messages_from_strangers(mission: Mission) -> frozenset[str]:
-    """Messages that pools without a process of their own send."""
+def messages_from_black_box_pools(mission: Mission) -> frozenset[str]:
+    """Ids of messages that pools without a process of their own send."""
     found: set[str] = set()
     for flow in mission.message_flows:
         if flow.source_id not in mission.elements:
@@ -241,52 +251,56 @@ def messages_from_strangers(mission: Mission) -> frozenset[str]:
     return frozenset(found)
 
 
-def _from_outside(making: Making, what: str, ref: str) -> None:
-    """It comes when somebody waits for it, or when it begins a process."""
+def _from_outside(context: TranslationContext, what: str, ref: str) -> None:
+    """A signal or message comes from outside when something waits for it, or when it begins a
+    process.
+    """
     trigger = Trigger.SIGNAL if what == "signal" else Trigger.MESSAGE
-    register = making.signals if what == "signal" else making.messages
+    register = context.signals if what == "signal" else context.messages
     catchers: list[Catcher] = register.get(ref, [])
     if what == "message":
         effects = [
             effect
-            for effect in message_effects(making, ref, kept=False)
+            for effect in message_effects(context, ref, kept=False)
             if effect.consume or effect.produce
         ]
-        on = Effect(read=frozenset({making.running}))  # what it begins, it begins in the run
+        on = Effect(read=frozenset({context.running}))  # what it begins, it begins in the run
         for effect in product([on], effects):
-            named = effect.saying(_receiver(making, catchers, effect), Action.TRIGGERED, ref)
-            making.net.rule(named, Kind.OUTSIDE, trigger, ref)
+            named = effect.with_step(_receiver(context, catchers, effect), Action.TRIGGERED, ref)
+            context.net.transition(named, Kind.OUTSIDE, trigger, ref)
         return
-    effects = signal_effects(making, ref)
-    begins = bool(making.begins.get((what, ref)))
+    effects = signal_effects(context, ref)
+    begins = bool(context.begins.get((what, ref)))
     seen: list[int] = []
     for catcher in catchers:
-        host = making.net.places[catcher.told]
+        place = context.net.places[catcher.caught]
         when = Effect(
             steps=(Step(catcher.element, Action.TRIGGERED, ref),),
             read=frozenset({catcher.waiting}),
             inhibit=frozenset(seen) - {catcher.waiting}
-            | ({host.index} if catcher.keeps else set()),
+            | ({place.index} if catcher.keeps else set()),
         )
         if catcher.waiting not in seen:
             for effect in product([when], effects):
-                making.net.rule(effect, Kind.OUTSIDE, trigger, ref)
+                context.net.transition(effect, Kind.OUTSIDE, trigger, ref)
         seen.append(catcher.waiting)
     if begins:
-        nobody = Effect(inhibit=frozenset(seen), read=frozenset({making.running}))
-        for effect in product([nobody], effects):
+        unawaited = Effect(inhibit=frozenset(seen), read=frozenset({context.running}))
+        for effect in product([unawaited], effects):
             if effect.produce:
-                making.net.rule(effect, Kind.OUTSIDE, trigger, ref)
+                context.net.transition(effect, Kind.OUTSIDE, trigger, ref)
 
 
-def _receiver(making: Making, catchers: list[Catcher], effect: Effect) -> str:
+def _receiver(context: TranslationContext, catchers: list[Catcher], effect: Effect) -> str:
     for catcher in catchers:
-        if catcher.told in effect.produce:
+        if catcher.caught in effect.produce:
             return catcher.element
-    return effect.steps[0].element if effect.steps else making.process.id
+    return effect.steps[0].element if effect.steps else context.process.id
 
 
-_BUILD: tuple[tuple[type[e.FlowNode], Callable[[Making, e.FlowNode, Area], None]], ...] = (
+_BUILD: tuple[
+    tuple[type[e.FlowNode], Callable[[TranslationContext, e.FlowNode, ScopeDraft], None]], ...
+] = (
     (e.Activity, activities.activity),
     (e.ExclusiveGateway, gateways.exclusive),
     (e.ParallelGateway, gateways.parallel),
@@ -300,13 +314,13 @@ _BUILD: tuple[tuple[type[e.FlowNode], Callable[[Making, e.FlowNode, Area], None]
 )
 
 
-def build_node(making: Making, node: e.FlowNode, area: Area) -> None:
-    """Make the rules of one element in one area."""
-    making.net.knows(node)
+def build_node(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
+    """Translate one element in one scope."""
+    context.net.add_element(node)
     if isinstance(node, e.SubProcess) and node.triggered_by_event:
-        subprocesses.event_subprocess(making, node, area)
+        subprocesses.event_subprocess(context, node, scope)
         return
     for kind, translate_node in _BUILD:
         if isinstance(node, kind):
-            translate_node(making, node, area)
+            translate_node(context, node, scope)
             return

@@ -25,33 +25,36 @@ from m2pem.verify.net.petri_net import (
     Exactness,
     Flag,
     Kind,
+    PetriNet,
     Place,
     Role,
-    Rule,
     Scope,
     Step,
-    System,
+    Transition,
     Trigger,
     Variable,
     with_outcomes,
 )
-from m2pem.verify.net.size_limit import Bound
+from m2pem.verify.net.size_limit import SizeLimit
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Fields as in `Rule`. `kill_scopes` stand for all places in them, `quiet_scopes` must have
-    no token in them. `guard` and `assign` are by variable."""
+    """A part of a transition, with the fields of `Transition`.
+
+    `reset_scopes` stand for all places in them; `empty_scopes` must have no token in them. `guard`
+    and `assign` are by variable.
+    """
 
     steps: tuple[Step, ...] = ()
     consume: tuple[int, ...] = ()
     read: frozenset[int] = frozenset()
     inhibit: frozenset[int] = frozenset()
-    quiet_scopes: frozenset[int] = frozenset()
+    empty_scopes: frozenset[int] = frozenset()
     moves: tuple[tuple[int, int], ...] = ()
     copies: tuple[tuple[int, int], ...] = ()
-    kill: frozenset[int] = frozenset()
-    kill_scopes: frozenset[int] = frozenset()
+    reset: frozenset[int] = frozenset()
+    reset_scopes: frozenset[int] = frozenset()
     produce: tuple[int, ...] = ()
     guard: "dict[int, frozenset[int]]" = field(default_factory=dict)
     assign: dict[int, int] = field(default_factory=dict)
@@ -59,7 +62,7 @@ class Effect:
     flagged: str = ""
 
     def then(self, other: "Effect") -> "Effect | None":
-        """Both, this one first; None when they ask for what excludes each other."""
+        """Return both effects together, this one first; None if they exclude each other."""
         guard = dict(self.guard)
         for variable, values in other.guard.items():
             if variable in self.assign:
@@ -78,11 +81,11 @@ class Effect:
             self.consume + other.consume,
             read,
             inhibit,
-            self.quiet_scopes | other.quiet_scopes,
+            self.empty_scopes | other.empty_scopes,
             self.moves + other.moves,
             self.copies + other.copies,
-            self.kill | other.kill,
-            self.kill_scopes | other.kill_scopes,
+            self.reset | other.reset,
+            self.reset_scopes | other.reset_scopes,
             self.produce + other.produce,
             guard,
             {**self.assign, **other.assign},
@@ -90,43 +93,43 @@ class Effect:
             self.flagged or other.flagged,
         )
 
-    def saying(self, element: str, action: Action, detail: str = "") -> "Effect":
-        """With one more step at its beginning."""
+    def with_step(self, element: str, action: Action, detail: str = "") -> "Effect":
+        """Return the effect with one more step at its beginning."""
         return replace(self, steps=(Step(element, action, detail), *self.steps))
 
 
 def product(first: Iterable[Effect], second: Iterable[Effect]) -> list[Effect]:
-    """Every pair of the two that does not exclude itself."""
+    """Every pair of the two lists whose effects do not exclude each other."""
     others = list(second)
     pairs = (one.then(other) for one in first for other in others)
     return [pair for pair in pairs if pair is not None]
 
 
 @dataclass(slots=True, eq=False)
-class Area:
-    """A scope in the making. `frame`: the process instance whose data it sees."""
+class ScopeDraft:
+    """A scope under construction. `frame`: the process instance whose data it sees."""
 
     index: int
     element: Element
-    parent: "Area | None"
+    parent: "ScopeDraft | None"
     path: tuple[str, ...]
     frame: tuple[str, ...]
     depth_of_calls: tuple[str, ...] = ()
     places: list[int] = field(default_factory=list)
-    children: "list[Area]" = field(default_factory=list)
+    children: "list[ScopeDraft]" = field(default_factory=list)
     hidden: frozenset[str] = frozenset()
-    """Names that only this activity, or its instances, know: not followed."""
-    host: "object | None" = None
-    """How its activity ends, when it is the inside of one (`Host`)."""
+    """Names of data that only this activity, or its instances, have: not followed."""
+    instance: "object | None" = None
+    """The `ActivityInstance` whose inside it is, if it is one."""
     several: bool = False
-    """Tokens in it may meet others without harm."""
+    """Several tokens on one place in it are no finding."""
     open: int | None = None
-    """Place that has a token while its event subprocesses can begin."""
+    """The place that has a token while its event subprocesses can begin."""
 
 
 @dataclass(slots=True)
-class Draft:
-    """A rule in the making."""
+class TransitionDraft:
+    """A transition under construction."""
 
     effect: Effect
     kind: Kind
@@ -137,42 +140,44 @@ class Draft:
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """A timer whose duration is known: it runs while all of `running` have a token."""
+    """A timer whose duration is known. It runs while all places of `running` have a token."""
 
     after_us: int
     running: tuple[int, ...]
-    rules: list[Draft]
+    transitions: list[TransitionDraft]
 
 
-class Net:
-    """Collects places, areas and rules; `finish` makes them a system."""
+class NetBuilder:
+    """Collects places, scopes and transitions; `finish` makes a net of them."""
 
-    def __init__(self, bound: Bound) -> None:
-        self.bound = bound
-        self.areas: list[Area] = []
+    def __init__(self, size_limit: SizeLimit) -> None:
+        self.size_limit = size_limit
+        self.scopes: list[ScopeDraft] = []
         self.places: list[Place] = []
-        self.drafts: list[Draft] = []
+        self.drafts: list[TransitionDraft] = []
         self.approximations: dict[Approximation, None] = {}
         self.elements: dict[str, str] = {}
         self.holders: dict[str, list[int]] = {}
         self.timed: dict[int, list[Timed]] = {}
         self.at_once: set[int] = set()
-        """Places of tokens at what waits as soon as it is entered (`entering`)."""
+        """Entry places of elements that wait as soon as they are entered (`enter_at_once`)."""
         self._at: dict[tuple[object, int, str], int] = {}
 
     # --- parts ----------------------------------------------------------------------------------
 
-    def area(
+    def scope(
         self,
         element: Element,
-        parent: Area | None,
+        parent: ScopeDraft | None,
         step: str = "",
         frame: tuple[str, ...] | None = None,
-    ) -> Area:
-        """A new scope. `step`: what tells it from others of its parent, else the element's id."""
+    ) -> ScopeDraft:
+        """Add a scope. `step`: distinguishes it from others of its parent; by default the element's
+        id.
+        """
         path = (*parent.path, step or element.id) if parent is not None else (element.id,)
-        made = Area(
-            len(self.areas),
+        made = ScopeDraft(
+            len(self.scopes),
             element,
             parent,
             path,
@@ -180,7 +185,7 @@ class Net:
             parent.depth_of_calls if parent is not None else (),
             several=parent.several if parent is not None else False,
         )
-        self.areas.append(made)
+        self.scopes.append(made)
         if parent is not None:
             parent.children.append(made)
         return made
@@ -188,7 +193,7 @@ class Net:
     def place(
         self,
         element: Element,
-        area: Area,
+        scope: ScopeDraft,
         role: Role,
         suffix: str = "",
         *,
@@ -196,12 +201,12 @@ class Net:
         resources: tuple[str, ...] = (),
         behavior: str = "",
     ) -> int:
-        """The place of an element in an area, made when it is first asked for."""
-        key = (element, area.index, f"{role}{suffix}")
+        """Return the place of an element in a scope; it is created at the first call."""
+        key = (element, scope.index, f"{role}{suffix}")
         known = self._at.get(key)
         if known is not None:
             return known
-        name = "/".join((*area.path[1:], element.id))
+        name = "/".join((*scope.path[1:], element.id))
         name += {Role.ENTERING: "", Role.ACTIVE: "!", Role.FLOW: ">"}.get(role, f"~{role.value}")
         number = self._at[key] = len(self.places)
         self.places.append(
@@ -209,38 +214,38 @@ class Net:
                 number,
                 f"{name}{suffix}",
                 element.id,
-                area.index,
+                scope.index,
                 role,
-                several or area.several,
+                several or scope.several,
                 resources,
                 behavior,
             )
         )
-        area.places.append(number)
+        scope.places.append(number)
         for resource in resources:
             self.holders.setdefault(resource, []).append(number)
         return number
 
-    def rule(
+    def transition(
         self,
         effect: Effect,
         kind: Kind = Kind.INTERNAL,
         trigger: Trigger | None = None,
         detail: str = "",
         due_us: int | None = None,
-    ) -> Draft:
-        """A new rule."""
-        self.bound.rule(_spelled_out(effect))
-        draft = Draft(effect, kind, trigger, detail, due_us)
+    ) -> TransitionDraft:
+        """Add a transition."""
+        self.size_limit.count_transition(_first_element(effect))
+        draft = TransitionDraft(effect, kind, trigger, detail, due_us)
         self.drafts.append(draft)
         return draft
 
-    def knows(self, element: Element) -> None:
-        """An element that has rules."""
+    def add_element(self, element: Element) -> None:
+        """Note that an element has transitions."""
         self.elements[element.id] = element.label
 
     def approximate(self, element: Element, exactness: Exactness, what: str) -> None:
-        """Note where the rules are not what the engine does."""
+        """Note where the net is not exactly what the engine does."""
         self.approximations[Approximation(element.id, exactness, what)] = None
 
     # --- the end --------------------------------------------------------------------------------
@@ -252,40 +257,40 @@ class Net:
         variables: tuple[Variable, ...],
         initial: tuple[int, ...],
         ends: tuple[int, int, int],
-    ) -> System:
-        """All of it, with every scope spelled out as its places."""
-        inside = {area.index: self._inside(area) for area in reversed(self.areas)}
+    ) -> PetriNet:
+        """Return the net, with the places of every scope in place of the scope."""
+        inside = {scope.index: self._inside(scope) for scope in reversed(self.scopes)}
 
         @cache  # whatever ends one scope shares one list of its places: there may be many of both
-        def killed(kill: frozenset[int], scopes: frozenset[int]) -> tuple[int, ...]:
-            return tuple(sorted(kill.union(*(inside[scope][0] for scope in scopes))))
+        def reset_places(reset: frozenset[int], scope_indices: frozenset[int]) -> tuple[int, ...]:
+            return tuple(sorted(reset.union(*(inside[index][0] for index in scope_indices))))
 
-        rules: list[Rule] = []
+        transitions: list[Transition] = []
         names: Counter[str] = Counter()
         for draft in self.drafts:
-            kill = killed(draft.effect.kill, draft.effect.kill_scopes)
-            rule = self._rule(draft, len(rules), names, inside, kill)
-            if rule is not None:
-                rules.append(rule)
-        return System(
+            reset = reset_places(draft.effect.reset, draft.effect.reset_scopes)
+            transition = self._transition(draft, len(transitions), names, inside, reset)
+            if transition is not None:
+                transitions.append(transition)
+        return PetriNet(
             mission,
             process,
             tuple(
                 Scope(a.index, a.element.id, a.parent.index if a.parent else None, a.path)
-                for a in self.areas
+                for a in self.scopes
             ),
             tuple(self.places),
             variables,
-            tuple(with_outcomes(rules)),
+            tuple(with_outcomes(transitions)),
             tuple(Counter(initial).items()),
             *ends,
             tuple(self.approximations),
             self.elements,
         )
 
-    def _inside(self, area: Area) -> tuple[frozenset[int], frozenset[int]]:
+    def _inside(self, scope: ScopeDraft) -> tuple[frozenset[int], frozenset[int]]:
         everything: set[int] = set()
-        waiting = [area]
+        waiting = [scope]
         while waiting:
             each = waiting.pop()
             everything.update(each.places)
@@ -293,26 +298,26 @@ class Net:
         tokens = {n for n in everything if self.places[n].role is not Role.CONTROL}
         return frozenset(everything), frozenset(tokens)
 
-    def _rule(
+    def _transition(
         self,
-        draft: Draft,
+        draft: TransitionDraft,
         number: int,
         names: Counter[str],
         inside: dict[int, tuple[frozenset[int], frozenset[int]]],
-        kill: tuple[int, ...],
-    ) -> Rule | None:
+        reset: tuple[int, ...],
+    ) -> Transition | None:
         effect = draft.effect
-        self.bound.look(_spelled_out(effect))
+        self.size_limit.check_time(_first_element(effect))
         inhibit = set(effect.inhibit)
-        for scope in effect.quiet_scopes:
-            inhibit |= inside[scope][1]
+        for index in effect.empty_scopes:
+            inhibit |= inside[index][1]
         consume = Counter(effect.consume)
         inhibit -= set(consume)
         if inhibit & effect.read:
             return None
-        element = _spelled_out(effect)
+        element = _first_element(effect)
         names[element] += 1
-        return Rule(
+        return Transition(
             number,
             f"{element}.{names[element]}",
             draft.kind,
@@ -323,50 +328,50 @@ class Net:
             tuple(sorted(effect.guard.items())),
             effect.moves,
             effect.copies,
-            kill,
+            reset,
             tuple(sorted(Counter(effect.produce).items())),
             tuple(sorted(effect.assign.items())),
             draft.trigger,
             draft.detail,
             effect.flag,
             effect.flagged,
-            bool(effect.quiet_scopes),
+            bool(effect.empty_scopes),
             draft.due_us,
         )
 
 
-def _spelled_out(effect: Effect) -> str:
+def _first_element(effect: Effect) -> str:
     return effect.steps[0].element if effect.steps else "run"
 
 
 def is_join(node: FlowNode) -> bool:
-    """Whether tokens wait at it by the flow that they came by."""
+    """Whether tokens wait at a node by the flow that they came by."""
     if isinstance(node, ComplexGateway):
         return True
     return isinstance(node, ParallelGateway | InclusiveGateway) and len(node.incoming) > 1
 
 
-def arrival(net: Net, flow: SequenceFlow, area: Area) -> int:
+def arrival(net: NetBuilder, flow: SequenceFlow, scope: ScopeDraft) -> int:
     """The place that a token comes to by a flow."""
     if is_join(flow.target):
-        return net.place(flow, area, Role.FLOW)
-    return at(net, flow.target, area)
+        return net.place(flow, scope, Role.FLOW)
+    return entry_place(net, flow.target, scope)
 
 
-def at(net: Net, node: FlowNode, area: Area) -> int:
-    """The place of a token that a node is to be executed on."""
+def entry_place(net: NetBuilder, node: FlowNode, scope: ScopeDraft) -> int:
+    """The place of a token that has entered a node."""
     many = isinstance(node, Activity) and node.start_quantity > 1
-    return net.place(node, area, Role.ENTERING, several=many)
+    return net.place(node, scope, Role.ENTERING, several=many)
 
 
-def enter_at_once(net: Net, initial: Sequence[int]) -> tuple[int, ...]:
-    """Join the first rule of what waits with each rule that leads to it.
+def enter_at_once(net: NetBuilder, initial: Sequence[int]) -> tuple[int, ...]:
+    """Fuse the first transition of an element that waits with each transition that leads to it.
 
-    Gives the places that have a token at first.
+    Returns the places that have a token at first.
     """
     entries = {place: draft for place in net.at_once if (draft := _entry(net, place)) is not None}
     needed: set[int] = set()
-    """Places to which some rule still brings a token without what follows."""
+    """Entry places to which some transition still brings a token."""
     for draft in net.drafts:
         draft.effect = _joined(net, draft.effect, entries, needed)
     first = _joined(net, Effect(produce=tuple(initial)), entries, needed)
@@ -375,25 +380,27 @@ def enter_at_once(net: Net, initial: Sequence[int]) -> tuple[int, ...]:
     return first.produce
 
 
-def _entry(net: Net, place: int) -> Draft | None:
-    """The one rule that takes a token from a place, if it asks for nothing else."""
+def _entry(net: NetBuilder, place: int) -> TransitionDraft | None:
+    """The one transition that takes a token from a place, if it has no other condition."""
     takes = [draft for draft in net.drafts if place in draft.effect.consume]
     if len(takes) != 1 or takes[0].kind is not Kind.INTERNAL:
         return None
     effect = takes[0].effect
-    asks = effect.read or effect.inhibit or effect.quiet_scopes or effect.guard
-    does_more = effect.moves or effect.copies or effect.kill_scopes or effect.flag is not None
+    asks = effect.read or effect.inhibit or effect.empty_scopes or effect.guard
+    does_more = effect.moves or effect.copies or effect.reset_scopes or effect.flag is not None
     return None if effect.consume != (place,) or asks or does_more else takes[0]
 
 
-def _joined(net: Net, effect: Effect, entries: dict[int, Draft], needed: set[int]) -> Effect:
+def _joined(
+    net: NetBuilder, effect: Effect, entries: dict[int, TransitionDraft], needed: set[int]
+) -> Effect:
     waiting = [place for place in effect.produce if place in entries]
     while waiting:
         place = waiting.pop()
         entry = entries[place].effect
         rest = list(effect.produce)
         rest.remove(place)
-        if not entry.kill.isdisjoint(rest) or not entry.assign.keys().isdisjoint(effect.assign):
+        if not entry.reset.isdisjoint(rest) or not entry.assign.keys().isdisjoint(effect.assign):
             needed.add(place)
             continue
         effect = Effect(
@@ -401,11 +408,11 @@ def _joined(net: Net, effect: Effect, entries: dict[int, Draft], needed: set[int
             effect.consume,
             effect.read,
             effect.inhibit,
-            effect.quiet_scopes,
+            effect.empty_scopes,
             effect.moves,
             effect.copies,
-            effect.kill | entry.kill,
-            effect.kill_scopes,
+            effect.reset | entry.reset,
+            effect.reset_scopes,
             (*rest, *entry.produce),
             effect.guard,
             {**effect.assign, **entry.assign},

@@ -1,4 +1,4 @@
-"""What a derivation assumes about the world around a mission."""
+"""What a translation assumes about the world around a mission."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,15 +9,15 @@ from m2pem.mission.values import Value
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Assumptions.
+    """Assumptions of a translation.
 
     `data`: what the run is started with. `service_writes`: names that each service writes, by
     class; one that is not listed may write any name that nothing else writes. `open_world`: every
     signal and message may come from outside, not only those that operators are expected to send.
-    `instances`: how many parallel instances of an activity, and of a process that is begun again
-    and again, are told apart when the mission does not say how many there are. `calls`: how often
-    a process may be called within itself. `failures`: behaviors and services may fail.
-    `timers_in_order`: of timers that begin to run together, the one that is due first comes first.
+    `instances`: how many parallel instances of an activity, and of a process that triggers start,
+    are modelled when the mission does not state their number. `calls`: how often a process may be
+    called within itself. `failures`: behaviors and services may fail. `timers_in_order`: of timers
+    that begin to run together, the one that is due first fires first.
     """
 
     data: Mapping[str, Value] = field(default_factory=dict)
@@ -28,6 +28,6 @@ class Options:
     failures: bool = True
     timers_in_order: bool = False
     conditions: Sequence[Expression] = ()
-    """What else is asked of the data of the process that the run begins with: by requirements."""
+    """Conditions of requirements on the data of the process that the run begins with."""
     most_instances: int = 8
-    """Of a number that the mission says; above, `instances` are checked."""
+    """Most instances of a number that the mission states; above, `instances` are checked."""

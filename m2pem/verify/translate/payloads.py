@@ -1,9 +1,4 @@
-"""What signals and messages bring to those who catch them.
-
-Where it goes, and under which names, is as in the engine. A constant that is sent within the
-mission is followed; anything else may be any value. What comes from outside brings only what the
-catcher's outputs, or the senders within the mission, give a name to: any value, or none.
-"""
+"""Payloads: what signals and messages bring to their catchers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,8 +15,10 @@ _SIMPLE = (bool, int, float, str)
 
 
 @dataclass(frozen=True, slots=True)
-class Brought:
-    """What a name may get: the value of a constant, or any (None). `perhaps`: or it stays."""
+class ReceivedValue:
+    """What a name may get: the value of a constant, or any (None). `perhaps`: or it keeps its
+    value.
+    """
 
     key: str
     sources: tuple[Expression | None, ...]
@@ -29,7 +26,7 @@ class Brought:
 
 
 class Payloads:
-    """What all senders of a mission send."""
+    """The payloads of all senders of a mission."""
 
     def __init__(self, mission: Mission, *, open_world: bool) -> None:
         self._mission = mission
@@ -41,21 +38,23 @@ class Payloads:
                 inputs = {m.target: _constant(m) for m in node.data_flow.inputs}
                 self._sent.setdefault(ref, []).append(inputs)
 
-    def brought(self, node: e.FlowNode) -> list[Brought]:
+    def received_values(self, node: e.FlowNode) -> list[ReceivedValue]:
         """What a catch event or receive task may get by any of its triggers."""
-        found: dict[str, Brought] = {}
+        found: dict[str, ReceivedValue] = {}
         refs = list(_catches(node))
         for ref in refs:
             for each in self._by(node, ref):
                 known = found.get(each.key)
                 sources = (*(known.sources if known else ()), *each.sources)
                 anything = any(source is None for source in sources)
-                found[each.key] = Brought(each.key, (None,) if anything else sources, each.perhaps)
+                found[each.key] = ReceivedValue(
+                    each.key, (None,) if anything else sources, each.perhaps
+                )
         if len(refs) > 1 or len(_definitions(node)) > len(refs):
-            return [Brought(each.key, each.sources, perhaps=True) for each in found.values()]
+            return [ReceivedValue(each.key, each.sources, perhaps=True) for each in found.values()]
         return list(found.values())
 
-    def _by(self, node: e.FlowNode, ref: str) -> Iterator[Brought]:
+    def _by(self, node: e.FlowNode, ref: str) -> Iterator[ReceivedValue]:
         sent, outside = self._sent.get(ref, []), self._comes_from_outside(ref)
         if isinstance(node, e.Event) and node.data_flow.outputs:
             for mapping in node.data_flow.outputs:
@@ -63,14 +62,14 @@ class Payloads:
                 single = alone and not outside and all(len(each) == 1 for each in sent)
                 sources = [next(iter(each.values())) if single else None for each in sent]
                 if sources or outside:
-                    yield Brought(mapping.target, tuple(sources or [None]), perhaps=False)
+                    yield ReceivedValue(mapping.target, tuple(sources or [None]), perhaps=False)
             return
         if isinstance(node, e.ReceiveTask) and node.data_flow.outputs:
             return  # its outputs say where it goes when it has completed
         for key in dict.fromkeys(key for each in sent for key in each):
             values = [each[key] for each in sent if key in each]
             perhaps = outside or len(values) < len(sent)
-            yield Brought(key, (*values, None) if outside else tuple(values), perhaps)
+            yield ReceivedValue(key, (*values, None) if outside else tuple(values), perhaps)
 
     def _comes_from_outside(self, ref: str) -> bool:
         if self._open_world:
@@ -79,10 +78,10 @@ class Payloads:
         if signal is not None:
             return bool(signal.from_operator or signal.returned)
         message = self._mission.messages.get(ref)
-        strangers = any(
+        black_box_messages = any(
             f.source_id not in self._mission.elements for f in self._mission.message_flows
         )
-        return message is None or bool(message.from_operator) or strangers
+        return message is None or bool(message.from_operator) or black_box_messages
 
 
 def _constant(mapping: Mapping) -> Expression | None:

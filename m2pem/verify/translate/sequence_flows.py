@@ -1,32 +1,34 @@
-"""By which sequence flows a token can leave an element."""
+"""Sequence flows: by which of them a token can leave an element."""
 
 import itertools
 from collections.abc import Callable, Sequence
 
 from m2pem.mission import elements as e
 from m2pem.verify.net.petri_net import Action, Exactness, Step
-from m2pem.verify.translate.context import Making
+from m2pem.verify.translate.context import TranslationContext
 from m2pem.verify.translate.data import ERROR, Truth
-from m2pem.verify.translate.net_builder import Area, Effect, arrival
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival
 
 MOST_SUBSETS = 6
-"""Flows whose every combination is tried; of more, each alone and all together."""
+"""Most flows of which every combination is tried; of more, each alone and all together."""
 
 Fail = Callable[[str], list[Effect]]
-"""What an error of a code leads to, the token being taken off already."""
+"""What an error with a code leads to; the token is removed already."""
 
 
-def along(making: Making, area: Area, flows: Sequence[e.SequenceFlow], times: int = 1) -> Effect:
+def along(
+    context: TranslationContext, scope: ScopeDraft, flows: Sequence[e.SequenceFlow], times: int = 1
+) -> Effect:
     """A token comes to the end of each flow."""
     return Effect(
         steps=tuple(Step(flow.id, Action.TAKEN) for flow in flows),
-        produce=tuple(arrival(making.net, flow, area) for flow in flows) * times,
+        produce=tuple(arrival(context.net, flow, scope) for flow in flows) * times,
     )
 
 
 def leave(
-    making: Making,
-    area: Area,
+    context: TranslationContext,
+    scope: ScopeDraft,
     node: e.FlowNode,
     default: e.SequenceFlow | None,
     fail: Fail,
@@ -35,9 +37,10 @@ def leave(
     times: int = 1,
     own: frozenset[str] = frozenset(),
 ) -> list[Effect]:
-    """Every flow that is true, or the first of them, else the default one, else NO_FLOW.
+    """Take every flow that is true, or the first of them, else the default flow, else throw
+    NO_FLOW.
 
-    The default of an activity goes with the flows that have no condition (clause 13.3.1).
+    The default flow of an activity goes with the flows that have no condition (clause 13.3.1).
     """
     beside = default is not None and isinstance(node, e.Activity)
     flows = [flow for flow in node.outgoing if flow is not default]
@@ -45,7 +48,7 @@ def leave(
         taken = flows[:1] if first_only else flows
         if default is not None and (beside or not taken):
             taken = [*taken, default]
-        return [along(making, area, taken, times)]
+        return [along(context, scope, taken, times)]
     asked = [flow.condition for flow in flows if flow.condition is not None]
 
     def choose(truths: Sequence[Truth]) -> tuple[int, ...] | str:
@@ -64,11 +67,11 @@ def leave(
         return tuple(taken)
 
     found: list[Effect] = []
-    if not making.data.is_followed(asked, node):
-        making.net.approximate(
+    if not context.data.is_followed(asked, node):
+        context.net.approximate(
             node, Exactness.MORE, "a condition reads what nothing in the mission writes"
         )
-    for guard, outcome in making.data.cases(asked, area, node, choose, own):
+    for guard, outcome in context.data.cases(asked, scope, node, choose, own):
         when = Effect(guard=guard)
         if isinstance(outcome, str):
             ways = fail(outcome)
@@ -77,19 +80,21 @@ def leave(
             asks = any(flow.condition is not None for flow in taken)
             if default is not None and not (asks if beside else taken):
                 taken.append(default)
-            ways = [along(making, area, taken, times)]
+            ways = [along(context, scope, taken, times)]
         found += [both for way in ways if (both := when.then(way)) is not None]
     return found
 
 
 def is_free_choice(node: e.Gateway) -> bool:
-    """Whether a diverging gateway says nothing about which of its flows are taken."""
+    """Whether no outgoing flow of a diverging gateway has a condition."""
     return len(node.outgoing) > 1 and all(flow.condition is None for flow in node.outgoing)
 
 
-def any_of(making: Making, area: Area, node: e.Gateway, *, one: bool) -> list[Effect]:
-    """A gateway whose flows have no conditions: one of them, or some, nobody knows which."""
-    making.net.approximate(
+def any_of(
+    context: TranslationContext, scope: ScopeDraft, node: e.Gateway, *, one: bool
+) -> list[Effect]:
+    """A gateway whose flows have no conditions: it takes one of them, or some; which is unknown."""
+    context.net.approximate(
         node, Exactness.MORE, "no flow has a condition, so any of them may be taken"
     )
     flows = node.outgoing
@@ -97,11 +102,11 @@ def any_of(making: Making, area: Area, node: e.Gateway, *, one: bool) -> list[Ef
         chosen: list[tuple[e.SequenceFlow, ...]] = [(flow,) for flow in flows]
     else:
         chosen = some_of(flows)
-    return [along(making, area, each) for each in chosen]
+    return [along(context, scope, each) for each in chosen]
 
 
 def some_of(flows: Sequence[e.SequenceFlow]) -> list[tuple[e.SequenceFlow, ...]]:
-    """Combinations of flows, not none of them."""
+    """The non-empty combinations of flows."""
     if len(flows) > MOST_SUBSETS:
         return [*((flow,) for flow in flows), tuple(flows)]
     return [

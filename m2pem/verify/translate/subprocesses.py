@@ -1,4 +1,4 @@
-"""Processes, subprocesses, event subprocesses and calls: where tokens are together."""
+"""Processes, subprocesses, event subprocesses, ad-hoc subprocesses and call activities."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -6,71 +6,73 @@ from itertools import combinations
 from m2pem.mission import elements as e
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, Place, Role, Step, Trigger
 from m2pem.verify.translate.catching import arm_handler
-from m2pem.verify.translate.compensation import ended, forget, noted
-from m2pem.verify.translate.context import Host, Making
-from m2pem.verify.translate.net_builder import Area, Effect, at, product
-from m2pem.verify.translate.parallel_multiple import all_must_come, gathering
-from m2pem.verify.translate.scopes import begin, handler_host, quiet
+from m2pem.verify.translate.compensation import forget_completions, note_completion, on_inside_end
+from m2pem.verify.translate.context import ActivityInstance, TranslationContext
+from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
+from m2pem.verify.translate.parallel_multiple import all_must_come, trigger_places
+from m2pem.verify.translate.scopes import begin, handler_instance, when_empty
 
 
-def build(making: Making, container: e.Container, area: Area) -> None:
-    """Make the rules of all that is in a container."""
+def build(context: TranslationContext, container: e.Container, scope: ScopeDraft) -> None:
+    """Translate all that is in a container."""
     if container.event_subprocesses:
-        area.open = making.net.place(area.element, area, Role.CONTROL, ":open")
+        scope.open = context.net.place(scope.element, scope, Role.CONTROL, ":open")
     for node in container.nodes:
-        making.build_node(making, node, area)
-    if area.open is not None:
-        making.later.append(lambda: _completing(making, container, area))
+        context.build_node(context, node, scope)
+    if scope.open is not None:
+        context.later.append(lambda: _completing(context, container, scope))
 
 
-def ends_with_its_inside(making: Making, host: Host) -> None:
-    """An activity is done when nothing is left inside."""
-    over = host.leave().then(quiet(host.inside))
+def ends_with_its_inside(context: TranslationContext, instance: ActivityInstance) -> None:
+    """An activity is done when no token is left inside."""
+    over = instance.leave().then(when_empty(instance.inside))
     assert over is not None
-    over = over.saying(host.node.id, Action.COMPLETED)
-    making.rules(ended(making, host, host.inside, [over]))
+    over = over.with_step(instance.node.id, Action.COMPLETED)
+    context.transitions(on_inside_end(context, instance, instance.inside, [over]))
 
 
-def event_subprocess(making: Making, container: e.SubProcess, area: Area) -> None:
-    """Its inside, and how it begins."""
-    host = handler_host(making, area, container)
-    host.done = lambda: [noted(making, host)]
-    host.cut = lambda: [Effect()]
-    host.inside.several = area.several or any(not s.interrupting for s in container.starts)
-    if host.inside.several:
-        making.net.places[host.active] = _several(making.net.places[host.active])
-    build(making, container, host.inside)
-    ends_with_its_inside(making, host)
+def event_subprocess(
+    context: TranslationContext, container: e.SubProcess, scope: ScopeDraft
+) -> None:
+    """Translate the inside of an event subprocess, and how it begins."""
+    instance = handler_instance(context, scope, container)
+    instance.done = lambda: [note_completion(context, instance)]
+    instance.cut = lambda: [Effect()]
+    instance.inside.several = scope.several or any(not s.interrupting for s in container.starts)
+    if instance.inside.several:
+        context.net.places[instance.active] = _several(context.net.places[instance.active])
+    build(context, container, instance.inside)
+    ends_with_its_inside(context, instance)
     for start in container.starts:
-        arm_handler(making, area, start)
+        arm_handler(context, scope, start)
 
 
 def _several(place: Place) -> Place:
     return replace(place, several=True)
 
 
-def _completing(making: Making, container: e.Container, area: Area) -> None:
-    """When only event subprocesses are left, no other one begins."""
-    net = making.net
-    assert area.open is not None
-    others: set[int] = {n for n in area.places if net.places[n].role is not Role.CONTROL}
-    hosts = []
+def _completing(context: TranslationContext, container: e.Container, scope: ScopeDraft) -> None:
+    """When only event subprocesses are left in a scope, no other one begins."""
+    net = context.net
+    assert scope.open is not None
+    others: set[int] = {n for n in scope.places if net.places[n].role is not Role.CONTROL}
+    activity_instances = []
     awaited: set[int] = set()
     for each in container.event_subprocesses:
         for start in each.starts:
             if all_must_come(start):
-                awaited.update(gathering(making, start, area).places)
-        host = handler_host(making, area, each)
-        others.discard(host.active)
-        hosts.append(host)
-    for host in hosts:
-        net.rule(
+                awaited.update(trigger_places(context, start, scope).places)
+        instance = handler_instance(context, scope, each)
+        others.discard(instance.active)
+        activity_instances.append(instance)
+    for instance in activity_instances:
+        net.transition(
             Effect(
-                steps=(Step(area.element.id, Action.COMPLETED, "its own work"),),
-                consume=(area.open,),
-                read=frozenset({host.active}),
+                steps=(Step(scope.element.id, Action.COMPLETED, "its own work"),),
+                consume=(scope.open,),
+                read=frozenset({instance.active}),
                 inhibit=frozenset(others),
-                kill=frozenset(awaited),
+                reset=frozenset(awaited),
             )
         )
 
@@ -78,41 +80,43 @@ def _completing(making: Making, container: e.Container, area: Area) -> None:
 # --- activities that hold others ----------------------------------------------------------------
 
 
-def subprocess(making: Making, host: Host) -> list[Effect]:
-    """Open it, and begin what is in it."""
-    node = host.node
+def subprocess(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
+    """Begin a subprocess."""
+    node = instance.node
     assert isinstance(node, e.SubProcess)
-    build(making, node, host.inside)
-    ends_with_its_inside(making, host)
-    both = forget(making, host.inside, node).then(host.begin())
+    build(context, node, instance.inside)
+    ends_with_its_inside(context, instance)
+    both = forget_completions(context, instance.inside, node).then(instance.begin())
     assert both is not None
-    return product([both], [begin(making, node, host.inside)])
+    return product([both], [begin(context, node, instance.inside)])
 
 
-def ad_hoc(making: Making, host: Host) -> list[Effect]:
-    """Its activities are begun by choice."""
-    node, net = host.node, making.net
+def ad_hoc(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
+    """Begin an ad-hoc subprocess: its activities are begun by choice."""
+    node, net = instance.node, context.net
     assert isinstance(node, e.AdHocSubProcess)
-    build(making, node, host.inside)
-    inside = host.inside
-    over = host.leave().saying(node.id, Action.COMPLETED)
+    build(context, node, instance.inside)
+    inside = instance.inside
+    over = instance.leave().with_step(node.id, Action.COMPLETED)
     if node.active_elements is not None or not node.entries:
         net.approximate(node, Exactness.MORE, "any of its activities may be chosen")
-        ends_with_its_inside(making, host)
-        begun = host.begin().then(begin(making, node, inside))
+        ends_with_its_inside(context, instance)
+        begun = instance.begin().then(begin(context, node, inside))
         assert begun is not None
-        begun = replace(begun, kill=forget(making, inside, node).kill)
+        begun = replace(begun, reset=forget_completions(context, inside, node).reset)
         bare = replace(
             begun,
             produce=tuple(
-                n for n in begun.produce if n not in {at(net, x, inside) for x in node.entries}
+                n
+                for n in begun.produce
+                if n not in {entry_place(net, x, inside) for x in node.entries}
             ),
         )
         chosen = [
             Effect(),
             *(
-                Effect(produce=tuple(at(net, x, inside) for x in some))
-                for some in _some(node.entries)
+                Effect(produce=tuple(entry_place(net, x, inside) for x in some))
+                for some in _subsets(node.entries)
             ),
         ]
         return product([bare], chosen)
@@ -124,43 +128,43 @@ def ad_hoc(making: Making, host: Host) -> list[Effect]:
     for entry in node.entries:
         chosen_one = Effect(
             steps=(Step(node.id, Action.TRIGGERED, entry.id),),
-            read=frozenset({host.active}),
-            quiet_scopes=frozenset({inside.index}) if alone else frozenset(),
-            produce=(at(net, entry, inside),),
+            read=frozenset({instance.active}),
+            empty_scopes=frozenset({inside.index}) if alone else frozenset(),
+            produce=(entry_place(net, entry, inside),),
         )
-        making.choices.append((chosen_one, entry, inside))
+        context.choices.append((chosen_one, entry, inside))
     asked = net.place(node, inside, Role.ENTERING, ":asked")
     if node.completion is None:
-        when = Effect() if node.cancel_remaining else quiet(inside)
-        for effect in product(product([when], [over]), host.done()):
-            net.rule(effect, Kind.OUTSIDE, Trigger.ANSWER, "complete")
-        net.rule(Effect(steps=(Step(node.id, Action.ENTERED, "asks"),), consume=(asked,)))
+        when = Effect() if node.cancel_remaining else when_empty(inside)
+        for effect in product(product([when], [over]), instance.done()):
+            net.transition(effect, Kind.OUTSIDE, Trigger.ANSWER, "complete")
+        net.transition(Effect(steps=(Step(node.id, Action.ENTERED, "asks"),), consume=(asked,)))
     else:
-        for guard, truth in making.data.cases([node.completion], inside, node, lambda t: t[0]):
+        for guard, truth in context.data.cases([node.completion], inside, node, lambda t: t[0]):
             looked = Effect(guard=guard, consume=(asked,))
             going = [Effect(steps=(Step(node.id, Action.ENTERED, "asks"),))]
             if truth is True:
-                going = product([over], host.done())
+                going = product([over], instance.done())
                 if not node.cancel_remaining:
                     net.approximate(node, Exactness.MORE, "it ends though some of it goes on")
-            making.rules(product([looked], going))
-    begun = host.begin().then(begin(making, node, inside))
+            context.transitions(product([looked], going))
+    begun = instance.begin().then(begin(context, node, inside))
     assert begun is not None
-    begun = replace(begun, kill=forget(making, inside, node).kill)
-    entries = {at(net, x, inside) for x in node.entries}
+    begun = replace(begun, reset=forget_completions(context, inside, node).reset)
+    entries = {entry_place(net, x, inside) for x in node.entries}
     return [replace(begun, produce=tuple(n for n in begun.produce if n not in entries))]
 
 
-def _some(nodes: tuple[e.FlowNode, ...]) -> list[tuple[e.FlowNode, ...]]:
+def _subsets(nodes: tuple[e.FlowNode, ...]) -> list[tuple[e.FlowNode, ...]]:
     if len(nodes) > 6:
         return [*((n,) for n in nodes), nodes]
     return [c for size in range(1, len(nodes) + 1) for c in combinations(nodes, size)]
 
 
-def choose(making: Making) -> None:
-    """The choices of ad-hoc subprocesses: not what is being done already."""
-    net = making.net
-    for effect, entry, inside in making.choices:
+def translate_choices(context: TranslationContext) -> None:
+    """Add the choices of ad-hoc subprocesses, of activities that are not active already."""
+    net = context.net
+    for effect, entry, inside in context.choices:
         busy = {
             n
             for n in inside.places
@@ -168,40 +172,44 @@ def choose(making: Making) -> None:
         }
         both = effect.then(Effect(inhibit=frozenset(busy)))
         assert both is not None
-        net.rule(both, Kind.OUTSIDE, Trigger.ANSWER, entry.id)
+        net.transition(both, Kind.OUTSIDE, Trigger.ANSWER, entry.id)
 
 
-def call(making: Making, host: Host) -> list[Effect]:
-    """Open an instance of the called process, with what the mappings pass in."""
-    node = host.node
+def call(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
+    """Begin an instance of the called process, with the inputs that the mappings pass in."""
+    node = instance.node
     assert isinstance(node, e.CallActivity)
-    calls = host.outer.depth_of_calls
-    if calls.count(node.called.id) >= making.options.calls:
-        making.net.approximate(
+    calls = instance.outer.depth_of_calls
+    if calls.count(node.called.id) >= context.options.calls:
+        context.net.approximate(
             node, Exactness.BOUNDED, "a process calls itself: what the inner call does is not seen"
         )
-        done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(host.active,))
-        for effect in product([done], host.done()):
-            making.net.rule(effect, Kind.INTERNAL)
-        return [host.begin()]
-    inside = making.net.area(node, host.inside, step=node.called.id)
+        done = Effect(steps=(Step(node.id, Action.COMPLETED),), consume=(instance.active,))
+        for effect in product([done], instance.done()):
+            context.net.transition(effect, Kind.INTERNAL)
+        return [instance.begin()]
+    inside = context.net.scope(node, instance.inside, step=node.called.id)
     inside.depth_of_calls = (*calls, node.called.id)
     inside.frame = inside.path
-    inside.host = host
-    inside.several = host.inside.several
-    build(making, node.called, inside)
-    ways = product([forget(making, inside, node.called)], [begin(making, node.called, inside)])
-    data = making.data
+    inside.instance = instance
+    inside.several = instance.inside.several
+    build(context, node.called, inside)
+    ways = product(
+        [forget_completions(context, inside, node.called)], [begin(context, node.called, inside)]
+    )
+    data = context.data
     for key in data.domains.of:
-        if key not in making.mission.data_stores and data.is_read_in(key, node.called):
+        if key not in context.mission.data_stores and data.is_read_in(key, node.called):
             variable = data.variable(key, inside.frame)
             ways = product(ways, [Effect(assign={variable: data.variables[variable].initial})])
     for mapping in node.mappings.inputs:
-        ways = data.write(ways, mapping.target, mapping.source, host.outer, node, into=inside.frame)
-    over = host.leave().then(quiet(host.inside))
+        ways = data.write(
+            ways, mapping.target, mapping.source, instance.outer, node, into=inside.frame
+        )
+    over = instance.leave().then(when_empty(instance.inside))
     assert over is not None
-    overs = [over.saying(node.id, Action.COMPLETED)]
+    overs = [over.with_step(node.id, Action.COMPLETED)]
     for mapping in node.mappings.outputs:
-        overs = data.write_out(overs, mapping.target, mapping.source, inside, host.outer, node)
-    making.rules(ended(making, host, inside, overs))
-    return product([host.begin()], ways)
+        overs = data.write_out(overs, mapping.target, mapping.source, inside, instance.outer, node)
+    context.transitions(on_inside_end(context, instance, inside, overs))
+    return product([instance.begin()], ways)

@@ -96,7 +96,7 @@ def judge(path: Path, terms: Terms) -> Judgement:
         _said(report, Verdict.VIOLATED),
         _said(report, Verdict.UNDECIDED),
         report.states,
-        len(report.system.rules),
+        len(report.net.transitions),
         *took(),
     )
 

@@ -26,7 +26,7 @@ _WHENS = Argument("when", Kind.CONDITIONS)
 
 
 def at_most(what: Formula, times: int) -> Formula:
-    """It begins to hold so many times at most, from now on."""
+    """It begins to hold at most so many times, from now on."""
     never: Formula = Always(Not(what))
     for _ in range(times):
         never = WeakUntil(Not(what), WeakUntil(what, never))

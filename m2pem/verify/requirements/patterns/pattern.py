@@ -1,4 +1,6 @@
-"""A pattern: a requirement with a name and arguments, which says its formula and itself."""
+"""Patterns: requirements with a name and arguments. A pattern gives its formula and its English
+text.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +14,7 @@ class Kind(StrEnum):
     """What an argument is."""
 
     CONDITION = "condition"
-    """A formula, or the id of an element, which stands for `completed(id)`."""
+    """A formula, or the id of an element, which means `completed(id)`."""
     CONDITIONS = "conditions"
     """A list of at least two."""
     ELEMENT = "element"
@@ -40,16 +42,16 @@ class Surroundings(Protocol):
     """What a pattern may ask about the mission and its fleet."""
 
     def places_of(self, resource: str, behavior: str) -> Mapping[str, Sequence[str]]:
-        """By where it is done, the tasks in which a resource does a behavior."""
+        """The tasks in which a resource does a behavior, by location."""
         ...
 
     def store_of(self, task: str) -> str:
-        """The name under which a user task's decision is written."""
+        """The name to which a user task's decision is written."""
         ...
 
 
 class Words(Protocol):
-    """How things are said in English."""
+    """How parts of a pattern are written in English."""
 
     def of(self, formula: Formula) -> str:
         """A condition as a clause: "'Drive route' is completed"."""
@@ -60,19 +62,22 @@ class Words(Protocol):
         ...
 
     def element(self, element: str) -> str:
-        """What an element is called."""
+        """The name of an element."""
         ...
 
 
 Arguments: TypeAlias = Mapping[str, Any]
-"""Values by name: formulas, texts, numbers, flags, as `Kind` says; absent ones are None."""
+"""Arguments by name: formulas, texts, numbers or flags, according to `Kind`; absent
+ones are None.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """One pattern. `meaning` is for the docs; `fair`: only fair runs count unless said otherwise.
+    """A pattern. `meaning` is for the docs; `fair`: only fair runs count unless the author says
+    otherwise.
 
-    `scoped`: it may be asked for a part of the run only (`scopes.py`).
+    `scoped`: it may be required of a part of the run only (`scopes.py`).
     """
 
     name: str
@@ -83,7 +88,7 @@ class Pattern:
     scoped: bool = True
     fair: bool = False
     steps: bool = False
-    """It looks at single steps of the run."""
+    """Its formula observes single steps of the run."""
 
     def argument(self, name: str) -> Argument | None:
         """The argument of that name."""

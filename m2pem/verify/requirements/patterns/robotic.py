@@ -45,13 +45,13 @@ def _visit(places: Sequence[Formula]) -> Formula:
 
 
 def sequence(places: Sequence[Formula]) -> Formula:
-    """The first at some point, from then on the second at some point, and so on."""
+    """The first at some time, from then on the second at some time, and so on."""
     first, *rest = places
     return Eventually(And((first, sequence(rest))) if rest else first)
 
 
 def _no_earlier(places: Sequence[Formula]) -> list[Formula]:
-    """Each comes only after the one before it has."""
+    """Each happens only after the one before it."""
     return [Until(Not(later), earlier) for earlier, later in itertools.pairwise(places)]
 
 
@@ -60,12 +60,14 @@ def _ordered(places: Sequence[Formula]) -> list[Formula]:
 
 
 def then_not_before(place: Formula, other: Formula) -> Formula:
-    """After this visit, the place is visited again only after the other; which must come."""
+    """After this visit, the location is visited again only after the other one, which must be
+    visited.
+    """
     return Until(place, And((Not(place), Until(Not(place), other))))
 
 
 def then_not_before_if(place: Formula, other: Formula) -> Formula:
-    """The same, but the other need not come, if the place does not either."""
+    """The same, but the other one need not be visited, if the location is not either."""
     return WeakUntil(place, And((Not(place), WeakUntil(Not(place), other))))
 
 
@@ -77,7 +79,7 @@ def _strictly(places: Sequence[Formula]) -> list[Formula]:
 
 
 def _in_turn(places: Sequence[Formula]) -> list[Formula]:
-    """Between two visits of a place, the one that is next in turn is visited."""
+    """Between two visits of a location, the next one in order is visited."""
     turn = [*places[1:], places[0]]
     return [
         Always(Implies(each, then_not_before_if(each, other)))

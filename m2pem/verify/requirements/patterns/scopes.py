@@ -29,7 +29,7 @@ from m2pem.verify.ltl.formula import (
 
 
 class ScopeError(ValueError):
-    """A formula that cannot be asked for a part of a run."""
+    """A formula that cannot be required of a part of a run."""
 
 
 def within(
@@ -38,10 +38,11 @@ def within(
     after: Formula | None = None,
     until: Formula | None = None,
 ) -> Formula:
-    """The formula, asked for the part of the run that is meant.
+    """The formula, required of one part of the run.
 
     Raises:
-        ScopeError: it looks back, or at single steps, or `until` stands without `after`.
+        ScopeError: it has operators of the past, or observes single steps, or `until` is given
+            without `after`.
     """
     if before is None and after is None and until is None:
         return formula
@@ -61,7 +62,7 @@ def within(
 
 
 def _up_to(formula: Formula, end: Formula) -> Formula:
-    """The formula, of the moments up to and without the first in which `end` holds."""
+    """The formula, required of the moments before the first in which `end` holds."""
     match formula:
         case Always(operand):
             return WeakUntil(_up_to(operand, end), end)
