@@ -155,7 +155,7 @@ def replay_counterexample(
     from m2pem.cli.arguments import get_fleet
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import wants_colour
-    from m2pem.verify.conformance_run import NotPlayableError, ConformanceRun
+    from m2pem.verify.conformance_run import ConformanceRun, NotPlayableError
 
     report = _read(file)
     violation = _violation(file, report, number)
