@@ -15,7 +15,6 @@ from m2pem.bpmn.data_names import written_by
 from m2pem.bpmn.rules.loops import BUSY_LOOP, ENDLESS_LOOP
 from m2pem.findings import Finding
 from m2pem.mission.behavior import Assignment, ThrowError
-from m2pem.mission.components import components
 from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
@@ -52,7 +51,7 @@ from m2pem.mission.expression import Expression
 from m2pem.mission.expression import tree as t
 from m2pem.mission.loops import LOOP_COUNTER, StandardLoop
 from m2pem.mission.mission import Mission
-from m2pem.mission.reach import unreached
+from m2pem.mission.reachability import components, unreached
 
 _NAMED = 8
 """Elements of a loop that a finding names."""

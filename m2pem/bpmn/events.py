@@ -34,8 +34,6 @@ from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.schema import SHAPES
 from m2pem.bpmn.xml import BPMN, a, kind, local
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.cycle import cycle
-from m2pem.mission.duration import date_us, duration_us
 from m2pem.mission.elements import (
     BoundaryEvent,
     Container,
@@ -67,6 +65,7 @@ from m2pem.mission.events import (
     TimerEventDefinition,
     TimerKind,
 )
+from m2pem.mission.timers import cycle, date_us, duration_us
 from m2pem.mission.values import Value
 from m2pem.suggestions import suggest_or
 

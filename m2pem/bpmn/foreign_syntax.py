@@ -4,11 +4,10 @@ import re
 from collections.abc import Callable
 
 from m2pem.errors import ExpressionSyntaxError
-from m2pem.mission.cycle import cycle
-from m2pem.mission.duration import date_us, duration_us
 from m2pem.mission.expression import parse
 from m2pem.mission.expression.literals import shorten, show_scalar
 from m2pem.mission.script import parse_script
+from m2pem.mission.timers import cycle, date_us, duration_us
 
 EXPRESSION = "write for example user.decision == 'continue' (docs/conditions.md)"
 SCRIPT = "one statement a line: dotted.name = expression, or throw error CODE"

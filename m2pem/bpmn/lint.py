@@ -15,7 +15,6 @@ from m2pem.bpmn.rules.gateways import NO_CONDITIONS
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.sequence_flows import unreachable
 from m2pem.findings import Finding
-from m2pem.mission.components import components
 from m2pem.mission.elements import (
     Activity,
     CallActivity,
@@ -40,7 +39,7 @@ from m2pem.mission.events import (
 )
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
-from m2pem.mission.reach import unreached
+from m2pem.mission.reachability import components, unreached
 
 
 def lint(

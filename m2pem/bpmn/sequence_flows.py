@@ -43,7 +43,7 @@ from m2pem.mission.elements import (
 )
 from m2pem.mission.events import LinkEventDefinition
 from m2pem.mission.expression import Expression
-from m2pem.mission.reach import begins_by_itself, instantiates, unreached
+from m2pem.mission.reachability import begins_by_itself, instantiates, unreached
 from m2pem.suggestions import suggest_or
 
 SEQUENCE_FLOW = BPMN + "sequenceFlow"

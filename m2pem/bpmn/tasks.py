@@ -33,7 +33,6 @@ from m2pem.bpmn.xml import (
 )
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.behavior import Behavior, Decision, Parameter, Prompt, Script, ServiceCall
-from m2pem.mission.duration import duration_us
 from m2pem.mission.elements import (
     BusinessRuleTask,
     ManualTask,
@@ -48,6 +47,7 @@ from m2pem.mission.events import Message
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.literals import shorten
 from m2pem.mission.script import parse_script
+from m2pem.mission.timers import duration_us
 
 _SERVICE = frozenset({"behavior", "service", "property", "role"})
 _ENGINES = (CAMUNDA, FLOWABLE, ACTIVITI)

@@ -19,8 +19,8 @@ from m2pem.diagram.layout.model import (
     Element,
     children,
     is_node,
-    local,
     name_of,
+    referred_id,
     tag,
 )
 from m2pem.diagram.layout.process import lay_out
@@ -53,7 +53,7 @@ def add_diagrams(definitions: Element) -> list[str]:
 
     Everything that has a symbol or a line must have an id. What refers to nothing is left out.
     """
-    drawn = {local(each.get("bpmnElement")) for each in _drawn(definitions)}
+    drawn = {referred_id(each.get("bpmnElement")) for each in _drawn(definitions)}
     sound = deepcopy(definitions)
     keep_sound(sound)
     writer = _Writer(definitions)
@@ -81,7 +81,7 @@ def add_diagrams(definitions: Element) -> list[str]:
 
 def undrawn(definitions: Element) -> list[str]:
     """The ids of flow nodes that no diagram shows, though it shows others beside them."""
-    drawn = {local(each.get("bpmnElement")) for each in _drawn(definitions)}
+    drawn = {referred_id(each.get("bpmnElement")) for each in _drawn(definitions)}
     return [
         name_of(each)
         for each in definitions.iter(etree.Element)
@@ -95,7 +95,7 @@ def _drawn(definitions: Element) -> Iterator[Element]:
 
 
 def _processes_of(collaboration: Element) -> set[str]:
-    return {local(each.get("processRef")) for each in children(collaboration, "participant")}
+    return {referred_id(each.get("processRef")) for each in children(collaboration, "participant")}
 
 
 def _undrawn(definitions: Element, drawn: set[str]) -> list[Element]:
@@ -170,7 +170,7 @@ class _Writer:
     def collapse(self, subprocess: str) -> None:
         """Its symbol, wherever it is, shows no inside."""
         for shape in self._root.iter(f"{_DI}BPMNShape"):
-            if local(shape.get("bpmnElement")) == subprocess:
+            if referred_id(shape.get("bpmnElement")) == subprocess:
                 shape.set("isExpanded", "false")
 
     def _new(self, wanted: str) -> str:

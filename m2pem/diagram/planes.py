@@ -6,7 +6,15 @@ from lxml import etree
 
 from m2pem.bpmn.xml import parse_xml
 from m2pem.diagram.layout.file import lay_out_file
-from m2pem.diagram.layout.model import SUBPROCESSES, Block, Element, children, is_node, local, tag
+from m2pem.diagram.layout.model import (
+    SUBPROCESSES,
+    Block,
+    Element,
+    children,
+    is_node,
+    referred_id,
+    tag,
+)
 from m2pem.diagram.picture import Bounds, Line, Picture, Point, Shape, Trait
 
 _DI = "{http://www.omg.org/spec/BPMN/20100524/DI}"
@@ -49,12 +57,12 @@ class _File:
                     self.parents.setdefault(name, owner)
         for pool in self.root.iter(etree.Element):
             if tag(pool) == "participant" and pool.get("processRef") and pool.get("id"):
-                self.parents.setdefault(local(pool.get("processRef")), str(pool.get("id")))
+                self.parents.setdefault(referred_id(pool.get("processRef")), str(pool.get("id")))
 
     def element(self, reference: str | None) -> Element | None:
         """What a diagram refers to, by id or by a name with a prefix."""
         found = self.elements.get(reference or "")
-        return found if found is not None else self.elements.get(local(reference))
+        return found if found is not None else self.elements.get(referred_id(reference))
 
     # --- drawn by its author --------------------------------------------------------------------
 
@@ -103,7 +111,7 @@ class _File:
         if drawn.get("isExpanded") is not None:
             return flag(drawn, "isExpanded")
         inside = {str(each.get("id")) for each in element if is_node(each)}
-        return any(local(each.get("bpmnElement")) in inside for each in beside)
+        return any(referred_id(each.get("bpmnElement")) in inside for each in beside)
 
     def _hidden(self, shapes: Iterable[Shape], plane: str) -> set[str]:
         """What is inside of collapsed subprocesses on the same plane."""
@@ -189,7 +197,7 @@ def _owner(element: Element) -> str:
 
 def _ends(element: Element) -> tuple[str, str]:
     if tag(element) not in _DATA_LINES:
-        return local(element.get("sourceRef")), local(element.get("targetRef"))
+        return referred_id(element.get("sourceRef")), referred_id(element.get("targetRef"))
     owner = element.getparent()
     host = "" if owner is None else owner.get("id") or ""
     source = next((e.text or "" for e in children(element, "sourceRef")), "").strip()
@@ -236,7 +244,7 @@ def definitions_of(element: Element) -> tuple[str, ...]:
     ending = "EventDefinition"
     own = [tag(e).removesuffix(ending) for e in element if tag(e).endswith(ending)]
     for reference in children(element, "eventDefinitionRef"):
-        wanted = local(reference.text)
+        wanted = referred_id(reference.text)
         for each in element.getroottree().getroot():
             if each.get("id") == wanted and tag(each).endswith(ending):
                 own.append(tag(each).removesuffix(ending))
@@ -323,7 +331,7 @@ def _siblings(element: Element) -> list[Element]:
 
 
 def _category(group: Element) -> str:
-    wanted = local(group.get("categoryValueRef"))
+    wanted = referred_id(group.get("categoryValueRef"))
     for each in group.getroottree().getroot().iter(etree.Element):
         if wanted and tag(each) == "categoryValue" and each.get("id") == wanted:
             return each.get("value") or ""

@@ -8,14 +8,13 @@ import re
 from lxml import etree
 
 from m2pem.api.authoring import Editable
+from m2pem.bpmn.behaviors import is_behavior
+from m2pem.bpmn.context import text_of
 from m2pem.bpmn.files import open_part
-from m2pem.bpmn.xml import M2PEM
+from m2pem.bpmn.xml import M2PEM, XmlError, local, parse_xml
 from m2pem.diagram.interchange import NAMESPACES, add_diagrams, remove_diagrams, undrawn
-from m2pem.diagram.layout.model import Element
-from m2pem.editing.behaviors import lift_behaviors
-from m2pem.editing.flow_references import refer_to_flows
+from m2pem.diagram.layout.model import BPMN, Element, children, is_node, referred_id, tag
 from m2pem.editing.identifiers import name_all, unqualify_references
-from m2pem.editing.texts import flatten_texts, set_types
 
 _DECLARATION = b'<?xml version="1.0" encoding="UTF-8"?>\n'
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
@@ -90,3 +89,171 @@ def _with_prefixes(root: Element) -> Element:
     made.text = root.text
     made.extend([*root])
     return made
+
+
+_TYPE = "{http://www.w3.org/2001/XMLSchema-instance}type"
+_READ_AS_TEXT = ("documentation", "text")
+_KEPT_AS_TEXT = ("script", "conditionExpression")
+_EXPRESSIONS = (
+    "condition",
+    "timeDate",
+    "timeDuration",
+    "timeCycle",
+    "loopCondition",
+    "loopCardinality",
+    "completionCondition",
+    "from",
+    "to",
+    "messagePath",
+    "dataPath",
+    "transformation",
+    "activationCondition",
+)
+
+
+def flatten_texts(definitions: Element) -> list[str]:
+    """Make plain texts of those with elements in them; tells what was lost, where."""
+    notes = []
+    for element in [*definitions.iter(etree.Element)]:
+        name = tag(element)
+        if not len(element) or name not in (*_READ_AS_TEXT, *_KEPT_AS_TEXT, *_EXPRESSIONS):
+            continue
+        if name in _KEPT_AS_TEXT:
+            text = _as_written(element)
+        else:
+            text = text_of(element)
+        owner = element.getparent()
+        of = "" if owner is None else owner.get("id") or tag(owner)
+        what = "script" if name == "script" else name
+        notes.append(f"The {what} of {of} has XML elements in it: their text is kept.")
+        for child in [*element]:
+            element.remove(child)
+        element.text = text
+    return notes
+
+
+def set_types(definitions: Element) -> None:
+    """Conditions are formal expressions, the only type of theirs that editors know."""
+    prefix = next((p for p, uri in definitions.nsmap.items() if uri == BPMN), None)
+    for condition in definitions.iter(f"{{{BPMN}}}conditionExpression"):
+        said = referred_id(condition.get(_TYPE))
+        if said not in ("tFormalExpression", "tExpression"):
+            known = f"{prefix}:tFormalExpression" if prefix else "tFormalExpression"
+            condition.set(_TYPE, known)
+
+
+def _as_written(element: Element) -> str:
+    parts = [element.text or ""]
+    parts += [etree.tostring(each, encoding="unicode") for each in element]
+    return "".join(parts).strip()
+
+
+_BEFORE = ("documentation", "extensionElements", "auditing", "monitoring", "categoryValueRef")
+
+
+def refer_to_flows(definitions: Element) -> None:
+    """Write anew which flows lead to each node, and which away from it, in the file's order."""
+    incoming: dict[str, list[str]] = {}
+    outgoing: dict[str, list[str]] = {}
+    for flow in definitions.iter(f"{{{BPMN}}}sequenceFlow"):
+        name = str(flow.get("id"))
+        outgoing.setdefault(referred_id(flow.get("sourceRef")), []).append(name)
+        incoming.setdefault(referred_id(flow.get("targetRef")), []).append(name)
+    for node in [*definitions.iter(etree.Element)]:
+        if not is_node(node):
+            continue
+        for each in [*children(node, "incoming", "outgoing")]:
+            node.remove(each)
+        place = len([*children(node, *_BEFORE)])
+        name = str(node.get("id"))
+        wanted = [("incoming", each) for each in incoming.get(name, ())]
+        wanted += [("outgoing", each) for each in outgoing.get(name, ())]
+        for number, (kind, flow_id) in enumerate(wanted):
+            reference = etree.Element(f"{{{BPMN}}}{kind}")
+            reference.text = flow_id
+            node.insert(place + number, reference)
+
+
+_SCRIPTS = ("scriptTask", "globalScriptTask")
+_FORMAT = {"scriptTask": "scriptFormat", "globalScriptTask": "scriptLanguage"}
+_OURS = (f"{{{BPMN}}}", M2PEM)
+_HEAD = ("type", "name")
+
+
+def lift_behaviors(definitions: Element) -> None:
+    """Move the behavior of each script into its task's extension elements, in one form."""
+    for task in definitions.iter(*(f"{{{BPMN}}}{name}" for name in _SCRIPTS)):
+        scripts = [*children(task, "script")]
+        behavior = _behavior_of(scripts[0]) if len(scripts) == 1 else None
+        if behavior is None:
+            continue
+        task.remove(scripts[0])
+        task.attrib.pop(_FORMAT[tag(task)], "")
+        extensions_of(task).append(behavior)
+    for behavior in [*definitions.iter(f"{M2PEM}behavior")]:
+        _in_one_form(behavior)
+
+
+def extensions_of(element: Element) -> Element:
+    """Its extension elements, made if it has none."""
+    found = next(children(element, "extensionElements"), None)
+    if found is None:
+        found = etree.Element(f"{{{BPMN}}}extensionElements")
+        element.insert(len([*children(element, "documentation")]), found)
+    return found
+
+
+def _behavior_of(script: Element) -> Element | None:
+    """What a script carries; None when it carries no behavior, or something beside it."""
+    if len(script) == 1:
+        found = script[0]
+    elif len(script) or not (script.text or "").lstrip().startswith("<"):
+        return None
+    else:
+        try:
+            found = parse_xml((script.text or "").strip().encode(), declared=False).root
+        except XmlError:
+            return None
+    return _ours(found) if is_behavior(found) else None
+
+
+def _ours(element: Element) -> Element:
+    """The same in m2pem's namespace, as far as it is ours."""
+    name = element.tag
+    if not name.startswith("{") or name.startswith(_OURS):
+        name = f"{M2PEM}{local(name)}"
+    made = etree.Element(name)
+    for key, value in element.attrib.items():
+        made.set(str(key).removeprefix(M2PEM), value)
+    made.text = element.text
+    for child in element:
+        made.append(_ours(child))
+    return made
+
+
+def _in_one_form(behavior: Element) -> None:
+    """Type and name as attributes, values of properties as attributes, no text between."""
+    heads = [
+        each
+        for each in behavior.iterchildren(f"{M2PEM}property")
+        if each.get("name") in _HEAD and not len(each)
+    ]
+    for name in _HEAD:
+        mine = [each for each in heads if each.get("name") == name]
+        values = {*map(_value, mine), *([behavior.get(name)] if behavior.get(name) else [])}
+        if mine and len(values) == 1:
+            behavior.set(name, values.pop() or "")
+            for each in mine:
+                behavior.remove(each)
+    for each in behavior.iter(f"{M2PEM}property"):
+        if each.get("value") is None and not len(each):
+            each.set("value", _value(each))
+            each.text = None
+    for each in behavior.iter(etree.Element):
+        if len(each):
+            each.text = None
+        each.tail = None
+
+
+def _value(element: Element) -> str:
+    return element.get("value") or (element.text or "").strip()

@@ -14,7 +14,7 @@ from m2pem.api.authoring import (
 from m2pem.bpmn import read_partly
 from m2pem.bpmn.context import KEY, ReadingContext
 from m2pem.bpmn.files import open_part
-from m2pem.diagram.layout.model import DATA, Element, children, is_node, local, tag
+from m2pem.diagram.layout.model import DATA, Element, children, is_node, referred_id, tag
 from m2pem.mission.elements import Activity
 from m2pem.mission.events import Message, Signal
 from m2pem.mission.library import Library
@@ -48,7 +48,7 @@ def outline(
 def _processes(root: Element) -> Iterator[OutlineProcess]:
     found = [each for each in children(root, "process") if each.get("id")]
     called = {
-        local(each.get("calledElement")) for each in root.iter("{*}callActivity") if tag(each)
+        referred_id(each.get("calledElement")) for each in root.iter("{*}callActivity") if tag(each)
     }
     executable = [each for each in found if each.get("isExecutable") in ("true", "1")]
     candidates = executable or found

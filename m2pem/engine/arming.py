@@ -22,8 +22,6 @@ from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, TokenOrScope, Wait
 from m2pem.engine.throwing import throw_error, throw_error_in
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.cycle import cycle, next_round
-from m2pem.mission.duration import date_us, duration_us
 from m2pem.mission.elements import FlowNode
 from m2pem.mission.events import (
     ConditionalEventDefinition,
@@ -35,6 +33,7 @@ from m2pem.mission.events import (
 )
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.literals import describe
+from m2pem.mission.timers import cycle, date_us, duration_us, next_round
 
 
 class _NotATimeError(Exception):

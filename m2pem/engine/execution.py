@@ -42,7 +42,7 @@ from m2pem.mission.events import (
     TimerEventDefinition,
 )
 from m2pem.mission.mission import Mission
-from m2pem.mission.upstream import upstream
+from m2pem.mission.reachability import upstream
 from m2pem.mission.values import Value
 
 NO_FLEET = Fleet("", "no fleet", {})
@@ -149,7 +149,7 @@ class Execution:
         return self.process_ids[node.index]
 
     def upstream(self, join: FlowNode) -> dict[FlowNode, int]:
-        """Return `m2pem.mission.upstream.upstream` of a join, computed once."""
+        """Return `m2pem.mission.reachability.upstream` of a join, computed once."""
         reach = self._reach.get(join)
         if reach is None:
             reach = self._reach[join] = upstream(join)

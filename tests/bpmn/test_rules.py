@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 import test_rules_activities
+import test_rules_attributes
 import test_rules_collaboration
 import test_rules_compensation
 import test_rules_data
+import test_rules_definitions
 import test_rules_events
-import test_rules_flows
-import test_rules_structure
-import test_rules_values
+import test_rules_sequence_flows
 from bpmn_text import around, findings, process, summary
 
 from m2pem.bpmn.pages import rules_page
@@ -29,9 +29,9 @@ TABLES = (
     test_rules_compensation,
     test_rules_data,
     test_rules_events,
-    test_rules_flows,
-    test_rules_structure,
-    test_rules_values,
+    test_rules_sequence_flows,
+    test_rules_definitions,
+    test_rules_attributes,
 )
 ELSEWHERE = {"no-target-namespace", "unreachable"}
 """BPMN's rules whose tests are no cases: of the root element, and of the whole mission."""

@@ -8,12 +8,11 @@ import pytest
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.behavior import Assignment, ThrowError
-from m2pem.mission.cycle import cycle
-from m2pem.mission.duration import date_us, duration_us
 from m2pem.mission.expression import parse, template
 from m2pem.mission.expression.calls import FLOWABLE, METHODS, XPATH_DATA, XPATH_NAMES
 from m2pem.mission.expression.functions import FEEL_NAMES, FUNCTIONS
 from m2pem.mission.script import parse_script
+from m2pem.mission.timers import cycle, date_us, duration_us
 
 DOCS = (Path(__file__).parents[2] / "docs" / "conditions.md").read_text(encoding="utf-8")
 DATA = json.loads(re.search(r"```json\n(.*?)```", DOCS, re.DOTALL)[1])

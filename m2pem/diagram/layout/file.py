@@ -14,8 +14,8 @@ from m2pem.diagram.layout.model import (
     data_lines,
     flow_nodes,
     is_node,
-    local,
     name_of,
+    referred_id,
     tag,
 )
 from m2pem.diagram.layout.process import lay_out
@@ -65,7 +65,7 @@ def lay_out_pools(collaboration: Element, processes: dict[str, Element]) -> Bloc
     insides: dict[str, Block] = {}
     shown: set[str] = set()
     for pool in pools:
-        process = local(pool.get("processRef"))
+        process = referred_id(pool.get("processRef"))
         if process in processes and process not in shown:
             shown.add(process)
             insides[name_of(pool)] = lay_out(processes[process])
@@ -75,7 +75,7 @@ def lay_out_pools(collaboration: Element, processes: dict[str, Element]) -> Bloc
     block = Block(width=width + _HEADER)
     for pool in pools:
         inside = insides.get(name_of(pool))
-        lanes = [] if inside is None else _lanes(processes[local(pool.get("processRef"))])
+        lanes = [] if inside is None else _lanes(processes[referred_id(pool.get("processRef"))])
         for lane in lanes:
             assert inside is not None
             inside.boxes[lane].width = width - inside.boxes[lane].x
@@ -95,7 +95,7 @@ def _lanes(process: Element) -> list[str]:
 
 
 def _message(flow: Element, number: int, block: Block, pools: list[Element]) -> list[Point]:
-    source, target = local(flow.get("sourceRef")), local(flow.get("targetRef"))
+    source, target = referred_id(flow.get("sourceRef")), referred_id(flow.get("targetRef"))
     for end in (source, target):
         if end not in block.boxes:
             raise ValueError(f"{name_of(flow)}: nothing drawn is called {end!r}")
@@ -137,7 +137,7 @@ def add_loose(within: Element, block: Block) -> None:
 def _lines(within: Element) -> Iterator[tuple[str, str, str]]:
     yield from data_lines(within)
     for line in children(within, "association"):
-        yield name_of(line), local(line.get("sourceRef")), local(line.get("targetRef"))
+        yield name_of(line), referred_id(line.get("sourceRef")), referred_id(line.get("targetRef"))
     for inner in within:
         if is_node(inner) and tag(inner).lower().endswith(("process", "transaction")):
             yield from _lines(inner)
@@ -176,13 +176,13 @@ def keep_sound(definitions: Element) -> None:
 def _keep_within(container: Element) -> None:
     nodes = {name_of(each) for each in flow_nodes(container)}
     for event in [*children(container, "boundaryEvent")]:
-        if local(event.get("attachedToRef")) in nodes:
+        if referred_id(event.get("attachedToRef")) in nodes:
             nodes.add(name_of(event))
         else:
             container.remove(event)
     events = {name_of(each) for each in children(container, "boundaryEvent")}
     for flow in [*children(container, "sequenceFlow")]:
-        ends = local(flow.get("sourceRef")), local(flow.get("targetRef"))
+        ends = referred_id(flow.get("sourceRef")), referred_id(flow.get("targetRef"))
         if ends[0] not in nodes or ends[1] not in nodes - events:
             container.remove(flow)
 
@@ -190,10 +190,10 @@ def _keep_within(container: Element) -> None:
 def _keep_flows_between_pools(collaboration: Element, definitions: Element) -> None:
     pools = [*children(collaboration, "participant")]
     known = {name_of(each) for each in pools}
-    shown = {local(each.get("processRef")) for each in pools}
+    shown = {referred_id(each.get("processRef")) for each in pools}
     for process in children(definitions, "process"):
         if name_of(process) in shown:
             known |= {name_of(each) for each in process.iter(etree.Element) if is_node(each)}
     for flow in [*children(collaboration, "messageFlow")]:
-        if not {local(flow.get("sourceRef")), local(flow.get("targetRef"))} <= known:
+        if not {referred_id(flow.get("sourceRef")), referred_id(flow.get("targetRef"))} <= known:
             collaboration.remove(flow)

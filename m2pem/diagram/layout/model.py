@@ -35,7 +35,7 @@ def name_of(element: Element) -> str:
     return identifier
 
 
-def local(reference: str | None) -> str:
+def referred_id(reference: str | None) -> str:
     """An id that is referred to, without the prefix of its namespace."""
     return (reference or "").rpartition(":")[2].strip()
 
@@ -64,7 +64,7 @@ def boundary_events(container: Element) -> dict[str, list[Element]]:
     """By the activity that they are attached to."""
     found: dict[str, list[Element]] = {}
     for event in children(container, "boundaryEvent"):
-        found.setdefault(local(event.get("attachedToRef")), []).append(event)
+        found.setdefault(referred_id(event.get("attachedToRef")), []).append(event)
     return found
 
 
@@ -72,8 +72,8 @@ def data_lines(container: Element) -> Iterator[tuple[str, str, str]]:
     """Id, source and target of the data associations of the container's own flow nodes."""
     for node in (e for e in container if is_node(e)):
         for line in children(node, *_LINES_OF_DATA):
-            source = next((local(e.text) for e in children(line, "sourceRef")), "")
-            target = next((local(e.text) for e in children(line, "targetRef")), "")
+            source = next((referred_id(e.text) for e in children(line, "sourceRef")), "")
+            target = next((referred_id(e.text) for e in children(line, "targetRef")), "")
             if tag(line) == "dataInputAssociation":
                 target = name_of(node)
             else:
@@ -112,7 +112,7 @@ def lanes(process: Element) -> LaneTree:
                 add(each, level + 1)
         if len(leaves) == first:
             leaves.append(name)
-            refs = (local(ref.text) for ref in children(lane, "flowNodeRef"))
+            refs = (referred_id(ref.text) for ref in children(lane, "flowNodeRef"))
             of_node.update(dict.fromkeys(refs, first))
         within[name] = tuple(leaves[first:])
 

@@ -97,10 +97,13 @@ def _links(container: Element, nodes: dict[str, Element], host: dict[str, str]) 
     lines += [
         a
         for a in model.children(container, "association")
-        if model.local(a.get("sourceRef")) in host
+        if model.referred_id(a.get("sourceRef")) in host
     ]
     for line in lines:
-        source, target = model.local(line.get("sourceRef")), model.local(line.get("targetRef"))
+        source, target = (
+            model.referred_id(line.get("sourceRef")),
+            model.referred_id(line.get("targetRef")),
+        )
         if target not in nodes:
             if tag(line) == "association":
                 continue
@@ -116,7 +119,7 @@ def _ties(container: Element, here: dict[str, object]) -> dict[str, tuple[str, s
     surfaces = {name_of(each) for each in model.children(container, *model.SURFACES)}
     lines = [*model.data_lines(container)]
     lines += [
-        (name_of(a), model.local(a.get("sourceRef")), model.local(a.get("targetRef")))
+        (name_of(a), model.referred_id(a.get("sourceRef")), model.referred_id(a.get("targetRef")))
         for a in model.children(container, "association")
     ]
     found = {}
@@ -131,7 +134,9 @@ def _reversed(container: Element) -> set[str]:
     surfaces = {name_of(each) for each in model.children(container, *model.SURFACES)}
     found = {name for name, source, _ in model.data_lines(container) if source in surfaces}
     associations = model.children(container, "association")
-    return found | {name_of(a) for a in associations if model.local(a.get("sourceRef")) in surfaces}
+    return found | {
+        name_of(a) for a in associations if model.referred_id(a.get("sourceRef")) in surfaces
+    }
 
 
 def _size(node: Element, inner: Block | None, events: list[Element]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Token
 from m2pem.engine.triggering import arm_boundary
 from m2pem.mission.elements import Activity, AdHocSubProcess
-from m2pem.mission.reach import begins_by_itself
+from m2pem.mission.reachability import begins_by_itself
 
 
 def _gather(x: Execution, token: Token, node: Activity) -> bool:

@@ -24,9 +24,9 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.mission.behavior import Behavior as BehaviorOfTask
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
-from m2pem.mission.duration import duration_us
 from m2pem.mission.elements import Event
 from m2pem.mission.expression import Expression
+from m2pem.mission.timers import duration_us
 from m2pem.mission.values import Value
 from m2pem.units import Dimension, UnitError, quantity
 

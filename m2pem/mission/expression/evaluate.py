@@ -1,14 +1,9 @@
-"""The value of a syntax tree over the data store: the tree is walked, nothing is made of it first.
-
-Most expressions of a mission are evaluated once or never, so that preparing them costs more than it
-saves.
-"""
+"""Conditions on the items of a list, under a name of their own."""
 
 from collections.abc import Callable
 from typing import Any
 
 from m2pem.errors import ExpressionError
-from m2pem.mission.expression.binding import bind
 from m2pem.mission.expression.functions import FUNCTIONS
 from m2pem.mission.expression.literals import describe
 from m2pem.mission.expression.operators import (
@@ -39,8 +34,25 @@ from m2pem.mission.expression.tree import (
     Not,
     Or,
     Some,
+    binds,
 )
 from m2pem.mission.values import ReadValue, Value
+
+
+def bind(variable: str, item: Value, read: ReadValue) -> ReadValue:
+    """What reads `variable`, and what is below it, from the item, and all else as before."""
+
+    def bound(name: str) -> Value:
+        return _part(item, name[len(variable) + 1 :]) if binds(variable, name) else read(name)
+
+    return bound
+
+
+def _part(value: Value, path: str) -> Value:
+    """What a dotted path leads to in maps; null where it leads nowhere."""
+    for key in path.split(".") if path else ():
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
 
 
 def evaluate(node: Node, read: ReadValue) -> Value:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any
 
-import m2pem.mission.duration as times  # imports this package too: only its name is bound yet
+import m2pem.mission.timers as times  # imports this package too: only its name is bound yet
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression.literals import NUMBER, describe, read_number
 from m2pem.mission.expression.operators import (

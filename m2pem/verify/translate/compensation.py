@@ -18,7 +18,7 @@ from m2pem.engine.scopes import compensation_handler, is_compensation_handler
 from m2pem.mission import elements as e
 from m2pem.mission.events import CancelEventDefinition, CompensateEventDefinition
 from m2pem.mission.loops import MultiInstance
-from m2pem.mission.reach import following
+from m2pem.mission.reachability import following
 from m2pem.verify.net.petri_net import (
     COMPENSATION_BEGINS,
     COMPENSATION_ENDS,

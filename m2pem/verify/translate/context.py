@@ -15,7 +15,7 @@ from m2pem.mission import elements as e
 from m2pem.mission.behavior import Behavior
 from m2pem.mission.events import EventDefinition, MessageEventDefinition, SignalEventDefinition
 from m2pem.mission.mission import Mission
-from m2pem.mission.reach import following
+from m2pem.mission.reachability import following
 from m2pem.verify.net.petri_net import Kind, Role
 from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate.data import Data, Truth

@@ -4,7 +4,7 @@ import itertools
 
 from m2pem.errors import ExpressionError
 from m2pem.mission import elements as e
-from m2pem.mission.upstream import upstream
+from m2pem.mission.reachability import upstream
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, Role, Step, Trigger
 from m2pem.verify.translate.context import TranslationContext
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, arrival, entry_place, product

@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.duration import duration_us, fixed_us
 from m2pem.mission.events import TimerEventDefinition, TimerKind
 from m2pem.mission.expression import Expression
+from m2pem.mission.timers import duration_us, fixed_us
 from m2pem.verify.translate.context import TranslationContext
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, Timed, TransitionDraft, product
 

@@ -3,7 +3,7 @@
 from random import Random
 
 from m2pem.mission.elements import BoundaryEvent, FlowNode, InclusiveGateway
-from m2pem.mission.upstream import upstream
+from m2pem.mission.reachability import upstream
 from tests.engine.notation import mission
 from tests.engine.random_missions import graph
 

@@ -1,0 +1,394 @@
+"""Times of timers (BPMN 2.0.2, table 10.101): ISO 8601 durations, dates and cycles, and cron texts.
+
+`..._us` counts microseconds: instants from the Unix epoch (UTC), durations by themselves. Values
+come from expressions, so each reader takes any value and refuses what is no text. Every reader
+raises ExpressionSyntaxError.
+
+Cron texts are those of other engines, always in UTC:
+
+* 5 fields, as cron has them: minute, hour, day of the month, month, day of the week (0 and 7 are
+  Sunday). When both days are restricted, either matches.
+* 6 fields begin with seconds (Quartz, Spring); 7 end with years (Quartz).
+* `@yearly`, `@annually`, `@monthly`, `@weekly`, `@daily`, `@midnight`, `@hourly`.
+
+Engines differ about which day of the week 1 is once there is a seconds field (Quartz: Sunday;
+Spring: Monday), so days have names there; with years it can only be Quartz.
+
+A cycle without a date (`R3/PT10S`) is due at mission times, and counts how often it has fired. One
+with a start or an end, and a cron text, is due at dates, which also pass during a pause or an
+outage of the executive. The rounds of that time are caught up once, not one by one: see
+`next_round`.
+"""
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import NoReturn
+
+import isodate
+from cronsim import CronSim, CronSimError
+
+from m2pem.errors import ExpressionSyntaxError
+from m2pem.mission.expression.literals import describe, shorten
+from m2pem.mission.values import Value
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
+_MAX_CHARACTERS = 100
+
+_NUMBER = r"[0-9]+(?:[.,][0-9]+)?"
+_DURATION = re.compile(
+    rf"P(?=[0-9T])(?:[0-9]+Y)?(?:[0-9]+M)?(?:{_NUMBER}W)?(?:{_NUMBER}D)?"
+    rf"(?:T(?=[0-9])(?:{_NUMBER}H)?(?:{_NUMBER}M)?(?:{_NUMBER}S)?)?"
+)
+_DATE = re.compile(r"([0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8})(T[0-9:.,]+(Z|[+-][0-9:]+)?)?")
+
+
+def duration_us(text: Value, at_us: int) -> int:
+    """The length of a duration (`PT30S`, `P1DT2H`, `PT0.5S`, `P2W`) that begins at `at_us`.
+
+    Years and months are those of the calendar (UTC) from `at_us` on; where the month is too short
+    for the day, its last day counts. Rounded to a microsecond.
+
+    Raises:
+        ExpressionSyntaxError: no duration, a negative one, or one that ends after the year 9999.
+    """
+    what = "a duration such as PT30S, PT0.5S or P1DT2H"
+    stripped = text_from(text, what)
+    if stripped.startswith("-"):
+        _refuse("a duration cannot be negative", stripped)
+    if not _DURATION.fullmatch(stripped):
+        _refuse(f"expected {what} (ISO 8601)", stripped)
+    try:
+        begin = _EPOCH + timedelta(microseconds=at_us)
+        end: datetime = begin + isodate.parse_duration(stripped)
+    except (ValueError, ArithmeticError):
+        _refuse("the duration ends after the year 9999", stripped)
+    return (end - begin) // _MICROSECOND
+
+
+def date_us(text: Value) -> int:
+    """The instant of a date and time (`2026-01-01T12:00:00Z`, `...+02:00`).
+
+    Without an offset it is UTC; without a time it is midnight.
+
+    Raises:
+        ExpressionSyntaxError: no date and time, or one that does not exist.
+    """
+    what = "a date and time such as 2026-01-01T12:00:00Z"
+    stripped = text_from(text, what)
+    if not _DATE.fullmatch(stripped):
+        _refuse(f"expected {what} (ISO 8601)", stripped)
+    try:
+        if "T" in stripped:
+            instant: datetime = isodate.parse_datetime(stripped)
+        else:
+            instant = datetime.combine(isodate.parse_date(stripped), datetime.min.time())
+        if instant.tzinfo is None:
+            instant = instant.replace(tzinfo=UTC)
+        return (instant - _EPOCH) // _MICROSECOND
+    except (ValueError, ArithmeticError) as error:
+        _refuse(f"expected {what} (ISO 8601): {error}", stripped)
+
+
+def fixed_us(text: Value) -> int | None:
+    """The length of a duration that is the same whenever it begins; None: it has months or years.
+
+    Raises:
+        ExpressionSyntaxError: as for `duration_us`.
+    """
+    length_us = duration_us(text, 0)
+    days, _, _ = str(text).partition("T")
+    return None if "Y" in days or "M" in days else length_us
+
+
+def text_from(value: Value, what: str) -> str:
+    """A value's text, without the space around it; `what` says what it should have been.
+
+    Raises:
+        ExpressionSyntaxError: it is none, or far too long.
+    """
+    if not isinstance(value, str):
+        _refuse(f"expected {what} (ISO 8601), not {describe(value)}", "")
+    stripped = value.strip()
+    if len(stripped) > _MAX_CHARACTERS:
+        _refuse(f"expected {what} (ISO 8601)", stripped)
+    return stripped
+
+
+def _refuse(message: str, text: str) -> NoReturn:
+    raise ExpressionSyntaxError(message, shorten(text), 0)
+
+
+_SECOND = timedelta(seconds=1)
+
+MACROS = {
+    "@yearly": "0 0 1 1 *",
+    "@annually": "0 0 1 1 *",
+    "@monthly": "0 0 1 * *",
+    "@weekly": "0 0 * * 0",
+    "@daily": "0 0 * * *",
+    "@midnight": "0 0 * * *",
+    "@hourly": "0 * * * *",
+}
+_DAYS = ("SUN", "MON", "TUE", "WED", "THU", "FRI", "SAT")
+_DAY = r"[0-9]+|SUN|MON|TUE|WED|THU|FRI|SAT"
+_DAY_TERM = re.compile(
+    rf"(?P<first>{_DAY}|\*)(?:-(?P<last>{_DAY}))?(?:/(?P<step>[1-9][0-9]*))?"
+    rf"|(?P<day>{_DAY})(?P<which>L|\#[1-5])"
+)
+_YEAR_TERM = re.compile(
+    r"(?P<first>[0-9]{4}|\*)(?:-(?P<last>[0-9]{4}))?(?:/(?P<step>[1-9][0-9]*))?"
+)
+_FIRST_YEAR, _LAST_YEAR = 1970, 2099  # Quartz's
+
+
+@dataclass(frozen=True, slots=True)
+class Cron:
+    """`fields`: what cronsim reads; `years`: None for all."""
+
+    fields: str
+    years: tuple[int, ...] | None
+
+    def after_us(self, at_us: int) -> int | None:
+        """The first of its dates after an instant (both: microseconds since the Unix epoch).
+
+        None: there is none, at least for 50 years.
+        """
+        try:
+            moment = _EPOCH + timedelta(microseconds=at_us)
+            while True:
+                found = next(CronSim(self.fields, moment))
+                if self.years is None or found.year in self.years:
+                    return (found - _EPOCH) // _MICROSECOND
+                following = [year for year in self.years if year > found.year]
+                if not following:
+                    return None
+                moment = datetime(following[0], 1, 1, tzinfo=UTC) - _SECOND
+        except (StopIteration, OverflowError, ValueError):  # the calendar ends
+            return None
+
+
+def is_cron(text: str) -> bool:
+    """Whether a text looks like cron's rather than like ISO 8601."""
+    return text.lstrip().startswith("@") or len(text.split()) > 1
+
+
+def parse_cron(text: str) -> Cron:
+    """Read a cron text.
+
+    Raises:
+        ExpressionSyntaxError: it is none, or it means different things to different engines.
+    """
+    stripped = text.strip()
+    if len(stripped) > _MAX_CHARACTERS:
+        raise _wrong(text, f"a cron text has at most {_MAX_CHARACTERS} characters")
+    if stripped.startswith("@"):
+        macro = MACROS.get(stripped.lower())
+        if macro is None:
+            raise _wrong(text, f"expected one of {', '.join(MACROS)}")
+        return Cron(macro, None)
+    words = stripped.upper().split()
+    if len(words) not in (5, 6, 7):
+        raise _wrong(
+            text, f"a cron text has 5, 6 (seconds first) or 7 fields (years last), not {len(words)}"
+        )
+    quartz = len(words) == 7
+    years = _years(text, words.pop()) if quartz else None
+    day, weekday = words[-3], words[-1]
+    if len(words) == 6 and not (_is_any(day) or _is_any(weekday)):
+        raise _wrong(
+            text, "give the day of the month or the day of the week, and '?' for the other"
+        )
+    words[-3] = day.replace("?", "*")
+    words[-1] = _weekdays(text, weekday, quartz) if len(words) == 6 else weekday.replace("?", "*")
+    fields = " ".join(words)
+    try:
+        CronSim(fields, _EPOCH)
+    except CronSimError as error:
+        raise _wrong(text, f"{str(error).lower()} in the cron text") from None
+    return Cron(fields, years)
+
+
+def _is_any(field: str) -> bool:
+    return field == "?" or field.startswith("*")
+
+
+def _weekdays(text: str, field: str, quartz: bool) -> str:
+    """Days of the week as numbers from Sunday 0: what cronsim reads."""
+    if field in ("?", "*"):
+        return "*"
+    found: list[str] = []
+    for term in field.split(","):
+        match = _DAY_TERM.fullmatch(term)
+        if match is None:
+            raise _wrong(
+                text, f"'{term}' is no day of the week such as MON, MON-FRI, FRIL or MON#1"
+            )
+        if match["day"]:
+            found.append(f"{_weekday(text, match['day'], quartz)}{match['which']}")
+            continue
+        step = int(match["step"] or 1)
+        first = 0 if match["first"] == "*" else _weekday(text, match["first"], quartz)
+        if match["last"]:
+            last = _weekday(text, match["last"], quartz)
+        else:
+            last = 6 if match["step"] or match["first"] == "*" else first
+        # A range may pass the end of the week: FRI-MON.
+        days = range(first, last + 1 if last >= first else last + 8)
+        found += [str(each % 7) for each in days[::step]]
+    return ",".join(found)
+
+
+def _weekday(text: str, name: str, quartz: bool) -> int:
+    if name in _DAYS:
+        return _DAYS.index(name)
+    if not quartz:
+        raise _wrong(
+            text,
+            f"which day of the week '{name}' is depends on the engine (1 is Sunday for Quartz, "
+            "Monday for Spring): write MON, TUE, ...",
+        )
+    if not 1 <= int(name) <= 7:
+        raise _wrong(text, f"'{name}' is no day of the week: 1 (SUN) to 7 (SAT)")
+    return int(name) - 1
+
+
+def _years(text: str, field: str) -> tuple[int, ...] | None:
+    if field in ("*", "?"):
+        return None
+    found: set[int] = set()
+    for term in field.split(","):
+        match = _YEAR_TERM.fullmatch(term)
+        if match is None:
+            raise _wrong(text, f"'{term}' is no year such as 2026, 2026-2028 or 2026/2")
+        first = _FIRST_YEAR if match["first"] == "*" else int(match["first"])
+        if match["last"]:
+            last = int(match["last"])
+        else:
+            last = _LAST_YEAR if match["step"] or match["first"] == "*" else first
+        if not _FIRST_YEAR <= first <= last <= _LAST_YEAR:
+            raise _wrong(text, f"years are {_FIRST_YEAR} to {_LAST_YEAR}, the first one first")
+        found.update(range(first, last + 1, int(match["step"] or 1)))
+    return tuple(sorted(found))
+
+
+def _wrong(text: str, message: str) -> ExpressionSyntaxError:
+    return ExpressionSyntaxError(message, shorten(text), 0)
+
+
+_WHAT = "a cycle such as R3/PT10S, R/PT1M or R3/2026-01-01T12:00:00Z/PT10S"
+_CYCLE = re.compile(r"R(?P<repetitions>[0-9]{0,9})/(?P<first>[^/]*)(?:/(?P<second>[^/]*))?")
+_US_PER_S = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A repeating timer. `repetitions`: how often it fires; None is for ever.
+
+    `period`: an ISO 8601 duration longer than nothing, or a cron text. `start_us`: its first date,
+    `end_us`: its last, in microseconds since the Unix epoch, when the text says one.
+    """
+
+    repetitions: int | None
+    start_us: int | None
+    period: str
+    end_us: int | None = None
+
+    @property
+    def dated(self) -> bool:
+        """Whether it is due at dates, not at mission times."""
+        return self.start_us is not None or self.end_us is not None or is_cron(self.period)
+
+    def first(self, at_us: int) -> tuple[int, int]:
+        """When it is due first, if it is armed at `at_us`, and how often it fires after that (-1:
+        for ever). A date may have passed already: it is due at once then.
+
+        Raises:
+            ExpressionSyntaxError: that is after the year 9999, or no date of a cron text is left.
+        """
+        left = -1 if self.repetitions is None else self.repetitions - 1
+        if self.start_us is not None:
+            return self.start_us, left
+        if self.end_us is not None:
+            period_us = fixed_us(self.period)
+            assert period_us is not None
+            if left < 0:
+                left = max(0, self.end_us - at_us) // period_us
+            return self.end_us - left * period_us, left
+        if is_cron(self.period):
+            due_us = parse_cron(self.period).after_us(at_us)
+            if due_us is None:
+                _refuse("none of its dates is left", self.period)
+            return due_us, left
+        return at_us + duration_us(self.period, at_us), left
+
+
+def next_round(
+    period: str, due_us: int, at_us: int, left: int, *, dated: bool
+) -> tuple[int, int] | None:
+    """The round after the one that was due at `due_us` and fires at `at_us`, as `Cycle.first`.
+
+    It is the first one after `at_us`: those between have been missed, and the one that fires now
+    stands for them. Of a `dated` cycle they are over, as their dates are; of another they still
+    come, later, so that `R3/PT10S` fires three times. None: there is no further round.
+    """
+    if left == 0:
+        return None
+    if is_cron(period):
+        found = parse_cron(period).after_us(max(due_us, at_us))
+        return None if found is None else (found, left)
+    length_us = fixed_us(period)
+    try:
+        if length_us is not None:
+            rounds = max(0, at_us - due_us) // length_us + 1
+            next_us = due_us + rounds * length_us
+            duration_us("PT0S", next_us)
+        else:
+            rounds, next_us = 0, due_us
+            while next_us <= max(due_us, at_us):
+                rounds, next_us = rounds + 1, next_us + duration_us(period, next_us)
+    except ExpressionSyntaxError:  # beyond the calendar: it never comes
+        return None
+    if left < 0:
+        return next_us, left
+    left -= rounds if dated else 1
+    return None if left < 0 else (next_us, left)
+
+
+def cycle(text: Value) -> Cycle:
+    """Read a cycle: `R3/PT10S`, `R/PT1M` (for ever), `R3/2026-01-01T00:00:00Z/PT10S`,
+    `R/PT1H/2026-01-01T00:00:00Z` (the last date), or a cron text (`m2pem.mission.timers`).
+
+    Raises:
+        ExpressionSyntaxError: no cycle, or one that never fires.
+    """
+    stripped = text_from(text, _WHAT)
+    if is_cron(stripped):
+        parse_cron(stripped)
+        return Cycle(None, None, stripped)
+    match = _CYCLE.fullmatch(stripped)
+    if match is None:
+        _refuse(f"expected {_WHAT} (ISO 8601), or a cron text such as 0 0 8 * * MON-FRI", stripped)
+    repetitions = int(match["repetitions"]) if match["repetitions"] else None
+    if repetitions == 0:
+        _refuse("the cycle would never fire; leave the number out to repeat for ever", stripped)
+    first, second = match["first"], match["second"]
+    if second is None:
+        found = Cycle(repetitions, None, first)
+    elif first.startswith("P"):
+        found = Cycle(repetitions, None, first, date_us(second))
+        if duration_us(first, 0) and fixed_us(first) is None:
+            _refuse("counted back from an end, months and years have no one length", stripped)
+    elif second.startswith("P"):
+        found = Cycle(repetitions, date_us(first), second)
+    else:
+        found = Cycle(repetitions, date_us(first), _between(date_us(first), date_us(second)))
+    if duration_us(found.period, 0) == 0:
+        _refuse("the period of a cycle must be longer than nothing", stripped)
+    return found
+
+
+def _between(start_us: int, end_us: int) -> str:
+    seconds, rest_us = divmod(max(0, end_us - start_us), _US_PER_S)
+    return f"PT{seconds}.{rest_us:06}S" if rest_us else f"PT{seconds}S"
