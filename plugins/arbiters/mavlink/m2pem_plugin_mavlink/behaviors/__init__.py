@@ -1,4 +1,4 @@
-"""The behaviors of the catalogue, in terms of a vehicle and its driver: one class each."""
+"""The behaviors of the catalogue, one class each, in terms of a vehicle and its driver."""
 
 from collections.abc import Callable, Mapping
 

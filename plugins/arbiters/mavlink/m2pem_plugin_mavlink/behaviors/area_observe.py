@@ -1,4 +1,4 @@
-"""Watching an area or a place."""
+"""The behavior `area_observe`: aircraft circle over an area or a point, others stop at its edge."""
 
 import math
 from itertools import pairwise
@@ -21,13 +21,13 @@ STANDOFF_M = 20.0
 
 
 class ObserveFromAbove(Orbit):
-    """Circle over the middle of an area, at the distance of its farthest corner; or a place."""
+    """Circle over the centre of the area, as far out as its farthest corner; or circle over a
+    point."""
 
     name = "area_observe"
     ends = False
 
     def circle(self) -> tuple[Place, float]:
-        """Over the middle of the area, or the target."""
         area = self.parameters.area
         if area is None:
             return super().circle()
@@ -36,7 +36,7 @@ class ObserveFromAbove(Orbit):
 
 
 class ObserveFromTheEdge(Goto):
-    """Stand at the nearest point of an area's edge, or off a place, and look."""
+    """Stop at the nearest point of the area's edge, or at a distance from a point, and observe."""
 
     name = "area_observe"
     modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
@@ -49,7 +49,7 @@ class ObserveFromTheEdge(Goto):
         self._since_s: float | None = None
 
     def target(self) -> Place:
-        """Where it stands and looks; chosen once."""
+        """Return where the vehicle stops; chosen once."""
         if self._stand is None:
             self._stand = Place(*self._edge(), *self.parameters.altitude())
         return self._stand
@@ -72,17 +72,18 @@ class ObserveFromTheEdge(Goto):
         return frame.to_latlon((east * STANDOFF_M / away, north * STANDOFF_M / away))
 
     async def begin(self) -> None:
-        """Go there, or stay there."""
+        """Drive to the place; a vehicle that has arrived stays there."""
         if self._since_s is None:
             await super().begin()
         else:
             await self.vehicle.driver.stop()
 
     async def run_in_background(self) -> None:
-        """It stands."""
+        """Do nothing: unlike the target of `goto`, the place does not move."""
 
     def finished(self) -> bool:
-        """After the duration, counted from the arrival; without one never."""
+        """Return whether the duration since the arrival is over; without a duration always
+        False."""
         if self._since_s is None:
             if not super().finished():
                 return False
@@ -90,19 +91,19 @@ class ObserveFromTheEdge(Goto):
         return self._seconds is not None and self.context.now_s() - self._since_s >= self._seconds
 
     def paused(self) -> None:
-        """A pause does not count in the duration."""
+        """Exclude the pause from the duration."""
         if self._since_s is not None and self._seconds is not None:
             self._seconds -= self.context.now_s() - self._since_s
             self._since_s = self.context.now_s()
 
     async def resume(self) -> None:
-        """Go on there, for as long as is left."""
+        """Continue for the rest of the duration."""
         if self._since_s is not None:
             self._since_s = self.context.now_s()
         await self.begin()
 
     async def reattach(self) -> BehaviorState:
-        """By whether it goes there, or stands there."""
+        """Judge by whether the vehicle drives to the place, or has stopped there."""
         if not accepts_mode(self, self.vehicle.state.mode) or not self.vehicle.state.armed:
             return BehaviorState.UNKNOWN
         state = await super().reattach()
@@ -110,19 +111,17 @@ class ObserveFromTheEdge(Goto):
         return BehaviorState.RUNNING if watches and is_still(self.vehicle) else state
 
     def checkpoint(self) -> CheckpointState:
-        """Where it stands."""
         place = self.target()
         return {"stand": [place.latitude_deg, place.longitude_deg]}
 
     def restore(self, checkpoint: CheckpointState) -> None:
-        """The same."""
         stand = checkpoint.get("stand")
         if isinstance(stand, list):
             self._stand = Place(stand[0], stand[1], *self.parameters.altitude())
 
 
 def middle(area: Area) -> tuple[LatLon, float]:
-    """The middle of an area, and how far its farthest corner is from it."""
+    """Return the centre of an area, and the distance to its farthest corner in metres."""
     frame = LocalFrame(area.rings[0][0][:2])
     corners = [frame.to_local(corner[:2]) for corner in area.rings[0][:-1]]
     center = (

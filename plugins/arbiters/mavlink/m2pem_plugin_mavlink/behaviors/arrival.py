@@ -1,4 +1,4 @@
-"""Whether a vehicle is there, stands, or is on its way: by what it says of itself."""
+"""Arrival checks and mode checks: has a vehicle arrived, stopped, or set out, by its telemetry?"""
 
 import math
 
@@ -32,14 +32,15 @@ _TOWARDS = math.cos(math.radians(60.0))
 
 
 class StillnessTimer:
-    """For how long a vehicle has stood, as far as anybody has looked."""
+    """Measures for how long a vehicle has not moved, from the first call of `seconds`."""
 
     def __init__(self, context: BehaviorContext) -> None:
         self._job = context
         self._since_s: float | None = None
 
     def seconds(self, circled: LatLon | None = None, radius_m: float | None = None) -> float:
-        """Up to now; 0 while it moves. `circled`, `radius_m`: as for `stays`."""
+        """Return the time since the vehicle has stopped; 0 while it moves. `circled`, `radius_m`:
+        see `stays_at`."""
         now_s = self._job.now_s()
         if not stays_at(self._job.vehicle, circled, radius_m):
             self._since_s = None
@@ -49,19 +50,18 @@ class StillnessTimer:
         return now_s - self._since_s
 
     def forget(self) -> None:
-        """Count anew."""
+        """Restart at 0."""
         self._since_s = None
 
 
 def is_still(vehicle: Vehicle) -> bool:
-    """Whether it hardly moves."""
+    """Return whether the vehicle hardly moves."""
     return vehicle.state.speed_m_s < STANDS_BELOW_M_S
 
 
 def stays_at(vehicle: Vehicle, at: LatLon | None, radius_m: float | None = None) -> bool:
-    """Whether it hardly moves; what cannot stand still in the air stays at a place when it is on
-    its circle around it, or within. `radius_m`: of that circle, None: the one that it has been set
-    to."""
+    """Return whether the vehicle hardly moves or, if it cannot stop in the air, is on or inside its
+    circle around `at`. `radius_m`: of the circle; None: the radius that the autopilot is set to."""
     if is_still(vehicle):
         return True
     if at is None or not cannot_stop(vehicle):
@@ -70,17 +70,18 @@ def stays_at(vehicle: Vehicle, at: LatLon | None, radius_m: float | None = None)
 
 
 def cannot_stop(vehicle: Vehicle) -> bool:
-    """Whether it is in the air and cannot stand still there."""
+    """Return whether the vehicle is in the air and cannot stop there."""
     return vehicle.state.loiter_radius_m is not None and vehicle.state.landed is not True
 
 
 def circle_tolerance_m(radius_m: float) -> float:
-    """How far off a circle still counts as on it."""
+    """Return how far from the circle a vehicle may be to count as on it."""
     return max(NEAR_THE_CIRCLE_M, NEAR_THE_CIRCLE * radius_m)
 
 
 def arrival_radius_m(vehicle: Vehicle, tolerance_m: float, radius_m: float | None = None) -> float:
-    """How near to a place a vehicle is there: within a tolerance, or what circles on its circle."""
+    """Return how near to a place the vehicle counts as arrived: the tolerance or, if it cannot
+    stop, its circle."""
     radius = vehicle.state.loiter_radius_m if radius_m is None else radius_m
     if radius is None or not cannot_stop(vehicle):
         return tolerance_m
@@ -88,24 +89,25 @@ def arrival_radius_m(vehicle: Vehicle, tolerance_m: float, radius_m: float | Non
 
 
 def height_tolerance_m(vehicle: Vehicle, tolerance_m: float) -> float:
-    """The same of heights."""
+    """Return the tolerance of heights; it is larger for a vehicle that circles."""
     return max(tolerance_m, CIRCLING_HEIGHT_TOLERANCE_M) if cannot_stop(vehicle) else tolerance_m
 
 
 def position_of(vehicle: Vehicle) -> LatLon | None:
-    """Its latitude and longitude."""
+    """Return the latitude and longitude; None if unknown."""
     position = vehicle.state.position
     return (position.latitude_deg, position.longitude_deg) if position is not None else None
 
 
 def distance_to_m(vehicle: Vehicle, place: LatLon) -> float:
-    """How far it is from a place, over ground; infinite while that is not known."""
+    """Return the distance to a place over ground; infinite while the position is unknown."""
     here = position_of(vehicle)
     return distance_m(place, here) if here is not None else math.inf
 
 
 def height_m(state: AutopilotState, frame: str) -> float | None:
-    """Its height in a frame of altitudes."""
+    """Return the height above home, above mean sea level or above terrain, by `frame`; None if
+    unknown."""
     if frame == RELATIVE:
         return state.altitude_above_home_m
     if frame == AMSL:
@@ -114,7 +116,7 @@ def height_m(state: AutopilotState, frame: str) -> float | None:
 
 
 def height_error_m(vehicle: Vehicle, place: Place) -> float:
-    """How far it is from a place in height; 0 where no height was asked for, or none is known."""
+    """Return the difference in height to a place; 0 if no height was requested or it is unknown."""
     if place.altitude_m is None:
         return 0.0
     height = height_m(vehicle.state, place.altitude_frame)
@@ -122,19 +124,20 @@ def height_error_m(vehicle: Vehicle, place: Place) -> float:
 
 
 def on_the_ground(vehicle: Vehicle) -> bool:
-    """Whether it is an aircraft that has not taken off."""
+    """Return whether the vehicle is an aircraft that has not taken off."""
     return vehicle.domain == "air" and vehicle.state.landed is True
 
 
 def takeoff_required(vehicle: Vehicle) -> str:
-    """Why a motion cannot begin yet; "" if it can."""
+    """Return why a motion cannot begin before a takeoff; "" if it can."""
     if on_the_ground(vehicle):
         return f"{vehicle.resource} stands on the ground: let it take off first (takeoff)"
     return ""
 
 
 def accepted_modes(behavior: Behavior) -> frozenset[FlightMode]:
-    """The modes in which a behavior goes on. PX4 goes to a place in the mode in which it holds."""
+    """Return the modes in which a behavior continues. PX4 goes to a place in the mode in which it
+    holds."""
     modes = behavior.modes
     if FlightMode.GUIDED in modes and "px4" in behavior.vehicle.driver.name.lower():
         return modes | {FlightMode.HOLD}
@@ -142,13 +145,13 @@ def accepted_modes(behavior: Behavior) -> frozenset[FlightMode]:
 
 
 def accepts_mode(behavior: Behavior, mode: FlightMode) -> bool:
-    """Whether a vehicle in a mode may be doing what the behavior has told it."""
+    """Return whether a vehicle in this mode may be executing the behavior."""
     return mode in accepted_modes(behavior)
 
 
 async def moves_towards(vehicle: Vehicle, place: Place) -> bool:
-    """Whether it moves towards a place, or names that as its target; waits a little for the former
-    to be seen."""
+    """Return whether the vehicle moves towards a place, or reports it as its target; wait up to
+    `LOOKS_FOR_S` for the motion."""
 
     def towards() -> bool:
         return _towards(vehicle, place)
@@ -173,8 +176,8 @@ def _towards(vehicle: Vehicle, place: Place) -> bool:
 
 
 async def _has_target(vehicle: Vehicle, place: Place) -> bool:
-    """By what its autopilot says when it is asked: a plane may fly away from its target for a while
-    until it has turned. Heights in its answer are above the sea."""
+    """Ask the autopilot for its target: a plane may fly away from its target until it has turned.
+    Heights in the answer are above mean sea level."""
     try:
         target = await position_target(vehicle.link)
     except ExchangeError:

@@ -1,4 +1,4 @@
-"""What a vehicle does for one request."""
+"""The base class of behaviors: what a vehicle does for one request."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ is in its way; no autopilot needs that long."""
 
 
 class BehaviorFailedError(Exception):
-    """It cannot be done, or not any more. `code`: an error code of docs/missions.md."""
+    """The behavior cannot be executed or continued. `code`: an error code of docs/missions.md."""
 
     def __init__(self, reason: str, code: str = "FAILED") -> None:
         super().__init__(reason)
@@ -32,8 +32,9 @@ class BehaviorFailedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class BehaviorContext:
-    """What is to be done, by whom, and where: the fleet's bus (positions of other vehicles) and the
-    origin of its ENU frame (latitude and longitude in degrees, altitude in metres).
+    """The request and its surroundings: the vehicle, the parameters, the fleet's bus (telemetry of
+    other vehicles), and the origin of the fleet's ENU frame (latitude and longitude in degrees,
+    altitude in metres).
 
     `now_s`: seconds of the arbiter's clock, which goes on over a restart. `fence`: what the vehicle
     may not leave. `cruise_m_s`: the speed that `set_speed` has set. `actuators`: names that the
@@ -51,13 +52,16 @@ class BehaviorContext:
 
 
 class Behavior(ABC):
-    """One behavior. The arbiter asks for a `refusal`, calls `begin` once (again, if it was held
-    before that had ended), then `finished` several times a second; `paused` and `go_on` at a hold
-    and after it. `steps`, if it has any, run beside that and are cancelled with it (a setpoint that
-    must be repeated).
+    """One behavior of one vehicle.
 
-    `modes`: those in which it goes on; another one, that nobody here asked for, says that somebody
-    else has taken the vehicle over. `steers`: beginning it ends what the vehicle did before.
+    The arbiter asks for a `refusal` and calls `begin` (again, if the vehicle was held before
+    `begin` had returned), then `finished` several times a second. At a hold it calls `paused`,
+    after it `resume`. `run_in_background` runs at the same time and is cancelled with the behavior:
+    it repeats setpoints, for example.
+
+    `modes`: the flight modes in which the behavior continues; any other mode that was not commanded
+    here means that the vehicle was taken over. `moves_vehicle`: beginning this behavior ends the
+    motion before it.
     """
 
     name: ClassVar[str]
@@ -71,12 +75,12 @@ class Behavior(ABC):
         self.vehicle = context.vehicle
 
     def refusal(self) -> str:
-        """Why it cannot be done; "" if it can. Nothing has been sent yet."""
+        """Return why the behavior cannot be executed; "" if it can. Send nothing."""
         return ""
 
     @abstractmethod
     async def begin(self) -> None:
-        """Have the vehicle do it; returns when it does.
+        """Command the vehicle; return when it executes the behavior.
 
         Raises:
             BehaviorFailedError, ExchangeError: it cannot.
@@ -84,38 +88,39 @@ class Behavior(ABC):
 
     @abstractmethod
     def finished(self) -> bool:
-        """Whether it is done.
+        """Return whether the behavior is complete.
 
         Raises:
             BehaviorFailedError: it has failed.
         """
 
     def paused(self) -> None:  # noqa: B027  # most have no clock of their own
-        """The vehicle is being held."""
+        """The vehicle is being held: stop measuring time."""
 
     @abstractmethod
     async def resume(self) -> None:
-        """Have the vehicle go on after it was held."""
+        """Command the vehicle again after a hold."""
 
     def adjust(self, speed_m_s: float) -> bool:
-        """Mean to go on at that speed from now on; False: its speed cannot be changed. The vehicle
-        is told by the helm, and again by what is sent after a hold."""
+        """Use this speed from now on; return False if the behavior has no speed to change. The
+        controller sends the speed to the vehicle."""
         return False
 
     async def run_in_background(self) -> None:  # noqa: B027  # most have none
-        """What must be done over and over while it goes on and is not held."""
+        """Repeat what must be repeated while the behavior is active and not held."""
 
     async def clean_up(self) -> None:  # noqa: B027  # most leave nothing behind
-        """Undo what must not outlive it; another behavior takes over without a stop."""
+        """Undo what must not outlive the behavior, when another one replaces it without a stop."""
 
     @abstractmethod
     async def reattach(self) -> BehaviorState:
-        """After a restart, by looking at the vehicle and asking it nothing but what it has: RUNNING
-        (it does just this), SUCCEEDED (it has done it) or UNKNOWN."""
+        """After a restart, compare with the vehicle, and only read from it. Return RUNNING (it
+        executes this behavior), SUCCEEDED (it has completed it) or UNKNOWN."""
 
     def checkpoint(self) -> CheckpointState:
-        """What `recall` needs after a restart, beside parameters that are no routes or areas."""
+        """Return what `restore` needs after a restart, in addition to parameters that are no routes
+        or areas."""
         return {}
 
     def restore(self, checkpoint: CheckpointState) -> None:  # noqa: B027  # most need nothing
-        """Before `recognised`: what `memory` said when it began."""
+        """Take over a checkpoint; called before `reattach`."""

@@ -1,4 +1,4 @@
-"""Working an actuator."""
+"""The behavior `deploy`: servos, relays, actuators of PX4 and grippers."""
 
 import math
 
@@ -31,7 +31,7 @@ class Deploy(Behavior):
         self._value = parameters.number("value")
 
     def refusal(self) -> str:
-        """There must be such an actuator, and it must take the value."""
+        """Check that there is such an actuator, and that it accepts the value."""
         if not self._kind:
             names = ", ".join(self.context.actuators)
             known = f"{names}; or " if names else ""
@@ -49,7 +49,6 @@ class Deploy(Behavior):
         return ""
 
     async def begin(self) -> None:
-        """Command it."""
         driver, number = self.vehicle.driver, float(self._number)
         if self._kind == "servo":
             await driver.command(dialect.MAV_CMD_DO_SET_SERVO, number, self._value or 0.0)
@@ -64,20 +63,19 @@ class Deploy(Behavior):
             await driver.command(dialect.MAV_CMD_DO_SET_ACTUATOR, *values, 0.0)
 
     async def resume(self) -> None:
-        """Command it again."""
         await self.begin()
 
     def finished(self) -> bool:
-        """As soon as the autopilot has accepted."""
+        """Return True: `begin` returns when the autopilot has accepted."""
         return True
 
     async def reattach(self) -> BehaviorState:
-        """No autopilot tells how its actuators are set."""
+        """Return UNKNOWN: no autopilot reports its actuators."""
         return BehaviorState.UNKNOWN
 
 
 def _read(words: list[str]) -> tuple[str, int]:
-    """The kind and number of an actuator; ("", 0) if it is none."""
+    """Return kind and number of an actuator; ("", 0) if the words name none."""
     match words:
         case [number] if number.isdecimal():
             return "servo", int(number)

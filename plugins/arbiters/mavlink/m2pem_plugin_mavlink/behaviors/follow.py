@@ -1,4 +1,5 @@
-"""Staying with another vehicle of the fleet, whatever its domain and its arbiter."""
+"""The behavior `follow`: keep a relative position to another vehicle of the fleet, of any
+arbiter."""
 
 import math
 
@@ -22,7 +23,8 @@ COURSE_ABOVE_M_S = 1.0
 
 
 class Follow(Behavior):
-    """Keep a station at another vehicle: `offset` from it, at `bearing` from its bow."""
+    """Keep a position relative to another vehicle: at `offset` metres, at `bearing` from its
+    heading."""
 
     name = "follow"
     modes = frozenset({FlightMode.GUIDED})
@@ -38,7 +40,8 @@ class Follow(Behavior):
         self._course_rad: float | None = None
 
     def refusal(self) -> str:
-        """Another vehicle is needed, with its station within the fence."""
+        """Check that the target is another vehicle, and that the relative position is inside the
+        fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
         if self._target in ("", self.vehicle.resource):
@@ -46,23 +49,21 @@ class Follow(Behavior):
         return "" if self._state() is None else self._breach(self._station())
 
     async def begin(self) -> None:
-        """Send it to its station."""
         await self._parameters.hear_target()
         self._told = None
         await self._tell()
 
     async def resume(self) -> None:
-        """To where the station is by now."""
         await self.begin()
 
     async def run_in_background(self) -> None:
-        """Tell it twice a second where its station is."""
+        """Send the vehicle to its relative position twice a second."""
         while True:
             await self.vehicle.sleep(REPEAT_S)
             await self._tell()
 
     def finished(self) -> bool:
-        """Never: it goes on until it is interrupted."""
+        """Return False: the behavior continues until it is interrupted."""
         return False
 
     async def _tell(self) -> None:
@@ -87,7 +88,7 @@ class Follow(Behavior):
         return self.context.fence.breach([station], position_of(self.vehicle), lambda _: name)
 
     def _state(self) -> VehicleState | None:
-        """What the target said; None: nothing that is new enough."""
+        """Return the target's last state; None if there is none that is recent."""
         state = state_of(self.context, self._target)
         if state is None or state.position is None or state.link is LinkState.LOST:
             return None
@@ -110,7 +111,7 @@ class Follow(Behavior):
         )
 
     async def reattach(self) -> BehaviorState:
-        """It flies in the mode in which it takes places; what it was told last does not matter."""
+        """Return RUNNING if the vehicle flies in the mode in which it accepts positions."""
         state = self.vehicle.state
         follows = (
             state.armed and accepts_mode(self, state.mode) and not takeoff_required(self.vehicle)

@@ -1,4 +1,4 @@
-"""Going to a place, and standing."""
+"""The behaviors `goto`, `hold` and `drive_stop`."""
 
 import math
 from dataclasses import replace
@@ -51,7 +51,7 @@ REPEAT_S = 0.5
 
 
 class Goto(Behavior):
-    """Go to a place, or to where another vehicle is, as long as it takes."""
+    """Go to a point, or to another vehicle while that moves."""
 
     name = "goto"
     modes = frozenset({FlightMode.GUIDED})
@@ -68,11 +68,11 @@ class Goto(Behavior):
         self._tolerance_m = usual_m if tolerance is None else max(tolerance, NEAREST_M)
 
     def target(self) -> Place:
-        """Where to go now."""
+        """Return where to go now."""
         return replace(self.parameters.target_place(), heading_rad=self.parameters.heading_rad)
 
     def refusal(self) -> str:
-        """What flies must be in the air, and the way within the fence."""
+        """Check that an aircraft is in the air, and that the path is inside the fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
         return "" if self.parameters.target_is_unheard else self._breach(self.target())
@@ -84,7 +84,6 @@ class Goto(Behavior):
         return self.context.fence.breach(way, position_of(self.vehicle), lambda _: "the target")
 
     async def begin(self) -> None:
-        """Send it there."""
         self._stillness.forget()
         if self.parameters.target_is_unheard:
             await self.parameters.hear_target()
@@ -94,16 +93,14 @@ class Goto(Behavior):
         await self.vehicle.driver.go_to(self._place, self.parameters.speed_m_s)
 
     async def resume(self) -> None:
-        """Send it there again."""
         await self.begin()
 
     def adjust(self, speed_m_s: float) -> bool:
-        """It can."""
         self.parameters.adjusted_m_s = speed_m_s
         return True
 
     async def run_in_background(self) -> None:
-        """Go after a target that moves."""
+        """Send the vehicle again when its target has moved."""
         while self.parameters.target_vehicle is not None:
             await self.vehicle.sleep(REPEAT_S)
             new, old = self.target(), self._place
@@ -118,8 +115,8 @@ class Goto(Behavior):
                 await self.vehicle.driver.go_to(new, self.parameters.speed_m_s)
 
     def finished(self) -> bool:
-        """Within the tolerance and turned; or it stands, as near as its autopilot goes. What cannot
-        stand still is there when it circles the place.
+        """Return whether the vehicle is within the tolerance and has turned, or has stopped as near
+        as its autopilot goes. A vehicle that cannot stop has arrived when it circles the place.
 
         Raises:
             BehaviorFailedError: it stands outside of a tolerance that was asked for.
@@ -149,7 +146,7 @@ class Goto(Behavior):
         return abs(off) <= TURNED_RAD or self._stillness.seconds() >= TURN_S
 
     async def reattach(self) -> BehaviorState:
-        """By its place, and whether it moves towards the target."""
+        """Judge by the position, and by whether the vehicle moves towards the target."""
         self._place = place = self.target()
         if not accepts_mode(self, self.vehicle.state.mode):
             return BehaviorState.UNKNOWN
@@ -165,7 +162,7 @@ def _apart_m(a: Place, b: Place) -> float:
 
 
 class Hold(Behavior):
-    """Stand for a time, or until it stands; what cannot, circles where it was."""
+    """Stop for a duration; without one, until the vehicle has stopped. What cannot stop circles."""
 
     name = "hold"
     modes = frozenset({FlightMode.HOLD})
@@ -177,7 +174,7 @@ class Hold(Behavior):
         self._at: LatLon | None = None
 
     async def begin(self) -> None:
-        """Stop it; what is not armed stands."""
+        """Stop the vehicle; one that is not armed has stopped."""
         self._at = position_of(self.vehicle)
         if on_the_ground(self.vehicle) or self.vehicle.state.armed is False:
             self.modes = frozenset(FlightMode)  # it stands already, in whatever mode
@@ -186,23 +183,23 @@ class Hold(Behavior):
         self._since_s = self.context.now_s()
 
     def paused(self) -> None:
-        """A pause does not count in the duration."""
+        """Exclude the pause from the duration."""
         if self._since_s is not None:
             self._left_s -= self.context.now_s() - self._since_s
             self._since_s = None
 
     async def resume(self) -> None:
-        """For as long as is left."""
+        """Continue for the rest of the duration."""
         await self.begin()
 
     def finished(self) -> bool:
-        """Standing, and the time is over."""
+        """Return whether the vehicle has stopped and the duration is over."""
         now_s = self.context.now_s()
         over = self._since_s is not None and now_s - self._since_s >= self._left_s
         return over and stays_at(self.vehicle, self._at)
 
     async def reattach(self) -> BehaviorState:
-        """By its mode."""
+        """Judge by the mode."""
         if self.vehicle.state.armed and not accepts_mode(self, self.vehicle.state.mode):
             return BehaviorState.UNKNOWN
         self._at = position_of(self.vehicle)
@@ -212,17 +209,14 @@ class Hold(Behavior):
         return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.RUNNING
 
     def checkpoint(self) -> CheckpointState:
-        """When it ends."""
+        """Return when the duration ends."""
         return {"until_s": self.context.now_s() + self._left_s}
 
     def restore(self, checkpoint: CheckpointState) -> None:
-        """How long is left."""
         until_s = checkpoint.get("until_s")
         if isinstance(until_s, int | float):
             self._left_s = max(0.0, until_s - self.context.now_s())
 
 
 class DriveStop(Hold):
-    """Stop."""
-
     name = "drive_stop"

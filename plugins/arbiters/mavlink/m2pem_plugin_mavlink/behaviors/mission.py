@@ -39,21 +39,21 @@ _HEIGHT_STEP_M = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Fingerprint:
-    """Of the items that have a place: how many there are, where, and how high in all."""
+    """Identifies the items of a mission that have a place: their number, their positions, and the
+    sum of their heights."""
 
     count: int
     places: int
     height_m: float
 
     def fits(self, other: "Fingerprint") -> bool:
-        """Whether they are of the same mission, but for what storing it changes."""
+        """Return whether both are of the same mission, apart from what storing it changes."""
         off_m = abs(self.height_m - other.height_m)
         same = (self.count, self.places) == (other.count, other.places)
         return same and off_m <= _HEIGHT_STEP_M * max(1, self.count) + 1e-6 * abs(self.height_m)
 
 
 def fingerprint(items: Sequence[MissionItem]) -> Fingerprint:
-    """The fingerprint of a mission."""
     placed = [item for item in items if is_navigation(item)]
     lines = "\n".join(
         f"{item.command} {_SAME_FRAMES.get(item.frame, item.frame)}"
@@ -68,7 +68,7 @@ def fingerprint(items: Sequence[MissionItem]) -> Fingerprint:
 
 
 def is_navigation(item: MissionItem) -> bool:
-    """Whether the vehicle moves for it, and says that it was reached."""
+    """Return whether the vehicle moves for the item, and reports that it reached it."""
     return item.command <= _LAST_NAVIGATION_COMMAND
 
 
@@ -85,7 +85,7 @@ STANDS_AT_END_S = 2.0
 
 
 def waypoint(place: LatLon, altitude_m: float, frame: str) -> MissionItem:
-    """Go there, and on."""
+    """Return an item that goes to a place and continues from there."""
     nan = float("nan")
     return MissionItem(
         dialect.MAV_CMD_NAV_WAYPOINT, FRAMES[frame], (0.0, 0.0, 0.0, nan), *place, altitude_m
@@ -93,19 +93,19 @@ def waypoint(place: LatLon, altitude_m: float, frame: str) -> MissionItem:
 
 
 def circle_for_ever(last: MissionItem) -> MissionItem:
-    """Stay at the place of another item, for what cannot stand still there: an ArduPlane would go
-    home at the end of its mission, and go on into a landing that stands behind it."""
+    """Return an item that circles the place of another item. At the end of its mission an ArduPlane
+    would otherwise return home, or continue into a landing that is stored behind it."""
     return replace(last, command=dialect.MAV_CMD_NAV_LOITER_UNLIM)
 
 
 def speed_item(speed_m_s: float) -> MissionItem:
-    """From here on, so fast over ground."""
+    """Return an item that sets the speed over ground from here on."""
     params = (GROUND_SPEED, speed_m_s, AS_IT_IS, 0.0)
     return MissionItem(dialect.MAV_CMD_DO_CHANGE_SPEED, dialect.MAV_FRAME_MISSION, params)
 
 
 class MissionFlight(Behavior):
-    """Uploads a way and has it flown; `loop`: over and over. A subclass says the `items`."""
+    """Uploads waypoints as a mission and has the vehicle execute it; `loop`: again and again."""
 
     modes = frozenset({FlightMode.MISSION})
     max_still_s = MOVES_WITHIN_S
@@ -121,20 +121,20 @@ class MissionFlight(Behavior):
 
     @abstractmethod
     def way(self) -> Sequence[MissionItem]:
-        """The waypoints.
+        """Return the waypoints.
 
         Raises:
             BehaviorFailedError: there can be none; the reason says why.
         """
 
     def named(self, index: int) -> str:
-        """What people call a waypoint."""
+        """Return how messages name a waypoint."""
         return f"waypoint {index + 1}"
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
-        """What is uploaded: the speed, if one was asked for, then the waypoints; for a plane also
-        a circle at the last of them."""
+        """Return the items to upload: the speed if one was requested, then the waypoints; for a
+        plane also a circle at the last of them."""
         if self._items is None:
             way = tuple(self.way())
             speed = self.parameters.speed_m_s
@@ -147,7 +147,8 @@ class MissionFlight(Behavior):
         return self._items
 
     def refusal(self) -> str:
-        """What flies must be in the air, and the way within the fence; a loop's way back, too."""
+        """Check that an aircraft is in the air, and that the path, with a loop's way back, is
+        inside the fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
         speeds = 0 if self.parameters.speed_m_s is None else 1
@@ -166,13 +167,12 @@ class MissionFlight(Behavior):
         )
 
     async def begin(self) -> None:
-        """Upload the items and start the mission."""
         self._stillness.forget()
         await self.vehicle.driver.upload(self.items)
         await self.vehicle.driver.start_mission(0)
 
     async def resume(self) -> None:
-        """From the item that it was moving to."""
+        """Restart the mission at the current item."""
         self._stillness.forget()
         last = self._end[0] if self._end else 0
         current = self.vehicle.driver.current_item or 0
@@ -181,12 +181,12 @@ class MissionFlight(Behavior):
             await self.vehicle.driver.set_speed(speed)
 
     def adjust(self, speed_m_s: float) -> bool:
-        """It can; what was uploaded stays as it is."""
+        """Keep the speed for loops and holds; the uploaded mission is not changed."""
         self.parameters.adjusted_m_s = speed_m_s
         return True
 
     async def run_in_background(self) -> None:
-        """Begin again at the end of a loop."""
+        """Restart the mission at the end of each loop."""
         while self.loop:
             await self.vehicle.until(self.at_the_end)
             self._stillness.forget()
@@ -196,7 +196,8 @@ class MissionFlight(Behavior):
             await self.vehicle.until(lambda: not self.at_the_end())
 
     def at_the_end(self) -> bool:
-        """Whether the last waypoint was reached, by the vehicle's word or its place."""
+        """Return whether the last waypoint was reached, by the vehicle's messages or its
+        position."""
         if self._end is None:
             return False
         last, place = self._end
@@ -213,11 +214,11 @@ class MissionFlight(Behavior):
         return over or self._stillness.seconds(place) >= STANDS_AT_END_S
 
     def finished(self) -> bool:
-        """At the last waypoint; a loop never is."""
+        """Return whether the last waypoint was reached; in a loop always False."""
         return not self.loop and self.at_the_end()
 
     async def reattach(self) -> BehaviorState:
-        """By the mission that it has stored, its mode, its item and its place."""
+        """Judge by the stored mission, the mode, the current item and the position."""
         if self._kept is None or self._end is None:
             return BehaviorState.UNKNOWN
         stored = await self.vehicle.driver.downloaded()
@@ -235,7 +236,7 @@ class MissionFlight(Behavior):
         return await self.vehicle.until(self.at_the_end, STANDS_AT_END_S + 0.5)
 
     def checkpoint(self) -> CheckpointState:
-        """The mission's fingerprint, its last item and where that is."""
+        """Return the mission's fingerprint, its last item and the position of that."""
         if not self.items or self._kept is None or self._end is None:
             raise BehaviorFailedError("there is no way to move")
         last, place = self._end
@@ -246,7 +247,6 @@ class MissionFlight(Behavior):
         }
 
     def restore(self, checkpoint: CheckpointState) -> None:
-        """The same."""
         mission, end = checkpoint.get("mission"), checkpoint.get("end")
         if isinstance(mission, list) and isinstance(end, list):
             self._kept = Fingerprint(int(mission[0]), int(mission[1]), mission[2])
@@ -254,7 +254,7 @@ class MissionFlight(Behavior):
 
 
 class Routing(MissionFlight):
-    """Fly or drive a route from its first waypoint to its last, or over and over."""
+    """The behavior `single_vehicle_routing`: follow a route once, or in a loop."""
 
     name = "single_vehicle_routing"
 
@@ -263,7 +263,6 @@ class Routing(MissionFlight):
         self.loop = self.parameters.loop
 
     def way(self) -> Sequence[MissionItem]:
-        """The waypoints of the route."""
         route = self.parameters.route
         if route is None or not route.waypoints:
             raise BehaviorFailedError("parameter 'route': it has no waypoints")
@@ -275,7 +274,6 @@ class Routing(MissionFlight):
         ]
 
     def named(self, index: int) -> str:
-        """By its number, from 1."""
         return f"waypoint {index + 1} of the route"
 
 
@@ -283,12 +281,13 @@ SPACING_M = 20.0
 
 
 class Survey(MissionFlight):
-    """The passes of a lawn-mower, begun at the nearer of their two ends."""
+    """The behavior `area_survey`: parallel tracks over an area, from the nearer of their two
+    ends."""
 
     name = "area_survey"
 
     def way(self) -> Sequence[MissionItem]:
-        """The ends of the passes."""
+        """Return the ends of the tracks."""
         area = self.parameters.area
         if area is None:
             raise BehaviorFailedError("parameter 'area': there is none")
@@ -312,12 +311,12 @@ class Survey(MissionFlight):
         return [waypoint(place, *height) for place in places]
 
     def named(self, index: int) -> str:
-        """By the number of its pass, from 1."""
         return f"{'end' if index % 2 else 'begin'} of pass {index // 2 + 1} of the survey"
 
 
 class RunOnboardMission(Behavior):
-    """Carry it out from an item on; done when its last waypoint was reached, or it has landed."""
+    """Execute the stored mission from an item on; complete at its last waypoint, or after
+    landing."""
 
     name = "run_onboard_mission"
     modes = frozenset({FlightMode.MISSION})
@@ -329,7 +328,6 @@ class RunOnboardMission(Behavior):
         self._flew = False
 
     async def begin(self) -> None:
-        """Look at what is stored, and start it."""
         items = await self.vehicle.driver.downloaded()
         if not items:
             raise BehaviorFailedError("it has no mission stored")
@@ -341,11 +339,11 @@ class RunOnboardMission(Behavior):
         await self.vehicle.driver.start_mission(self._first)
 
     async def resume(self) -> None:
-        """From the item that it was moving to."""
         await self.vehicle.driver.start_mission(self.vehicle.driver.current_item or self._first)
 
     def finished(self) -> bool:
-        """At the last waypoint, or down and disarmed after having flown."""
+        """Return whether the last waypoint was reached, or the vehicle has landed and disarmed
+        after the flight."""
         state = self.vehicle.state
         self._flew = self._flew or state.landed is False
         reached = self.vehicle.driver.reached_item
@@ -365,7 +363,7 @@ class RunOnboardMission(Behavior):
                 raise BehaviorFailedError(reason)
 
     async def reattach(self) -> BehaviorState:
-        """By its mode."""
+        """Judge by the mode."""
         if self.vehicle.state.mode is not FlightMode.MISSION or not self.vehicle.state.armed:
             return BehaviorState.UNKNOWN
         items = await self.vehicle.driver.downloaded()

@@ -1,4 +1,4 @@
-"""Circling."""
+"""The behavior `orbit`."""
 
 import math
 from collections.abc import Sequence
@@ -28,8 +28,9 @@ LOOK_EVERY_S = 0.2
 
 
 class Orbit(MissionFlight):
-    """Circle a place clockwise, for turns or a time: by the autopilot's own command, where it has
-    one, else by waypoints round the circle. A vehicle is circled where it is when this begins."""
+    """Circle a place clockwise, for a number of turns or a time: by the autopilot's command if it
+    has one, else by waypoints on the circle. A target vehicle is circled where it is at the
+    beginning."""
 
     name = "orbit"
     modes = frozenset({FlightMode.MISSION, FlightMode.ORBIT})
@@ -55,12 +56,12 @@ class Orbit(MissionFlight):
     # --- where ----------------------------------------------------------------------------------
 
     def circle(self) -> tuple[Place, float]:
-        """The centre, and the radius in metres."""
+        """Return the centre, and the radius in metres."""
         return self.parameters.target_place(), self._radius_m
 
     @property
     def center(self) -> Place:
-        """Its height is known."""
+        """The centre, with a known height."""
         if self._center is None:
             place, self._radius_m = self.circle()
             height = self.parameters.altitude_to_fly(place.altitude_m, place.altitude_frame)
@@ -68,7 +69,7 @@ class Orbit(MissionFlight):
         return self._center
 
     def way(self) -> Sequence[MissionItem]:
-        """A polygon on the circle: all turns, or one lap that is begun anew each time."""
+        """Return a polygon on the circle: all turns, or one turn that is repeated."""
         center = self.center
         frame = LocalFrame((center.latitude_deg, center.longitude_deg))
         sides = self._sides()
@@ -85,7 +86,8 @@ class Orbit(MissionFlight):
         return [waypoint(frame.to_latlon(level), *height) for level in around]
 
     def _sides(self) -> int:
-        """Of the polygon: corners that stand no more than a metre or so off the circle."""
+        """Return the number of sides of the polygon: its edges are at most about a metre inside the
+        circle."""
         return max(8, min(36, math.ceil(math.tau * self._radius_m / 12.0)))
 
     def _begins_at(self, frame: LocalFrame) -> float:
@@ -96,19 +98,17 @@ class Orbit(MissionFlight):
         return math.atan2(north, east)
 
     def named(self, index: int) -> str:
-        """Its corners have no names."""
         return "a point of the circle"
 
     # --- how ------------------------------------------------------------------------------------
 
     def refusal(self) -> str:
-        """As for a route; no turn at all needs no room."""
         if self._turns == 0 or self._seconds == 0:
             return takeoff_required(self.vehicle)
         return super().refusal()
 
     async def begin(self) -> None:
-        """By the autopilot's command, else by a mission."""
+        """Start by the autopilot's command, else by a mission."""
         self._done = self._turns == 0 or self._seconds == 0
         if self._done:
             return
@@ -119,14 +119,14 @@ class Orbit(MissionFlight):
             await super().begin()
 
     async def resume(self) -> None:
-        """What was turned already counts."""
+        """Continue; completed turns count."""
         if self._by_command or self._done:
             await self.begin()
         else:
             await super().resume()
 
     async def run_in_background(self) -> None:
-        """Stop at the end; begin each lap anew until then."""
+        """Repeat the turn where needed, and stop at the end."""
         if self._done:
             return
         if self._by_command or self.loop:
@@ -150,7 +150,7 @@ class Orbit(MissionFlight):
                 await self.vehicle.driver.start_mission(0)
 
     def _look(self) -> bool:
-        """Add to what was turned; whether it is on the circle."""
+        """Add the angle since the last call; return whether the vehicle is on the circle."""
         center = (self.center.latitude_deg, self.center.longitude_deg)
         here = position_of(self.vehicle)
         near_m, away = circle_tolerance_m(self._radius_m), distance_to_m(self.vehicle, center)
@@ -168,7 +168,7 @@ class Orbit(MissionFlight):
         return True
 
     def finished(self) -> bool:
-        """After the turns or the time."""
+        """Return whether the turns or the time are complete."""
         if self._by_command or self.loop or self._done:
             return self._done
         return self.at_the_end()
@@ -176,7 +176,7 @@ class Orbit(MissionFlight):
     # --- after a restart ------------------------------------------------------------------------
 
     async def reattach(self) -> BehaviorState:
-        """By its mode and its distance from the centre, or by its mission."""
+        """Judge by the mode and the distance from the centre, or by the stored mission."""
         plane = self.vehicle.state.loiter_radius_m is not None
         by_place = plane and self.vehicle.state.mode is FlightMode.GUIDED
         if by_place or self.vehicle.state.mode is FlightMode.ORBIT:
@@ -186,7 +186,7 @@ class Orbit(MissionFlight):
         return await super().reattach()
 
     def checkpoint(self) -> CheckpointState:
-        """As for a route, and the circle."""
+        """Return what `MissionFlight` needs, and the circle."""
         center = self.center
         return {
             **super().checkpoint(),
@@ -197,7 +197,6 @@ class Orbit(MissionFlight):
         }
 
     def restore(self, checkpoint: CheckpointState) -> None:
-        """The same."""
         super().restore(checkpoint)
         center, radius = checkpoint.get("center"), checkpoint.get("radius")
         if not isinstance(center, list) or not isinstance(radius, int | float):

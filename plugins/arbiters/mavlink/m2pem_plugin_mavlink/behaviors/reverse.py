@@ -1,4 +1,4 @@
-"""Backwards."""
+"""The behavior `reverse`: drive backwards over a distance."""
 
 import math
 
@@ -25,7 +25,8 @@ LOOK_EVERY_S = 0.1
 
 
 class Reverse(Behavior):
-    """Drive backwards over a distance, then stand: by DO_SET_REVERSE, and a place behind."""
+    """Drive backwards over a distance, then stop: by DO_SET_REVERSE and a target behind the
+    vehicle."""
 
     name = "reverse"
     modes = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
@@ -41,7 +42,7 @@ class Reverse(Behavior):
         self._done = False
 
     def refusal(self) -> str:
-        """It must know where it is and points, and not back out of the fence."""
+        """Check that position and heading are known, and that the path is inside the fence."""
         if self._from is None or self._yaw_rad is None:
             return "where it is, and where its bow points, is not known yet"
         if self.context.fence is None:
@@ -50,12 +51,11 @@ class Reverse(Behavior):
         return self.context.fence.breach(way, self._from, lambda _: "the place behind it")
 
     def adjust(self, speed_m_s: float) -> bool:
-        """It can."""
         self._speed_m_s = speed_m_s
         return True
 
     async def begin(self) -> None:
-        """Set it to drive backwards, to a place somewhat beyond the distance."""
+        """Reverse, towards a target `BEYOND_M` behind the distance."""
         if self._from is None or self._yaw_rad is None:
             raise BehaviorFailedError("where it is, and where its bow points, is not known")
         if self._distance_m == 0:
@@ -69,12 +69,12 @@ class Reverse(Behavior):
         await driver.go_to(Place(*beyond), self._speed_m_s)
 
     async def resume(self) -> None:
-        """To the same place as before."""
+        """Continue to the same target."""
         if not self._done:
             await self.begin()
 
     async def run_in_background(self) -> None:
-        """Stop it after the distance."""
+        """Stop the vehicle after the distance."""
         if self._done:
             return
         while not self._covered():
@@ -83,11 +83,11 @@ class Reverse(Behavior):
         self._done = True
 
     def finished(self) -> bool:
-        """It was stopped after the distance, and stands."""
+        """Return whether the vehicle was stopped after the distance, and does not move."""
         return self._done and is_still(self.vehicle)
 
     async def clean_up(self) -> None:
-        """Set it to drive forwards again."""
+        """Let the vehicle drive forwards again."""
         await self.vehicle.driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 0.0)
 
     def _covered(self) -> bool:
@@ -103,7 +103,7 @@ class Reverse(Behavior):
         return offset(place, -distance_m * math.cos(yaw_rad), -distance_m * math.sin(yaw_rad))
 
     async def reattach(self) -> BehaviorState:
-        """By how far it is from where it began."""
+        """Judge by the distance from the start."""
         mode = self.vehicle.state.mode
         if self._from is None or mode not in self.modes:
             return BehaviorState.UNKNOWN
@@ -115,11 +115,10 @@ class Reverse(Behavior):
         return BehaviorState.RUNNING if moves else BehaviorState.UNKNOWN
 
     def checkpoint(self) -> CheckpointState:
-        """Where it began, and where its bow pointed."""
+        """Return the position and the yaw at the start."""
         return {"from": list(self._from or ()), "yaw": self._yaw_rad}
 
     def restore(self, checkpoint: CheckpointState) -> None:
-        """The same."""
         began, yaw = checkpoint.get("from"), checkpoint.get("yaw")
         if isinstance(began, list) and len(began) == 2 and isinstance(yaw, int | float):
             self._from, self._yaw_rad = (began[0], began[1]), float(yaw)

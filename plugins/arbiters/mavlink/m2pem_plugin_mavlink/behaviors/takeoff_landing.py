@@ -1,4 +1,4 @@
-"""Up, down and home."""
+"""Takeoff, landing, changes of altitude, return to launch, and the speed of later behaviors."""
 
 import contextlib
 import math
@@ -51,7 +51,7 @@ HOVERS_AT_HOME_S = 30.0
 
 
 class ChangeAltitude(Behavior):
-    """Climb or sink to a height, over where it is."""
+    """Climb or descend to a height at the present position."""
 
     name = "change_altitude"
     modes = frozenset({FlightMode.GUIDED})
@@ -64,24 +64,23 @@ class ChangeAltitude(Behavior):
         self._altitude_m = altitude or 0.0
 
     def refusal(self) -> str:
-        """It must fly, and know where."""
+        """Check that the vehicle flies, and that its position is known."""
         if reason := takeoff_required(self.vehicle):
             return reason
         return "" if position_of(self.vehicle) else "its position is not known yet"
 
     async def begin(self) -> None:
-        """Send it to the height, over where it is."""
         here = position_of(self.vehicle)
         if here is None:
             raise BehaviorFailedError("its position is not known")
         await self.vehicle.driver.go_to(Place(*here, self._altitude_m, self._frame))
 
     async def resume(self) -> None:
-        """The same, over where it is by now."""
+        """Continue at the position that the vehicle has now."""
         await self.begin()
 
     def finished(self) -> bool:
-        """At the height, and neither climbing nor sinking."""
+        """Return whether the vehicle is at the height and neither climbs nor descends."""
         height = height_m(self.vehicle.state, self._frame)
         if height is None:
             raise BehaviorFailedError(f"its height above {self._frame} is not known")
@@ -94,7 +93,7 @@ class ChangeAltitude(Behavior):
         return velocity is None or abs(velocity[2]) < LEVEL_M_S
 
     async def reattach(self) -> BehaviorState:
-        """By its height, and whether it climbs or sinks towards the one asked for."""
+        """Judge by the height, and by whether the vehicle climbs or descends towards the target."""
         if not accepts_mode(self, self.vehicle.state.mode):
             return BehaviorState.UNKNOWN
         here = position_of(self.vehicle)
@@ -106,7 +105,7 @@ class ChangeAltitude(Behavior):
 
 
 class Takeoff(ChangeAltitude):
-    """Take off and climb; one that flies already only climbs. Planes take off by a mission."""
+    """Take off and climb; a vehicle that flies only climbs. Planes take off by a mission."""
 
     name = "takeoff"
     modes = frozenset({FlightMode.GUIDED, FlightMode.TAKEOFF})
@@ -117,7 +116,7 @@ class Takeoff(ChangeAltitude):
             self.modes |= {FlightMode.MISSION}
 
     def refusal(self) -> str:
-        """The height must be above its home."""
+        """Check that the height is above home."""
         altitude_m = self._above_home_m()
         if altitude_m is None:
             return "the height of its home is not known yet: say a relative altitude"
@@ -129,7 +128,6 @@ class Takeoff(ChangeAltitude):
         return ""
 
     async def begin(self) -> None:
-        """Arm it and have it take off; one that flies only climbs."""
         altitude_m = self._above_home_m()
         if self.vehicle.state.landed is False and self.vehicle.state.armed:
             await super().begin()
@@ -137,7 +135,7 @@ class Takeoff(ChangeAltitude):
             await self.vehicle.driver.take_off(altitude_m)
 
     def finished(self) -> bool:
-        """Up there, and no longer climbing."""
+        """Return whether the vehicle is at the height and no longer climbs."""
         if self.vehicle.state.landed is True:
             return False
         height = self.vehicle.state.altitude_above_home_m
@@ -158,8 +156,8 @@ class Takeoff(ChangeAltitude):
         return self._altitude_m - state.position.altitude_m + state.altitude_above_home_m
 
     async def reattach(self) -> BehaviorState:
-        """As for a change of altitude; or it is in a mode for takeoffs, or flies a mission that
-        is one."""
+        """Judge as for a change of altitude, by the mode, or by a stored mission that is a
+        takeoff."""
         state = await super().reattach()
         if state is not BehaviorState.UNKNOWN or not self.vehicle.state.armed:
             return state
@@ -179,7 +177,7 @@ class Takeoff(ChangeAltitude):
 
 
 class Land(Behavior):
-    """Land where it is; a plane by the landing of its mission."""
+    """Land at the present position; a plane lands by the landing sequence of its mission."""
 
     name = "land"
     modes = frozenset({FlightMode.LAND})
@@ -191,27 +189,26 @@ class Land(Behavior):
             self.modes |= {FlightMode.MISSION}
 
     async def begin(self) -> None:
-        """Unless it has landed already."""
+        """Land, unless the vehicle has landed already."""
         if not self._down():
             await self.vehicle.driver.land()
 
     async def resume(self) -> None:
-        """Land where it is by now."""
         await self.begin()
 
     async def run_in_background(self) -> None:
-        """Disarm an aircraft that has landed and does not do that itself."""
+        """Disarm an aircraft that has landed and does not disarm itself."""
         await disarm_after_landing(self)
 
     def finished(self) -> bool:
-        """On the ground and disarmed."""
+        """Return whether the vehicle is on the ground and disarmed."""
         return self._down()
 
     def _down(self) -> bool:
         return self.vehicle.state.landed is True and self.vehicle.state.armed is False
 
     async def reattach(self) -> BehaviorState:
-        """By its mode, or because it is down; a mission must have come to its landing."""
+        """Judge by the mode, or by being on the ground; a mission must have come to its landing."""
         if self._down():
             return BehaviorState.SUCCEEDED
         mode = self.vehicle.state.mode
@@ -223,7 +220,7 @@ class Land(Behavior):
 
 
 async def disarm_after_landing(behavior: Behavior) -> None:
-    """Wait for a landing, and for the autopilot to disarm; if it does not, disarm."""
+    """Wait for a landing and for the autopilot to disarm; if it does not, disarm."""
     vehicle = behavior.vehicle
     await vehicle.until(lambda: vehicle.state.landed is True)
     if not await vehicle.until(lambda: vehicle.state.armed is False, DISARMS_WITHIN_S):
@@ -231,7 +228,7 @@ async def disarm_after_landing(behavior: Behavior) -> None:
 
 
 class ReturnToLaunch(Behavior):
-    """Go home; an aircraft lands there, unless it is set up to hover or circle."""
+    """Return home; an aircraft lands there, unless it is set to hover or circle."""
 
     name = "return_to_launch"
     modes = _RETURNS | {FlightMode.LAND}
@@ -244,13 +241,13 @@ class ReturnToLaunch(Behavior):
         self._rally: Sequence[LatLon] = ()
 
     def refusal(self) -> str:
-        """What stands on the ground away from home must take off first."""
+        """Check that an aircraft on the ground is at home."""
         if on_the_ground(self.vehicle) and self._home_m() > self._near_m:
             return takeoff_required(self.vehicle)
         return ""
 
     async def begin(self) -> None:
-        """Unless it is at home already."""
+        """Return, unless the vehicle is at home already."""
         self._stillness.forget()
         if self._is_there_already():
             self.modes = ANY_MODE
@@ -258,19 +255,18 @@ class ReturnToLaunch(Behavior):
         await self.vehicle.driver.return_home()
 
     async def resume(self) -> None:
-        """The same."""
         await self.begin()
 
     async def run_in_background(self) -> None:
-        """As `Land`; before, find out where else than at home it may land."""
+        """Read the rally points; then disarm as `Land` does."""
         if self.vehicle.domain == "air" and self.modes is not ANY_MODE:
             with contextlib.suppress(ExchangeError):  # most have no rally points
                 self._rally = await self.vehicle.driver.rally_points()
             await disarm_after_landing(self)
 
     def _off_m(self) -> float:
-        """How far it is from where it should land; 0 where that is not known, or the landing is one
-        of its own (a plane's, which may begin anywhere)."""
+        """Return the distance from where it should land; 0 if that is unknown, or if the landing is
+        a sequence of its own (a plane's, which may begin anywhere)."""
         if self.vehicle.state.loiter_radius_m is not None or position_of(self.vehicle) is None:
             return 0.0
         return min(
@@ -290,8 +286,8 @@ class ReturnToLaunch(Behavior):
         return state.home is not None and self._home_m() <= self._near_m and is_still(self.vehicle)
 
     def finished(self) -> bool:
-        """At home: an aircraft down and disarmed (or hovering, or circling, for long), others
-        standing.
+        """Return whether the vehicle is at home: an aircraft landed and disarmed (or hovering or
+        circling for long), others stopped.
 
         Raises:
             BehaviorFailedError: an aircraft stands somewhere else.
@@ -317,7 +313,7 @@ class ReturnToLaunch(Behavior):
         return self.vehicle.state.home is None and standing_s >= DISARMS_WITHIN_S
 
     async def reattach(self) -> BehaviorState:
-        """By its mode, or because it is at home."""
+        """Judge by the mode, or by being at home."""
         if self._is_there_already() and self._home_m() <= self._near_m:
             return BehaviorState.SUCCEEDED
         returns = accepts_mode(self, self.vehicle.state.mode)
@@ -325,7 +321,7 @@ class ReturnToLaunch(Behavior):
 
 
 class SetSpeed(Behavior):
-    """Change the speed of what follows; the arbiter keeps it for the behaviors after this one."""
+    """Set the speed of the following motion; the controller keeps it for later behaviors."""
 
     name = "set_speed"
     modes = ANY_MODE
@@ -336,8 +332,8 @@ class SetSpeed(Behavior):
         self.speed_m_s = VehicleParameters(context).speed_m_s or 0.0
 
     async def begin(self) -> None:
-        """Tell it the speed. A mode in which it goes nowhere may refuse it (BRAKE, HOLD); what
-        follows is told the speed in any case."""
+        """Send the speed. A mode without motion (BRAKE, HOLD) may refuse it; later behaviors send
+        it again."""
         try:
             await self.vehicle.driver.set_speed(self.speed_m_s)
         except RefusedError as refused:
@@ -345,13 +341,12 @@ class SetSpeed(Behavior):
                 raise
 
     async def resume(self) -> None:
-        """Tell it again."""
         await self.begin()
 
     def finished(self) -> bool:
-        """As soon as the autopilot has accepted."""
+        """Return True: `begin` returns when the autopilot has accepted."""
         return True
 
     async def reattach(self) -> BehaviorState:
-        """No autopilot tells the speed that it was set to."""
+        """Return UNKNOWN: no autopilot reports the speed that it was set to."""
         return BehaviorState.UNKNOWN
