@@ -1,4 +1,5 @@
-"""The arbiter of MAVLink vehicles. Its catalogue needs no MAVLink library, and no connection."""
+"""The arbiter of MAVLink vehicles. Its catalogue needs neither a MAVLink library nor a
+connection."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
@@ -50,22 +51,22 @@ STATES_WAITING = 1000
 
 
 class VehicleConnections(Protocol):
-    """The vehicles of a fleet, over whatever carries their messages."""
+    """The vehicles of a fleet and the links to them."""
 
     async def open(self) -> Mapping[ResourceId, "Vehicle"]:
-        """Listen; the vehicles need not be heard yet."""
+        """Open the links and return the vehicles; they need not have sent anything yet."""
         ...
 
     def watch(self, vehicle: "Vehicle") -> "TakeoverMonitor":
-        """What notices that somebody else steers; not open yet."""
+        """Return a monitor that detects takeovers of the vehicle; it is not open yet."""
         ...
 
     async def findings(self, vehicle: "Vehicle") -> Sequence[str]:
-        """Where the vehicle's own failsafes are not what the fleet says they are."""
+        """Return the differences between the vehicle's failsafes and the fleet file."""
         ...
 
     async def close(self) -> None:
-        """Let go of them, and of all sockets."""
+        """Close all vehicles, links and sockets."""
         ...
 
 
@@ -93,7 +94,7 @@ def _make_connections(
 
 
 class MavlinkArbiter:
-    """Implements `m2pem.api.AdjustingArbiter`. What a fleet may say of it: docs/mavlink.md.
+    """Implements `m2pem.api.AdjustingArbiter`. Its settings in a fleet file: docs/mavlink.md.
 
     Raises:
         PluginError: a connection cannot be used; the text names the resource and the key.
@@ -124,22 +125,22 @@ class MavlinkArbiter:
     # --- what is offered ------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What a vehicle can do, by its domain; payloads are carried, no more."""
+        """Return the behaviors of a vehicle, by its domain; payloads have none."""
         if resource not in self._settings:
             return ()
         return offered(self._connections[resource].domain)
 
     def _behaviors_of(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """A payload may be held by what its vehicle does."""
+        """Return the behaviors of a vehicle or, for a payload, of the vehicle that carries it."""
         return self.catalogue(ResourceId(resource.partition("/")[0]))
 
     def limits(self, resource: ResourceId) -> Limits:
-        """The bounds that hold for a vehicle."""
+        """Return the time limits of a vehicle."""
         own = self._connections[resource].lost_after_s if resource in self._connections else None
         return Limits(LOST_AFTER_S if own is None else own, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
 
     def addresses(self, resource: ResourceId) -> Sequence[str]:
-        """The system on each of its links; payloads are carried.
+        """Return the system id with each of the vehicle's URLs; none for payloads.
 
         A port that the kernel chooses (0) is another one in each process: nothing is shared there.
         """
@@ -155,7 +156,8 @@ class MavlinkArbiter:
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Listen to all vehicles; returns when all were heard, or soon."""
+        """Open all links; return when all vehicles have sent their state, or after
+        `HEARD_WITHIN_S`."""
         from m2pem_plugin_mavlink.vehicle_controller import VehicleController  # noqa: PLC0415  # it needs pymavlink
 
         lost_after_s = {resource: self.limits(resource).lost_after_s for resource in self._settings}
@@ -192,7 +194,7 @@ class MavlinkArbiter:
                 self._context.logger.warning("%s: where it is was not heard yet", resource)
 
     async def close(self) -> None:
-        """Listen no more. Vehicles keep doing what they do."""
+        """Close all links. The vehicles continue what they do."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -222,7 +224,7 @@ class MavlinkArbiter:
             self._pending.pop(request.id, None)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Stop the vehicle that does it."""
+        """Stop the vehicle that executes the behavior."""
         if self._tracker.may_cancel(behavior, epoch):
             for resource, controller in self._controllers.items():
                 if self._tracker.holder(resource) == behavior:
@@ -231,7 +233,7 @@ class MavlinkArbiter:
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
     ) -> None:
-        """Have the vehicle that does it go on at another `speed`; other parameters stay."""
+        """Change the `speed` of a behavior; other parameters stay."""
         speed_m_s = parameters.get("speed")
         if not isinstance(speed_m_s, int | float) or speed_m_s <= 0:
             return
@@ -241,22 +243,22 @@ class MavlinkArbiter:
                     controller.adjust(behavior, float(speed_m_s))
 
     async def hold(self, resource: ResourceId) -> None:
-        """Have a vehicle stand still at once."""
+        """Stop a vehicle at once; it keeps its behavior."""
         if resource in self._controllers:
             self._controllers[resource].hold()
 
     async def resume(self, resource: ResourceId) -> None:
-        """Have a vehicle go on."""
+        """Continue the behavior of a held vehicle."""
         if resource in self._controllers:
             self._controllers[resource].resume()
 
     async def reclaim(self, resource: ResourceId) -> str:
-        """A vehicle that was lost is heard again: have it stop, unless it flies a failsafe."""
+        """Stop a vehicle that was lost and is connected again, unless it executes a failsafe."""
         return await self._controllers[resource].reclaim() if resource in self._controllers else ""
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What is known; after a restart, what the vehicle itself shows. Nothing is sent to it but
-        questions."""
+        """Return the last report or, after a restart, the state that the vehicle shows. Only
+        questions are sent to the vehicle."""
         known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
@@ -269,11 +271,11 @@ class MavlinkArbiter:
     # --- streams --------------------------------------------------------------------------------
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Reports as they come, for one reader, until `close`."""
+        """Yield reports to one reader until `close`."""
         return self._tracker.reports()
 
     def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """States as they come, for one reader, until `close`; a slow one misses old states."""
+        """Yield states to one reader until `close`; a slow reader misses old states."""
         return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
@@ -367,14 +369,15 @@ class MavlinkArbiter:
         return replace(unknown, reason=f"{checkpoint.resource} is in {mode}, and does not do it")
 
     async def _check(self, vehicle: "Vehicle") -> None:
-        """Tell where the fleet and the vehicle disagree about failsafes, once it is heard."""
+        """Log the differences between the fleet file and the vehicle's failsafes, once it is
+        identified."""
         await vehicle.until(lambda: vehicle.identity is not None)
         if self._vehicle_connections is not None and self._connections[vehicle.resource].failsafe:
             for finding in await self._vehicle_connections.findings(vehicle):
                 self._context.logger.warning("%s", finding)
 
     async def _monitor_vehicle(self, resource: ResourceId) -> None:
-        """Tell how a vehicle is, and notice when it falls silent."""
+        """Publish the state of a vehicle, and report its behavior LOST when it falls silent."""
         controller, clock = self._controllers[resource], self._context.clock
         vehicle = controller.vehicle
         bound_s = self.limits(resource).lost_after_s
@@ -398,8 +401,8 @@ class MavlinkArbiter:
             await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
 
     def _publish_mode_changes(self, controller: "VehicleController") -> None:
-        """Publish changes of mode, and arming, at once: they may end a run, and what operators then
-        read of the vehicle is its last state."""
+        """Publish a change of mode or arming at once: it may end a run, and operators then read the
+        last state of the vehicle."""
         state = controller.vehicle.state
         shown = state.custom_mode, state.armed
 

@@ -1,4 +1,4 @@
-"""What a MAVLink vehicle can be asked for, by its domain; needs no MAVLink library."""
+"""The behaviors that a MAVLink vehicle offers, by its domain; needs no MAVLink library."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -53,7 +53,7 @@ RUN_ONBOARD_MISSION = BehaviorSpec(
 
 
 def offered(domain: str) -> tuple[BehaviorSpec, ...]:
-    """What a vehicle of a domain is offered to do, over MAVSDK too."""
+    """Return the behaviors of a domain; they are the same over MAVSDK."""
     return _offered(domain if domain in _BY_DOMAIN else "ground")
 
 

@@ -1,4 +1,4 @@
-"""The commands of this plugin. What they need is loaded only when one is called."""
+"""The commands of this plugin; their modules are imported when a command is invoked."""
 
 from collections.abc import MutableMapping
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""What a fleet says of the connection to a MAVLink vehicle."""
+"""The settings of a connection to a MAVLink vehicle in the fleet file."""
 
 import difflib
 from collections.abc import Mapping
@@ -15,8 +15,8 @@ GCS_SYSTEM_ID = 255
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """`urls`: of the endpoints that the vehicle may be heard on. `actuators`: the fleet's names for
-    them ("servo 9")."""
+    """`urls`: the endpoints on which the vehicle may be reached. `actuators`: the names in the
+    fleet file for actuators ("servo 9")."""
 
     urls: tuple[str, ...]
     system_id: int
@@ -33,7 +33,7 @@ _KEYS = ("url", "system_id", "component_id", "driver", "gcs_system_id", "actuato
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
-    """The settings of all vehicles; payloads have none of their own.
+    """Read the settings of all vehicles; payloads have none of their own.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.

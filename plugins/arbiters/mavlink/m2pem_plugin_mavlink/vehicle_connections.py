@@ -1,4 +1,4 @@
-"""The vehicles of a fleet behind their links."""
+"""Opens the links to the vehicles of a fleet."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
@@ -21,7 +21,8 @@ _OPEN: Mapping[str, Callable[..., Awaitable[RoutedLink | MavsdkLink]]] = {
 
 
 class MavlinkVehicleConnections:
-    """Implements `m2pem_plugin_mavlink.arbiter.Station`; `lost_after_s`: of each vehicle."""
+    """Implements `m2pem_plugin_mavlink.arbiter.VehicleConnections`; `lost_after_s`: of each
+    vehicle."""
 
     def __init__(
         self,
@@ -38,7 +39,7 @@ class MavlinkVehicleConnections:
         self._vehicles: dict[ResourceId, Vehicle] = {}
 
     async def open(self) -> Mapping[ResourceId, Vehicle]:
-        """Open the endpoints, and listen.
+        """Open the links.
 
         Raises:
             PluginError: a URL is wrong, or an endpoint cannot be opened; nothing stays open.
@@ -72,17 +73,14 @@ class MavlinkVehicleConnections:
         vehicle.open()
 
     def watch(self, vehicle: Vehicle) -> TakeoverMonitor:
-        """What notices that somebody else steers; not open yet."""
         return TakeoverMonitor(vehicle, self._settings[vehicle.resource].gcs_system_id)
 
     async def findings(self, vehicle: Vehicle) -> Sequence[str]:
-        """Where the vehicle's own failsafes are not what the fleet says they are."""
         word = self._connections[vehicle.resource].failsafe
         own = self._settings[vehicle.resource].gcs_system_id
         return [str(finding) for finding in await check(vehicle, word, own)]
 
     async def close(self) -> None:
-        """Close all that was opened."""
         for vehicle in self._vehicles.values():
             await vehicle.close()
         await asyncio.gather(*(link.close() for link in self._links))

@@ -1,7 +1,7 @@
-"""Who steers one vehicle: one behavior at a time, from its beginning to its end.
+"""Controls one vehicle: one behavior at a time, from its beginning to its end.
 
-Whatever is asked of it (a new behavior, a hold, a cancel) takes effect at once: what was being done
-for it before, an exchange in flight too, is given up, and only then something else is sent.
+A new behavior, a hold or a cancel takes effect at once: the work before it is cancelled, an
+exchange in flight too, and only then is something else sent.
 """
 
 import asyncio
@@ -39,9 +39,9 @@ _FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
 
 @dataclass(slots=True)
 class _ActiveBehavior:
-    """A behavior that goes on. `begun`: the vehicle does it; `looked`: it was recognised on a
-    vehicle that had it already, and nothing need be sent. `speed_m_s`: to be told to the vehicle
-    while it goes on; None: nothing is."""
+    """The behavior that is active. `begun`: the vehicle executes it; `reattached`: it was found on
+    the vehicle after a restart, and nothing need be sent. `speed_m_s`: to be sent to the vehicle;
+    None: nothing is."""
 
     id: BehaviorId
     behavior: Behavior
@@ -52,7 +52,7 @@ class _ActiveBehavior:
 
 
 class VehicleController:
-    """Steers a vehicle; what becomes of it goes to the ledger."""
+    """Controls a vehicle; reports what becomes of its behaviors to the tracker."""
 
     def __init__(
         self,
@@ -75,12 +75,12 @@ class VehicleController:
 
     @property
     def behavior(self) -> str:
-        """The name of what it does now, or ""."""
+        """The name of the active behavior, or ""."""
         return self._active.behavior.name if self._active is not None else ""
 
     async def wait_until_known(self, within_s: float) -> bool:
-        """Wait until it is known what the vehicle is, where it is and whether it flies; False: it
-        was not within so many seconds."""
+        """Wait until the kind of vehicle, its position and whether it flies are known; False: not
+        within this time."""
         state = self.vehicle.state
         return await self.vehicle.identified(within_s) and await self.vehicle.until(
             lambda: state.position is not None and state.landed is not None, within_s
@@ -89,7 +89,7 @@ class VehicleController:
     # --- what may be asked ----------------------------------------------------------------------
 
     def start(self, id_: BehaviorId, behavior: Behavior, *, look_first: bool = False) -> None:
-        """Do this from now on, in place of what it does.
+        """Execute a behavior in place of the active one.
 
         `look_first`: it may have been begun before a restart; then it is not begun again.
         """
@@ -101,27 +101,28 @@ class VehicleController:
         self._replace(lambda: self._run(active, before.behavior if before else None, look_first))
 
     def adopt(self, id_: BehaviorId, behavior: Behavior) -> None:
-        """The vehicle was found doing it, and is to go on."""
+        """Continue a behavior that the vehicle was found to execute."""
         self._active = active = _ActiveBehavior(id_, behavior, begun=True, reattached=True)
         self._held = False
         self._was_commanded = True
         self._replace(lambda: self._run(active))
 
     def cancel(self, id_: BehaviorId) -> None:
-        """Stop, and be free."""
+        """Stop the vehicle, and free it."""
         active = self._active
         if active is not None and active.id == id_ and not active.cancelled:
             active.cancelled = True
             self._replace(lambda: self._cancel(active))
 
     def adjust(self, id_: BehaviorId, speed_m_s: float) -> None:
-        """Go on at another speed; who is held does so when it goes on."""
+        """Change the speed of the behavior; while it is held, the change takes effect when it is
+        resumed."""
         active = self._active
         if active is not None and active.id == id_ and active.behavior.adjust(speed_m_s):
             active.speed_m_s = speed_m_s
 
     def hold(self) -> None:
-        """Stand still, and keep the behavior."""
+        """Stop the vehicle, and keep the behavior."""
         active = self._active
         if active is not None and active.cancelled:
             return  # it is being stopped already
@@ -136,23 +137,23 @@ class VehicleController:
         self._replace(lambda: self._hold_still(active))
 
     def resume(self) -> None:
-        """Go on with the behavior."""
+        """Continue the behavior."""
         active, held = self._active, self._held
         self._held = False
         if active is not None and held:
             self._replace(lambda: self._run(active))
 
     def release(self) -> None:
-        """It cannot be reached: its behavior is nobody's any more."""
+        """Forget the behavior of a vehicle that is lost."""
         self._active = None
         self._held = False
         for task in self._work:
             task.cancel()
 
     async def reclaim(self) -> str:
-        """It is heard again: have it stop what it was given before. Returns "" when it has
-        acknowledged, else why it is not free: RTL or LAND is not interrupted, as a lost link makes
-        autopilots do that by themselves."""
+        """Stop a vehicle that is connected again. Return "" when it has acknowledged, else why
+        it is not free: RTL or LAND is not interrupted, as autopilots start them when a link is
+        lost."""
         self.release()
         if not await self.wait_until_known(KNOWN_WITHIN_S):
             return "it is heard again, and does not say yet what it does"
@@ -175,11 +176,12 @@ class VehicleController:
         return ""
 
     def mark_commanded(self) -> None:
-        """It may be doing what it was given before a restart, and could not be asked."""
+        """Note that the vehicle may execute a command from before a restart, and could not be
+        asked."""
         self._was_commanded = True
 
     def _stands(self) -> bool:
-        """One that flies does not stand, though it may hover for a while."""
+        """Return whether the vehicle has stopped; one that flies has not, though it may hover."""
         if self.vehicle.domain == "air":
             return on_the_ground(self.vehicle)
         velocity = self.vehicle.state.velocity_enu_m_s
@@ -239,13 +241,13 @@ class VehicleController:
             self._end(active, BehaviorState.SUCCEEDED)
 
     async def _wait_until_received(self) -> None:
-        """Wait for a vehicle that was not heard yet; one that is never heard is LOST. One that
-        knows no position yet is asked all the same: its driver says why it is not ready."""
+        """Wait for the first messages of the vehicle; one that never sends any is LOST. A vehicle
+        without a position is commanded all the same: its driver says why it is not ready."""
         if not await self.wait_until_known(KNOWN_WITHIN_S):
             await self.vehicle.until(lambda: self.vehicle.identity is not None)
 
     async def _clean_up_before(self, before: Behavior, after: Behavior) -> None:
-        """What takes over without steering must not let the old motion go on."""
+        """End the motion before a behavior that does not move the vehicle; otherwise clean up."""
         if after.moves_vehicle:
             await before.clean_up()
         elif before.moves_vehicle:
@@ -282,7 +284,8 @@ class VehicleController:
             await asyncio.gather(steps, telling, return_exceptions=True)
 
     async def _send_speeds(self, active: _ActiveBehavior) -> None:
-        """Beside the behavior, whose end must not wait for it; of several the newest counts."""
+        """Send new speeds beside the behavior, whose end must not wait for them; the newest
+        counts."""
         while True:
             speed_m_s, active.speed_m_s = active.speed_m_s, None
             if speed_m_s is not None:
@@ -300,7 +303,7 @@ class VehicleController:
             raise _TakenOverError(takeover.reason, code)
 
     def _has_restarted(self) -> bool:
-        """False.
+        """Return False.
 
         Raises:
             _TakenOverError: it has.
@@ -358,8 +361,8 @@ class VehicleController:
 
     @property
     def _is_in_failsafe(self) -> bool:
-        """Whether it returns or lands, and was not asked for that here: a failsafe, or a person.
-        After a restart it is held when its behavior is not recognised."""
+        """Return whether the vehicle returns or lands without a command from here: by a failsafe,
+        or by a person."""
         state, active = self.vehicle.state, self._active
         if not state.armed or state.mode not in _FAIL_SAFE:
             return False
@@ -368,7 +371,7 @@ class VehicleController:
         )
 
     async def _stop(self) -> None:
-        """Have it stand; a failsafe of its own goes on, whatever ends here."""
+        """Stop the vehicle, unless it executes a failsafe of its own."""
         if not await self.vehicle.identified(0.0):
             return
         if self._is_in_failsafe:
@@ -381,8 +384,8 @@ class VehicleController:
         await self.vehicle.driver.stop()
 
     async def _fail(self, active: _ActiveBehavior, reason: str, code: str = "") -> None:
-        """What has failed half-way must not go on, but a return or a landing; a vehicle that stands
-        is left as it is."""
+        """End a behavior that has failed half-way: stop the motion, but not a return or a landing,
+        nor a vehicle that is on the ground."""
         state = self.vehicle.state
         comes_down = isinstance(active.behavior, Land | ReturnToLaunch) and state.mode in _FAIL_SAFE
         try:
@@ -401,7 +404,7 @@ class VehicleController:
 
 
 class _TakenOverError(Exception):
-    """Somebody else steers: nothing more is sent."""
+    """The vehicle was taken over: nothing more is sent to it."""
 
     def __init__(self, reason: str, code: str) -> None:
         super().__init__(reason)

@@ -1,1 +1,1 @@
-"""One vehicle: what is known of it, whether it is ready, and how it is driven."""
+"""One vehicle: its state, its modes, whether it may be armed, and the drivers of autopilots."""

@@ -1,4 +1,4 @@
-"""How ArduPilot is driven: ArduCopter, ArduPlane, ArduRover (boats too) and ArduSub."""
+"""The driver of ArduPilot: ArduCopter, ArduPlane, ArduRover (boats too) and ArduSub."""
 
 import math
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ _STOP_MODES = {
 
 
 class ArdupilotDriver(Autopilot):
-    """Drives a vehicle with ArduPilot; see `Driver`."""
+    """The driver of a vehicle with ArduPilot; see `Driver`."""
 
     home_items = 1
 
@@ -51,17 +51,17 @@ class ArdupilotDriver(Autopilot):
         )
 
     async def _enter_arming_mode(self) -> None:
-        """GUIDED, which is refused as long as there is no position: an arming in STABILIZE would
-        succeed without one, and the takeoff then fail. A plane that is armed in GUIDED would set
-        out at once; it is armed in the mode that it is in."""
+        """Enter GUIDED, which is refused as long as there is no position: in STABILIZE the arming
+        would succeed and the takeoff then fail. A plane that is armed in GUIDED would set out at
+        once; it is armed in the mode that it is in."""
         if self.kind not in WINGED:
             await self.set_mode(FlightMode.GUIDED)
 
     # --- up and down ----------------------------------------------------------------------------
 
     async def take_off(self, altitude_m: float) -> None:
-        """Arm where needed, and climb to so much above home. A plane does that by a mission, which
-        takes the place of the one that it has."""
+        """Arm where needed, and climb to a height above home. A plane takes off by a mission, which
+        replaces its stored one."""
         match self.kind:
             case Kind.COPTER:
                 await self._copter_takes_off(altitude_m)
@@ -114,7 +114,7 @@ class ArdupilotDriver(Autopilot):
         return Place(position.latitude_deg, position.longitude_deg, altitude_m)
 
     async def land(self) -> None:
-        """Land where it is: a plane by the landing of its mission, if that has one."""
+        """Land at the present position; a plane by the landing sequence of its mission."""
         match self.kind:
             case Kind.COPTER | Kind.VTOL:
                 await self.set_mode(FlightMode.LAND)
@@ -127,7 +127,6 @@ class ArdupilotDriver(Autopilot):
                 raise cannot(f"a {self.kind} does not land")
 
     async def return_home(self) -> None:
-        """Return to launch."""
         if self.kind is Kind.SUB:
             raise cannot("a sub does not return to launch")
         if self.kind in (Kind.ROVER, Kind.BOAT):
@@ -135,8 +134,8 @@ class ArdupilotDriver(Autopilot):
         await self.set_mode(FlightMode.RETURN)
 
     async def stop(self) -> None:
-        """BRAKE, HOLD or LOITER, whatever stops this kind of vehicle best; one that is not armed
-        stands already."""
+        """Enter BRAKE, HOLD or LOITER, whichever stops this kind of vehicle best; one that is not
+        armed has stopped."""
         if self.state.armed is False:
             return
         *better, last = _STOP_MODES[self.kind]
@@ -151,8 +150,8 @@ class ArdupilotDriver(Autopilot):
     # --- to places ------------------------------------------------------------------------------
 
     async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
-        """Go to a place in GUIDED. The speed is set after it: a rover that has no target refuses
-        a speed, also that of the command for the target."""
+        """Go to a place in GUIDED. The speed is sent after it: a rover without a target refuses a
+        speed, also that of the command for the target."""
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
         # Unless it is told, a plane circles as far from there as from the place before.
@@ -181,7 +180,8 @@ class ArdupilotDriver(Autopilot):
         )
 
     def _altitude(self, place: Place) -> tuple[int, float]:
-        """A MAV_FRAME and a height in it; ArduPilot takes no NaN for "as it is"."""
+        """Return a MAV_FRAME and a height in it; ArduPilot accepts no NaN for the present
+        height."""
         if self.kind in (Kind.ROVER, Kind.BOAT):
             return dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0.0
         if place.altitude_m is not None:
@@ -191,8 +191,8 @@ class ArdupilotDriver(Autopilot):
         return dialect.MAV_FRAME_GLOBAL, self.state.position.altitude_m
 
     async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
-        """Only planes can be told to circle a place; the CIRCLE of copters and rovers has no
-        command for its center."""
+        """Circle a place with a plane; the CIRCLE of copters and rovers has no command for its
+        centre."""
         if self.kind not in WINGED:
             return False
         await self._arm_to_drive()
@@ -203,8 +203,8 @@ class ArdupilotDriver(Autopilot):
         return True
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
-        """One velocity setpoint, which holds for 3 s. It does not take the vehicle back from
-        somebody who has left GUIDED."""
+        """Send one velocity setpoint, which holds for 3 s. Raise an error if another client has
+        left GUIDED."""
         if self.kind in WINGED:
             raise cannot(f"a {self.kind} takes no velocities")
         guided = self.modes.number("GUIDED")
@@ -218,7 +218,7 @@ class ArdupilotDriver(Autopilot):
     # --- missions -------------------------------------------------------------------------------
 
     def _as_stored(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Item 0 is home, which the vehicle replaces by its own."""
+        """Return the items behind item 0, which is home; the vehicle replaces it by its own."""
         home = self.state.home
         place = (
             (home.latitude_deg, home.longitude_deg, home.altitude_m) if home else (0.0, 0.0, 0.0)
@@ -227,8 +227,8 @@ class ArdupilotDriver(Autopilot):
         return (MissionItem(dialect.MAV_CMD_NAV_WAYPOINT, frame, (0.0,) * 4, *place), *items)
 
     async def upload(self, items: Sequence[MissionItem]) -> None:
-        """Store a mission. The landing of the one before stays behind it, unless it has its own;
-        the mission must not run into it."""
+        """Store a mission. The landing sequence of the mission before stays behind it, unless the
+        new one has its own; the mission must not continue into it."""
         if self.kind is Kind.PLANE and items and landing_begins(items) is None:
             items = (*items, *landing(await self.downloaded()))
         await super().upload(items)

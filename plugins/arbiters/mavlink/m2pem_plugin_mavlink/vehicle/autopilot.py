@@ -1,4 +1,5 @@
-"""What the drivers of all autopilots share: to command, and to believe what is then heard."""
+"""What the drivers of all autopilots share: send commands until the vehicle's own messages confirm
+them."""
 
 import contextlib
 import re
@@ -59,12 +60,12 @@ _LATER: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 def cannot(reason: str) -> RefusedError:
-    """It is not even asked: it has no such thing."""
+    """Return the error for a command that this vehicle does not have; nothing was sent."""
     return RefusedError(reason, _UNSUPPORTED)
 
 
 def not_now(reason: str) -> RefusedError:
-    """It is not asked as it stands."""
+    """Return the error for a command that is impossible in the present state; nothing was sent."""
     return RefusedError(reason, _LATER, temporary=True)
 
 
@@ -82,7 +83,7 @@ class DrivenVehicle(Protocol):
 
 
 class Autopilot(ABC):
-    """Implements `Driver`, but for what each make of autopilot has its own way of."""
+    """Implements the part of `Driver` that is the same for all autopilots."""
 
     home_items: int
     """How many items of a stored mission stand before the first real one."""
@@ -100,26 +101,21 @@ class Autopilot(ABC):
     # --- what it says ---------------------------------------------------------------------------
 
     def mode_name(self, custom_mode: int) -> str:
-        """The autopilot's own name of a mode."""
         return self.modes.name(custom_mode)
 
     def flight_mode(self, custom_mode: int) -> FlightMode:
-        """What a mode is for."""
         return self.modes.purpose(custom_mode)
 
     def readiness(self) -> Readiness:
-        """Whether it may be armed now."""
         texts = self.vehicle.recent_texts(TEXTS_WITHIN_S)
         return readiness(self.identity.firmware, self.state, texts, self.link.now_s())
 
     @property
     def current_item(self) -> int | None:
-        """The item that the vehicle moves to, numbered as in `upload`."""
         return self._item(self.state.mission_sequence)
 
     @property
     def reached_item(self) -> int | None:
-        """The item reached last since the mission was started."""
         return self._item(self.state.reached_sequence)
 
     def _item(self, sequence: int | None) -> int | None:
@@ -129,13 +125,13 @@ class Autopilot(ABC):
 
     @property
     def in_the_air(self) -> bool:
-        """Whether it flies."""
         return bool(self.state.armed) and self.state.landed is False
 
     # --- modes ----------------------------------------------------------------------------------
 
     async def set_mode(self, mode: FlightMode) -> None:
-        """Change the mode, again and again until its heartbeat shows it, within `MODE_WITHIN_S`.
+        """Change the mode; repeat the command until a heartbeat confirms it, within
+        `MODE_WITHIN_S`.
 
         Raises:
             ExchangeError: it does not; one in which a person steers is never commanded.
@@ -167,7 +163,7 @@ class Autopilot(ABC):
         *,
         must_accept: bool = False,
     ) -> None:
-        """Give a command that changes the mode, and note that the change is ours."""
+        """Send a command that changes the mode, and note that the change was commanded here."""
         before = self.commanded.custom_mode
         self.commanded.custom_mode = custom_mode
         self.commanded.changing += 1
@@ -189,9 +185,9 @@ class Autopilot(ABC):
         *,
         must_accept: bool = False,
     ) -> None:
-        """Command until what is heard shows that it is so: an acknowledgement may be lost, and a
-        refusal may be for now. `must_accept`: that it is so proves nothing, as it may have been
-        before."""
+        """Send a command until received messages confirm it: an acknowledgement may be lost, and a
+        refusal may be temporary. `must_accept`: the messages prove nothing, as the vehicle may have
+        been in this state before."""
         end_s = self.link.now_s() + within_s
         while True:
             error: ExchangeError = NoAnswerError(f"{what} was accepted, but does not come")
@@ -215,8 +211,8 @@ class Autopilot(ABC):
     # --- arming ---------------------------------------------------------------------------------
 
     async def arm(self) -> None:
-        """Wait until it knows where it is and its checks pass, within `LOCATED_WITHIN_S` and
-        `CHECKED_WITHIN_S`, and arm it, until its heartbeat shows it. An armed vehicle is left as it
+        """Wait until the position is known and the checks pass, within `LOCATED_WITHIN_S` and
+        `CHECKED_WITHIN_S`; then arm until a heartbeat confirms it. An armed vehicle is left as it
         is.
 
         Raises:
@@ -233,11 +229,11 @@ class Autopilot(ABC):
         await self._arm()
 
     async def _locate(self) -> None:
-        """Wait until it knows where it is."""
+        """Wait until the position is known."""
         await self._until(self._is_located, LOCATED_WITHIN_S)
 
     async def _until(self, ready: Callable[[], bool], within_s: float) -> None:
-        """Wait; operators read what for, and when that changes."""
+        """Wait; show operators the reasons, and changes of them."""
         end_s = self.link.now_s() + within_s
         told = ""
 
@@ -262,8 +258,8 @@ class Autopilot(ABC):
         return not_now("not ready: " + "; ".join(self.readiness().reasons))
 
     async def _have_it_checked(self) -> None:
-        """Have it say now why it cannot be armed; else ArduPilot does that every 30 s, and PX4 when
-        a reason comes or goes."""
+        """Request the reasons against arming now; unasked, ArduPilot sends them every 30 s, and PX4
+        when they change."""
         with contextlib.suppress(ExchangeError):  # older ones do not know the command
             await exchanges.command(self.link, dialect.MAV_CMD_RUN_PREARM_CHECKS)
 
@@ -280,7 +276,6 @@ class Autopilot(ABC):
         self.commanded.disarming = False
 
     async def disarm(self) -> None:
-        """Disarm; refused in flight."""
         if self.state.armed is False:
             return
         self.commanded.disarming = True
@@ -293,7 +288,7 @@ class Autopilot(ABC):
             raise NoAnswerError("disarming was accepted, but does not come")
 
     async def _arm_to_drive(self) -> None:
-        """What drives is armed when it is to move; what flies takes off first."""
+        """Arm a vehicle that drives; one that flies must take off first."""
         if self.state.armed:
             return
         if self.kind in (Kind.COPTER, Kind.PLANE, Kind.VTOL):
@@ -317,13 +312,12 @@ class Autopilot(ABC):
         )
 
     def _left_by_somebody(self, custom_mode: int) -> bool:
-        """Whether it was brought into a mode from here and is in another one now."""
+        """Return whether the vehicle was brought into a mode from here and has left it since."""
         return self.commanded.custom_mode == custom_mode and self.state.custom_mode != custom_mode
 
     # --- missions -------------------------------------------------------------------------------
 
     async def upload(self, items: Sequence[MissionItem]) -> None:
-        """Store a mission of items that begin with the first real one; none: clear it."""
         self.commanded.mission = None
         self.commanded.exchanging += 1
         try:
@@ -340,7 +334,6 @@ class Autopilot(ABC):
         return items
 
     async def downloaded(self) -> tuple[MissionItem, ...]:
-        """The mission that the vehicle has, as `upload` takes it."""
         self.commanded.exchanging += 1
         try:
             return (await exchanges.download(self.link))[self.home_items :]
@@ -348,13 +341,12 @@ class Autopilot(ABC):
             self.commanded.exchanging -= 1
 
     async def rally_points(self) -> Sequence[LatLon]:
-        """Where it may land instead of at home when it returns."""
         found = await exchanges.download(self.link, MissionType.RALLY)
         return [(each.latitude_deg, each.longitude_deg) for each in found]
 
     async def _mission_begins(self) -> None:
-        """Wait until MISSION_CURRENT shows that the mission is flown, or was to its end. One that
-        does not say it is believed.
+        """Wait until MISSION_CURRENT shows that the mission is active or complete. An autopilot
+        that does not report this is trusted.
 
         Raises:
             ExchangeError: it is not.
@@ -372,7 +364,7 @@ class Autopilot(ABC):
     # --- speed ----------------------------------------------------------------------------------
 
     async def set_speed(self, speed_m_s: float) -> None:
-        """The speed over ground of what follows (of a plane: through the air)."""
+        """Set the speed over ground of the following motion (of a plane: the airspeed)."""
         air = self.kind is Kind.PLANE
         type_ = dialect.SPEED_TYPE_AIRSPEED if air else dialect.SPEED_TYPE_GROUNDSPEED
         await exchanges.command(
@@ -380,5 +372,4 @@ class Autopilot(ABC):
         )
 
     async def command(self, command: int, *params: float) -> None:
-        """Any command that has no method of its own."""
         await exchanges.command(self.link, command, *params)

@@ -1,4 +1,4 @@
-"""What an autopilot can be asked for, whatever its make: ArduPilot and PX4 each have a driver."""
+"""The interface of drivers: the commands of an autopilot, whatever its make."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 
 
 class FlightMode(StrEnum):
-    """What a mode is for; autopilots have more modes, and names of their own for these."""
+    """The purpose of a mode; autopilots have more modes, and their own names for these."""
 
     GUIDED = "guided"  # ArduPilot GUIDED; PX4 HOLD (DO_REPOSITION) or OFFBOARD
     MISSION = "mission"  # AUTO; PX4 AUTO.MISSION
@@ -25,8 +25,9 @@ class FlightMode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where to go, in WGS-84 degrees; `altitude_m` in `altitude_frame` ("relative" to home, "amsl",
-    "terrain"), None: as it is. `heading_rad` from true north, clockwise; None: as it is."""
+    """A place to go to, in WGS-84 degrees; `altitude_m` in `altitude_frame` ("relative" to home,
+    "amsl", "terrain"), None: the present one. `heading_rad` from true north, clockwise; None: the
+    present one."""
 
     latitude_deg: float
     longitude_deg: float
@@ -37,15 +38,15 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """Whether a vehicle may be armed, and if not why: "EKF: no position yet, 12 s"."""
+    """Whether a vehicle may be armed, and the reasons if not: "EKF: no position yet, 12 s"."""
 
     ready: bool
     reasons: tuple[str, ...] = ()
 
 
 class Driver(Protocol):
-    """Each method returns when the vehicle has accepted and its own messages show it (HEARTBEAT for
-    a mode, not the acknowledgement), after retries; it does not wait until the motion ends.
+    """Each method returns when the vehicle has accepted and its own messages confirm it (HEARTBEAT
+    for a mode, not the acknowledgement), after retries; it does not wait until the motion ends.
 
     Raises:
         ExchangeError: the vehicle refuses (with its STATUSTEXT as the reason) or is not heard.
@@ -56,15 +57,15 @@ class Driver(Protocol):
     """How many items of a stored mission stand before the first real one."""
 
     def mode_name(self, custom_mode: int) -> str:
-        """The autopilot's own name of a mode: "GUIDED", "AUTO.MISSION"."""
+        """Return the autopilot's own name of a mode: "GUIDED", "AUTO.MISSION"."""
         ...
 
     def flight_mode(self, custom_mode: int) -> FlightMode:
-        """What a mode is for."""
+        """Return the purpose of a mode."""
         ...
 
     def readiness(self) -> Readiness:
-        """Whether it may be armed now."""
+        """Return whether the vehicle may be armed now."""
         ...
 
     async def set_mode(self, mode: FlightMode) -> None:
@@ -80,44 +81,47 @@ class Driver(Protocol):
         ...
 
     async def take_off(self, altitude_m: float) -> None:
-        """Arm where needed, and climb to so much above home."""
+        """Arm where needed, and climb to a height above home."""
         ...
 
     async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
-        """Go to a place and stay there (DO_REPOSITION or its equal)."""
+        """Go to a place and stay there (DO_REPOSITION or its equivalent)."""
         ...
 
     async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
-        """Circle a place without an end; False: the autopilot has no command for it."""
+        """Circle a place without end; return False if the autopilot has no command for it."""
         ...
 
     async def set_speed(self, speed_m_s: float) -> None:
-        """The speed over ground of what follows."""
+        """Set the speed over ground of the following motion."""
         ...
 
     async def command(self, command: int, *params: float) -> None:
-        """Any command (a MAV_CMD with up to seven parameters) that has no method of its own."""
+        """Send a command (a MAV_CMD with up to seven parameters) that has no method of its own."""
         ...
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
-        """One velocity setpoint; it must be repeated twice a second, or the vehicle stops."""
+        """Send one velocity setpoint; repeat it twice a second, or the vehicle stops."""
         ...
 
     async def upload(self, items: Sequence[MissionItem]) -> None:
-        """Store a mission of items that begin with the first real one; home, where the autopilot
-        wants it as item 0, is added here, and left out of `downloaded` and `current_item`."""
+        """Store a mission; an empty one clears it. Item 0 is the first real one: home, where the
+        autopilot requires it as item 0, is added here, and left out of `downloaded` and
+        `current_item`."""
         ...
 
     async def downloaded(self) -> tuple[MissionItem, ...]:
-        """The mission that the vehicle has, as `upload` takes it."""
+        """Return the stored mission, in the form that `upload` takes."""
         ...
 
     async def rally_points(self) -> Sequence[LatLon]:
-        """Where it may land instead of at home when it returns: latitudes and longitudes in deg."""
+        """Return where it may land instead of at home when it returns: latitudes and longitudes in
+        deg."""
         ...
 
     async def start_mission(self, first: int = 0) -> None:
-        """Fly the stored mission from an item on (numbered as in `upload`), arming where needed."""
+        """Execute the stored mission from an item on (numbered as in `upload`), arming where
+        needed."""
         ...
 
     @property
@@ -131,7 +135,7 @@ class Driver(Protocol):
         ...
 
     async def stop(self) -> None:
-        """Stand still at once (HOLD, LOITER, BRAKE), whatever it does; idempotent."""
+        """Stop at once (HOLD, LOITER, BRAKE), whatever it does; idempotent."""
         ...
 
     async def return_home(self) -> None:
@@ -139,5 +143,5 @@ class Driver(Protocol):
         ...
 
     async def land(self) -> None:
-        """Land where it is."""
+        """Land at the present position."""
         ...

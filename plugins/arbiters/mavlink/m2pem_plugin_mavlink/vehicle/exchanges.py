@@ -1,4 +1,4 @@
-"""The exchanges that a vehicle is driven by, each in one call.
+"""The exchanges that drivers use, one function each. All of them raise `ExchangeError`.
 
 Raises of all of them: `ExchangeError`, see the exchange.
 """
@@ -33,30 +33,31 @@ _IGNORES_POSITION = 0b111
 
 
 async def command(link: VehicleLink, command_id: int, *params: float) -> None:
-    """A command with its first parameters; the others are 0."""
+    """Send a command with its first parameters; the others are 0."""
     await link.perform(Command(link.address, command_id, params))
 
 
 async def command_at(
     link: VehicleLink, command_id: int, params: Sequence[float], place: CommandPlace
 ) -> None:
-    """A command with a place."""
+    """Send a command with a place."""
     await link.perform(Command(link.address, command_id, params, place=place))
 
 
 async def message_interval(link: VehicleLink, message_id: int, interval_s: float) -> None:
-    """Have a message sent so often, by the vehicle's clock, or as often as it can be."""
+    """Set the interval of a message, by the vehicle's clock."""
     await link.perform(SetMessageInterval(link.address, message_id, interval_s))
 
 
 async def request_message(link: VehicleLink, name: str) -> None:
-    """Have a message sent once; who listens to it hears it."""
+    """Request a message once; listeners receive it."""
     await link.perform(RequestMessage(link.address, name, lambda message: message))
 
 
 async def position_target(link: VehicleLink) -> tuple[float, float, float]:
-    """Where an autopilot is on its way to: latitude and longitude in degrees, metres above mean sea
-    level (POSITION_TARGET_GLOBAL_INT in MAV_FRAME_GLOBAL). One without a target does not answer."""
+    """Return the autopilot's target: latitude and longitude in degrees, metres above mean sea
+    level (POSITION_TARGET_GLOBAL_INT in MAV_FRAME_GLOBAL). An autopilot without a target does
+    not answer."""
     request = RequestMessage(
         link.address, "POSITION_TARGET_GLOBAL_INT", _target, retry_policy=_SHORT
     )
@@ -64,40 +65,40 @@ async def position_target(link: VehicleLink) -> tuple[float, float, float]:
 
 
 def _target(message: Message) -> tuple[float, float, float] | None:
-    """None: it says nothing of a position."""
+    """Return the target in the message; None if it has no position."""
     if message.type_mask & _IGNORES_POSITION:
         return None
     return message.lat_int / 1e7, message.lon_int / 1e7, message.alt
 
 
 async def upload(link: VehicleLink, items: Sequence[MissionItem]) -> None:
-    """Store a mission, as it is to be stored."""
+    """Store a mission with all its items."""
     await link.perform(UploadMission(link.address, items))
 
 
 async def download(
     link: VehicleLink, kind: MissionType = MissionType.MISSION
 ) -> tuple[MissionItem, ...]:
-    """The mission, the fence or the rally points that are stored, as they are stored."""
+    """Return the stored mission, fence or rally points."""
     return await link.perform(DownloadMission(link.address, kind))
 
 
 async def clear(link: VehicleLink) -> None:
-    """Store no mission."""
+    """Clear the stored mission."""
     await link.perform(ClearMission(link.address))
 
 
 async def set_current(link: VehicleLink, sequence: int) -> None:
-    """Have the stored mission go on at an item."""
+    """Set the current item of the stored mission."""
     await link.perform(SetCurrentItem(link.address, sequence))
 
 
 async def mission_item(link: VehicleLink, sequence: int) -> MissionItem:
-    """One item of the stored mission, outside of a download."""
+    """Return one item of the stored mission, outside of a download."""
     return await link.perform(ReadMissionItem(link.address, sequence))
 
 
 async def parameter(link: VehicleLink, firmware: Firmware, name: str) -> float:
-    """The value of a parameter."""
+    """Return the value of a parameter."""
     found = await link.perform(ReadParameter(link.address, name, _ENCODINGS[firmware]))
     return found.value

@@ -1,4 +1,4 @@
-"""What the fleet says that a vehicle does when its link is lost, against what it is set to.
+"""Compares the failsafe in the fleet file with the parameters of the vehicle.
 
 Sources: the parameter references of ArduPilot (FS_*, BATT_FS_*, RTL_ALT, MAV_GCS_SYSID) and PX4
 (NAV_DLL_ACT, COM_LOW_BAT_ACT, RTL_RETURN_ALT). Nothing is changed: findings say what to set.
@@ -25,8 +25,8 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class FailsafeFinding:
-    """The fleet and the vehicle disagree. `parameter`: the one to look at, "" if it is the fleet's
-    word; `text` is for people, and says what would be right."""
+    """A difference between the fleet file and the vehicle. `parameter`: the one to set, "" if the
+    fleet file is wrong; `text` is for people, and says what would be right."""
 
     resource: ResourceId
     parameter: str
@@ -136,7 +136,8 @@ _GOES_ON_IN_AUTO = 1 << 1
 
 
 def parameters_of_interest(identity: Identity) -> tuple[str, ...]:
-    """The names of the parameters that `findings` looks at; a vehicle does not have all of them."""
+    """Return the names of the parameters that `findings` compares; a vehicle does not have all of
+    them."""
     link = [name for each in _LINK[identity.firmware, identity.kind] for name in each.names]
     battery = _BATTERY[identity.firmware]
     if identity.firmware is Firmware.PX4:
@@ -170,8 +171,8 @@ def findings(
     values: Values,
     own_system: int | None = None,
 ) -> tuple[FailsafeFinding, ...]:
-    """Where a vehicle is set to something else than its fleet's `failsafe` says; "" says nothing,
-    and then nothing is found. `own_system`: the system id that this arbiter sends with."""
+    """Return where a vehicle is set to something else than the `failsafe` of its fleet; "" finds
+    nothing. `own_system`: the system id that this arbiter sends with."""
     if not word:
         return ()
     if word not in WORDS:
@@ -211,7 +212,7 @@ def _link_findings(word: str, identity: Identity, values: Values) -> _Found:
 
 
 def _station_findings(identity: Identity, values: Values, own_system: int | None) -> _Found:
-    """ArduPilot misses the heartbeats of one ground station alone."""
+    """Check the ground station that ArduPilot monitors: it monitors the heartbeats of one alone."""
     if identity.firmware is not Firmware.ARDUPILOT or own_system is None:
         return
     for name in _OUR_STATION:
@@ -255,8 +256,8 @@ def _copter_findings(word: str, values: Values) -> _Found:
 
 
 async def check(vehicle: Vehicle, word: str, own_system: int | None) -> tuple[FailsafeFinding, ...]:
-    """Ask a vehicle that is identified for its parameters, and compare; what it does not answer is
-    among the findings."""
+    """Read the parameters of an identified vehicle, and compare; an unanswered one is among the
+    findings."""
     identity = vehicle.identity
     if not word or identity is None:
         return ()

@@ -35,17 +35,18 @@ _RADII = {
 
 
 def circles(identity: Identity) -> bool:
-    """Whether a vehicle cannot stand still in the air."""
+    """Return whether a vehicle cannot stop in the air."""
     return identity.kind in WINGED
 
 
 def suppose(state: AutopilotState, identity: Identity) -> None:
-    """What its makers have set, until it says more."""
+    """Set the radii to the defaults of the autopilot, until it reports them."""
     state.loiter_radius_m = state.home_loiter_radius_m = _RADII[identity.firmware].usual_m
 
 
 async def ask(state: AutopilotState, identity: Identity, link: VehicleLink) -> None:
-    """Ask it for its radii. A negative one is flown counter-clockwise; 0 at home is as elsewhere.
+    """Read the radii. A negative one means counter-clockwise; 0 at home means the same as
+    elsewhere.
 
     Raises:
         ExchangeError: it does not tell.
@@ -72,8 +73,8 @@ NO_LANDING = (
 
 
 def landing_begins(mission: Sequence[MissionItem]) -> int | None:
-    """The item at which the landing of a mission begins (the first DO_LAND_START, else the first
-    item that lands); None: it has none."""
+    """Return the item at which the landing sequence begins (the first DO_LAND_START, else the first
+    item that lands); None if there is none."""
     for commands in ((_START,), _LANDS):
         for index, item in enumerate(mission):
             if item.command in commands:
@@ -82,12 +83,12 @@ def landing_begins(mission: Sequence[MissionItem]) -> int | None:
 
 
 def landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """The landing of a mission; it goes on to the mission's end."""
+    """Return the landing sequence of a mission, to the mission's end."""
     begins = landing_begins(mission)
     return () if begins is None else tuple(mission[begins:])
 
 
 def without_landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """What a mission has before its landing."""
+    """Return the items before the landing sequence."""
     begins = landing_begins(mission)
     return tuple(mission if begins is None else mission[:begins])

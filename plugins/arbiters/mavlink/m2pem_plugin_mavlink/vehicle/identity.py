@@ -1,4 +1,4 @@
-"""Which autopilot a vehicle has, and what kind of vehicle it is: from its HEARTBEAT."""
+"""The autopilot and the kind of a vehicle, from its HEARTBEAT."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,14 +7,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 
 class Firmware(StrEnum):
-    """Whose autopilot it is (MAV_AUTOPILOT)."""
+    """The firmware of the autopilot (MAV_AUTOPILOT)."""
 
     ARDUPILOT = "ArduPilot"
     PX4 = "PX4"
 
 
 class Kind(StrEnum):
-    """What flies, drives or swims, as far as autopilots drive them differently (MAV_TYPE)."""
+    """The kind of vehicle, as far as autopilots control kinds differently (MAV_TYPE)."""
 
     COPTER = "copter"
     PLANE = "plane"
@@ -58,7 +58,7 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a heartbeat says of its sender."""
+    """Firmware and kind, as a heartbeat reports them."""
 
     firmware: Firmware
     kind: Kind
@@ -68,6 +68,6 @@ class Identity:
 
 
 def identity(autopilot: int, type_: int) -> Identity | None:
-    """Who sends a HEARTBEAT with these fields; None: no vehicle that can be driven here."""
+    """Return the identity in a HEARTBEAT with these fields; None if drivers do not support it."""
     firmware, kind = _FIRMWARES.get(autopilot), _KINDS.get(type_)
     return None if firmware is None or kind is None else Identity(firmware, kind)

@@ -1,4 +1,4 @@
-"""Modes of autopilots: their numbers (HEARTBEAT.custom_mode), names, and what they are for."""
+"""Modes of autopilots: their numbers (HEARTBEAT.custom_mode), names and purposes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,22 +15,21 @@ _ORBIT, _MANUAL = FlightMode.ORBIT, FlightMode.MANUAL
 
 @dataclass(frozen=True, slots=True)
 class Modes:
-    """The modes of one kind of vehicle. `purposes`: those with a purpose, by name; of two modes
-    for the same the one that is to be commanded stands first."""
+    """The modes of one kind of vehicle. `purposes`: by name; of two modes with the same purpose the
+    first one is commanded."""
 
     names: Mapping[int, str]
     purposes: Mapping[str, FlightMode]
 
     def name(self, custom_mode: int) -> str:
-        """As the autopilot's documents call it: "GUIDED", "AUTO.MISSION"; else "mode 99"."""
+        """Return the autopilot's own name: "GUIDED", "AUTO.MISSION"; else "mode 99"."""
         return self.names.get(custom_mode, f"mode {custom_mode}")
 
     def purpose(self, custom_mode: int) -> FlightMode:
-        """What it is for."""
         return self.purposes.get(self.names.get(custom_mode, ""), FlightMode.OTHER)
 
     def number(self, name: str) -> int:
-        """The custom_mode of a name.
+        """Return the custom_mode of a name.
 
         Raises:
             KeyError: there is no such mode.
@@ -41,7 +40,7 @@ class Modes:
         raise KeyError(name)
 
     def for_purpose(self, mode: FlightMode) -> int | None:
-        """The custom_mode to command for a purpose; None: there is none."""
+        """Return the custom_mode to command for a purpose; None if there is none."""
         for name, purpose in self.purposes.items():
             if purpose is mode:
                 return self.number(name)
@@ -49,7 +48,7 @@ class Modes:
 
 
 def modes_of(identity: Identity) -> Modes:
-    """The modes of a vehicle."""
+    """Return the modes of a vehicle."""
     return _PX4 if identity.firmware is Firmware.PX4 else _ARDUPILOT[identity.kind]
 
 
@@ -163,7 +162,7 @@ _ARDUPILOT = {
 
 
 def px4_mode(main: int, sub: int = 0) -> int:
-    """The custom_mode of PX4 of a main and a sub mode (px4_custom_mode)."""
+    """Return the custom_mode of PX4 of a main and a sub mode (px4_custom_mode)."""
     return main << 16 | sub << 24
 
 

@@ -1,4 +1,4 @@
-"""How PX4 is driven."""
+"""The driver of PX4."""
 
 import asyncio
 import math
@@ -23,7 +23,7 @@ _UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
 
 
 class Px4Driver(Autopilot):
-    """Drives a vehicle with PX4; see `Driver`.
+    """The driver of a vehicle with PX4; see `Driver`.
 
     It goes to places in AUTO.LOITER, so that this is also its mode for `FlightMode.GUIDED`;
     OFFBOARD is entered by `move` alone.
@@ -32,8 +32,8 @@ class Px4Driver(Autopilot):
     home_items = 0
 
     async def set_mode(self, mode: FlightMode) -> None:
-        """Change the mode; see `Autopilot`. It may be refused for a while: a mission that was
-        just uploaded is not yet known to be one."""
+        """Change the mode; see `Autopilot`. AUTO.MISSION may be refused for a while after an
+        upload: PX4 checks the mission first."""
         await super().set_mode(FlightMode.HOLD if mode is FlightMode.GUIDED else mode)
 
     async def _command_mode(self, custom_mode: int) -> None:
@@ -43,13 +43,12 @@ class Px4Driver(Autopilot):
         )
 
     async def _enter_arming_mode(self) -> None:
-        """A mode that holds its place: one for people may want a stick to be there."""
+        """Enter a mode that holds its position: a manual mode may require a remote control."""
         await self.set_mode(FlightMode.HOLD)
 
     # --- up and down ----------------------------------------------------------------------------
 
     async def take_off(self, altitude_m: float) -> None:
-        """Arm where needed, and climb to so much above home."""
         if self.kind in ON_THE_GROUND:
             raise cannot(f"a {self.kind} does not take off")
         position = self.state.position
@@ -70,20 +69,18 @@ class Px4Driver(Autopilot):
         )
 
     async def land(self) -> None:
-        """Land where it is."""
         if self.kind in ON_THE_GROUND:
             raise cannot(f"a {self.kind} does not land")
         await self.set_mode(FlightMode.LAND)
 
     async def return_home(self) -> None:
-        """Return to launch."""
         if self.kind in ON_THE_GROUND:
             await self._arm_to_drive()
         await self.set_mode(FlightMode.RETURN)
 
     async def stop(self) -> None:
-        """AUTO.LOITER, in which it brakes at once; one that is not armed stands already. As that is
-        also the mode in which it goes to places, it is then told to go nowhere."""
+        """Enter AUTO.LOITER, which brakes at once; one that is not armed has stopped. As this is
+        also the mode in which it goes to places, then clear its target."""
         if self.state.armed is not False:
             await self.set_mode(FlightMode.HOLD)
             change = float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
@@ -93,7 +90,6 @@ class Px4Driver(Autopilot):
     # --- to places ------------------------------------------------------------------------------
 
     async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
-        """Go to a place and stay there."""
         await self._arm_to_drive()
         altitude_m = self._place_amsl(place)
         heading = math.nan if place.heading_rad is None else place.heading_rad
@@ -113,7 +109,7 @@ class Px4Driver(Autopilot):
         )
 
     async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
-        """Circle a place without an end, clockwise, looking at it."""
+        """Circle a place without end, clockwise, facing it."""
         if self.kind in ON_THE_GROUND or self.kind is Kind.PLANE:
             return False
         await self._arm_to_drive()
@@ -151,7 +147,8 @@ class Px4Driver(Autopilot):
         return self._amsl(place.altitude_m, place.altitude_frame)
 
     def _amsl(self, altitude_m: float, frame: str) -> float:
-        """PX4 takes heights above the sea, whatever the frame of the command says."""
+        """Return a height above mean sea level: PX4 takes no other, whatever the frame of the
+        command."""
         if frame == "amsl":
             return altitude_m
         if frame == "terrain":
@@ -161,8 +158,7 @@ class Px4Driver(Autopilot):
         return self.state.home.altitude_m + altitude_m
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:
-        """One velocity setpoint. It does not take the vehicle back from somebody who has left
-        OFFBOARD."""
+        """Send one velocity setpoint. Raise an error if another client has left OFFBOARD."""
         offboard = self.modes.number("OFFBOARD")
         if self.state.custom_mode != offboard:
             if self._left_by_somebody(offboard) and not self.commanded.changing:
@@ -190,7 +186,6 @@ class Px4Driver(Autopilot):
     # --- missions -------------------------------------------------------------------------------
 
     async def start_mission(self, first: int = 0) -> None:
-        """Fly the stored mission from an item on, arming where needed."""
         await self.arm()
         self.state.reached_sequence = None
         await exchanges.set_current(self.link, first)

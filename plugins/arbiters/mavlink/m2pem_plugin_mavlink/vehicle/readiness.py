@@ -1,4 +1,4 @@
-"""Whether a vehicle may be armed, and if not, why: in words for people.
+"""Whether a vehicle may be armed, and the reasons if not, for people.
 
 ArduPilot is believed on its estimator before its pre-arm bit: that is set in STABILIZE long before
 there is a position, and GUIDED cannot be armed without one.
@@ -30,7 +30,8 @@ _REFUSALS = {
 def readiness(
     firmware: Firmware, state: AutopilotState, texts: Iterable[str], now_s: float
 ) -> Readiness:
-    """Whether it may be armed now; `texts`: what it said in the last `TEXTS_WITHIN_S`, newest last.
+    """Return whether the vehicle may be armed now; `texts`: those of the last `TEXTS_WITHIN_S`,
+    newest last.
 
     A vehicle that is armed already is ready.
     """
@@ -43,8 +44,8 @@ def readiness(
 
 
 def unlocated(firmware: Firmware, state: AutopilotState, now_s: float) -> tuple[str, ...]:
-    """Why it does not know where it is; none: it does. Unlike the rest that does not depend on the
-    mode that it is in."""
+    """Return why the position is unknown; empty if it is known. Unlike the other reasons, these do
+    not depend on the mode."""
     gps = state.gps_fix is not None and state.gps_fix < _FIX_3D
     return (*(("GPS: no 3D fix",) if gps else ()), *_position_reasons(firmware, state, now_s))
 

@@ -1,4 +1,4 @@
-"""What is known of a vehicle: what it reports, and what this arbiter has commanded."""
+"""The state of a vehicle: what it reports, and what this arbiter has commanded."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,8 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness
 
 @dataclass(slots=True)
 class AutopilotState:
-    """What was heard of a vehicle last; None: not heard yet. Frames and units as in VehicleState.
+    """The last values that a vehicle has reported; None: not yet. Frames and units as in
+    VehicleState.
 
     `changes` counts the messages that were taken in. By the link's clock: `at_s` and `heartbeat_s`
     are when the last message and the last heartbeat came, `boot_s` when it was first heard since it
@@ -61,14 +62,14 @@ class AutopilotState:
 
     @property
     def speed_m_s(self) -> float:
-        """Over ground and in height; infinite while it is not known."""
+        """The speed over ground and in height; infinite while it is unknown."""
         if self.velocity_enu_m_s is None:
             return float("inf")
         east, north, up = self.velocity_enu_m_s
         return float((east * east + north * north + up * up) ** 0.5)
 
     def forget_the_last_boot(self) -> None:
-        """It was switched off in between: what it then was ready for it need not be now."""
+        """Clear what need not hold after the autopilot was switched off and on."""
         self.gps_fix = self.estimator_flags = self.prearm_passed = None
         self.position = self.home = self.velocity_enu_m_s = self.yaw_rad = None
         self.altitude_above_home_m = self.altitude_above_terrain_m = None
@@ -101,8 +102,8 @@ DEGRADED_LOSS = 0.25
 
 
 def link_state(silent_s: float | None, lost_after_s: float, loss: float = 0.0) -> LinkState:
-    """How well a vehicle is heard that was heard so many seconds ago (None: never), and of whose
-    frames the share `loss` goes missing."""
+    """Return the state of the link to a vehicle that was silent for `silent_s` (None: always) and
+    loses the share `loss` of its frames."""
     if silent_s is None or silent_s >= lost_after_s:
         return LinkState.LOST
     if silent_s >= DEGRADED_SHARE * lost_after_s or loss > DEGRADED_LOSS:
@@ -118,7 +119,7 @@ def vehicle_state(
     readiness: Readiness | None,
     link: LinkState,
 ) -> VehicleState:
-    """What the fleet is told. `mode`: the autopilot's own name of it."""
+    """Return the telemetry for the fleet. `mode`: the autopilot's own name of it."""
     return VehicleState(
         resource,
         time_us,

@@ -1,4 +1,4 @@
-"""Which messages a vehicle is asked to send, how often, and when it must be asked again."""
+"""The messages that a vehicle is asked to stream: intervals, and when to request them again."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -30,13 +30,14 @@ _OWN = {
 
 
 def telemetry_streams(firmware: Firmware) -> Mapping[int, float]:
-    """Ids of the messages that `AutopilotState` is made of, and their intervals in seconds."""
+    """Return the ids of the messages that `AutopilotState` needs, and their intervals in
+    seconds."""
     named = {**_COMMON, **_OWN[firmware]}
     return MappingProxyType({message_type(name).id: each for name, each in named.items()})
 
 
 class Streams:
-    """What was asked for and what of it comes, without I/O.
+    """The requested streams and whether they arrive, without I/O.
 
     A vehicle forgets what it was asked for when it is switched off, and that may go unnoticed: so
     what has stopped coming is asked for again, until it is refused. `refused` is not asked for
@@ -49,7 +50,7 @@ class Streams:
         self._asked_s: dict[int, float] = {}
 
     def forget(self) -> None:
-        """The vehicle has lost what it was asked for."""
+        """The vehicle has restarted and lost all requests."""
         self.refused.clear()
         self._asked_s.clear()
 
@@ -74,9 +75,9 @@ class Streams:
         return due
 
     def asked(self, id_: int, now_s: float) -> None:
-        """It was asked for a message, and will send it."""
+        """The vehicle has accepted a request."""
         self._asked_s[id_] = now_s
 
     def unanswered(self, id_: int) -> None:
-        """It did not answer; it will be asked again."""
+        """The vehicle has not answered a request; it will be repeated."""
         self._asked_s.pop(id_, None)

@@ -1,8 +1,8 @@
-"""Somebody else at the vehicle: another ground station, a person at its sticks, its own failsafes.
+"""Detects that a vehicle was taken over: by another ground station, a pilot, or its own failsafes.
 
-MAVLink lets anybody command (no arbitration between ground stations). So what the vehicle does is
-compared with what it was asked for here; why it does something else is read from its texts, and is
-else a guess, which the words leave open.
+MAVLink lets every ground station command (there is no arbitration between them). So the vehicle's
+mode and mission are compared with what was commanded here. The cause of a difference is read from
+the vehicle's texts; without a text it is a guess, and the reason says so.
 """
 
 import asyncio
@@ -52,7 +52,7 @@ _REQUESTS = (message_type("MISSION_REQUEST").id, message_type("MISSION_REQUEST_I
 
 
 class Cause(StrEnum):
-    """Who or what has taken a vehicle over, as far as can be told."""
+    """Who or what has taken a vehicle over, as far as is known."""
 
     FAILSAFE = "failsafe"
     PILOT = "pilot"
@@ -62,17 +62,17 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Takeover:
-    """A vehicle does what it was not asked for here. `reason`: for people."""
+    """A vehicle does what was not commanded here. `reason`: for people."""
 
     cause: Cause
     reason: str
 
 
 class TakeoverMonitor:
-    """Watches a vehicle between `open` and `close`.
+    """Monitors a vehicle between `open` and `close`.
 
-    `own`: the system id that this arbiter sends with; None: not known, and then what a vehicle says
-    to another ground station counts only while no exchange of ours goes on.
+    `own_system`: the system id that this arbiter sends with. None: unknown; then messages of the
+    vehicle to another ground station count only while no exchange of this arbiter is active.
     """
 
     def __init__(self, vehicle: Vehicle, own_system: int | None = None) -> None:
@@ -93,13 +93,11 @@ class TakeoverMonitor:
         self._check: asyncio.Task[None] | None = None
 
     def open(self) -> None:
-        """Watch."""
         self._unsubscribe.append(self.vehicle.watch(self._update))
         ids = (_COUNT, _ACK, *_REQUESTS)
         self._unsubscribe.append(self.vehicle.link.listen(ids, self._receive_from_mission_protocol))
 
     async def close(self) -> None:
-        """Watch no more."""
         for end in self._unsubscribe:
             end()
         self._unsubscribe.clear()
@@ -110,13 +108,13 @@ class TakeoverMonitor:
     # --- the answer -----------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Something new is about to be asked of it: how it is by now is not a takeover."""
+        """A new command follows: the present state is no takeover."""
         self._disarmed = None
         self._boots = self.vehicle.state.boots
         self._settled = (self.vehicle.state.custom_mode, self.vehicle.commanded.custom_mode)
 
     def restarted(self) -> Takeover | None:
-        """Whether the autopilot has restarted since `begin`: its clock has gone back, and it
+        """Return whether the autopilot has restarted since `begin`: its clock has gone back, and it
         is not armed."""
         state = self.vehicle.state
         if state.armed is not False or state.boots <= max(self._boots, 1):
@@ -132,8 +130,8 @@ class TakeoverMonitor:
         return self._disarmed_by(modes) or self._mode_by(modes) or self._mission_by(modes)
 
     def mode_is_commanded(self, modes: Collection[FlightMode]) -> bool:
-        """Whether the vehicle is in the mode that was asked for here, or in one of these modes that
-        it goes over to by itself."""
+        """Return whether the vehicle is in the commanded mode, or in one of these modes that it
+        enters by itself afterwards."""
         state, asked_for = self.vehicle.state, self.vehicle.commanded.custom_mode
         if asked_for is None or state.custom_mode == asked_for:
             return asked_for is not None or state.mode in modes
@@ -185,7 +183,8 @@ class TakeoverMonitor:
         return Takeover(Cause.STATION, f"another ground station has {self._replaced}")
 
     def _explained(self, since_s: float, changed: str, otherwise: Takeover) -> Takeover | None:
-        """What its texts say of a change; without any: `otherwise`, when there was time for one."""
+        """Return the takeover that the texts explain; without a text `otherwise`, after
+        `SETTLES_S`."""
         now_s = self.vehicle.link.now_s()
         texts = self.vehicle.recent_texts(now_s - since_s + TEXTS_BEFORE_S)
         for cause, pattern in ((Cause.FAILSAFE, _FAILSAFE), (Cause.PILOT, _PILOT)):
@@ -198,7 +197,7 @@ class TakeoverMonitor:
         return otherwise if now_s - since_s >= SETTLES_S else None
 
     def _fence_breached(self, since_s: float) -> list[str]:
-        """ArduRover says nothing of a breach but in FENCE_STATUS."""
+        """Return a breach from FENCE_STATUS: ArduRover sends no text."""
         state = self.vehicle.state
         breached_s = state.fence_breached_s
         if breached_s is None or breached_s < since_s - TEXTS_BEFORE_S:
@@ -257,12 +256,12 @@ class TakeoverMonitor:
 
     @property
     def _answers_single_requests(self) -> bool:
-        """PX4 gives an item only as part of a download."""
+        """Return whether single items can be read: PX4 sends an item only as part of a download."""
         identity = self.vehicle.identity
         return identity is not None and identity.firmware is Firmware.ARDUPILOT
 
     async def _compare_item(self, item: int, mission: tuple[MissionItem, ...]) -> None:
-        """The item that it now moves to must be the one that was uploaded."""
+        """Read the current item: it must be the one that was uploaded."""
         try:
             found = await exchanges.mission_item(self.vehicle.link, item + 1)
         except ExchangeError:
@@ -271,7 +270,8 @@ class TakeoverMonitor:
             self._replaced = f"replaced the mission: its item {item + 1} is not ours"
 
     def _receive_from_mission_protocol(self, message: Message, sender: Address) -> None:
-        """What it says about missions to somebody else. Links need not carry that."""
+        """Receive the vehicle's messages about missions to another ground station. Not all links
+        carry them."""
         if sender != self.vehicle.link.address or message.mission_type:
             return
         to: int = message.target_system
@@ -295,8 +295,8 @@ class TakeoverMonitor:
 
 
 def _same(found: MissionItem, commanded: MissionItem) -> bool:
-    """Whether an item is the one that was uploaded. What an item without a place is given back
-    with depends on the autopilot."""
+    """Return whether an item is the one that was uploaded. Autopilots return items without a place
+    in different ways."""
     if commanded.latitude_deg == 0.0 and commanded.longitude_deg == 0.0:
         return found.command == commanded.command
     return found.same_as(commanded)

@@ -34,20 +34,22 @@ _BREACHES = {
 
 
 def enu_yaw(heading_rad: float) -> float:
-    """A heading (from north, clockwise) as a yaw (from east, counter-clockwise), in -pi..pi."""
+    """Convert a heading (from north, clockwise) to a yaw (from east, counter-clockwise), in
+    -pi..pi."""
     return math.remainder(math.pi / 2 - heading_rad, math.tau)
 
 
 def heading(yaw_rad: float) -> float:
-    """A yaw (from east, counter-clockwise) as a heading (from north, clockwise), in 0..2 pi."""
+    """Convert a yaw (from east, counter-clockwise) to a heading (from north, clockwise), in 0..2
+    pi."""
     return (math.pi / 2 - yaw_rad) % math.tau
 
 
 class TelemetryDecoder:
-    """`take` is handed each message of the autopilot, in the order of their coming.
+    """`take` receives each message of the autopilot, in order.
 
-    `flies`: whether it leaves the ground; the height above home that one that doesn't flies says
-    is not believed (autopilots of ground vehicles were seen to say the height above the sea).
+    `flies`: the vehicle leaves the ground. The reported height above home of other vehicles is not
+    used: some of their autopilots report the height above mean sea level.
     """
 
     def __init__(self, state: AutopilotState, modes: Modes, *, flies: bool) -> None:
@@ -80,11 +82,11 @@ class TelemetryDecoder:
 
     @property
     def wants(self) -> frozenset[int]:
-        """Ids of the messages that can be taken in."""
+        """The ids of the messages that are decoded."""
         return frozenset(self._takers)
 
     def take(self, message: Message, now_s: float) -> None:
-        """A message of the autopilot has come."""
+        """Decode a message."""
         state = self.state
         id_ = message.TYPE.id
         if state.boot_s is None:
@@ -96,7 +98,7 @@ class TelemetryDecoder:
         state.changes += 1
 
     def _booted(self, now_s: float) -> None:
-        """It speaks for the first time, or its clock has gone back."""
+        """The vehicle sends for the first time, or its clock has gone back."""
         self.state.forget_the_last_boot()
         self._landed_is_said = False
         if not self.flies:
@@ -194,7 +196,7 @@ class TelemetryDecoder:
             self.state.altitude_above_terrain_m = message.bottom_clearance
 
     def _fence(self, message: Any) -> None:
-        """Whether the vehicle is outside of its fence now (mavlink.io, "FENCE_STATUS")."""
+        """Read whether the vehicle is outside of its fence (mavlink.io, "FENCE_STATUS")."""
         state = self.state
         breached = message.breach_status != 0
         if breached and not state.fence_breach:
@@ -213,7 +215,8 @@ class TelemetryDecoder:
 
 
 def _place(latitude_e7: int, longitude_e7: int, altitude_mm: int) -> GeoPosition | None:
-    """None for what autopilots say while they know no place, or can be no place."""
+    """Return the position; None for values that autopilots send while they know none, or that are
+    impossible."""
     latitude, longitude = latitude_e7 / 1e7, longitude_e7 / 1e7
     if (latitude_e7 == 0 and longitude_e7 == 0) or abs(latitude) > 90.0 or abs(longitude) > 180.0:
         return None

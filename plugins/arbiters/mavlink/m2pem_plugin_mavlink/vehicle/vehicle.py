@@ -32,14 +32,14 @@ from m2pem_plugin_mavlink.vehicle.telemetry_decoder import TelemetryDecoder
 
 
 class ConditionWaiters:
-    """Who waits until something is true. `look` is to be called whenever something may be."""
+    """Tasks that wait for conditions. Call `look` whenever a condition may have become true."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._waiting: dict[asyncio.Future[bool], Callable[[], bool]] = {}
 
     def look(self) -> None:
-        """Wake those whose condition holds, or raises."""
+        """Wake the tasks whose condition is true, or raises."""
         for future, true in tuple(self._waiting.items()):
             if future.done():
                 continue
@@ -50,7 +50,7 @@ class ConditionWaiters:
                 future.set_exception(error)
 
     async def wait(self, true: Callable[[], bool], within_s: float | None = None) -> bool:
-        """Wait until `true()`, which may raise; False: it was not within so many seconds."""
+        """Wait until `true()`, which may raise; return False after `within_s`."""
         if true():
             return True
         loop = asyncio.get_running_loop()
@@ -71,7 +71,7 @@ class ConditionWaiters:
 
 
 def driver_of(vehicle: "Vehicle", identity: Identity) -> Driver:
-    """The driver for a vehicle."""
+    """Return the driver for a vehicle."""
     if identity.firmware is Firmware.PX4:
         return Px4Driver(vehicle, identity)
     return ArdupilotDriver(vehicle, identity)
@@ -136,13 +136,13 @@ class Vehicle:
     # --- life -----------------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Listen."""
+        """Subscribe to the vehicle's messages."""
         self._deafen.append(self.link.listen((_HEARTBEAT,), self._identify))
         self._deafen.append(self.link.listen((_STATUSTEXT,), self._read_text))
         self._go(self._watch_silence())
 
     async def close(self) -> None:
-        """Listen no more; the vehicle goes on with what it does."""
+        """Unsubscribe; the vehicle continues what it does."""
         for deafen in self._deafen:
             deafen()
         self._deafen.clear()
@@ -152,8 +152,8 @@ class Vehicle:
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def watch(self, watcher: Callable[[], None]) -> Callable[[], None]:
-        """Call `watcher` whenever the vehicle was heard or has fallen silent, until the function
-        that is returned is called."""
+        """Call `watcher` whenever a message was received or the vehicle has fallen silent, until
+        the returned function is called."""
         self._watchers.append(watcher)
         return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
 
@@ -161,7 +161,7 @@ class Vehicle:
 
     @property
     def driver(self) -> Driver:
-        """How its autopilot is driven.
+        """The driver of its autopilot.
 
         Raises:
             NoAnswerError: it was not heard yet, so that nobody knows.
@@ -172,17 +172,17 @@ class Vehicle:
 
     @property
     def silent_s(self) -> float | None:
-        """Since when nothing was heard of it; None: nothing ever was."""
+        """Seconds since the last message; None: no message was ever received."""
         return None if self.state.at_s is None else self.link.now_s() - self.state.at_s
 
     @property
     def link_state(self) -> LinkState:
-        """Whether it is heard."""
+        """The state of the link."""
         quality = self.link.quality()
         return link_state(self.silent_s, self.lost_after_s, quality.loss if quality else 0.0)
 
     def telemetry(self) -> VehicleState:
-        """Its telemetry now."""
+        """Return the present state for the fleet."""
         state, driver = self.state, self._driver
         known = driver is not None and state.custom_mode is not None
         return vehicle_state(
@@ -195,18 +195,18 @@ class Vehicle:
         )
 
     def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:
-        """What it said lately (STATUSTEXT), newest last: the reasons of its refusals."""
+        """Return the last texts (STATUSTEXT), newest last: the reasons of refusals."""
         return tuple(each.text for each in self.texts.recent(self.link.now_s(), within_s))
 
     # --- waiting --------------------------------------------------------------------------------
 
     async def identified(self, within_s: float) -> bool:
-        """Wait until its heartbeat has told which autopilot and kind of vehicle it is."""
+        """Wait until a heartbeat has reported the autopilot and the kind of vehicle."""
         return await self.until(lambda: self._driver is not None, within_s)
 
     async def until(self, true: Callable[[], bool], within_s: float | None = None) -> bool:
-        """Wait until something is true; it is looked at whenever the vehicle is heard. False: it
-        was not within so many seconds of the arbiter's clock."""
+        """Wait until a condition is true; it is checked at each message. Return False after
+        `within_s` of the arbiter's clock."""
         return await self._waiters.wait(true, within_s)
 
     async def sleep(self, seconds: float) -> None:
@@ -214,7 +214,8 @@ class Vehicle:
         await self._clock.sleep(seconds)
 
     def want(self, message: str, interval_s: float) -> None:
-        """Have it send a message that telemetry is not made of (a gimbal's attitude, say)."""
+        """Request a stream of a message that is not part of telemetry (a gimbal's attitude,
+        say)."""
         if self._streams is None:
             raise NoAnswerError(f"{self.resource} was not heard yet")
         self._streams.wanted[message_type(message).id] = interval_s
@@ -276,8 +277,8 @@ class Vehicle:
             self._tell()
 
     def _warn_of(self, text: Text) -> None:
-        """Operators see what an autopilot itself warns of. It repeats what it cannot be armed for
-        every 30 s."""
+        """Show operators the warnings of the autopilot. It repeats the reasons against arming every
+        30 s."""
         now_s = self.link.now_s()
         said_s = self._warned_s.get(text.text)
         if text.severity > _WARNING or (said_s is not None and now_s - said_s < SAID_AGAIN_S):
@@ -289,7 +290,7 @@ class Vehicle:
         self.warn(f"says: {text.text}")
 
     def warn(self, text: str) -> None:
-        """Tell operators something about it."""
+        """Show operators a text about the vehicle."""
         self._logger.warning("%s %s", self.resource, text)
 
     def _tell(self) -> None:
@@ -298,7 +299,7 @@ class Vehicle:
             watcher()
 
     async def _watch_silence(self) -> None:
-        """What is true because nothing was heard is noticed, too."""
+        """Check conditions and call watchers also when messages stop."""
         while True:
             silent_s = self.silent_s
             if silent_s is None or silent_s >= self.lost_after_s:
