@@ -11,7 +11,7 @@ import math
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.transaction import NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place, Readiness
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Readiness, TargetPosition
 from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState, CommandedState
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
@@ -90,7 +90,7 @@ class DoubleDriver:
         self.body.target = (self.body.east, self.body.north, altitude_m)
         self._enter(FlightMode.GUIDED)
 
-    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+    async def go_to(self, place: TargetPosition, speed_m_s: float | None = None) -> None:
         await self._tell("go_to", place, speed_m_s)
         self.body.armed = True
         level = LocalFrame(HOME).to_local((place.latitude_deg, place.longitude_deg))
@@ -106,7 +106,7 @@ class DoubleDriver:
         if holds:
             self.body.mode = FlightMode.GUIDED  # it moves; what is heard says HOLD
 
-    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+    async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:
         if not self.body.circles:
             return False
         await self._tell("orbit", center, radius_m, speed_m_s)
@@ -214,7 +214,7 @@ class DoubleVehicle:
         state.boots, state.clock_s = body.boots, self.link.now_s()
         state.at_s = state.heartbeat_s = self.link.now_s()
         state.changes += 1
-        self._waiters.look()
+        self._waiters.check()
         for watcher in tuple(self._watchers):
             watcher()
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.sitl.readiness import ready
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_vehicle_world import (
     ACCEPTED,
@@ -35,7 +35,7 @@ Run = Callable[[Callable[[Clock], Any]], Any]
 ARM, SET_MODE = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_SET_MODE
 TAKEOFF, REPOSITION = dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_DO_REPOSITION
 SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
-THERE = Place(47.4, 8.55, 20.0)
+THERE = TargetPosition(47.4, 8.55, 20.0)
 
 
 def commands(link: ScriptedLink) -> list[int]:
@@ -259,7 +259,7 @@ def test_a_place_is_told_in_its_altitude_frame(virtual: Run, frame: str, number:
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             await in_the_air(link, vehicle)
-            await vehicle.driver.go_to(Place(47.4, 8.55, 20.0, frame), 5.0)
+            await vehicle.driver.go_to(TargetPosition(47.4, 8.55, 20.0, frame), 5.0)
             (there,) = link.of("COMMAND_INT", REPOSITION)
             assert (there.frame, there.x, there.y, there.z) == (
                 number, 474_000_000, 85_500_000, 20.0,
@@ -287,7 +287,7 @@ def test_a_place_without_a_height_is_at_the_height_that_it_has(virtual: Run) -> 
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             await in_the_air(link, vehicle)
-            await vehicle.driver.go_to(Place(47.4, 8.55, heading_rad=math.pi / 2))
+            await vehicle.driver.go_to(TargetPosition(47.4, 8.55, heading_rad=math.pi / 2))
             (there,) = link.of("COMMAND_INT", REPOSITION)
             assert (there.frame, there.z) == (0, 498.0)
             (yaw,) = link.of("COMMAND_LONG", dialect.MAV_CMD_CONDITION_YAW)

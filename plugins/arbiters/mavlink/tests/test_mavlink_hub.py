@@ -74,7 +74,7 @@ async def test_a_vehicle_is_heard_whose_link_is_opened_after_it_was() -> None:
     first = await open_link(Address(1, 1), [URL], HandClock())
     vehicle = await udp_end(port(), system=2)
     vehicle.beat()
-    await until(lambda: first.heard_systems() == {2})
+    await until(lambda: first.known_systems() == {2})
     second = await open_link(Address(2, 1), [URL], HandClock())
     modes: list[int] = []
     second.listen([0], lambda message, _: modes.append(message.custom_mode))
@@ -93,7 +93,7 @@ async def test_all_that_we_are_is_said_and_numbered_apart() -> None:
     ]
     vehicle = await udp_end(port())
     vehicle.beat()
-    await until(links[0].heard_systems)
+    await until(links[0].known_systems)
     await clock.turn(2.0)
     await until(lambda: len(vehicle.received) == 4)
     assert vehicle.beats() == [(255, 190), OTHER] * 2
@@ -111,7 +111,7 @@ async def test_heartbeats_do_not_catch_up_after_a_pause() -> None:
     link = await open_link(Address(1, 1), [URL], clock)
     vehicle = await udp_end(port())
     vehicle.beat()
-    await until(link.heard_systems)
+    await until(link.known_systems)
     clock._now_us += 30_000_000
     await clock.turn(3.0)
     await until(lambda: len(vehicle.beats()) >= 4)

@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.microservices.commands import (
     PROGRESS_S,
     REASON_S,
     Command,
-    CommandPlace,
+    CommandPosition,
     Request,
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
@@ -61,7 +61,7 @@ def test_what_must_not_be_done_twice_is_sent_once() -> None:
 
 
 def test_a_place_is_sent_in_whole_numbers() -> None:
-    place = CommandPlace(47.3977420, -8.5455941, math.nan, dialect.MAV_FRAME_GLOBAL_INT)
+    place = CommandPosition(47.3977420, -8.5455941, math.nan, dialect.MAV_FRAME_GLOBAL_INT)
     vehicle = Answers([ack(dialect.MAV_CMD_DO_REPOSITION)])
     reposition = Command(VEHICLE, dialect.MAV_CMD_DO_REPOSITION, (-1, 1), place=place)
     assert run(reposition, vehicle).error is None
@@ -75,16 +75,16 @@ def test_a_place_is_sent_in_whole_numbers() -> None:
 @pytest.mark.parametrize(
     ("place", "params", "says"),
     [
-        (CommandPlace(math.nan, 8.0, 1.0), (), "there is no place nan, 8.0"),
-        (CommandPlace(47.0, math.inf, 1.0), (), "there is no place 47.0, inf"),
-        (CommandPlace(91.0, 8.0, 1.0), (), "there is no place 91.0, 8.0"),
-        (CommandPlace(47.0, 8.0, math.inf), (), "the altitude is infinite"),
+        (CommandPosition(math.nan, 8.0, 1.0), (), "there is no place nan, 8.0"),
+        (CommandPosition(47.0, math.inf, 1.0), (), "there is no place 47.0, inf"),
+        (CommandPosition(91.0, 8.0, 1.0), (), "there is no place 91.0, 8.0"),
+        (CommandPosition(47.0, 8.0, math.inf), (), "the altitude is infinite"),
         (None, (math.inf,), "a parameter is infinite"),
         (None, (0,) * 8, "seven parameters, not 8"),
     ],
 )
 def test_what_cannot_be_sent_is_not_sent(
-    place: CommandPlace | None, params: Sequence[float], says: str
+    place: CommandPosition | None, params: Sequence[float], says: str
 ) -> None:
     played = run(Command(VEHICLE, TAKEOFF, params, place=place), Answers([ack(TAKEOFF)]))
     assert not played.sent
@@ -210,7 +210,7 @@ def test_the_other_form_is_tried_once_if_the_vehicle_wants_it() -> None:
 
     only_long = [ack(TAKEOFF, dialect.MAV_RESULT_COMMAND_LONG_ONLY)]
     vehicle = Answers(only_long, [ack(TAKEOFF)])
-    place = CommandPlace(47.0, 8.0, 30.0)
+    place = CommandPosition(47.0, 8.0, 30.0)
     assert run(Command(VEHICLE, TAKEOFF, place=place), vehicle).error is None
     assert [each.TYPE.name for each in vehicle.received] == ["COMMAND_INT", "COMMAND_LONG"]
     assert (vehicle.received[1].param5, vehicle.received[1].param6) == (47.0, 8.0)

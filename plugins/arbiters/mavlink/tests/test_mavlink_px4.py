@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.modes import px4_mode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_vehicle_world import (
@@ -103,15 +103,15 @@ def test_a_place_is_told_by_its_height_above_the_sea(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(px4(clock)) as (link, vehicle):
             await in_the_air(link, vehicle)
-            await vehicle.driver.go_to(Place(47.4, 8.55, 20.0, heading_rad=1.5), 6.0)
-            await vehicle.driver.go_to(Place(47.4, 8.55))
+            await vehicle.driver.go_to(TargetPosition(47.4, 8.55, 20.0, heading_rad=1.5), 6.0)
+            await vehicle.driver.go_to(TargetPosition(47.4, 8.55))
             first, second = link.of("COMMAND_INT", REPOSITION)
             assert (first.frame, first.z, first.param1) == (0, 508.0, 6.0)
             assert first.param4 == 1.5
             assert math.isnan(second.z)
             assert math.isnan(second.param4)
             with pytest.raises(RefusedError, match="no height above terrain"):
-                await vehicle.driver.go_to(Place(47.4, 8.55, 20.0, "terrain"))
+                await vehicle.driver.go_to(TargetPosition(47.4, 8.55, 20.0, "terrain"))
 
     virtual(main)
 
@@ -122,7 +122,7 @@ def test_a_refused_place_is_a_refusal_although_the_mode_is_right_already(virtual
             await in_the_air(link, vehicle)
             link.obey[REPOSITION] = lambda _: DENIED
             with pytest.raises(RefusedError):
-                await vehicle.driver.go_to(Place(47.4, 8.55, 20.0))
+                await vehicle.driver.go_to(TargetPosition(47.4, 8.55, 20.0))
 
     virtual(main)
 
@@ -132,12 +132,12 @@ def test_it_orbits_by_command_where_it_can(virtual: Run) -> None:
         async with Playing(px4(clock)) as (link, vehicle):
             await in_the_air(link, vehicle)
             link.obey[ORBIT] = enters(link, POSCTL_ORBIT)
-            assert await vehicle.driver.orbit(Place(47.4, 8.55, 20.0), 30.0, 4.0) is True
+            assert await vehicle.driver.orbit(TargetPosition(47.4, 8.55, 20.0), 30.0, 4.0) is True
             (orbit,) = link.of("COMMAND_INT", ORBIT)
             assert (orbit.param1, orbit.param2, orbit.z) == (30.0, 4.0, 508.0)
             assert vehicle.state.mode is FlightMode.ORBIT
             link.obey[ORBIT] = lambda _: dialect.MAV_RESULT_UNSUPPORTED
-            assert await vehicle.driver.orbit(Place(47.4, 8.55, 20.0), 30.0, 4.0) is False
+            assert await vehicle.driver.orbit(TargetPosition(47.4, 8.55, 20.0), 30.0, 4.0) is False
 
     virtual(main)
 
@@ -202,7 +202,7 @@ def test_a_stop_ends_a_way_to_a_place_too(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(px4(clock)) as (link, vehicle):
             await in_the_air(link, vehicle)
-            await vehicle.driver.go_to(Place(47.4, 8.55, 20.0))
+            await vehicle.driver.go_to(TargetPosition(47.4, 8.55, 20.0))
             await vehicle.driver.stop()
             (nowhere,) = link.of("COMMAND_LONG", REPOSITION)
             assert link.sent[-1] is nowhere

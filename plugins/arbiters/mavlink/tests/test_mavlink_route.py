@@ -3,7 +3,7 @@
 import logging
 
 import pytest
-from m2pem_plugin_mavlink.link.route import FORGOTTEN_S, MOST_RIVALS, TAKEOVER_S, Peer, Route
+from m2pem_plugin_mavlink.link.route import FORGOTTEN_S, MAX_COMPETITORS, TAKEOVER_S, Peer, Route
 from m2pem_plugin_mavlink.protocol.frames import encode
 from m2pem_plugin_mavlink.protocol.inbound import Sender
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
@@ -144,7 +144,7 @@ def test_rivals_do_not_pile_up() -> None:
     world.beat(world.peer("first"))
     for number in range(100):
         world.beat(world.peer(str(number)))
-    assert len(world.route._seats[1].rivals) == MOST_RIVALS
+    assert len(world.route._owners[1].competitors) == MAX_COMPETITORS
 
 
 def test_a_component_that_is_long_silent_is_forgotten_and_met_anew_but_no_autopilot() -> None:

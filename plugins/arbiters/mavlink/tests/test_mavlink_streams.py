@@ -1,19 +1,19 @@
 from m2pem_plugin_mavlink.protocol.messages import message_type
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
-from m2pem_plugin_mavlink.vehicle.streams import Streams, telemetry_streams
+from m2pem_plugin_mavlink.vehicle.streams import RequestedStreams, telemetry_streams
 
 FAST, SLOW = 30, 242
 
 
-def granted(now_s: float = 0.0) -> Streams:
-    streams = Streams({FAST: 0.25, SLOW: 2.0})
+def granted(now_s: float = 0.0) -> RequestedStreams:
+    streams = RequestedStreams({FAST: 0.25, SLOW: 2.0})
     for id_ in (FAST, SLOW):
         streams.asked(id_, now_s)
     return streams
 
 
 def test_all_is_asked_for_at_first_and_not_again_while_it_comes() -> None:
-    assert Streams({FAST: 0.25, SLOW: 2.0}).due({}, 0.0) == [FAST, SLOW]
+    assert RequestedStreams({FAST: 0.25, SLOW: 2.0}).due({}, 0.0) == [FAST, SLOW]
     assert granted().due({FAST: 99.8, SLOW: 98.0}, 100.0) == []
 
 

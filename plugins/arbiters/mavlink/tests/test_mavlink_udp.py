@@ -151,7 +151,7 @@ async def test_what_says_to_come_from_us_is_not_heard() -> None:
         await clock.turn(1.0)
         await until(vehicle.beats)
         assert echo.received == []
-        assert link.heard_systems() == {1}
+        assert link.known_systems() == {1}
         await echo.close()
         await vehicle.close()
 
@@ -177,7 +177,7 @@ async def test_peers_that_are_silent_are_forgotten_but_not_a_vehicle() -> None:
         vehicle.beat()
         await until(lambda: modes and len(endpoint().peers) == 2)
         await clock.turn(udp.FORGOTTEN_S + 2)
-        assert link.heard_systems() == {1}
+        assert link.known_systems() == {1}
         link.send(arm())
         await until(vehicle.names)
         await other.close()
@@ -193,10 +193,10 @@ async def test_when_there_are_too_many_peers_the_longest_silent_goes(
         ends = [await udp_end(endpoint().port, system=each) for each in range(1, 7)]
         for number, end in enumerate(ends):
             end.beat()
-            await until(lambda: number + 1 in link.heard_systems())  # noqa: B023
+            await until(lambda: number + 1 in link.known_systems())  # noqa: B023
             await clock.turn(0.1)
         assert modes == [0]
-        assert link.heard_systems() == {1, 5, 6}
+        assert link.known_systems() == {1, 5, 6}
         for end in ends:
             await end.close()
 

@@ -12,7 +12,7 @@ from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.vehicle import failsafe
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import Cause, TakeoverMonitor
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -57,7 +57,7 @@ async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> 
             lambda: (vehicle.state.altitude_above_home_m or 0) > 9.0, AMPLE_S
         )
         assert vehicle.state.landed is False
-        await driver.go_to(Place(47.3982, 8.545594, 20.0), 8.0)
+        await driver.go_to(TargetPosition(47.3982, 8.545594, 20.0), 8.0)
         there = 47.3982 - 2e-6
         arrived = lambda: vehicle.state.position.latitude_deg > there  # noqa: E731
         assert await vehicle.until(arrived, AMPLE_S)
@@ -83,7 +83,7 @@ async def test_a_copter_stands_soon_after_a_stop() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.driver.take_off(10.0)
         await vehicle.until(lambda: (vehicle.state.altitude_above_home_m or 0) > 9.0, AMPLE_S)
-        await vehicle.driver.go_to(Place(47.41, 8.545594, 10.0), 8.0)
+        await vehicle.driver.go_to(TargetPosition(47.41, 8.545594, 10.0), 8.0)
         assert await vehicle.until(lambda: 7.0 < vehicle.state.speed_m_s < 20.0, AMPLE_S)
         await vehicle.driver.stop()
         assert truth.mode == "BRAKE"
@@ -105,7 +105,7 @@ async def test_a_rover_is_armed_drives_holds_and_does_not_take_off() -> None:
     async with flying(Kind.ROVER) as (truth, vehicle):
         with pytest.raises(RefusedError, match="a rover does not take off"):
             await vehicle.driver.take_off(10.0)
-        await vehicle.driver.go_to(Place(47.3982, 8.545594))
+        await vehicle.driver.go_to(TargetPosition(47.3982, 8.545594))
         assert truth.mode == "GUIDED"
         assert await vehicle.until(lambda: 1.0 < vehicle.state.speed_m_s < 20.0, AMPLE_S)
         await vehicle.driver.stop()

@@ -12,7 +12,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
 )
 from m2pem_plugin_mavlink.behaviors.goto import Goto
 from m2pem_plugin_mavlink.behaviors.orbit import Orbit
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 RADII_M = (15.0, 300.0)
 """A circle is no smaller and no larger than these."""
@@ -27,12 +27,12 @@ class ObserveFromAbove(Orbit):
     name = "area_observe"
     ends = False
 
-    def circle(self) -> tuple[Place, float]:
+    def circle(self) -> tuple[TargetPosition, float]:
         area = self.parameters.area
         if area is None:
             return super().circle()
         center, radius = middle(area)
-        return Place(*center), max(RADII_M[0], min(RADII_M[1], radius))
+        return TargetPosition(*center), max(RADII_M[0], min(RADII_M[1], radius))
 
 
 class ObserveFromTheEdge(Goto):
@@ -45,13 +45,13 @@ class ObserveFromTheEdge(Goto):
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
         self._seconds = self.parameters.duration_s
-        self._stand: Place | None = None
+        self._stand: TargetPosition | None = None
         self._since_s: float | None = None
 
-    def target(self) -> Place:
+    def target(self) -> TargetPosition:
         """Return where the vehicle stops; chosen once."""
         if self._stand is None:
-            self._stand = Place(*self._edge(), *self.parameters.altitude())
+            self._stand = TargetPosition(*self._edge(), *self.parameters.altitude())
         return self._stand
 
     def _edge(self) -> LatLon:
@@ -117,7 +117,7 @@ class ObserveFromTheEdge(Goto):
     def restore(self, checkpoint: CheckpointState) -> None:
         stand = checkpoint.get("stand")
         if isinstance(stand, list):
-            self._stand = Place(stand[0], stand[1], *self.parameters.altitude())
+            self._stand = TargetPosition(stand[0], stand[1], *self.parameters.altitude())
 
 
 def middle(area: Area) -> tuple[LatLon, float]:

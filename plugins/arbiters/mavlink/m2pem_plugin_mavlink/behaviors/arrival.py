@@ -6,7 +6,7 @@ from m2pem.api import LatLon, LocalFrame, distance_m
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
 from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.exchanges import position_target
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
@@ -115,7 +115,7 @@ def height_m(state: AutopilotState, frame: str) -> float | None:
     return state.altitude_above_terrain_m
 
 
-def height_error_m(vehicle: Vehicle, place: Place) -> float:
+def height_error_m(vehicle: Vehicle, place: TargetPosition) -> float:
     """Return the difference in height to a place; 0 if no height was requested or it is unknown."""
     if place.altitude_m is None:
         return 0.0
@@ -149,7 +149,7 @@ def accepts_mode(behavior: Behavior, mode: FlightMode) -> bool:
     return mode in accepted_modes(behavior)
 
 
-async def moves_towards(vehicle: Vehicle, place: Place) -> bool:
+async def moves_towards(vehicle: Vehicle, place: TargetPosition) -> bool:
     """Return whether the vehicle moves towards a place, or reports it as its target; wait up to
     `LOOKS_FOR_S` for the motion."""
 
@@ -161,7 +161,7 @@ async def moves_towards(vehicle: Vehicle, place: Place) -> bool:
     )
 
 
-def _towards(vehicle: Vehicle, place: Place) -> bool:
+def _towards(vehicle: Vehicle, place: TargetPosition) -> bool:
     here, velocity = position_of(vehicle), vehicle.state.velocity_enu_m_s
     if here is None or velocity is None or vehicle.state.speed_m_s < STANDS_BELOW_M_S:
         return False
@@ -175,7 +175,7 @@ def _towards(vehicle: Vehicle, place: Place) -> bool:
     return along > _TOWARDS * ahead * vehicle.state.speed_m_s
 
 
-async def _has_target(vehicle: Vehicle, place: Place) -> bool:
+async def _has_target(vehicle: Vehicle, place: TargetPosition) -> bool:
     """Ask the autopilot for its target: a plane may fly away from its target until it has turned.
     Heights in the answer are above mean sea level."""
     try:

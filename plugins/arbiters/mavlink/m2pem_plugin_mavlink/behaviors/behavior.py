@@ -10,15 +10,14 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 CheckpointState: TypeAlias = Mapping[str, float | str | list[float] | None]
-"""What a behavior must know to be recognised after a restart, beside its parameters; goes into a
-text of JSON."""
+"""What a behavior needs after a restart, in addition to its parameters; stored as JSON."""
 
 ANY_MODE: frozenset[FlightMode] = frozenset(FlightMode)
 
 
 MOVES_WITHIN_S = 60.0
-"""`Behavior.still_s` of what is on its way somewhere. It may be slow to set out, or wait for what
-is in its way; no autopilot needs that long."""
+"""The usual `Behavior.max_still_s`. A vehicle may be slow to set out, or wait for an obstacle; no
+autopilot needs that long."""
 
 
 class BehaviorFailedError(Exception):

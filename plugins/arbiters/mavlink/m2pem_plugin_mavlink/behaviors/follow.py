@@ -7,7 +7,7 @@ from m2pem.api import BehaviorState, LatLon, LinkState, VehicleState, distance_m
 from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, position_of, takeoff_required
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters, state_of
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 OFFSET_M = 15.0
 BEHIND_RAD = math.pi
@@ -74,7 +74,7 @@ class Follow(Behavior):
             await self._stop(reason)
         if self._told is None or distance_m(self._told, station) > MOVED_M:
             self._told = station
-            place = Place(*station, *self._parameters.altitude())
+            place = TargetPosition(*station, *self._parameters.altitude())
             await self.vehicle.driver.go_to(place, self._parameters.speed_m_s)
 
     async def _stop(self, reason: str) -> None:

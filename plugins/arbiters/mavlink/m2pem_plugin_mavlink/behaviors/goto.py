@@ -28,7 +28,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     CheckpointState,
 )
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
 """How near is there, if nobody says; what autopilots take for a waypoint's radius."""
@@ -60,14 +60,14 @@ class Goto(Behavior):
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
         self.parameters = VehicleParameters(context)
-        self._place: Place | None = None
+        self._place: TargetPosition | None = None
         self._stillness = StillnessTimer(context)
         tolerance = self.parameters.tolerance_m
         self._said = tolerance is not None
         usual_m = TOLERANCES_M.get(self.vehicle.domain, 2.5)
         self._tolerance_m = usual_m if tolerance is None else max(tolerance, NEAREST_M)
 
-    def target(self) -> Place:
+    def target(self) -> TargetPosition:
         """Return where to go now."""
         return replace(self.parameters.target_place(), heading_rad=self.parameters.heading_rad)
 
@@ -77,7 +77,7 @@ class Goto(Behavior):
             return reason
         return "" if self.parameters.target_is_unheard else self._breach(self.target())
 
-    def _breach(self, place: Place) -> str:
+    def _breach(self, place: TargetPosition) -> str:
         if self.context.fence is None:
             return ""
         way = [(place.latitude_deg, place.longitude_deg)]
@@ -136,7 +136,7 @@ class Goto(Behavior):
             )
         return True
 
-    def _turned(self, place: Place) -> bool:
+    def _turned(self, place: TargetPosition) -> bool:
         yaw = self.vehicle.state.yaw_rad
         if place.heading_rad is None or self.vehicle.domain != "air" or yaw is None:
             return True
@@ -157,7 +157,7 @@ class Goto(Behavior):
         return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.UNKNOWN
 
 
-def _apart_m(a: Place, b: Place) -> float:
+def _apart_m(a: TargetPosition, b: TargetPosition) -> float:
     return distance_m((a.latitude_deg, a.longitude_deg), (b.latitude_deg, b.longitude_deg))
 
 

@@ -27,7 +27,7 @@ from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
 from m2pem_plugin_mavlink.behaviors.parameters import AMSL, RELATIVE, TERRAIN, VehicleParameters
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
-from m2pem_plugin_mavlink.vehicle.fixed_wing import without_landing
+from m2pem_plugin_mavlink.vehicle.fixed_wing import remove_landing
 
 _LAST_NAVIGATION_COMMAND: int = dialect.MAV_CMD_NAV_LAST
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
@@ -222,7 +222,7 @@ class MissionFlight(Behavior):
         if self._kept is None or self._end is None:
             return BehaviorState.UNKNOWN
         stored = await self.vehicle.driver.downloaded()
-        if not fingerprint(without_landing(stored)).fits(self._kept):
+        if not fingerprint(remove_landing(stored)).fits(self._kept):
             return BehaviorState.UNKNOWN
         if self.finished() or await self._stands_at_the_end():
             return BehaviorState.SUCCEEDED

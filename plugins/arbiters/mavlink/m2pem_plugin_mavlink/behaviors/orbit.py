@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
 )
 from m2pem_plugin_mavlink.behaviors.mission import MissionFlight, waypoint
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 RADIUS_M = 30.0
 MOST_ITEMS = 400
@@ -37,7 +37,7 @@ class Orbit(MissionFlight):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._center: Place | None = None
+        self._center: TargetPosition | None = None
         self._radius_m = self.parameters.radius_m or RADIUS_M
         self._seconds = self.parameters.duration_s
         self._turns = self.parameters.turns
@@ -55,17 +55,17 @@ class Orbit(MissionFlight):
 
     # --- where ----------------------------------------------------------------------------------
 
-    def circle(self) -> tuple[Place, float]:
+    def circle(self) -> tuple[TargetPosition, float]:
         """Return the centre, and the radius in metres."""
         return self.parameters.target_place(), self._radius_m
 
     @property
-    def center(self) -> Place:
+    def center(self) -> TargetPosition:
         """The centre, with a known height."""
         if self._center is None:
             place, self._radius_m = self.circle()
             height = self.parameters.altitude_to_fly(place.altitude_m, place.altitude_frame)
-            self._center = Place(place.latitude_deg, place.longitude_deg, *height)
+            self._center = TargetPosition(place.latitude_deg, place.longitude_deg, *height)
         return self._center
 
     def way(self) -> Sequence[MissionItem]:
@@ -201,6 +201,6 @@ class Orbit(MissionFlight):
         center, radius = checkpoint.get("center"), checkpoint.get("radius")
         if not isinstance(center, list) or not isinstance(radius, int | float):
             raise BehaviorFailedError("where it circles is not known any more")
-        self._center = Place(center[0], center[1], center[2], str(checkpoint.get("frame")))
+        self._center = TargetPosition(center[0], center[1], center[2], str(checkpoint.get("frame")))
         self._radius_m = float(radius)
         self.loop = bool(checkpoint.get("loop"))

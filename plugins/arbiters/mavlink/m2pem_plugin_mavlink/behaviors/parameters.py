@@ -2,7 +2,7 @@
 
 from m2pem.api import BehaviorParameters, LatLon, Point, ResourceId, VehiclePosition, VehicleState
 from m2pem_plugin_mavlink.behaviors.behavior import BehaviorContext, BehaviorFailedError
-from m2pem_plugin_mavlink.vehicle.driver import Place
+from m2pem_plugin_mavlink.vehicle.driver import TargetPosition
 
 RELATIVE, AMSL, TERRAIN = "relative", "amsl", "terrain"
 
@@ -60,7 +60,7 @@ class VehicleParameters(BehaviorParameters):
             raise BehaviorFailedError("its height is not known yet: say the altitude to move at")
         return present_m, RELATIVE
 
-    def target_place(self) -> Place:
+    def target_place(self) -> TargetPosition:
         """Where `target` is now.
 
         Raises:
@@ -69,9 +69,9 @@ class VehicleParameters(BehaviorParameters):
         value = self.target
         if isinstance(value, Point):
             latitude, longitude, own_m = value.position
-            return Place(latitude, longitude, *self.altitude(own_m, value.altitude_frame))
+            return TargetPosition(latitude, longitude, *self.altitude(own_m, value.altitude_frame))
         if isinstance(value, VehiclePosition):
-            return Place(*self.whereabouts(value.vehicle), *self.altitude())
+            return TargetPosition(*self.whereabouts(value.vehicle), *self.altitude())
         raise BehaviorFailedError("it has no target")
 
     @property

@@ -14,7 +14,7 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
     CheckpointState,
 )
 from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 SPEED_M_S = 1.0
 BEYOND_M = 5.0
@@ -66,7 +66,7 @@ class Reverse(Behavior):
         await driver.arm()
         await driver.command(dialect.MAV_CMD_DO_SET_REVERSE, 1.0)
         beyond = self._behind(self._from, self._yaw_rad, self._distance_m + BEYOND_M)
-        await driver.go_to(Place(*beyond), self._speed_m_s)
+        await driver.go_to(TargetPosition(*beyond), self._speed_m_s)
 
     async def resume(self) -> None:
         """Continue to the same target."""

@@ -30,8 +30,8 @@ from m2pem_plugin_mavlink.behaviors.behavior import (
 from m2pem_plugin_mavlink.behaviors.goto import TOLERANCES_M
 from m2pem_plugin_mavlink.behaviors.parameters import AMSL, VehicleParameters
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, RefusedError
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
-from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from m2pem_plugin_mavlink.vehicle.readiness import TEXTS_WITHIN_S
 
 _RETURNS = frozenset({FlightMode.RETURN})
@@ -73,7 +73,7 @@ class ChangeAltitude(Behavior):
         here = position_of(self.vehicle)
         if here is None:
             raise BehaviorFailedError("its position is not known")
-        await self.vehicle.driver.go_to(Place(*here, self._altitude_m, self._frame))
+        await self.vehicle.driver.go_to(TargetPosition(*here, self._altitude_m, self._frame))
 
     async def resume(self) -> None:
         """Continue at the position that the vehicle has now."""
@@ -99,7 +99,9 @@ class ChangeAltitude(Behavior):
         here = position_of(self.vehicle)
         if self.finished():
             return BehaviorState.SUCCEEDED
-        if here and await moves_towards(self.vehicle, Place(*here, self._altitude_m, self._frame)):
+        if here and await moves_towards(
+            self.vehicle, TargetPosition(*here, self._altitude_m, self._frame)
+        ):
             return BehaviorState.RUNNING
         return BehaviorState.SUCCEEDED if self.finished() else BehaviorState.UNKNOWN
 
@@ -214,7 +216,7 @@ class Land(Behavior):
         mode = self.vehicle.state.mode
         lands = accepts_mode(self, mode)
         if lands and mode is FlightMode.MISSION:
-            begins = landing_begins(await self.vehicle.driver.downloaded())
+            begins = landing_start(await self.vehicle.driver.downloaded())
             lands = begins is not None and (self.vehicle.driver.current_item or 0) >= begins
         return BehaviorState.RUNNING if lands else BehaviorState.UNKNOWN
 

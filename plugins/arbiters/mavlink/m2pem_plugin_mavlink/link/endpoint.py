@@ -1,4 +1,4 @@
-"""An endpoint: a socket or a serial line, its peers, and the vehicles that are heard over it."""
+"""An endpoint: a socket or a serial line, its peers, and the routes to vehicles over it."""
 
 import logging
 from abc import ABC, abstractmethod
@@ -10,13 +10,14 @@ from m2pem_plugin_mavlink.protocol.url import Url
 
 logger = logging.getLogger(__name__)
 
-MOST_STRANGERS = 64
+MAX_UNKNOWN_SENDERS = 64
 """Senders at one peer that nobody asked for, of which something is kept."""
 
 
 class Endpoint(ABC):
-    """`own_systems`: ids that are ours; what says to come from them is not heard. `now_s`: seconds
-    of the hub's clock. `greet` is called with each peer that must be spoken to first."""
+    """`own_systems`: the system ids of this process; frames that claim to come from them are
+    dropped. `now_s`: seconds of the hub's clock. `greet` is called with each peer that must receive
+    a frame first."""
 
     def __init__(
         self,
@@ -34,7 +35,7 @@ class Endpoint(ABC):
 
     @abstractmethod
     async def open(self) -> None:
-        """Listen, or begin to connect, again and again.
+        """Listen, or start to connect, repeatedly.
 
         Raises:
             PluginError: it is not possible, and will not be.
@@ -42,10 +43,10 @@ class Endpoint(ABC):
 
     @abstractmethod
     async def close(self) -> None:
-        """Let go of everything."""
+        """Close all connections."""
 
     def route(self, system: int) -> Route:
-        """The way to a vehicle; made where there is none."""
+        """Return the route to a vehicle; create it if there is none."""
         if system not in self._routes:
             self._routes[system] = Route(system, self.url)
             self.forget(system)
@@ -60,39 +61,39 @@ class Endpoint(ABC):
             self.forget(route.system)
 
     def forget(self, system: int) -> None:
-        """Meet its senders anew when they are heard next."""
+        """Forget the senders of a system; they are admitted again at their next frame."""
         for peer in self.peers.values():
             for sender in list(peer.inbound.senders.values()):
                 if sender.address.system == system:
                     peer.inbound.forget(sender)
 
-    def meet(self, peer: Peer, sender: Sender) -> bool:
-        """See `link.peer.Meet`."""
+    def admit(self, peer: Peer, sender: Sender) -> bool:
+        """See `link.route.AdmitSender`."""
         if sender.address.system in self._own_systems:
             return False
         route = self._routes.get(sender.address.system)
         if route is not None:
             return route.claim(peer, sender, self.now_s())
-        return len(peer.inbound.senders) < MOST_STRANGERS
+        return len(peer.inbound.senders) < MAX_UNKNOWN_SENDERS
 
-    def leads_to(self, system: int) -> bool:
-        """Whether somebody reaches a vehicle with this system id here."""
+    def has_route(self, system: int) -> bool:
+        """Return whether a link uses this system id here."""
         return system in self._routes
 
-    def heard_systems(self) -> set[int]:
-        """The system ids that are heard, wanted or not."""
+    def known_systems(self) -> set[int]:
+        """Return the system ids that send frames, whether links use them or not."""
         senders = (each for peer in self.peers.values() for each in peer.inbound.senders.values())
         return {each.address.system for each in senders}
 
-    def look_after(self) -> None:
-        """To be called about once a second."""
+    def maintain(self) -> None:
+        """Sample the quality of routes, and reassign silent ones. Call it about once a second."""
         now_s = self.now_s()
         for route in self._routes.values():
             route.sample(now_s)
             route.judge(now_s)
 
     def drop(self, key: Hashable) -> None:
-        """A peer has gone away."""
+        """A peer has closed its connection."""
         peer = self.peers.pop(key, None)
         if peer is not None:
             peer.open = False
@@ -101,7 +102,8 @@ class Endpoint(ABC):
             route.judge(now_s)
 
     def idle_peers(self, before_s: float) -> Iterable[Hashable]:
-        """Peers that were not heard since, and at which no vehicle is; longest silent first."""
+        """Yield peers that have sent nothing since `before_s` and reach no vehicle in use; the
+        longest silent first."""
         idle = [(each.heard_s, key) for key, each in self.peers.items() if each.heard_s < before_s]
         routes = self._routes.values()
         for _, key in sorted(idle, key=lambda each: each[0]):

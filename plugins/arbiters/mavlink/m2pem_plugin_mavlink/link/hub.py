@@ -1,9 +1,9 @@
-"""All endpoints of an event loop, shared by whoever speaks MAVLink in it.
+"""All endpoints of an event loop, shared by all links in it.
 
-Equal URLs are one socket, however many vehicles are reached over it, and whichever arbiters they
-belong to. To each peer we say once a second that we are there, as each of the sources in use; an
-autopilot takes ten seconds without that for a lost ground station, and some radios and routers send
-nothing to who has not spoken yet.
+Equal URLs are one socket, whatever the number of vehicles and arbiters that use it. Each peer
+receives a heartbeat once a second from each source in use: an autopilot takes ten seconds without
+one for the loss of its ground station, and some radios and routers send nothing to a peer that has
+not sent anything yet.
 """
 
 import asyncio
@@ -46,8 +46,8 @@ class _Opened:
 
 
 class Hub:
-    """Heartbeats and silences are timed by the clock of whoever opened the first endpoint, so that
-    they fit simulated vehicles that run faster than real time."""
+    """Heartbeats and silences are timed by the clock of the link that opened the first endpoint, so
+    that they fit simulated vehicles that run faster than real time."""
 
     _clock: Clock
 
@@ -59,17 +59,17 @@ class Hub:
         self._beating: asyncio.Task[None] | None = None
 
     def now_s(self) -> float:
-        """Seconds of the hub's clock."""
+        """Return the seconds of the hub's clock."""
         return self._clock.now_us() / US_PER_S
 
     def endpoint(self, url: Url) -> Endpoint:
-        """An endpoint that is open."""
+        """Return an open endpoint."""
         return self._opened[url].endpoint
 
     async def join(
         self, system: int, urls: Sequence[Url], source: Address, clock: Clock
     ) -> list[Route]:
-        """Open the endpoints over which a vehicle is reached, and speak as `source`.
+        """Open the endpoints over which a vehicle is reached, and send heartbeats as `source`.
 
         Raises:
             PluginError: one of them cannot be opened; nothing is left of the others.
@@ -78,7 +78,7 @@ class Hub:
             if not self._opened:
                 self._clock = clock
             ours = (source.system, *(each.system for each in self._sources))
-            taken = any(each.endpoint.leads_to(source.system) for each in self._opened.values())
+            taken = any(each.endpoint.has_route(source.system) for each in self._opened.values())
             if taken or system in ours:
                 clash = source.system if taken else system
                 raise PluginError(
@@ -155,7 +155,7 @@ class Hub:
                 at_us = now_us + HEARTBEAT_US
             await self._clock.sleep_until(at_us)
             for opened in list(self._opened.values()):
-                opened.endpoint.look_after()
+                opened.endpoint.maintain()
                 for number, peer in enumerate(list(opened.endpoint.peers.values())):
                     self._greet(peer)
                     if number % PEERS_AT_ONCE == PEERS_AT_ONCE - 1:
@@ -177,5 +177,5 @@ _hubs: WeakKeyDictionary[asyncio.AbstractEventLoop, Hub] = WeakKeyDictionary()
 
 
 def shared_hub() -> Hub:
-    """The hub of the running event loop."""
+    """Return the hub of the running event loop."""
     return _hubs.setdefault(asyncio.get_running_loop(), Hub())

@@ -18,29 +18,30 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.url import Url
 
-Meet: TypeAlias = Callable[["Peer", Sender], bool]
+AdmitSender: TypeAlias = Callable[["Peer", Sender], bool]
 """Is told of a new sender at a peer; False: it is not to be heard."""
 
 
 class Peer:
-    """A peer of an endpoint: a UDP address, a TCP connection, or what is at the end of a serial
-    line. `name` is for people; `write` sends bytes at once, or drops them; `heard_s`: when anything
-    came from it; `open`: it has not gone away."""
+    """A peer of an endpoint: a UDP address, a TCP connection, or the other end of a serial line.
+    `name` is for people; `write` sends bytes at once, or drops them; `heard_s`: when it has sent
+    anything last; `open`: it has not closed the connection."""
 
     __slots__ = ("_sequences", "heard_s", "inbound", "name", "open", "write")
 
     def __init__(
-        self, name: str, write: Callable[[bytes], None], meet: Meet, heard_s: float
+        self, name: str, write: Callable[[bytes], None], admit: AdmitSender, heard_s: float
     ) -> None:
         self.name = name
         self.write = write
         self.heard_s = heard_s
         self.open = True
-        self.inbound = Inbound(partial(meet, self))
+        self.inbound = Inbound(partial(admit, self))
         self._sequences: dict[Address, int] = {}
 
     def send(self, message: Message, source: Address) -> None:
-        """Send a message as `source`, whose frames to each peer are numbered by themselves.
+        """Send a message as `source`; the frames of each source to each peer have their own
+        sequence numbers.
 
         Raises:
             struct.error: a field's value does not fit its type.
@@ -54,7 +55,7 @@ _logger = logging.getLogger(__name__)
 
 TAKEOVER_S = 5.0
 FORGOTTEN_S = 60.0
-MOST_RIVALS = 8
+MAX_COMPETITORS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +71,17 @@ class _Claim:
 
 
 @dataclass(slots=True)
-class _Seat:
-    """A component: who is believed, and who else says to be it."""
+class _ComponentOwner:
+    """The sender that owns a component, and others that claim to be this component."""
 
     holder: _Claim
-    rivals: list[_Claim] = field(default_factory=list)
+    competitors: list[_Claim] = field(default_factory=list)
     warned: bool = False
 
 
 class Route:
-    """`users`: links that use it; `autopilots`: the components that they command, of which there is
-    mostly one; `turns`: of the exchanges with this vehicle."""
+    """`users`: the number of links that use it; `autopilots`: the components that they command,
+    mostly one; `locks`: serialize the exchanges with this vehicle."""
 
     def __init__(self, system: int, url: Url) -> None:
         self.system = system
@@ -89,7 +90,7 @@ class Route:
         self.autopilots: set[int] = set()
         self.locks = KeyedLock()
         self._wanted: dict[int, Wanted] = {}
-        self._seats: dict[int, _Seat] = {}
+        self._owners: dict[int, _ComponentOwner] = {}
 
     def listen(self, ids: Iterable[int], listener: Listener) -> None:
         """Hand messages with these ids to the listener; twice, if it listens twice.
@@ -115,75 +116,76 @@ class Route:
                 del self._wanted[id_]
 
     def claim(self, peer: Peer, sender: Sender, now_s: float) -> bool:
-        """A sender of this system is heard at a peer for the first time, or again after it was
-        forgotten; False: it is one of too many that say to be the same."""
+        """A sender of this system has sent its first frame over a peer. Return False if there are
+        too many senders that claim to be the same component."""
         claim = _Claim(peer, sender)
-        seat = self._seats.get(sender.address.component)
-        if seat is None:
-            self._seats[sender.address.component] = _Seat(claim)
+        owner = self._owners.get(sender.address.component)
+        if owner is None:
+            self._owners[sender.address.component] = _ComponentOwner(claim)
             sender.wanted = self._wanted
-        elif seat.holder.peer is peer or not seat.holder.live(now_s):
-            self._give(seat, claim)
+        elif owner.holder.peer is peer or not owner.holder.live(now_s):
+            self._give(owner, claim)
         else:
-            for rival in list(seat.rivals):
-                if rival.peer is peer or not rival.live(now_s):
-                    seat.rivals.remove(rival)
-                    rival.forget()
-            if len(seat.rivals) == MOST_RIVALS:
+            for competitor in list(owner.competitors):
+                if competitor.peer is peer or not competitor.live(now_s):
+                    owner.competitors.remove(competitor)
+                    competitor.forget()
+            if len(owner.competitors) == MAX_COMPETITORS:
                 return False
-            seat.rivals.append(claim)
-            self._warn(seat, claim)
+            owner.competitors.append(claim)
+            self._warn(owner, claim)
         return True
 
     def judge(self, now_s: float) -> None:
-        """Let who has been silent for too long lose its place to somebody who is heard; and forget
-        components, but not autopilots: they may hear us though we don't hear them."""
-        for component, seat in list(self._seats.items()):
-            holder = seat.holder
+        """Give a component whose owner is silent to a sender that is not. Forget other silent
+        components, but not autopilots: they may receive although nothing is received from them."""
+        for component, owner in list(self._owners.items()):
+            holder = owner.holder
             if holder.live(now_s):
                 continue
-            live = [rival for rival in seat.rivals if rival.live(now_s)]
+            live = [competitor for competitor in owner.competitors if competitor.live(now_s)]
             if live:
-                self._give(seat, max(live, key=lambda rival: rival.sender.heard_s))
+                self._give(owner, max(live, key=lambda competitor: competitor.sender.heard_s))
             elif component not in self.autopilots and now_s - holder.sender.heard_s > FORGOTTEN_S:
-                for claim in (holder, *seat.rivals):
+                for claim in (holder, *owner.competitors):
                     claim.forget()
-                del self._seats[component]
+                del self._owners[component]
 
     def holds(self, peer: Peer) -> bool:
-        """Whether the vehicle, or a part of it, is reached at this peer."""
-        return any(seat.holder.peer is peer for seat in self._seats.values())
+        """Return whether a component of the vehicle is reached at this peer."""
+        return any(owner.holder.peer is peer for owner in self._owners.values())
 
     def peer_of(self, component: int, autopilot: int) -> Peer | None:
-        """Where a component is reached: where it was heard, or else, where the autopilot was, which
-        passes on what is for others. None: nowhere."""
+        """Return the peer of a component or, if there is none, of the autopilot, which forwards
+        messages. None: neither is known."""
         for each in (component, autopilot):
-            seat = self._seats.get(each)
-            if seat is not None and seat.holder.peer.open:
-                return seat.holder.peer
+            owner = self._owners.get(each)
+            if owner is not None and owner.holder.peer.open:
+                return owner.holder.peer
         return None
 
     def sample(self, now_s: float) -> None:
-        """To be called about once a second."""
-        for seat in self._seats.values():
-            seat.holder.sender.sample(now_s)
+        """Sample the quality. Call it about once a second."""
+        for owner in self._owners.values():
+            owner.holder.sender.sample(now_s)
 
     def quality(self, component: int, now_s: float) -> LinkQuality | None:
-        """How well a component is heard; None: it was never heard, or its connection is gone."""
-        seat = self._seats.get(component)
-        if seat is None or not seat.holder.peer.open:
+        """Return the quality of the connection to a component; None if it has never sent anything,
+        or its connection is closed."""
+        owner = self._owners.get(component)
+        if owner is None or not owner.holder.peer.open:
             return None
-        return seat.holder.sender.quality(now_s)
+        return owner.holder.sender.quality(now_s)
 
-    def _give(self, seat: _Seat, claim: _Claim) -> None:
-        before = seat.holder
+    def _give(self, owner: _ComponentOwner, claim: _Claim) -> None:
+        before = owner.holder
         # Who is not believed is met anew when it is heard next: it may be believed another time.
-        for other in (before, *seat.rivals):
+        for other in (before, *owner.competitors):
             if other is not claim:
                 other.sender.wanted = NOTHING
                 other.forget()
         claim.sender.wanted = self._wanted
-        seat.holder, seat.rivals, seat.warned = claim, [], False
+        owner.holder, owner.competitors, owner.warned = claim, [], False
         if before.peer is not claim.peer:
             _logger.info(
                 "%s: component %d of system %d is silent at %s, and now at %s",
@@ -194,10 +196,10 @@ class Route:
                 claim.peer.name,
             )
 
-    def _warn(self, seat: _Seat, claim: _Claim) -> None:
+    def _warn(self, owner: _ComponentOwner, claim: _Claim) -> None:
         component = claim.sender.address.component
-        if not seat.warned and component in self.autopilots:
-            seat.warned = True
+        if not owner.warned and component in self.autopilots:
+            owner.warned = True
             _logger.warning(
                 "%s: %s says to be component %d of system %d, as %s does, which is believed; "
                 "do two vehicles have the same system id?",
@@ -205,5 +207,5 @@ class Route:
                 claim.peer.name,
                 component,
                 self.system,
-                seat.holder.peer.name,
+                owner.holder.peer.name,
             )

@@ -1,4 +1,4 @@
-"""The link to a vehicle through the hub: `await open_link(address, urls, clock)`."""
+"""The link to a vehicle over the hub: `await open_link(address, urls, clock)`."""
 
 import logging
 import math
@@ -34,7 +34,8 @@ US_PER_S = 1_000_000
 async def open_link(
     address: Address, urls: Sequence[str], clock: Clock, source: Address = GROUND_STATION
 ) -> "RoutedLink":
-    """Reach a vehicle over one or more endpoints, the preferred one first; `source`: who we are.
+    """Open a link to a vehicle over one or more endpoints, the preferred one first; `source`: the
+    address of this ground station.
 
     Returns when listening: a vehicle that is silent, or a connection that does not come about yet,
     is no error.
@@ -50,7 +51,7 @@ async def open_link(
 
 
 class RoutedLink:
-    """See `VehicleLink`. Sends over the endpoint that hears the vehicle best."""
+    """See `VehicleLink`. Sends over the endpoint with the best connection to the vehicle."""
 
     def __init__(
         self, hub: Hub, address: Address, source: Address, routes: Sequence[Route], clock: Clock
@@ -72,8 +73,8 @@ class RoutedLink:
         return self._clock.now_us() / US_PER_S
 
     def send(self, message: Message) -> None:
-        """See `VehicleLink.send`. Nothing is sent to a vehicle that was never heard: nobody knows
-        where it is.
+        """See `VehicleLink.send`. Nothing is sent to a vehicle that has never sent anything: its
+        peer is unknown.
 
         Raises:
             struct.error: a field's value does not fit its type.
@@ -120,20 +121,22 @@ class RoutedLink:
         return transaction.outcome()
 
     def quality(self) -> LinkQuality | None:
-        """How well the autopilot is heard over the endpoint in use; None: never yet."""
+        """Return the quality over the endpoint in use; None if the autopilot has never sent
+        anything."""
         return self._quality(self._best())
 
     def qualities(self) -> dict[str, LinkQuality | None]:
         """The same for each endpoint, by its URL."""
         return {str(route.url): self._quality(route) for route in self._routes}
 
-    def heard_systems(self) -> set[int]:
-        """Every system id that is heard on its endpoints: for when the vehicle's own is not."""
-        heard = (self._hub.endpoint(route.url).heard_systems() for route in self._routes)
+    def known_systems(self) -> set[int]:
+        """Return every system id that sends on its endpoints; for errors, when the vehicle's own
+        does not."""
+        heard = (self._hub.endpoint(route.url).known_systems() for route in self._routes)
         return set().union(*heard)
 
     async def close(self) -> None:
-        """Let go of the vehicle, and of endpoints that nobody else uses. Exchanges fail."""
+        """Release the vehicle, and endpoints without other users. Active exchanges fail."""
         if self._closed:
             return
         self._closed = True

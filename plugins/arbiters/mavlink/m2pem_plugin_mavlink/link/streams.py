@@ -1,4 +1,4 @@
-"""MAVLink over what breaks and is connected again: TCP and serial lines."""
+"""MAVLink over connections that break and are made again: TCP and serial lines."""
 
 import asyncio
 import socket
@@ -26,7 +26,7 @@ it does not acknowledge."""
 
 
 class Connection(asyncio.Protocol):
-    """One connection of an endpoint, a peer while it lasts."""
+    """One connection of an endpoint; it is a peer while it lasts."""
 
     def __init__(self, endpoint: Endpoint, name: str = "") -> None:
         self._endpoint = endpoint
@@ -36,7 +36,6 @@ class Connection(asyncio.Protocol):
         self.lost: asyncio.Future[None] = loop.create_future()
 
     def connection_made(self, transport: Any) -> None:
-        """It is there."""
         self._transport = transport
         if len(self._endpoint.peers) >= MOST_CONNECTIONS:
             transport.abort()
@@ -47,23 +46,21 @@ class Connection(asyncio.Protocol):
             connected.setsockopt(*option)
         address = transport.get_extra_info("peername")
         name = self._name or f"{address[0]}:{address[1]}"
-        self.peer = Peer(name, self._write, self._endpoint.meet, self._endpoint.now_s())
+        self.peer = Peer(name, self._write, self._endpoint.admit, self._endpoint.now_s())
         self._endpoint.peers[self] = self.peer
         self._endpoint.greet(self.peer)
         self.made.set_result(None)
 
     def data_received(self, data: bytes) -> None:
-        """Bytes have come."""
         self.peer.heard_s = now_s = self._endpoint.now_s()
         self.peer.inbound.stream(data, now_s)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is gone."""
         self._endpoint.drop(self)
         self.lost.set_result(None)
 
     def abort(self) -> None:
-        """End it now."""
+        """Close the connection at once."""
         self._transport.abort()
 
     def _write(self, data: bytes) -> None:
@@ -72,7 +69,7 @@ class Connection(asyncio.Protocol):
 
 
 class ConnectingEndpoint(Endpoint):
-    """Connects, and again with growing pauses whenever that fails or the connection breaks."""
+    """Connects, and reconnects with growing pauses."""
 
     async def open(self) -> None:
         """See `Endpoint.open`."""
@@ -118,7 +115,7 @@ class ConnectingEndpoint(Endpoint):
 
 
 class TcpOutEndpoint(ConnectingEndpoint):
-    """`tcpout`."""
+    """The endpoint of `tcpout` URLs."""
 
     url: SocketUrl
 
@@ -130,7 +127,7 @@ class TcpOutEndpoint(ConnectingEndpoint):
 
 
 class SerialEndpoint(ConnectingEndpoint):
-    """`serial`."""
+    """The endpoint of `serial` URLs."""
 
     url: SerialUrl
 
@@ -167,7 +164,7 @@ class SerialEndpoint(ConnectingEndpoint):
 
 
 class TcpInEndpoint(Endpoint):
-    """`tcpin`: up to `MOST_CONNECTIONS`."""
+    """The endpoint of `tcpin` URLs; it accepts up to `MOST_CONNECTIONS`."""
 
     url: SocketUrl
     _server: asyncio.Server
@@ -193,6 +190,6 @@ class TcpInEndpoint(Endpoint):
 
     @property
     def port(self) -> int:
-        """The local one."""
+        """The local port."""
         port: int = self._server.sockets[0].getsockname()[1]
         return port

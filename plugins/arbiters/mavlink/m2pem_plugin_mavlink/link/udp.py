@@ -21,12 +21,13 @@ LARGEST_DATAGRAM = 65_535
 AT_ONCE = 256
 """Datagrams that are read before others get their turn: about a millisecond's work."""
 
-MOST_PEERS = 1_024
+MAX_PEERS = 1_024
 FORGOTTEN_S = 60.0
 
 
 class UdpEndpoint(Endpoint):
-    """`udpin` and `udpout`: the latter has one peer from the first, and hears no other."""
+    """The endpoint of `udpin` and `udpout` URLs: the latter has one peer from the beginning, and no
+    other."""
 
     url: SocketUrl
     _socket: socket.socket
@@ -49,13 +50,13 @@ class UdpEndpoint(Endpoint):
 
     @property
     def port(self) -> int:
-        """The local one."""
+        """The local port."""
         port: int = self._socket.getsockname()[1]
         return port
 
-    def look_after(self) -> None:
-        """See `Endpoint.look_after`."""
-        super().look_after()
+    def maintain(self) -> None:
+        """See `Endpoint.maintain`."""
+        super().maintain()
         if self.url.way is Way.UDP_IN:
             for key in list(self.idle_peers(self.now_s() - FORGOTTEN_S)):
                 self.drop(key)
@@ -72,18 +73,18 @@ class UdpEndpoint(Endpoint):
                 continue  # what was sent before did not arrive: nobody listens there, yet
             peer = peers.get(address)
             if peer is None:
-                self._stranger(data, address, now_s)
+                self._receive_from_new_peer(data, address, now_s)
             else:
                 peer.heard_s = now_s
                 peer.inbound.datagram(data, now_s)
 
-    def _stranger(self, data: bytes, address: Any, now_s: float) -> None:
-        """Whoever sends a right frame is a peer; of others nothing is kept."""
+    def _receive_from_new_peer(self, data: bytes, address: Any, now_s: float) -> None:
+        """Add a peer for an address that has sent a valid frame; nothing is kept of others."""
         peer = self._peer(address, now_s)
         peer.inbound.datagram(data, now_s)
         if not peer.inbound.senders:
             return
-        if len(self.peers) >= MOST_PEERS:
+        if len(self.peers) >= MAX_PEERS:
             idle = next(iter(self.idle_peers(now_s)), None)
             if idle is None:
                 peer.open = False
@@ -107,7 +108,7 @@ class UdpEndpoint(Endpoint):
                 if error.errno not in (errno.ECONNREFUSED, errno.EAGAIN, errno.ENOBUFS):
                     logger.debug("%s: nothing sent to %s: %s", self.url, name, error)
 
-        return Peer(name, write, self.meet, now_s)
+        return Peer(name, write, self.admit, now_s)
 
 
 async def _opened(url: SocketUrl) -> socket.socket:
@@ -132,7 +133,7 @@ async def _opened(url: SocketUrl) -> socket.socket:
 
 
 def why_not(error: OSError) -> str:
-    """Why a socket cannot be had, for people."""
+    """Return why a socket cannot be opened, for people."""
     if error.errno == errno.EADDRINUSE:
         return "another program has this port; end it, or use another port"
     if error.errno == errno.EADDRNOTAVAIL:

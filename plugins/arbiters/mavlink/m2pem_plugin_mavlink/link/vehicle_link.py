@@ -17,14 +17,14 @@ from m2pem_plugin_mavlink.protocol.transaction import Transaction
 
 
 class KeyedLock:
-    """Who comes first is served first."""
+    """One lock for each key; waiters are served in their order."""
 
     def __init__(self) -> None:
         self._locks: dict[Hashable, tuple[asyncio.Lock, int]] = {}
 
     @asynccontextmanager
     async def locked(self, key: Hashable) -> AsyncIterator[None]:
-        """Wait until nobody else has this key."""
+        """Hold the lock of a key."""
         lock, users = self._locks.get(key) or (asyncio.Lock(), 0)
         self._locks[key] = lock, users + 1
         try:
@@ -43,23 +43,23 @@ Listener: TypeAlias = Callable[[Message, Address], None]
 
 
 class VehicleLink(Protocol):
-    """What the exchanges and drivers of a vehicle speak through. `address` is its autopilot's."""
+    """The link that exchanges and drivers of a vehicle use. `address` is its autopilot's."""
 
     @property
     def address(self) -> Address:
-        """Of the autopilot."""
+        """The address of the autopilot."""
         ...
 
     def now_s(self) -> float:
-        """The clock of `deadline_s`: seconds, never goes back."""
+        """Return the time of the clock of `deadline_s`, in seconds; it never goes back."""
         ...
 
     def send(self, message: Message) -> None:
-        """Send a message; its target fields are the caller's. Nothing is said of its arrival."""
+        """Send a message; the caller sets its target fields. It may get lost."""
         ...
 
     async def perform(self, transaction: Transaction[T]) -> T:
-        """Run an exchange to its end, after those with the same key.
+        """Run an exchange to its end, after others with the same key.
 
         Raises:
             ExchangeError: it failed.
@@ -67,12 +67,13 @@ class VehicleLink(Protocol):
         ...
 
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
-        """Hand over all messages with these ids of this system, any component; the function that is
-        returned ends it. Only messages that somebody listens to are decoded."""
+        """Call the listener with all messages of these ids from this system, any component; the
+        returned function ends that. Only messages with a listener are decoded."""
         ...
 
     def quality(self) -> LinkQuality | None:
-        """How well the autopilot is heard over the endpoint in use; None: never yet."""
+        """Return the quality over the endpoint in use; None if the autopilot has never sent
+        anything."""
         ...
 
 
@@ -80,7 +81,7 @@ US_PER_S = 1_000_000
 
 
 class Exchange:
-    """A transaction that goes on."""
+    """Runs a transaction."""
 
     def __init__(self, transaction: Transaction[Any], link: VehicleLink, clock: Clock) -> None:
         self._transaction = transaction
@@ -91,7 +92,7 @@ class Exchange:
         self._waits_until_s = math.inf
 
     async def run(self) -> None:
-        """Returns when the transaction is done.
+        """Run the transaction until it is done.
 
         Raises:
             Exception: what the transaction raised, or `abort` was given.

@@ -17,7 +17,8 @@ from m2pem_plugin_mavlink.protocol.url import SocketUrl, Url, Way, parse_url
 
 
 class GroundStation:
-    """Between `open` and `close`. `source`: whom it sends as."""
+    """A ground station of MAVSDK, between `open` and `close`. `source`: the address that it sends
+    from."""
 
     def __init__(self, url: Url, source: Address) -> None:
         self.url = url
@@ -57,7 +58,7 @@ class GroundStation:
             raise PluginError(f"{self.url}: MAVSDK cannot open it: {reason}") from error
 
     async def close(self) -> None:
-        """Close everything, once all links are closed: no thread and no socket is left."""
+        """Close everything, after all links are closed: no thread and no socket is left."""
         if self._search is not None:
             self._search.cancel()
             await asyncio.gather(self._search, return_exceptions=True)
@@ -85,7 +86,7 @@ class GroundStation:
 
 
 def _refuse_if_taken(url: SocketUrl) -> None:
-    """MAVSDK shares a port with whoever else listens there, and then hears nothing, or half."""
+    """Raise an error if the port is in use: MAVSDK would share it, and receive nothing, or half."""
     family = socket.AF_INET6 if ":" in url.host else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -97,7 +98,7 @@ def _refuse_if_taken(url: SocketUrl) -> None:
 async def open_mavsdk_link(
     address: Address, urls: Sequence[str], clock: Clock, source: Address = GROUND_STATION
 ) -> MavsdkLink:
-    """Reach a vehicle; see `link.routed_link.open_link`.
+    """Open a link to a vehicle; see `link.routed_link.open_link`.
 
     Raises:
         PluginError: there is no MAVSDK, the URL is wrong or cannot be opened, or there is more than
@@ -106,13 +107,13 @@ async def open_mavsdk_link(
     if len(urls) != 1:
         raise PluginError(f"`driver: mavsdk` takes one URL, and has {len(urls)}")
     loop = asyncio.get_running_loop()
-    stations = _stations.get(loop)
+    stations = _ground_stations.get(loop)
     if stations is None:
-        stations = _stations[loop] = _Stations()
+        stations = _ground_stations[loop] = _GroundStations()
     return await stations.join(address, parse_url(urls[0]), source, clock)
 
 
-class _Stations:
+class _GroundStations:
     """The ground stations of an event loop."""
 
     def __init__(self) -> None:
@@ -138,4 +139,6 @@ class _Stations:
                 await station.close()
 
 
-_stations: WeakKeyDictionary[asyncio.AbstractEventLoop, _Stations] = WeakKeyDictionary()
+_ground_stations: WeakKeyDictionary[asyncio.AbstractEventLoop, _GroundStations] = (
+    WeakKeyDictionary()
+)

@@ -1,4 +1,4 @@
-"""Messages as MAVSDK hands them over and takes them: their fields in JSON.
+"""Conversion of messages to and from the JSON of MAVSDK.
 
 A field that is no number is null there, whether NaN or infinite.
 """
@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.protocol.messages import Message, MessageType
 
 
 def read(type_: MessageType, fields_json: str) -> Message:
-    """The message with these fields; those that it does not have, or that say nothing of it, are 0.
+    """Return the message with these fields; missing ones are 0.
 
     Raises:
         ValueError: this is no JSON of a message.
@@ -35,7 +35,7 @@ def _read(value: Any, is_text: bool) -> Any:
 
 
 def written(message: Message) -> str:
-    """The fields of a message, in JSON."""
+    """Return the fields of a message as JSON."""
     names: tuple[str, ...] = message.TYPE.make._fields
     return json.dumps({name: _written(value) for name, value in zip(names, message, strict=True)})
 

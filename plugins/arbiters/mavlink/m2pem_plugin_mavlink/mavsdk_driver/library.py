@@ -1,4 +1,4 @@
-"""The package mavsdk: whether it is there, and where its log goes."""
+"""The package mavsdk: whether it is installed, and its log."""
 
 import asyncio
 import contextlib
@@ -48,25 +48,25 @@ def _missing() -> str:
 
 
 def plugin(name: str) -> ModuleType:
-    """One of its plugins."""
+    """Import one of its plugins."""
     return require(f"mavsdk.asyncio.plugins.{name}")
 
 
 def failure() -> type[Exception]:
-    """What its calls raise."""
+    """Return the class of its errors."""
     error: type[Exception] = require("mavsdk.exceptions").MavsdkError
     return error
 
 
 def reason(error: Exception) -> str:
-    """Why a call failed, for people."""
+    """Return why a call failed, for people."""
     result = getattr(error, "result", None)
     return str(error) if result is None else result.name.lower().replace("_", " ")
 
 
 def read_log() -> None:
-    """From now on its log goes to the logger of this module, in this event loop, and no more to the
-    terminal; to be undone by `leave_log`."""
+    """Send its log to the logger of this module, in this event loop, instead of the terminal;
+    undone by `leave_log`."""
     # Not by its `log_subscribe`: that prints whatever is no UTF-8, as texts of vehicles may be.
     log = require("mavsdk.logging")
     if not _callbacks:

@@ -33,19 +33,19 @@ T = TypeVar("T")
 
 
 class PendingCalls:
-    """A call is made in a thread and cannot be stopped: who waits for it may be cancelled, and then
-    it goes on. What it works with must not go away before it has come back."""
+    """Calls into MAVSDK. A call runs in a thread and cannot be stopped: it continues when its
+    waiter is cancelled, and the objects that it uses must exist until it returns."""
 
     def __init__(self) -> None:
         self._tasks: set[asyncio.Task[Any]] = set()
 
     @property
     def pending(self) -> bool:
-        """Whether any is on its way."""
+        """Whether a call is active."""
         return bool(self._tasks)
 
     async def make(self, call: Coroutine[Any, Any, T]) -> T:
-        """Make a call; what it raises is raised."""
+        """Make a call; raise what it raises."""
         task = asyncio.get_running_loop().create_task(call)
         self._tasks.add(task)
         task.add_done_callback(self._done)
@@ -57,7 +57,8 @@ class PendingCalls:
             task.exception()  # so that nobody says that nobody has asked
 
     async def finish(self) -> None:
-        """Wait until all have come back; each does so soon, as MAVSDK waits for no vehicle long."""
+        """Wait until all calls have returned; each does so soon, as MAVSDK waits for no vehicle
+        long."""
         while self._tasks:
             await asyncio.wait(self._tasks)
 
@@ -75,8 +76,8 @@ _RESULTS: dict[str, int] = {
 """What its results mean, by their names: MAV_MISSION_RESULT."""
 
 
-async def carried(link: "MavsdkLink", transaction: Transaction[Any]) -> bool:
-    """Have MAVSDK upload a mission; False: it is another exchange."""
+async def upload_with_mavsdk(link: "MavsdkLink", transaction: Transaction[Any]) -> bool:
+    """Let MAVSDK upload a mission; return False if the transaction is something else."""
     if not isinstance(transaction, UploadMission) or not transaction.items:
         return False
     if transaction.mission_type is not MissionType.MISSION:
@@ -89,20 +90,20 @@ async def carried(link: "MavsdkLink", transaction: Transaction[Any]) -> bool:
             await cancel_upload(link)
             raise
         except library.failure() as error:
-            transaction.fail(_meant(error))
+            transaction.fail(_transaction_error(error))
         else:
             transaction.succeed(None)
     return True
 
 
 async def cancel_upload(link: "MavsdkLink") -> None:
-    """End the upload that goes on, if there is one."""
+    """Cancel the active upload, if there is one."""
     with contextlib.suppress(library.failure()):  # there is none
         await link.calls.make(link.missions.cancel_mission_upload())
 
 
 async def _upload(link: "MavsdkLink", items: Sequence[MissionItem]) -> None:
-    """To the end: its progress is told in callbacks, for which somebody must be there."""
+    """Upload to the end; its progress comes in callbacks, which must be read."""
     make = library.plugin("mission_raw").MissionPlan
     plan = make([_item(item, sequence, link.address) for sequence, item in enumerate(items)])
     async for _ in link.missions.upload_mission_with_progress(plan):
@@ -116,7 +117,7 @@ def _item(item: MissionItem, sequence: int, target: Address) -> Any:
     return make(**{name: getattr(fields, name) for name in names.split()})
 
 
-def _meant(error: Exception) -> ExchangeError:
+def _transaction_error(error: Exception) -> ExchangeError:
     name = error.result.name if hasattr(error, "result") else ""
     if name not in _RESULTS:  # a time-out, or trouble of its own
         return NoAnswerError(f"upload of the mission: MAVSDK: {library.reason(error)}")
@@ -162,18 +163,18 @@ class MavsdkLink:
 
     @property
     def attached(self) -> bool:
-        """Whether MAVSDK has found it."""
+        """Whether MAVSDK has found the vehicle."""
         return self._direct is not None
 
     def attach(self, system: Any) -> None:
-        """MAVSDK has found it: begin to listen."""
+        """MAVSDK has found the vehicle: subscribe to its messages."""
         self._direct = library.plugin("mavlink_direct").MavlinkDirectAsync(system)
         self.missions = library.plugin("mission_raw").MissionRawAsync(system)
         for id_ in self._listeners:
             self._read(id_)
 
     async def close(self) -> None:
-        """Listen no more, and let what is on its way come back. Exchanges fail."""
+        """Unsubscribe, and wait for active calls. Active exchanges fail."""
         if self._closed:
             return
         self._closed = True
@@ -234,7 +235,7 @@ class MavsdkLink:
                 raise ExchangeError("the link was closed")
             if not self.attached:
                 raise NoAnswerError(f"system {self.address.system} was not heard yet")
-            if not await carried(self, transaction):
+            if not await upload_with_mavsdk(self, transaction):
                 exchange = Exchange(transaction, self, self._clock)
                 self._exchanges.add(exchange)
                 try:
@@ -244,7 +245,7 @@ class MavsdkLink:
         return transaction.outcome()
 
     def quality(self) -> LinkQuality | None:
-        """None: MAVSDK does not say how many frames get lost."""
+        """Return None: MAVSDK does not report lost frames."""
         return None
 
     # --- hearing --------------------------------------------------------------------------------

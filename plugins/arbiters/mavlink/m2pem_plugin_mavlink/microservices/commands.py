@@ -81,7 +81,7 @@ _CLEAR = (dialect.MAV_RESULT_UNSUPPORTED, *_OTHER_FORM)
 
 
 @dataclass(frozen=True, slots=True)
-class CommandPlace:
+class CommandPosition:
     """Param 5 to 7 of a command that has a place: WGS-84 degrees, and an altitude in a MAV_FRAME;
     an altitude that is NaN stays as it is."""
 
@@ -114,7 +114,7 @@ class CommandExchange(Transaction[T]):
         command: int,
         params: Sequence[float] = (),
         *,
-        place: CommandPlace | None = None,
+        place: CommandPosition | None = None,
         once: bool = False,
         retry_policy: RetryPolicy = PATIENCE,
         progress: Callable[[int | None], None] | None = None,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
+from m2pem_plugin_mavlink.microservices.commands import Command, CommandPosition
 from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
@@ -93,7 +93,7 @@ def set_home(target: Address, place: GroundPlace | None) -> Command:
     command = dialect.MAV_CMD_DO_SET_HOME
     if place is None:
         return Command(target, command, (1,))
-    at = CommandPlace(
+    at = CommandPosition(
         place.latitude_deg,
         place.longitude_deg,
         place.altitude_amsl_m,

@@ -1,1 +1,1 @@
-"""MAVLink without I/O: messages, frames, exchanges. Knows no vehicle and no clock."""
+"""MAVLink without I/O: messages, frames, transactions. Knows no vehicle and no clock."""

@@ -1,4 +1,5 @@
-"""What comes from one peer: split into frames, counted for each sender, decoded where wanted."""
+"""The frames of one peer: splits its bytes, counts frames for each sender, and decodes what has
+listeners."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -36,7 +37,7 @@ Listener: TypeAlias = Callable[[Message, Address], None]
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A message that somebody listens to."""
+    """A message type that has listeners."""
 
     type: MessageType
     listeners: tuple[Listener, ...]
@@ -48,8 +49,8 @@ NOTHING: WantedById = {}
 
 
 class Sender(Reception):
-    """One component of a system, as it is heard over one peer; `wanted` of its messages are
-    decoded and handed on."""
+    """One component of a system, as one peer sends it; messages in `wanted` are decoded and passed
+    on."""
 
     __slots__ = ("address", "wanted")
 
@@ -59,7 +60,7 @@ class Sender(Reception):
         self.wanted: WantedById = NOTHING
 
 
-Meet: TypeAlias = Callable[[Sender], bool]
+AdmitSender: TypeAlias = Callable[[Sender], bool]
 """Is told of a new sender, and may set what is wanted of it; False: it is not to be heard."""
 
 
@@ -70,10 +71,10 @@ class Inbound:
     sender that nobody knows and that cannot be checked.
     """
 
-    __slots__ = ("_marked", "_marked_s", "_meet", "_rest", "bad_frames", "junk_bytes", "senders")
+    __slots__ = ("_admit", "_marked", "_marked_s", "_rest", "bad_frames", "junk_bytes", "senders")
 
-    def __init__(self, meet: Meet) -> None:
-        self._meet = meet
+    def __init__(self, admit: AdmitSender) -> None:
+        self._admit = admit
         self._rest = b""
         self._marked = 0  # so many bytes of the rest were there at `_marked_s`
         self._marked_s = 0.0
@@ -82,7 +83,7 @@ class Inbound:
         self.bad_frames = 0
 
     def datagram(self, data: bytes, now_s: float) -> None:
-        """A datagram has come."""
+        """Receive a datagram."""
         size = len(data)
         # Nearly all have one frame of MAVLink 2: no call, no object more than is needed for it.
         if size >= AROUND_V2 and data[0] == V2 and size == data[1] + AROUND_V2:
@@ -120,7 +121,7 @@ class Inbound:
                 self._frame(header, each, now_s)
 
     def stream(self, data: bytes, now_s: float) -> None:
-        """More of a stream has come."""
+        """Receive bytes of a stream."""
         if self._rest:
             data = self._rest + data
         given_up = self._marked if now_s - self._marked_s > UNFINISHED_S else 0
@@ -154,14 +155,14 @@ class Inbound:
             self._hand_over(wanted, payload, sender.address)
 
     def forget(self, sender: Sender) -> None:
-        """Meet it anew when it is heard next."""
+        """Forget a sender; it is admitted again at its next frame."""
         key = sender.address.system | sender.address.component << 8
         if self.senders.get(key) is sender:
             del self.senders[key]
 
     def _met(self, source: int, sequence: int, now_s: float) -> Sender | None:
         sender = Sender(Address(source & 255, source >> 8), sequence, now_s)
-        if not self._meet(sender):
+        if not self._admit(sender):
             return None
         if len(self.senders) >= MOST_SENDERS:
             del self.senders[min(self.senders, key=lambda each: self.senders[each].heard_s)]

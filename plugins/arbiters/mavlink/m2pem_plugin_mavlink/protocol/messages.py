@@ -20,7 +20,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 
 class Address(NamedTuple):
-    """Who sends, or is sent to (mavlink.io, "Routing"). Component 1 is the autopilot."""
+    """The address of a sender or receiver (mavlink.io, "Routing"). Component 1 is the autopilot."""
 
     system: int
     component: int
@@ -88,7 +88,7 @@ class MessageType:
 
 @cache
 def types_by_id() -> dict[int, MessageType]:
-    """Every message of the dialect."""
+    """Return every message type of the dialect."""
     return {id_: _message_type(source) for id_, source in dialect.mavlink_map.items()}
 
 
@@ -98,7 +98,7 @@ def _types_by_name() -> dict[str, MessageType]:
 
 
 def message_type(name: str) -> MessageType:
-    """A message by its name.
+    """Return a message type by its name.
 
     Raises:
         KeyError: the dialect has no such message.

@@ -1,4 +1,4 @@
-"""How well a sender is heard over one path: loss, rate and age.
+"""The quality of a connection from a sender: loss, rate and age.
 
 Each sender numbers its frames 0..255, over and over, on each of its links (mavlink.io, "Packet
 Serialization").
@@ -63,11 +63,11 @@ class Reception:
 
     @property
     def sent(self) -> int:
-        """Frames that were sent, as far as their numbers tell."""
+        """The number of frames that were sent, as far as the sequence numbers tell."""
         return self.expected - self._start
 
     def count(self, sequence: int, now_s: float) -> None:
-        """A frame has come."""
+        """Count a frame."""
         if sequence == self.expected & 255:
             self.expected += 1
         else:
@@ -75,7 +75,7 @@ class Reception:
         self.heard_s = now_s
 
     def astray(self, sequence: int, now_s: float) -> None:
-        """A frame that was not expected next: some are missing, or it is late or doubled."""
+        """Count a frame that is not the next one: some are missing, or it is late or doubled."""
         ahead = (sequence - self.expected) & 255
         missing = self._missing << min(self.expected - self._marked, LATE)
         self._marked = self.expected
@@ -101,14 +101,14 @@ class Reception:
         self._marked = self.expected
 
     def sample(self, now_s: float) -> None:
-        """Note the counts; to be called about once a second."""
+        """Store the counts; call it about once a second."""
         samples = self._samples
         samples.append((now_s, self.sent, self.lost))
         while len(samples) > 2 and samples[1][0] <= now_s - WINDOW_S:
             del samples[0]
 
     def quality(self, now_s: float) -> LinkQuality:
-        """How well it is heard lately."""
+        """Return the recent quality."""
         since_s, sent_before, lost_before = self._samples[0]
         sent = self.sent - sent_before
         lost = min(max(self.lost - lost_before, 0), sent)

@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 class ExchangeError(Exception):
-    """The vehicle did not do what it was asked. `reason` is for people."""
+    """The vehicle did not do what was requested. `reason` is for people."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -24,12 +24,12 @@ class ExchangeError(Exception):
 
 
 class NoAnswerError(ExchangeError):
-    """It did not answer, however often it was asked; whether it has heard is not known."""
+    """The vehicle did not answer any request; it may have received one."""
 
 
 class RefusedError(ExchangeError):
-    """It answered, and will not. `result`: MAV_RESULT or MAV_MISSION_RESULT, as the exchange says;
-    `temporary`: asking again later may help."""
+    """The vehicle refused. `result`: MAV_RESULT or MAV_MISSION_RESULT, by the exchange;
+    `temporary`: a later request may succeed."""
 
     def __init__(self, reason: str, result: int, *, temporary: bool = False) -> None:
         super().__init__(reason)
@@ -58,19 +58,19 @@ class Transaction(ABC, Generic[T]):
 
     @abstractmethod
     def begin(self, now_s: float) -> None:
-        """Ask."""
+        """Send the first request."""
 
     @abstractmethod
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """A message that is wanted has come; it may be somebody else's answer, late or doubled."""
+        """Receive a message of `wants`; it may be another client's answer, late or doubled."""
 
     @abstractmethod
     def expire(self, now_s: float) -> None:
-        """`deadline_s` has passed: ask again, or `fail`."""
+        """`deadline_s` has passed: repeat the request, or `fail`."""
 
     def for_us(self, message: Message) -> bool:
-        """Whether it is addressed to us or to everybody, and not to another ground station
-        (mavlink.io, "Routing")."""
+        """Return whether the message is addressed to this ground station or to all (mavlink.io,
+        "Routing")."""
         if self.source is None:
             return True
         system = getattr(message, "target_system", 0)
@@ -78,17 +78,17 @@ class Transaction(ABC, Generic[T]):
         return system in (0, self.source.system) and component in (0, self.source.component)
 
     def succeed(self, result: T) -> None:
-        """It is done."""
+        """End with a result."""
         if not self.done:
             self.done, self._result, self.deadline_s = True, result, None
 
     def fail(self, error: ExchangeError) -> None:
-        """It cannot be done."""
+        """End with an error."""
         if not self.done:
             self.done, self._error, self.deadline_s = True, error, None
 
     def outcome(self) -> T:
-        """The result of an exchange that is done.
+        """Return the result of a transaction that is done.
 
         Raises:
             ExchangeError: it failed.
@@ -100,14 +100,15 @@ class Transaction(ABC, Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class RetryPolicy:
-    """It is asked `tries` times, and each time waited `answer_s` seconds."""
+    """How often a request is sent (`tries`), and how long each time its answer is waited for
+    (`answer_s`, seconds)."""
 
     tries: int
     answer_s: float
 
     @property
     def bound_s(self) -> float:
-        """After so much silence it is over."""
+        """The time after which a silent vehicle makes the exchange fail."""
         return self.tries * self.answer_s
 
 

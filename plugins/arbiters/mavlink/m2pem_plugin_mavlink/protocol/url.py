@@ -24,7 +24,7 @@ class UrlError(PluginError):
 
 
 class Way(StrEnum):
-    """How a socket comes to its peers."""
+    """How a socket gets its peers."""
 
     UDP_IN = "udpin"
     UDP_OUT = "udpout"
@@ -70,7 +70,7 @@ _DEVICE = re.compile(r"(?P<path>/dev/[^,:\s]+|COM\d+)(?:[,:](?P<baudrate>\d+))?"
 
 
 def chooses_port(url: Url) -> bool:
-    """Whether the kernel chooses the port, another one for each process: it is 0."""
+    """Return whether the port is 0: the kernel then chooses another one for each process."""
     return isinstance(url, SocketUrl) and url.port == 0
 
 

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.microservices.commands import CommandPlace
+from m2pem_plugin_mavlink.microservices.commands import CommandPosition
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
-from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing, landing_begins
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
+from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing_items, landing_start
 from m2pem_plugin_mavlink.vehicle.identity import Kind
 
 STOP_WITHIN_S = 3.0
@@ -107,11 +107,11 @@ class ArdupilotDriver(Autopilot):
         )
         await self.start_mission()
 
-    def _here(self, altitude_m: float) -> Place:
+    def _here(self, altitude_m: float) -> TargetPosition:
         position = self.state.position
         if position is None:
             raise not_now("its position is not known")
-        return Place(position.latitude_deg, position.longitude_deg, altitude_m)
+        return TargetPosition(position.latitude_deg, position.longitude_deg, altitude_m)
 
     async def land(self) -> None:
         """Land at the present position; a plane by the landing sequence of its mission."""
@@ -119,7 +119,7 @@ class ArdupilotDriver(Autopilot):
             case Kind.COPTER | Kind.VTOL:
                 await self.set_mode(FlightMode.LAND)
             case Kind.PLANE:
-                begins = landing_begins(await self.downloaded())
+                begins = landing_start(await self.downloaded())
                 if begins is None:
                     raise cannot(NO_LANDING)
                 await self.start_mission(begins)
@@ -149,7 +149,7 @@ class ArdupilotDriver(Autopilot):
 
     # --- to places ------------------------------------------------------------------------------
 
-    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+    async def go_to(self, place: TargetPosition, speed_m_s: float | None = None) -> None:
         """Go to a place in GUIDED. The speed is sent after it: a rover without a target refuses a
         speed, also that of the command for the target."""
         await self._arm_to_drive()
@@ -165,7 +165,7 @@ class ArdupilotDriver(Autopilot):
                 math.degrees(place.heading_rad) % 360.0,
             )
 
-    async def _reposition(self, place: Place, radius_m: float) -> None:
+    async def _reposition(self, place: TargetPosition, radius_m: float) -> None:
         frame, altitude_m = self._altitude(place)
         await exchanges.command_at(
             self.link,
@@ -176,10 +176,10 @@ class ArdupilotDriver(Autopilot):
                 radius_m,
                 math.nan,
             ),
-            CommandPlace(place.latitude_deg, place.longitude_deg, altitude_m, frame),
+            CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, frame),
         )
 
-    def _altitude(self, place: Place) -> tuple[int, float]:
+    def _altitude(self, place: TargetPosition) -> tuple[int, float]:
         """Return a MAV_FRAME and a height in it; ArduPilot accepts no NaN for the present
         height."""
         if self.kind in (Kind.ROVER, Kind.BOAT):
@@ -190,7 +190,7 @@ class ArdupilotDriver(Autopilot):
             raise not_now("its height is not known")
         return dialect.MAV_FRAME_GLOBAL, self.state.position.altitude_m
 
-    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+    async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:
         """Circle a place with a plane; the CIRCLE of copters and rovers has no command for its
         centre."""
         if self.kind not in WINGED:
@@ -229,8 +229,8 @@ class ArdupilotDriver(Autopilot):
     async def upload(self, items: Sequence[MissionItem]) -> None:
         """Store a mission. The landing sequence of the mission before stays behind it, unless the
         new one has its own; the mission must not continue into it."""
-        if self.kind is Kind.PLANE and items and landing_begins(items) is None:
-            items = (*items, *landing(await self.downloaded()))
+        if self.kind is Kind.PLANE and items and landing_start(items) is None:
+            items = (*items, *landing_items(await self.downloaded()))
         await super().upload(items)
 
     async def start_mission(self, first: int = 0) -> None:

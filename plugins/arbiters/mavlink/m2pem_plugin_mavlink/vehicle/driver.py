@@ -24,7 +24,7 @@ class FlightMode(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class TargetPosition:
     """A place to go to, in WGS-84 degrees; `altitude_m` in `altitude_frame` ("relative" to home,
     "amsl", "terrain"), None: the present one. `heading_rad` from true north, clockwise; None: the
     present one."""
@@ -84,11 +84,11 @@ class Driver(Protocol):
         """Arm where needed, and climb to a height above home."""
         ...
 
-    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+    async def go_to(self, place: TargetPosition, speed_m_s: float | None = None) -> None:
         """Go to a place and stay there (DO_REPOSITION or its equivalent)."""
         ...
 
-    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+    async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:
         """Circle a place without end; return False if the autopilot has no command for it."""
         ...
 

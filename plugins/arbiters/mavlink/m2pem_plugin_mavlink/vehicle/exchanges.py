@@ -6,7 +6,7 @@ Raises of all of them: `ExchangeError`, see the exchange.
 from collections.abc import Sequence
 
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
-from m2pem_plugin_mavlink.microservices.commands import Command, CommandPlace
+from m2pem_plugin_mavlink.microservices.commands import Command, CommandPosition
 from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage, SetMessageInterval
 from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType
@@ -38,7 +38,7 @@ async def command(link: VehicleLink, command_id: int, *params: float) -> None:
 
 
 async def command_at(
-    link: VehicleLink, command_id: int, params: Sequence[float], place: CommandPlace
+    link: VehicleLink, command_id: int, params: Sequence[float], place: CommandPosition
 ) -> None:
     """Send a command with a place."""
     await link.perform(Command(link.address, command_id, params, place=place))

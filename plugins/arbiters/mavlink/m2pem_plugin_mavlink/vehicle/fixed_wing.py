@@ -34,17 +34,17 @@ _RADII = {
 }
 
 
-def circles(identity: Identity) -> bool:
+def must_circle(identity: Identity) -> bool:
     """Return whether a vehicle cannot stop in the air."""
     return identity.kind in WINGED
 
 
-def suppose(state: AutopilotState, identity: Identity) -> None:
+def assume_default_radii(state: AutopilotState, identity: Identity) -> None:
     """Set the radii to the defaults of the autopilot, until it reports them."""
     state.loiter_radius_m = state.home_loiter_radius_m = _RADII[identity.firmware].usual_m
 
 
-async def ask(state: AutopilotState, identity: Identity, link: VehicleLink) -> None:
+async def read_radii(state: AutopilotState, identity: Identity, link: VehicleLink) -> None:
     """Read the radii. A negative one means counter-clockwise; 0 at home means the same as
     elsewhere.
 
@@ -72,7 +72,7 @@ NO_LANDING = (
 )
 
 
-def landing_begins(mission: Sequence[MissionItem]) -> int | None:
+def landing_start(mission: Sequence[MissionItem]) -> int | None:
     """Return the item at which the landing sequence begins (the first DO_LAND_START, else the first
     item that lands); None if there is none."""
     for commands in ((_START,), _LANDS):
@@ -82,13 +82,13 @@ def landing_begins(mission: Sequence[MissionItem]) -> int | None:
     return None
 
 
-def landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+def landing_items(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     """Return the landing sequence of a mission, to the mission's end."""
-    begins = landing_begins(mission)
+    begins = landing_start(mission)
     return () if begins is None else tuple(mission[begins:])
 
 
-def without_landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+def remove_landing(mission: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     """Return the items before the landing sequence."""
-    begins = landing_begins(mission)
+    begins = landing_start(mission)
     return tuple(mission if begins is None else mission[:begins])

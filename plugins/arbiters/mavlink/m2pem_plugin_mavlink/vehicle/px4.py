@@ -6,11 +6,11 @@ from collections.abc import Awaitable, Callable
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.microservices.commands import CommandPlace
+from m2pem_plugin_mavlink.microservices.commands import CommandPosition
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
-from m2pem_plugin_mavlink.vehicle.driver import FlightMode, Place
+from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Kind
 
 SETPOINTS_BEFORE_S = 1.0
@@ -53,7 +53,9 @@ class Px4Driver(Autopilot):
             raise cannot(f"a {self.kind} does not take off")
         position = self.state.position
         if self.in_the_air and position is not None:
-            await self.go_to(Place(position.latitude_deg, position.longitude_deg, altitude_m))
+            await self.go_to(
+                TargetPosition(position.latitude_deg, position.longitude_deg, altitude_m)
+            )
             return
         await self.arm()
         amsl_m = self._amsl(altitude_m, "relative")
@@ -89,7 +91,7 @@ class Px4Driver(Autopilot):
 
     # --- to places ------------------------------------------------------------------------------
 
-    async def go_to(self, place: Place, speed_m_s: float | None = None) -> None:
+    async def go_to(self, place: TargetPosition, speed_m_s: float | None = None) -> None:
         await self._arm_to_drive()
         altitude_m = self._place_amsl(place)
         heading = math.nan if place.heading_rad is None else place.heading_rad
@@ -104,11 +106,11 @@ class Px4Driver(Autopilot):
                     0.0,
                     heading,
                 ),
-                CommandPlace(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL),
+                CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, _AMSL),
             ),
         )
 
-    async def orbit(self, center: Place, radius_m: float, speed_m_s: float | None) -> bool:
+    async def orbit(self, center: TargetPosition, radius_m: float, speed_m_s: float | None) -> bool:
         """Circle a place without end, clockwise, facing it."""
         if self.kind in ON_THE_GROUND or self.kind is Kind.PLANE:
             return False
@@ -126,7 +128,7 @@ class Px4Driver(Autopilot):
                         float(dialect.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER),
                         0.0,
                     ),
-                    CommandPlace(center.latitude_deg, center.longitude_deg, altitude_m, _AMSL),
+                    CommandPosition(center.latitude_deg, center.longitude_deg, altitude_m, _AMSL),
                 ),
             )
         except RefusedError as refused:
@@ -141,7 +143,7 @@ class Px4Driver(Autopilot):
             number, command, lambda: self.state.custom_mode == number, must_accept=True
         )
 
-    def _place_amsl(self, place: Place) -> float:
+    def _place_amsl(self, place: TargetPosition) -> float:
         if place.altitude_m is None or self.kind in ON_THE_GROUND:
             return math.nan
         return self._amsl(place.altitude_m, place.altitude_frame)

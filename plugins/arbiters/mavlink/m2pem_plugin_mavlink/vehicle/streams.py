@@ -36,7 +36,7 @@ def telemetry_streams(firmware: Firmware) -> Mapping[int, float]:
     return MappingProxyType({message_type(name).id: each for name, each in named.items()})
 
 
-class Streams:
+class RequestedStreams:
     """The requested streams and whether they arrive, without I/O.
 
     A vehicle forgets what it was asked for when it is switched off, and that may go unnoticed: so

@@ -13,8 +13,7 @@ from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.texts import StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
-from m2pem_plugin_mavlink.vehicle import exchanges
-from m2pem_plugin_mavlink.vehicle import fixed_wing as circling
+from m2pem_plugin_mavlink.vehicle import exchanges, fixed_wing
 from m2pem_plugin_mavlink.vehicle.ardupilot import ArdupilotDriver
 from m2pem_plugin_mavlink.vehicle.driver import Driver
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, identity
@@ -27,18 +26,18 @@ from m2pem_plugin_mavlink.vehicle.state import (
     link_state,
     vehicle_state,
 )
-from m2pem_plugin_mavlink.vehicle.streams import Streams, telemetry_streams
+from m2pem_plugin_mavlink.vehicle.streams import RequestedStreams, telemetry_streams
 from m2pem_plugin_mavlink.vehicle.telemetry_decoder import TelemetryDecoder
 
 
 class ConditionWaiters:
-    """Tasks that wait for conditions. Call `look` whenever a condition may have become true."""
+    """Tasks that wait for conditions. Call `check` whenever a condition may have become true."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._waiting: dict[asyncio.Future[bool], Callable[[], bool]] = {}
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Wake the tasks whose condition is true, or raises."""
         for future, true in tuple(self._waiting.items()):
             if future.done():
@@ -123,7 +122,7 @@ class Vehicle:
         self._logger = logger or logging.getLogger(__name__)
         self._driver: Driver | None = None
         self._decoder: TelemetryDecoder | None = None
-        self._streams: Streams | None = None
+        self._streams: RequestedStreams | None = None
         self._waiters = ConditionWaiters(clock)
         self._watchers: list[Callable[[], None]] = []
         self._deafen: list[Callable[[], None]] = []
@@ -244,10 +243,10 @@ class Vehicle:
                 "%s: the fleet says %s, its heartbeat %s", self.resource, self.domain, found.kind
             )
         self._driver = driver_of(self, found)
-        self._streams = Streams(telemetry_streams(found.firmware))
+        self._streams = RequestedStreams(telemetry_streams(found.firmware))
         self._decoder = TelemetryDecoder(self.state, modes_of(found), flies=flies)
-        if circling.circles(found):
-            circling.suppose(self.state, found)
+        if fixed_wing.must_circle(found):
+            fixed_wing.assume_default_radii(self.state, found)
             self._go(self._ask_for_radii(found))
         self._hear(message, sender)
         self._deafen.append(self.link.listen(self._decoder.wants, self._hear))
@@ -294,7 +293,7 @@ class Vehicle:
         self._logger.warning("%s %s", self.resource, text)
 
     def _tell(self) -> None:
-        self._waiters.look()
+        self._waiters.check()
         for watcher in tuple(self._watchers):
             watcher()
 
@@ -331,7 +330,7 @@ class Vehicle:
             self._home_asked_s, self._asking = now_s, True
             self._go(self._ask_for_home())
 
-    async def _ask(self, streams: Streams, due: list[int]) -> None:
+    async def _ask(self, streams: RequestedStreams, due: list[int]) -> None:
         try:
             for id_ in due:
                 try:
@@ -359,7 +358,7 @@ class Vehicle:
     async def _ask_for_radii(self, found: Identity) -> None:
         while True:
             try:
-                await circling.ask(self.state, found, self.link)
+                await fixed_wing.read_radii(self.state, found, self.link)
             except ExchangeError as error:
                 self._logger.debug("%s: does not tell how it circles: %s", self.resource, error)
                 await self._clock.sleep(RADII_EVERY_S)
