@@ -1,4 +1,4 @@
-"""Arming and disarming, and what must be well before."""
+"""Arming and disarming, and the checks before."""
 
 from collections.abc import Iterator, Mapping
 
@@ -23,7 +23,7 @@ class Arming(Component):
         self._idle_s = 0.0
 
     def reasons(self) -> Iterator[str]:
-        """Why it would not arm in its present mode, best first."""
+        """Yield the reasons against arming in the present mode, the most important first."""
         mode = self.autopilot.modes.mode
         if not mode.armable:
             named = self.autopilot.spec.kind not in (Kind.ROVER, Kind.BOAT)
@@ -32,7 +32,7 @@ class Arming(Component):
             yield from component.refusals()
 
     def refusals(self) -> Iterator[str]:
-        """What somebody has broken, and what the estimator lacks."""
+        """Yield the injected faults, and what the estimator lacks."""
         estimator, mode = self.autopilot.estimator, self.autopilot.modes.mode
         if self.autopilot.injected_faults.arming is not None:
             yield self.autopilot.injected_faults.arming
@@ -47,11 +47,12 @@ class Arming(Component):
 
     @property
     def healthy(self) -> bool:
-        """Nothing is against arming it (the bit PREARM_CHECK of SYS_STATUS)."""
+        """Whether there is no reason against arming (the bit PREARM_CHECK of SYS_STATUS)."""
         return next(self.reasons(), None) is None
 
     def arm(self, *, force: bool = False, by: str = COMMANDED) -> bool:
-        """Arm; says why if it will not. To be armed already is well. `by`: the reason."""
+        """Arm, or send texts with the reasons against it; return True also if it was armed before.
+        `by`: the reason."""
         if self.armed:
             return True
         reasons = [] if force else list(self.reasons())
@@ -81,7 +82,7 @@ class Arming(Component):
         return True
 
     def disarm_after_landing(self) -> None:
-        """It is on the ground, and was to land."""
+        """Disarm after a landing."""
         if self.armed:
             self.autopilot.log_event("landed")
             self.disarm(by="landing")
@@ -90,7 +91,7 @@ class Arming(Component):
         return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT) or self.autopilot.body.on_ground
 
     def step(self, dt_s: float) -> None:
-        """What stands on the ground armed is disarmed after a while (DISARM_DELAY)."""
+        """Disarm a copter that stays on the ground for DISARM_DELAY."""
         autopilot = self.autopilot
         delay_s = autopilot.tuning.disarm_delay_s
         flies = autopilot.spec.kind is Kind.COPTER

@@ -1,4 +1,10 @@
-"""What a vehicle carries, whatever its firmware."""
+"""One simulated autopilot without I/O: messages and simulated time in, messages out.
+
+Its abilities are in its components (`simulator.interfaces.Component`), the behavior of its firmware
+is in `simulator.firmware`. Call `meet` with a peer, `receive` with each message and `step` as time
+passes; `take_outbox` returns the messages to send. Time is simulated time: its caller decides how
+fast it passes.
+"""
 
 import logging
 from typing import Any, TypeVar
@@ -43,7 +49,7 @@ from m2pem_plugin_mavlink.simulator.streams import Streams
 
 
 def equipment_of(spec: VehicleSpec) -> tuple[type[Component], ...]:
-    """Its parts."""
+    """Return the components that do not depend on the firmware."""
     gimbal = spec.kind is Kind.COPTER if spec.gimbal is None else spec.gimbal
     components: list[type[Component]] = [Fence]
     if gimbal:
@@ -63,7 +69,7 @@ logger = logging.getLogger(__name__)
 
 
 class Autopilot:
-    """One vehicle: its body, its firmware and its parts."""
+    """One vehicle: its state of motion, its firmware and its components."""
 
     def __init__(self, spec: VehicleSpec, now_s: float = 0.0, *, step_s: float = 0.02) -> None:
         self.spec = spec
@@ -84,7 +90,7 @@ class Autopilot:
         self._boot()
 
     def _boot(self) -> None:
-        """Make all parts anew; what is in permanent memory (parameters, plans) stays."""
+        """Create all components anew; permanent memory (parameters, plans) stays."""
         self.booted_s = self._silent_until_s
         self.texts = Texts(self)
         self.estimator = Estimator(self)
@@ -132,53 +138,53 @@ class Autopilot:
 
     @property
     def since_boot_s(self) -> float:
-        """Simulated time since it was started."""
+        """Simulated time since the start."""
         return self.now_s - self.booted_s
 
     @property
     def boot_ms(self) -> int:
-        """The same, as messages have it."""
+        """Milliseconds since the start, as messages have them."""
         return int(self.since_boot_s * 1000) & 0xFFFFFFFF
 
     @property
     def silent(self) -> bool:
-        """It is starting, and neither hears nor speaks."""
+        """Whether it is starting, and neither receives nor sends."""
         return self.now_s < self._silent_until_s
 
     @property
     def tuning(self) -> Tuning:
-        """How it behaves, as its parameters say now."""
+        """How the vehicle behaves, by the present parameters."""
         return self.firmware.tuning(self.parameters)
 
     @property
     def target_point(self) -> Point | None:
-        """Where it is on the way to."""
+        """The target of the present motion."""
         match self.setpoint:
             case PositionSetpoint(point=point) | CircleSetpoint(center=point):
                 return point
         return None
 
     def log_event(self, kind: str, detail: str = "") -> None:
-        """Write into the chronicle."""
+        """Add an event to the log."""
         self.log.log_event(self.now_s, kind, detail)
 
     @property
     def position(self) -> Point:
-        """Where it is, from the origin of its frame."""
+        """The position, from the origin of its frame."""
         return self.body.point
 
     def obey(self, command: Command) -> Result:
-        """Do what a command says, whoever sends it."""
+        """Execute a command, of any sender."""
         return self._commands.perform(command)
 
     def meet(self, peer: Peer) -> None:
-        """There is somebody to talk to. Knowing him already is well."""
+        """Add a peer, if it is new."""
         if peer not in self.peers:
             self.peers.append(peer)
             self.streams.meet(peer)
 
     def component(self, kind: type[P]) -> P:
-        """The part of that type.
+        """Return the component of a type.
 
         Raises:
             LookupError: there is none.
@@ -197,16 +203,16 @@ class Autopilot:
         self.texts.say(text, severity)
 
     def warn(self, text: str) -> None:
-        """Say why something is refused or wrong."""
+        """Send a STATUSTEXT with the reason of a refusal or fault."""
         self.texts.say(text, dialect.MAV_SEVERITY_CRITICAL)
 
     def take_outbox(self) -> list[Outgoing]:
-        """What is to be sent; it is yours, and the outbox is empty."""
+        """Return the messages to send, and empty the outbox."""
         taken, self.outbox = self.outbox, []
         return taken
 
     def receive(self, message: Any, sender: Peer, now_s: float) -> None:
-        """A message has come from a peer."""
+        """Receive a message of a peer."""
         self.meet(sender)
         if now_s > self.now_s:
             self.step(now_s)
@@ -218,7 +224,7 @@ class Autopilot:
             handler(message, origin)
 
     def step(self, now_s: float) -> None:
-        """Let simulated time pass up to then, in steps that are small enough."""
+        """Advance simulated time to `now_s`, in small steps."""
         while self.now_s < now_s - 1e-9:
             dt_s = min(self.step_s, now_s - self.now_s)
             self.now_s += dt_s
@@ -229,7 +235,7 @@ class Autopilot:
             self.dynamics.step(self.body, self.setpoint, dt_s)
 
     def reboot(self) -> None:
-        """Start anew; the vehicle stays where it is."""
+        """Restart; the vehicle stays where it is."""
         self.log_event("reboot")
         self._silent_until_s = self.now_s + REBOOT_S
         self.setpoint = NoThrust()

@@ -202,7 +202,7 @@ class Camera(Component):
     # --- pictures ---------------------------------------------------------------------------------
 
     def _take_picture(self) -> None:
-        """All are told where it was taken."""
+        """Take a picture, and report its position to all peers."""
         if self.spoilt:
             self.spoilt -= 1
             self._tell_of_picture(taken=False)

@@ -21,7 +21,7 @@ Told = tuple[Sender, int]
 
 
 class CommandServer(Component):
-    """Answers commands. `handlers`: by MAV_CMD; whoever is not there is UNSUPPORTED."""
+    """Executes and acknowledges commands. `handlers`: by MAV_CMD; all others are UNSUPPORTED."""
 
     def __init__(self, autopilot: AutopilotInterface, component: int = 1) -> None:
         super().__init__(autopilot)
@@ -58,7 +58,7 @@ class CommandServer(Component):
         )
 
     def perform(self, command: Command) -> Result:
-        """Let the handler do it."""
+        """Call the handler of a command."""
         handler = self.handlers.get(command.id)
         if handler is None:
             return Result.UNSUPPORTED
@@ -69,7 +69,8 @@ class CommandServer(Component):
             return Result.DENIED
 
     def _repeated(self, command: Command) -> Result | None:
-        """The answer that the same command got just now, if it comes once more."""
+        """Return the acknowledgement of the same command from a moment ago, if this one is a
+        repetition."""
         before = self._answers.get((command.sender, command.id))
         if not command.confirmation or before is None:
             return None
@@ -92,7 +93,7 @@ REBOOTS = (1, 3)
 
 
 class SystemCommands(Component):
-    """Restarts it."""
+    """Reboots the autopilot."""
 
     rebooting = False
 
@@ -109,7 +110,7 @@ class SystemCommands(Component):
         return Result.ACCEPTED
 
     def step(self, dt_s: float) -> None:
-        """The answer goes out first."""
+        """Reboot one step later, so that the acknowledgement is sent before."""
         if self.rebooting:
             self.rebooting = False
             self.autopilot.reboot()

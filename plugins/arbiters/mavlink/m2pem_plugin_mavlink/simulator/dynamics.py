@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.simulator.specification import Kind
 
 @dataclass(slots=True)
 class BodyState:
-    """The physical truth, in metres from home (north, east, up), m/s and radians.
+    """The true position and motion, in metres from home (north, east, up), m/s and radians.
 
     Attitude as aircraft count it: yaw from north clockwise, pitch nose up, roll right.
     """
@@ -29,7 +29,7 @@ class BodyState:
 
     @property
     def point(self) -> Point:
-        """Where it is."""
+        """The position."""
         return Point(self.north_m, self.east_m, self.up_m)
 
     @property
@@ -39,23 +39,23 @@ class BodyState:
 
     @property
     def moving(self) -> bool:
-        """Faster than the noise of sensors."""
+        """Whether it is faster than the noise of sensors."""
         return self.ground_speed_mps > 0.1 or abs(self.up_mps) > 0.1
 
     def stop(self) -> None:
-        """Stand still where it is, level."""
+        """Stop at once, level."""
         self.north_mps = self.east_mps = self.up_mps = self.yaw_rps = 0.0
         self.roll_rad = self.pitch_rad = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class NoThrust:
-    """No thrust. What is in the air comes down."""
+    """No thrust: a vehicle in the air falls."""
 
 
 @dataclass(frozen=True, slots=True)
 class PositionSetpoint:
-    """Be at a point. A plane flies over it, and comes back.
+    """Go to a point and stay there. A plane flies over it, and returns.
 
     `climb_mps` and `descent_mps` bound the vertical speed; `yaw_rad` None: face the way it goes;
     `reverse`: a rover drives there backwards.
@@ -71,7 +71,7 @@ class PositionSetpoint:
 
 @dataclass(frozen=True, slots=True)
 class VelocitySetpoint:
-    """Have a velocity over the ground. Yaw: an angle, a rate, or (both None) as it is.
+    """Move with a velocity over the ground. Yaw: an angle, a rate, or (both None) the present one.
 
     A rover turns towards the velocity and drives on.
     """
@@ -85,7 +85,7 @@ class VelocitySetpoint:
 
 @dataclass(frozen=True, slots=True)
 class DriveSetpoint:
-    """Go forward (backward if negative) along the own heading, and turn."""
+    """Drive forwards (backwards if negative) along the present heading, and turn."""
 
     speed_mps: float
     yaw_rps: float = 0.0
@@ -94,7 +94,7 @@ class DriveSetpoint:
 
 @dataclass(frozen=True, slots=True)
 class CircleSetpoint:
-    """Go around a point; `radius_m` negative: counterclockwise. Copters face the center."""
+    """Circle a point; a negative `radius_m` means counter-clockwise. Copters face the centre."""
 
     center: Point
     radius_m: float
@@ -112,7 +112,8 @@ FACING_M = 3.0
 
 
 def approach_mps(distance_m: float, deceleration_mps2: float, gain: float = 1.0) -> float:
-    """How fast to be, to come to rest after a distance: proportional near, by braking afar."""
+    """Return the speed from which to stop within a distance: proportional when near, by braking
+    when far."""
     near_m = deceleration_mps2 / gain**2
     if distance_m <= near_m:
         return gain * distance_m
@@ -130,7 +131,7 @@ class CopterDynamics:
     fastest_climb_mps: float = 10.0
 
     def step(self, body: BodyState, setpoint: MotionSetpoint, dt_s: float) -> None:
-        """Let `dt_s` pass."""
+        """Advance by `dt_s`."""
         north, east, up, yaw_rps = self._wanted(body, setpoint, dt_s)
         speed = math.hypot(north, east)
         if speed > self.fastest_mps:
@@ -226,7 +227,7 @@ class CopterDynamics:
         )
 
     def _lean(self, body: BodyState, north_mps2: float, east_mps2: float) -> None:
-        """It leans into what accelerates it."""
+        """Tilt towards the acceleration."""
         cos, sin = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
         forward = north_mps2 * cos + east_mps2 * sin
         right = -north_mps2 * sin + east_mps2 * cos
@@ -260,7 +261,7 @@ class PlaneDynamics:
     roll_rps: float = math.radians(75)
 
     def step(self, body: BodyState, setpoint: MotionSetpoint, dt_s: float) -> None:
-        """Let `dt_s` pass."""
+        """Advance by `dt_s`."""
         course, up_mps, speed_mps = self._wanted(body, setpoint)
         forward = body.ground_speed_mps
         faster = speed_mps > forward
@@ -342,7 +343,7 @@ class RoverDynamics:
     fastest_mps: float = 10.0
 
     def step(self, body: BodyState, setpoint: MotionSetpoint, dt_s: float) -> None:
-        """Let `dt_s` pass."""
+        """Advance by `dt_s`."""
         forward = body.north_mps * math.cos(body.yaw_rad) + body.east_mps * math.sin(body.yaw_rad)
         speed, rate = self._wanted(body, setpoint, forward, dt_s)
         speed = max(-self.fastest_mps, min(self.fastest_mps, speed))
@@ -404,15 +405,15 @@ class RoverDynamics:
 
 
 class Dynamics(Protocol):
-    """Moves a body."""
+    """Moves a vehicle."""
 
     def step(self, body: BodyState, setpoint: MotionSetpoint, dt_s: float) -> None:
-        """Let `dt_s` pass."""
+        """Advance by `dt_s`."""
         ...
 
 
 def dynamics_of(kind: Kind) -> Dynamics:
-    """How vehicles of a kind move."""
+    """Return the dynamics of a kind of vehicle."""
     match kind:
         case Kind.COPTER:
             return CopterDynamics()

@@ -33,7 +33,7 @@ class Change(Enum):
 
 
 class Watch:
-    """Something that is wrong or well."""
+    """Tracks whether a condition is bad, and reports changes."""
 
     def __init__(self) -> None:
         self.wrong = False
@@ -47,7 +47,7 @@ class Watch:
 
 
 class Lasting(Watch):
-    """It is wrong only after having been so for some time."""
+    """Tracks a condition that counts as bad only after some time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -60,7 +60,7 @@ class Lasting(Watch):
 
 
 class Heartbeats:
-    """When the ground station was heard last; one that was never heard is not missed."""
+    """Tracks the heartbeats of the ground station; before the first one it is not missed."""
 
     def __init__(self) -> None:
         self._heard_s: float | None = None
@@ -92,7 +92,7 @@ PLANE_ACTIONS: Modes = {1: "RTL", 2: "RTL", 5: "RTL"}
 
 
 class ArduPilotFailsafes(Component):
-    """Watches the ground station, the battery and the estimator."""
+    """Monitors the ground station, the battery and the estimator."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
@@ -116,7 +116,7 @@ class ArduPilotFailsafes(Component):
             self._heartbeats.heard(self.autopilot.now_s)
 
     def step(self, dt_s: float) -> None:
-        """Look after all three."""
+        """Check all three conditions."""
         self._look_at_link()
         for level, watch in self._battery.items():
             self._look_at_battery(level, watch)
@@ -242,7 +242,7 @@ RETURN_THEN_LAND = 3
 
 
 class Px4Failsafes(Component):
-    """Watches the ground station, the battery and the position."""
+    """Monitors the ground station, the battery and the position."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
@@ -269,7 +269,7 @@ class Px4Failsafes(Component):
             self._heartbeats.heard(self.autopilot.now_s)
 
     def step(self, dt_s: float) -> None:
-        """Look after all three."""
+        """Check all three conditions."""
         autopilot = self.autopilot
         if not autopilot.arming.armed or autopilot.modes.mode.number != self._acting_in:
             self._acting_in = self._then = None

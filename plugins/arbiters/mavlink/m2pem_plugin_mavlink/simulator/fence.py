@@ -1,4 +1,5 @@
-"""Shapes of a fence, made from the items of the plan (MAV_CMD 5001 to 5004)."""
+"""The fence: its zones, made from the items of the plan (MAV_CMD 5001 to 5004), and what happens at
+a breach."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,8 +25,8 @@ POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT = 5001, 5002, 5003, 5004
 
 
 @dataclass(frozen=True, slots=True)
-class Polygon:
-    """`keep_in`: it must not be left; else it must not be entered."""
+class PolygonZone:
+    """A polygon. `keep_in`: it must not be left; else it must not be entered."""
 
     corners: tuple[Point, ...]
     keep_in: bool
@@ -48,8 +49,8 @@ class Polygon:
 
 
 @dataclass(frozen=True, slots=True)
-class CircleSetpoint:
-    """`keep_in`: it must not be left; else it must not be entered."""
+class CircleZone:
+    """A circle. `keep_in`: it must not be left; else it must not be entered."""
 
     center: Point
     radius_m: float
@@ -60,16 +61,16 @@ class CircleSetpoint:
         return (self.center.distance_m(point) <= self.radius_m) != self.keep_in
 
 
-Zone = Polygon | CircleSetpoint
+Zone = PolygonZone | CircleZone
 
 
 def zones_of(items: Sequence[Item], frame: LocalFrame) -> tuple[Zone, ...]:
-    """The shapes. A polygon that lacks corners (its upload was abandoned) is none."""
+    """Return the zones. A polygon with missing corners (its upload was abandoned) is left out."""
     return tuple(_zones(items, frame))
 
 
 def is_whole(items: Sequence[Item]) -> bool:
-    """Whether every polygon has as many corners as each of them says, three at least."""
+    """Return whether every polygon has as many corners as its items say, and at least three."""
     index = 0
     while index < len(items):
         first = items[index]
@@ -89,7 +90,7 @@ def _zones(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
     while index < len(items):
         item = items[index]
         if item.command in (CIRCLE_IN, CIRCLE_OUT):
-            yield CircleSetpoint(_point(item, frame), item.param1, item.command == CIRCLE_IN)
+            yield CircleZone(_point(item, frame), item.param1, item.command == CIRCLE_IN)
         if item.command not in (POLYGON_IN, POLYGON_OUT):
             index += 1
             continue
@@ -97,7 +98,7 @@ def _zones(items: Sequence[Item], frame: LocalFrame) -> Iterator[Zone]:
         corners = items[index : index + count]
         if len(corners) == count >= 3 and all(each.command == item.command for each in corners):
             points = tuple(_point(each, frame) for each in corners)
-            yield Polygon(points, item.command == POLYGON_IN)
+            yield PolygonZone(points, item.command == POLYGON_IN)
         index += count
 
 
@@ -125,7 +126,7 @@ TYPES = {
 
 
 class Fence(Component):
-    """Watches where the vehicle is. `breach`: what is breached now; `count`: how often."""
+    """Monitors the position. `breach`: the present one; `count`: how many there were."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
@@ -137,12 +138,12 @@ class Fence(Component):
 
     @property
     def rules(self) -> FenceRules:
-        """As the parameters say now."""
+        """The rules, by the present parameters."""
         return self.autopilot.firmware.fence_rules(self.autopilot.parameters)
 
     @property
     def zones(self) -> tuple[Zone, ...]:
-        """The uploaded shapes."""
+        """The uploaded zones."""
         plans = self.autopilot.plans
         if self._changes != plans.changes:
             self._changes = plans.changes
@@ -150,7 +151,7 @@ class Fence(Component):
         return self._zones
 
     def at(self, point: Point, rules: FenceRules) -> Breach | None:
-        """What is breached at a point."""
+        """Return what a point breaches."""
         home = self.autopilot.home.point
         flies = self.autopilot.spec.kind in (Kind.COPTER, Kind.PLANE)
         up_m = point.up_m - home.up_m
@@ -166,7 +167,7 @@ class Fence(Component):
         return None
 
     def step(self, dt_s: float) -> None:
-        """Look where it is; the first moment of a breach counts."""
+        """Check the position; the first moment of a breach counts."""
         autopilot, rules = self.autopilot, self.rules
         now = None
         if rules.enabled and autopilot.arming.armed and autopilot.estimator.ready:
@@ -186,12 +187,12 @@ class Fence(Component):
             autopilot.modes.switch(rules.mode)
 
     def forbids(self, point: Point) -> bool:
-        """It does not go beyond the fence."""
+        """Return whether a point is beyond the fence."""
         rules = self.rules
         return rules.enabled and self.at(point, rules) not in (None, Breach.LOWEST)
 
     def refusals(self) -> Iterator[str]:
-        """It is not armed beyond the fence."""
+        """Refuse arming beyond the fence."""
         rules = self.rules
         if rules.enabled and self.autopilot.estimator.ready:
             breach = self.at(self.autopilot.position, rules)

@@ -1,4 +1,5 @@
-"""Where a gimbal points, and where it is to point. Angles in radians; pitch up, yaw clockwise."""
+"""The gimbal, and the gimbal manager in the autopilot (mavlink.io, "Gimbal Protocol v2"). Angles in
+radians; pitch up, yaw clockwise."""
 
 import math
 from collections.abc import Mapping
@@ -41,19 +42,19 @@ class Pointing:
     turning: bool = False
 
     def point(self, pitch_rad: float, yaw_rad: float, locked: bool) -> None:
-        """To angles."""
+        """Turn to angles."""
         self.wanted_pitch_rad, self.wanted_yaw_rad = pitch_rad, wrapped_rad(yaw_rad)
         self.locked, self.turning = locked, False
 
     def turn(self, pitch_rps: float, yaw_rps: float, locked: bool, heading_rad: float) -> None:
-        """On and on."""
+        """Turn at rates until the next command."""
         self.wanted_pitch_rad = self.pitch_rad
         self.wanted_yaw_rad = wrapped_rad(self.yaw_rad + (heading_rad if locked else 0.0))
         self.pitch_rps, self.yaw_rps = pitch_rps, yaw_rps
         self.locked, self.turning = locked, True
 
     def step(self, dt_s: float, heading_rad: float) -> None:
-        """Let time pass for a vehicle with that heading."""
+        """Advance by `dt_s`, for a vehicle with that heading."""
         if self.turning:
             self.wanted_pitch_rad = _within(
                 self.wanted_pitch_rad + self.pitch_rps * dt_s, PITCH_RAD
@@ -94,7 +95,7 @@ CAPABILITIES = 1 | 2 | 4 | 16 | 32 | 128 | 256 | 512 | 1024 | 131072
 
 
 class Controller(NamedTuple):
-    """Who may move it."""
+    """The system and component that control the gimbal."""
 
     system: int = 0
     component: int = 0
@@ -112,7 +113,7 @@ class Gimbal(Component):
     # --- motion -----------------------------------------------------------------------------------
 
     def step(self, dt_s: float) -> None:
-        """Move; a place that is watched is followed."""
+        """Move; follow the place of a region of interest."""
         body = self.autopilot.body
         if self._target is not None:
             here = body.point
@@ -163,7 +164,8 @@ class Gimbal(Component):
         }
 
     def _configure(self, command: Command) -> Result:
-        """Who is in control: -1 leaves it as it is, -2 is the sender, -3 nobody if it was he."""
+        """Set who controls the gimbal: -1 keeps it, -2 is the sender, -3 releases the sender's
+        control."""
         if int(command.z) not in (0, DEVICE):
             return Result.DENIED
         sender = Controller(command.sender.system, command.sender.component)
@@ -173,7 +175,7 @@ class Gimbal(Component):
         return Result.ACCEPTED
 
     def _may(self, sender: Sender) -> bool:
-        """PX4 obeys only who is in control, ArduPilot anybody."""
+        """Return whether the sender may move it: PX4 requires control, ArduPilot does not."""
         who = Controller(sender.system, sender.component)
         free = not self.autopilot.firmware.gimbal_needs_control
         return free or who in (self.primary, self.secondary)

@@ -1,4 +1,4 @@
-"""Home: where it returns to. Known as soon as the estimator is, and set again at arming."""
+"""The home position. It is set when the estimator is ready, and again at arming."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,18 +27,18 @@ class Home(Component):
         self._locked = False
 
     def set(self, point: Point) -> None:
-        """Home is there; all are told."""
+        """Set home, and report it to all peers."""
         self.point, self.known = point, True
         self.autopilot.send(self._home())
         self.autopilot.send(self._origin())
 
     def set_at_arming(self) -> None:
-        """Home is where it is armed, unless somebody has set it."""
+        """Set home at arming, unless a command has set it."""
         if self.known and not self._locked:
             self.set(self.autopilot.position)
 
     def step(self, dt_s: float) -> None:
-        """Know it at first."""
+        """Set home when the position is first known."""
         if not self.known and self.autopilot.estimator.ready:
             self.set(self.autopilot.position)
 

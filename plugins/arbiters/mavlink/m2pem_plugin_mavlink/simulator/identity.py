@@ -1,4 +1,4 @@
-"""Who the autopilot is (HEARTBEAT, AUTOPILOT_VERSION) and what time it has."""
+"""The identity of the autopilot (HEARTBEAT, AUTOPILOT_VERSION) and its time."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,7 +18,7 @@ EPOCH_S = 1_700_000_000
 
 
 class Identity(Component):
-    """Answers who it is."""
+    """Reports the identity."""
 
     def reports(self) -> Mapping[int, ReportMaker]:
         """What tells who it is."""

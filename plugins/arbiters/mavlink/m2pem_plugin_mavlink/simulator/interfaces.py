@@ -29,20 +29,21 @@ class Event(NamedTuple):
 
 @dataclass(slots=True)
 class EventLog:
-    """The last 1,000 events, and how many there were of each kind."""
+    """The last 1,000 events, and the number of each kind."""
 
     events: deque[Event] = field(default_factory=lambda: deque(maxlen=1000))
     counts: Counter[str] = field(default_factory=Counter)
 
     def log_event(self, at_s: float, kind: str, detail: str = "") -> None:
-        """It has happened."""
+        """Add an event."""
         self.events.append(Event(at_s, kind, detail))
         self.counts[kind] += 1
 
 
 @dataclass(slots=True)
 class CommandRefusal:
-    """A command that is not obeyed. `result` None: not even answered; `times` None: always."""
+    """A fault: a command that is refused. `result` None: not even answered; `times` None:
+    always."""
 
     result: Result | None = Result.FAILED
     text: str = ""
@@ -51,8 +52,11 @@ class CommandRefusal:
 
 @dataclass(slots=True)
 class InjectedFaults:
-    """`gps_lost`: no satellites; `arming`: why it does not arm; `commands`: by MAV_CMD;
-    `camera_full`: there is no room for another picture."""
+    """Faults that were injected into a vehicle; a reboot does not repair them.
+
+    `gps_lost`: no satellites; `arming`: why it does not arm; `commands`: by MAV_CMD; `camera_full`:
+    there is no room for another picture.
+    """
 
     gps_lost: bool = False
     camera_full: bool = False
@@ -60,7 +64,7 @@ class InjectedFaults:
     commands: dict[int, CommandRefusal] = field(default_factory=dict)
 
     def refusal_of(self, command: int) -> CommandRefusal | None:
-        """Whether that command is refused this time."""
+        """Return the refusal of a command this time; None if it is not refused."""
         refusal = self.commands.get(command)
         if refusal is None or refusal.times is None:
             return refusal
@@ -71,7 +75,7 @@ class InjectedFaults:
 
 
 class Parameters:
-    """The values, by name, in the order in which a list has them."""
+    """The values by name, in the order of the list."""
 
     def __init__(self, values: Mapping[str, float]) -> None:
         self._values = {name: float(values[name]) for name in sorted(values)}
@@ -144,37 +148,37 @@ class Component:
         self.autopilot = autopilot
 
     def commands(self) -> Mapping[int, CommandHandler]:
-        """What it does when it is told to, by MAV_CMD."""
+        """Return the handlers of commands, by MAV_CMD."""
         return {}
 
     def messages(self) -> Mapping[str, MessageHandler]:
-        """Other messages that it takes, by their names."""
+        """Return the handlers of other messages, by name."""
         return {}
 
     def reports(self) -> Mapping[int, ReportMaker]:
-        """Messages that it can make at any time, by their ids."""
+        """Return the makers of messages that can be streamed or requested, by id."""
         return {}
 
     def step(self, dt_s: float) -> None:
-        """Let `dt_s` of simulated time pass."""
+        """Advance by `dt_s` of simulated time."""
 
     @property
     def failsafe(self) -> bool:
-        """It does something against what has gone wrong (MAV_STATE_CRITICAL)."""
+        """Whether a failsafe is active (MAV_STATE_CRITICAL)."""
         return False
 
     def refusals(self) -> Iterable[str]:
-        """Why the vehicle must not be armed, as ArduPilot words it."""
+        """Yield the reasons against arming, in the words of ArduPilot."""
         return ()
 
     def forbids(self, point: Point) -> bool:
-        """Whether the vehicle must not go to a point (a fence)."""
+        """Return whether the vehicle must not go to a point (a fence)."""
         return False
 
 
 class Maneuver:
-    """Made when its mode is entered, gone when it is left. `taking_off`, `landing`: it goes up from
-    or down to the ground."""
+    """What a vehicle does in a mode. Created when its mode is entered. `taking_off`, `landing`: the
+    vehicle leaves or approaches the ground."""
 
     taking_off = False
     landing = False
@@ -189,29 +193,29 @@ class Maneuver:
         return False
 
     def refusal(self) -> str | None:
-        """Why it cannot be begun now, as ArduPilot words it; None: it can. Changes nothing."""
+        """Return why the mode cannot be entered now, in the words of ArduPilot; None if it can."""
         return None
 
     def begin(self) -> None:
-        """Its mode has been entered; it may be armed or not."""
+        """The mode was entered; the vehicle may be armed or not."""
 
     def end(self) -> None:
-        """Its mode has been left."""
+        """The mode was left."""
 
     def step(self, dt_s: float) -> MotionSetpoint:
-        """What the body is to do now. Asked only while armed."""
+        """Return the motion setpoint; called only while armed."""
         raise NotImplementedError
 
     def hand_over(self, mode: int, dt_s: float) -> MotionSetpoint:
-        """Enter another mode and do what is done there; if that cannot be, stay."""
+        """Enter another mode and return its setpoint; stay if it cannot be entered."""
         autopilot = self.autopilot
         autopilot.modes.switch(mode)
         successor = autopilot.modes.maneuver
         return self.stay(autopilot.position) if successor is self else successor.step(dt_s)
 
     def stay(self, point: Point) -> MotionSetpoint:
-        """Remain at a point: a copter hovers, a rover stands, a boat keeps station, a plane
-        circles."""
+        """Return the setpoint to stay at a point: a copter hovers, a rover stops, a boat keeps its
+        position, a plane circles."""
         tuning = self.autopilot.tuning
         match self.autopilot.spec.kind:
             case Kind.ROVER:
@@ -224,7 +228,7 @@ class Maneuver:
         return self.reach(point, yaw_rad=self.autopilot.body.yaw_rad)
 
     def reach(self, point: Point, *, yaw_rad: float | None = None) -> PositionSetpoint:
-        """Go to a point at the speed that is set."""
+        """Return the setpoint to go to a point at the present speed."""
         tuning = self.autopilot.tuning
         return PositionSetpoint(
             point,
@@ -251,7 +255,7 @@ class Tuning(NamedTuple):
 
 
 class Roles(NamedTuple):
-    """Which mode (custom_mode) does what; None: this kind of vehicle has none."""
+    """The mode (custom_mode) for each role; None: this kind of vehicle has none."""
 
     hold: int
     guided: int

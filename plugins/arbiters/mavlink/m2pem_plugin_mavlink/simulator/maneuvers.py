@@ -22,12 +22,12 @@ from m2pem_plugin_mavlink.simulator.specification import Kind
 
 
 class HoldPosition(Maneuver):
-    """Stop, and remain there. On the ground, remain on the ground."""
+    """Stop and hold the position; a vehicle on the ground stays there."""
 
     _point: Point | None = None
 
     def step(self, dt_s: float) -> MotionSetpoint:
-        """Brake first; the place is where it then stands."""
+        """Brake; then hold the position."""
         autopilot = self.autopilot
         if autopilot.body.on_ground and autopilot.spec.kind in (Kind.COPTER, Kind.PLANE):
             return NoThrust()
@@ -41,7 +41,7 @@ class HoldPosition(Maneuver):
 
 
 class Stop(Maneuver):
-    """Stop, and let it drift."""
+    """Stop, and drift."""
 
     def step(self, dt_s: float) -> MotionSetpoint:
         """No speed."""
@@ -49,13 +49,13 @@ class Stop(Maneuver):
 
 
 class CircleHere(Maneuver):
-    """Go around the place where the mode was entered."""
+    """Circle the place at which the mode was entered."""
 
     _center: Point | None = None
 
     @property
     def takes_speed(self) -> bool:
-        """What drives or floats does."""
+        """Whether it obeys DO_CHANGE_SPEED: rovers and boats."""
         return self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT)
 
     def step(self, dt_s: float) -> MotionSetpoint:
@@ -75,7 +75,7 @@ SLOW_BELOW_M = 10.0
 
 
 class Land(Maneuver):
-    """Down to the ground."""
+    """LAND: descend and land."""
 
     def begin(self) -> None:
         """Down from where it is."""
@@ -87,7 +87,7 @@ class Land(Maneuver):
 
 
 class Descend(Maneuver):
-    """Descend of PX4: down without knowing where it is."""
+    """AUTO.DESCEND of PX4: descend without a position."""
 
     def step(self, dt_s: float) -> MotionSetpoint:
         """Slowly."""
@@ -97,7 +97,7 @@ class Descend(Maneuver):
 
 
 def descend_to_land(maneuver: Maneuver, point: Point) -> MotionSetpoint:
-    """Descend to the ground at a point; landed, the motors stop."""
+    """Return the setpoint to land at a point; after landing, disarm."""
     autopilot = maneuver.autopilot
     autopilot.modes.maneuver.landing = True
     if autopilot.body.on_ground:
@@ -115,15 +115,16 @@ WAIT_S = 5.0
 
 
 class ReturnToLaunch(Maneuver):
-    """Home. `arrived`: it is there, or above."""
+    """RTL: climb, return home, land; a rover stops there, a plane circles. `arrived`: at home, or
+    above it."""
 
     @property
     def takes_speed(self) -> bool:
-        """Planes come home as fast as they are set up."""
+        """Whether it obeys DO_CHANGE_SPEED: all but planes."""
         return self.autopilot.spec.kind is not Kind.PLANE
 
     def begin(self) -> None:
-        """At which height, is decided once."""
+        """Choose the height of the return."""
         autopilot = self.autopilot
         home = autopilot.home.point
         up_m = self.least_up_m()
@@ -143,7 +144,7 @@ class ReturnToLaunch(Maneuver):
             autopilot.arming.disarm_after_landing()
 
     def least_up_m(self) -> float:
-        """The height at which it comes home, unless it is higher already."""
+        """Return the least height of the return."""
         return self.autopilot.home.point.up_m + self.autopilot.tuning.return_up_m
 
     def step(self, dt_s: float) -> MotionSetpoint:
@@ -222,8 +223,8 @@ class Guided(Maneuver):
         self._entered = True
 
     def _say_reached(self) -> None:
-        """A plane takes its last circle for that around the new place, and says at once, and only
-        then, that it is there (Plane::update_loiter)."""
+        """Report a reached item: a plane takes its last circle for that around the new place
+        (Plane::update_loiter)."""
         if self.autopilot.spec.kind is Kind.PLANE:
             self.autopilot.send(MAVLink_mission_item_reached_message(0))
 
@@ -252,7 +253,7 @@ class Guided(Maneuver):
         self.destination, self.yaw_rad = point, yaw_rad
 
     def move(self, setpoint: Callable[[], MotionSetpoint]) -> None:
-        """Have a velocity, for a while."""
+        """Follow a velocity for a while."""
         if self._velocity is None:
             self.autopilot.log_event("motion", "velocity")
         self._aim(False)
@@ -266,7 +267,7 @@ class Guided(Maneuver):
         self._stay = HoldPosition(self.autopilot)
 
     def stop(self) -> None:
-        """Stay where it is."""
+        """Hold the position."""
         self.destination = self._velocity = None
         self.taking_off = False
         self._stay = HoldPosition(self.autopilot)

@@ -12,7 +12,8 @@ Peer = Hashable
 
 
 class Sender(NamedTuple):
-    """Where a message came from: the peer that handed it over, and who says to have sent it."""
+    """The origin of a message: the peer that delivered it, and the system and component that it
+    names."""
 
     peer: Peer
     system: int
@@ -20,7 +21,7 @@ class Sender(NamedTuple):
 
 
 class Outgoing(NamedTuple):
-    """A message to be sent: to one peer, or (None) to all of them."""
+    """A message to send: to one peer, or (None) to all."""
 
     message: Any
     to: Peer | None
@@ -28,7 +29,7 @@ class Outgoing(NamedTuple):
 
 
 class Result(IntEnum):
-    """How a command ended (MAV_RESULT)."""
+    """The result of a command (MAV_RESULT)."""
 
     ACCEPTED = 0
     TEMPORARILY_REJECTED = 1

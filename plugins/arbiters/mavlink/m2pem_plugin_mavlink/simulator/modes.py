@@ -1,4 +1,4 @@
-"""Modes: which there are, which one it is in, and changing between them."""
+"""Changing modes: the present mode and its maneuver."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,22 +34,23 @@ class ModeSwitch(Component):
         self._speed_mps: float | None = None
 
     def start(self) -> None:
-        """Be in the mode that it has after starting."""
+        """Enter the first mode after the start."""
         self._enter(self.by_number[self.autopilot.firmware.first_mode], announce=False)
 
     @property
     def speed_mps(self) -> float:
-        """As told since the mode was entered, or as set up."""
+        """The speed that was set since the mode was entered, or the one of the parameters."""
         if self._speed_mps is not None:
             return self._speed_mps
         return self.autopilot.tuning.cruise_mps
 
     def set_speed(self, speed_mps: float | None) -> None:
-        """Go that fast from now on in this mode; None: as set up."""
+        """Set the speed for this mode; None: the one of the parameters."""
         self._speed_mps = speed_mps
 
     def switch(self, number: int) -> bool:
-        """Enter a mode; says why if it cannot. To be in it already is well."""
+        """Enter a mode, or send a text with the reason against it; return True also in the present
+        mode."""
         mode = self.by_number.get(number)
         if mode is None:
             self.autopilot.warn(f"No such mode {number}")
@@ -85,7 +86,7 @@ class ModeSwitch(Component):
             self.autopilot.firmware.mode_entered(self.autopilot)
 
     def step(self, dt_s: float) -> None:
-        """Let the maneuver say what to do."""
+        """Take the setpoint of the maneuver."""
         armed = self.autopilot.arming.armed
         self.autopilot.setpoint = self.maneuver.step(dt_s) if armed else NoThrust()
 

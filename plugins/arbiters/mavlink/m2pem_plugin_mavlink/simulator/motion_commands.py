@@ -32,7 +32,7 @@ OFFSET_FRAMES = (7, 9)
 
 
 class GuidedSetpoints(Component):
-    """Hands setpoints to GUIDED; in other modes they are ignored."""
+    """Passes setpoints to GUIDED; in other modes they are ignored."""
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Both setpoints."""
@@ -42,7 +42,7 @@ class GuidedSetpoints(Component):
         }
 
     def forbidden(self, point: Point) -> bool:
-        """Whether it must not go there; ArduPilot does not say why."""
+        """Return whether the fence forbids a point; ArduPilot sends no reason."""
         return any(component.forbids(point) for component in self.autopilot.components)
 
     def up_m(self, z: float, frame: int) -> float:
@@ -58,7 +58,7 @@ class GuidedSetpoints(Component):
         return self._on_surface(point.at_height(self.up_m(command.z, command.frame)))
 
     def _on_surface(self, point: Point) -> Point:
-        """What drives or floats stays on the surface, whatever height it was told."""
+        """Return the point at the surface for a rover or boat, whatever its height."""
         surface = self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT)
         return point.at_height(0.0) if surface else point
 
@@ -132,7 +132,7 @@ CHANGE_MODE = 1
 
 
 class MotionCommands(Component):
-    """Does what ArduPilot does with them."""
+    """Executes commands that move the vehicle, as ArduPilot does."""
 
     def commands(self) -> Mapping[int, CommandHandler]:
         """By MAV_CMD; what a kind of vehicle cannot do, it does not know."""

@@ -53,7 +53,7 @@ class ParameterServer(Component):
             self._unknown(message.param_id, message.param_index, sender)
 
     def _set(self, message: Any, sender: Sender) -> None:
-        """Everybody is told of the new value."""
+        """Set a parameter, and report its value to all peers."""
         name, parameters = message.param_id, self.autopilot.parameters
         if name not in parameters:
             self._unknown(name, -1, sender)

@@ -13,7 +13,7 @@ THERE_M = 0.5
 
 
 class TakeOff(Maneuver):
-    """Climbs once it is armed: the mode may be entered before.
+    """AUTO.TAKEOFF: climb once armed, then hold; the mode may be entered before.
 
     `up_m`: the height above the frame's origin; None: MIS_TAKEOFF_ALT above where it stands.
     """
@@ -55,7 +55,7 @@ class TakeOff(Maneuver):
 
 
 class Hold(Maneuver):
-    """`destination`: where it was told to be; None: where it was when the mode was entered."""
+    """AUTO.LOITER. `destination`: the commanded position; None: where the mode was entered."""
 
     destination: Point | None = None
     yaw_rad: float | None = None
@@ -82,7 +82,7 @@ class Hold(Maneuver):
         self._stay = HoldPosition(self.autopilot)
 
     def keep(self, point: Point) -> None:
-        """Stay there, which is where it is, or nearly."""
+        """Hold a position that is the present one, or near it."""
         self.destination, self.yaw_rad = point, self.autopilot.body.yaw_rad
 
     def step(self, dt_s: float) -> MotionSetpoint:
@@ -100,7 +100,7 @@ class Hold(Maneuver):
 
 
 class Orbit(Maneuver):
-    """Goes around `circle`, seen from above clockwise if its radius is positive."""
+    """POSCTL.ORBIT: circle around `circle`, clockwise from above if its radius is positive."""
 
     circle: CircleSetpoint | None = None
 
@@ -123,8 +123,8 @@ class Orbit(Maneuver):
 
 
 class Px4Return(ReturnToLaunch):
-    """Climbs to RTL_RETURN_ALT, but within a cone of 45 degrees (RTL_CONE_ANG) above home no higher
-    than the cone is."""
+    """AUTO.RTL: climb to RTL_RETURN_ALT, but within a cone of 45 degrees (RTL_CONE_ANG) above home
+    only to the cone."""
 
     def least_up_m(self) -> float:
         """On the cone, or at the height that is set."""
@@ -135,10 +135,10 @@ class Px4Return(ReturnToLaunch):
 
 
 class Offboard(Guided):
-    """As GUIDED, but a setpoint above takes it from the ground too."""
+    """OFFBOARD: as GUIDED, but a setpoint above it also takes it off."""
 
     def step(self, dt_s: float) -> MotionSetpoint:
-        """The last setpoint; that they stop, is for somebody else to notice."""
+        """Return the last setpoint; `OffboardMonitor` detects that they stop."""
         autopilot = self.autopilot
         if not (autopilot.body.on_ground and autopilot.spec.kind is Kind.COPTER):
             return super().step(dt_s)

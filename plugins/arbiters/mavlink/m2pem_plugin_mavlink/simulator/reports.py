@@ -120,7 +120,8 @@ class Reports(Component):
         )
 
     def _target(self) -> Any:
-        """Nothing but a place, with its height above the sea; none where there is no target."""
+        """Return only the position with its height above mean sea level; nothing without a
+        target."""
         autopilot, point = self.autopilot, self.autopilot.target_point
         if point is None:
             return None

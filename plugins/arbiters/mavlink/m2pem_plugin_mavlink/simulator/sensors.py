@@ -14,13 +14,13 @@ SENSORS_WELL = 0.55
 
 
 class Estimator(Component):
-    """Knows where the vehicle is, or not yet, or no longer. `found`: it has known it before."""
+    """The state of the position estimator. `found`: the position was known before."""
 
     found = False
 
     @property
     def gps_lost(self) -> bool:
-        """There are no satellites."""
+        """Whether there are no satellites."""
         return self.autopilot.injected_faults.gps_lost
 
     def step(self, dt_s: float) -> None:
@@ -29,17 +29,17 @@ class Estimator(Component):
 
     @property
     def ready(self) -> bool:
-        """It knows where the vehicle is."""
+        """Whether the position is known."""
         return self._waited >= 1 and not self.gps_lost
 
     @property
     def levelled(self) -> bool:
-        """It knows which way is up."""
+        """Whether the attitude is known."""
         return self._waited >= LEVELLED
 
     @property
     def sensors_well(self) -> bool:
-        """What needs no position may begin."""
+        """Whether modes that need no position may be armed."""
         return self._waited >= SENSORS_WELL
 
     @property

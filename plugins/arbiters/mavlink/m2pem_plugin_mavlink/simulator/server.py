@@ -1,4 +1,4 @@
-"""What carries frames between a vehicle and its peers: at once and whole, unless it is replaced."""
+"""The UDP socket of a simulated vehicle, and the wires that carry its frames."""
 
 import asyncio
 import logging
@@ -16,17 +16,18 @@ Deliver = Callable[[bytes, Address], None]
 
 
 class Wire:
-    """One direction of a vehicle's link. Faults are subclasses: they lose, delay or double."""
+    """One direction of a vehicle's link. Link faults are subclasses: they lose, delay or double
+    frames."""
 
     def __init__(self, deliver: Deliver) -> None:
         self.deliver = deliver
 
     def carry(self, data: bytes, peer: Address, now_s: float) -> None:
-        """Take a frame (or a datagram that came) to its end."""
+        """Deliver a frame, or a received datagram."""
         self.deliver(data, peer)
 
     def step(self, now_s: float) -> None:
-        """Deliver what was held up until now."""
+        """Deliver what was delayed until now."""
 
 
 logger = logging.getLogger(__name__)
@@ -64,14 +65,14 @@ class VehiclePort(asyncio.DatagramProtocol):
         """Nobody listens there (yet): it will be sent anew."""
 
     def step(self, now_s: float) -> None:
-        """Let simulated time pass, and send what there is to send."""
+        """Advance simulated time, and send messages."""
         self.inward.step(now_s)
         self.autopilot.step(now_s)
         self.flush()
         self.outward.step(now_s)
 
     def flush(self) -> None:
-        """Send what there is to send."""
+        """Send the messages of the outbox."""
         for outgoing in self.autopilot.take_outbox():
             if outgoing.message is None:
                 continue

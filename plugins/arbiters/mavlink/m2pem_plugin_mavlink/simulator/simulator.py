@@ -27,7 +27,7 @@ logger = logging.getLogger(__name__)
 
 
 class SimulatedVehicle:
-    """One vehicle as it really is, whatever its telemetry says; and the way to its autopilot."""
+    """The true state of a vehicle, whatever its telemetry says, and access to its autopilot."""
 
     def __init__(self, port: VehiclePort, seed: int) -> None:
         self.port = port

@@ -1,4 +1,4 @@
-"""What a simulated vehicle is: its kind, its number, where it stands and how it is set up."""
+"""The specification of a simulated vehicle: kind, system id, home, parameters."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ ZURICH = Location(47.397742, 8.545594, 488.0)
 
 
 class Kind(StrEnum):
-    """What moves, and in which way."""
+    """The kind of vehicle."""
 
     COPTER = "copter"
     ROVER = "rover"
@@ -24,8 +24,8 @@ class Kind(StrEnum):
 class VehicleSpec:
     """One simulated vehicle.
 
-    `firmware`: a name in `sim.firmware.FIRMWARES`; `estimator_s`: for how long after its start
-    the vehicle does not know where it is, in seconds of simulated time;
+    `firmware`: a name in `simulator.firmware.FIRMWARES`; `estimator_s`: how long the position is
+    unknown after the start, in seconds of simulated time;
     `parameters`: what differs from the firmware's defaults; `battery_s`: how long a full battery
     lasts in motion; `gimbal`: it has one (None: if it is a copter); `camera`: it has one, as a
     component of its own.

@@ -31,7 +31,7 @@ STREAM_GROUPS: Mapping[int, tuple[int, ...]] = {
 
 
 class Streams(Component):
-    """Sends reports when they are due. `makers`: who makes them, by message id."""
+    """Sends reports when they are due. `makers`: the makers of messages, by message id."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
@@ -40,14 +40,14 @@ class Streams(Component):
         self._next_s = 0.0
 
     def meet(self, peer: Peer) -> None:
-        """Somebody new gets the firmware's default streams."""
+        """Give a new peer the default streams of the firmware."""
         self._due[peer] = {}
         for id_, interval_s in self.autopilot.firmware.default_streams().items():
             if id_ in self.makers:
                 self._set(peer, id_, interval_s)
 
     def interval_s(self, peer: Peer, id_: int) -> float | None:
-        """How often a peer gets a message; None: not at all."""
+        """Return the interval of a message for a peer; None: it is not sent."""
         entry = self._due.get(peer, {}).get(id_)
         return entry[0] if entry else None
 

@@ -1,6 +1,6 @@
-"""Faults on request: bad links, lost satellites, an empty battery, refusals, somebody else's hands.
+"""Injected faults: bad links, lost satellites, an empty battery, refusals, takeovers.
 
-What happens is the same in every run: chances are drawn from a seed.
+Every run is the same: random choices have a seed.
 """
 
 from m2pem_plugin_mavlink.simulator.faults.faults import Direction, Faults

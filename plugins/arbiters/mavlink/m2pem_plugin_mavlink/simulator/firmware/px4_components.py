@@ -20,7 +20,8 @@ from m2pem_plugin_mavlink.simulator.specification import Kind
 
 
 class LandingDetector(Component):
-    """Disarmed, it is in the last mode in which it may be armed, other than AUTO.TAKEOFF."""
+    """Reports takeoff and landing; after disarming enters the last mode that may be armed, other
+    than AUTO.TAKEOFF (PX4: Commander, UserModeIntention)."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
@@ -51,7 +52,7 @@ cannot be entered without a remote control."""
 
 
 class OffboardMonitor(Component):
-    """Leaves OFFBOARD when setpoints have not come for COM_OF_LOSS_T."""
+    """Leaves OFFBOARD when no setpoints have come for COM_OF_LOSS_T."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)

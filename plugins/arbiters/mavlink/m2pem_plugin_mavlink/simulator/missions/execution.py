@@ -88,7 +88,7 @@ LOOKS_AHEAD = 3
 
 
 class AutoMission(Maneuver):
-    """Flies the mission from where it was; complete, it begins anew when the mode is left and
+    """AUTO: flies the mission from where it was; complete, it begins anew when the mode is left and
     entered again, and not before (ArduPilot: AP_Mission::start_or_resume)."""
 
     paused = False
@@ -229,7 +229,7 @@ CHECKING_S = 0.2
 
 
 class MissionAvailability(Component):
-    """Whether there is a mission that was found good."""
+    """PX4 checks a new mission for a while; until then it cannot be flown."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
@@ -256,7 +256,8 @@ class MissionAvailability(Component):
 
 
 class Px4AutoMission(AutoMission):
-    """Being armed in it is enough to take off."""
+    """AUTO.MISSION of PX4: flies the mission, and holds at its end; arming in it is enough to take
+    off."""
 
     def refusal(self) -> str | None:
         """While nothing is armed, it may be chosen without a mission."""

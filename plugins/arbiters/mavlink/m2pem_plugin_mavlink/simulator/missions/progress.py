@@ -1,4 +1,4 @@
-"""How far the mission is: the current item, its state, and what is told of that."""
+"""The progress of the mission: the current item, the state, and their messages."""
 
 from collections.abc import Mapping
 from enum import IntEnum
