@@ -187,7 +187,7 @@ async def test_peers_that_are_silent_are_forgotten_but_not_a_vehicle() -> None:
 async def test_when_there_are_too_many_peers_the_longest_silent_goes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(udp, "MOST_PEERS", 3)
+    monkeypatch.setattr(udp, "MAX_PEERS", 3)
     async with opened(1) as (clock, [link]):
         modes = heard(link)
         ends = [await udp_end(endpoint().port, system=each) for each in range(1, 7)]

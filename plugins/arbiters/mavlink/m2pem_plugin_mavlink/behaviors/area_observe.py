@@ -63,7 +63,7 @@ class ObserveFromTheEdge(Goto):
             frame = LocalFrame(area.rings[0][0][:2])
             ring = [frame.to_local(corner[:2]) for corner in area.rings[0]]
             return frame.to_latlon(_nearest(ring, frame.to_local(here)))
-        target = self.parameters.target_place()
+        target = self.parameters.target_position()
         frame = LocalFrame((target.latitude_deg, target.longitude_deg))
         east, north = frame.to_local(here)
         away = math.hypot(east, north)

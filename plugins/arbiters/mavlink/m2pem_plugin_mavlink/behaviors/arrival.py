@@ -35,14 +35,14 @@ class StillnessTimer:
     """Measures for how long a vehicle has not moved, from the first call of `seconds`."""
 
     def __init__(self, context: BehaviorContext) -> None:
-        self._job = context
+        self._context = context
         self._since_s: float | None = None
 
     def seconds(self, circled: LatLon | None = None, radius_m: float | None = None) -> float:
         """Return the time since the vehicle has stopped; 0 while it moves. `circled`, `radius_m`:
         see `stays_at`."""
-        now_s = self._job.now_s()
-        if not stays_at(self._job.vehicle, circled, radius_m):
+        now_s = self._context.now_s()
+        if not stays_at(self._context.vehicle, circled, radius_m):
             self._since_s = None
             return 0.0
         if self._since_s is None:

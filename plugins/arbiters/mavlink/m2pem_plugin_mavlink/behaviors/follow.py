@@ -49,7 +49,7 @@ class Follow(Behavior):
         return "" if self._state() is None else self._breach(self._station())
 
     async def begin(self) -> None:
-        await self._parameters.hear_target()
+        await self._parameters.wait_for_target()
         self._told = None
         await self._tell()
 

@@ -69,13 +69,13 @@ class Goto(Behavior):
 
     def target(self) -> TargetPosition:
         """Return where to go now."""
-        return replace(self.parameters.target_place(), heading_rad=self.parameters.heading_rad)
+        return replace(self.parameters.target_position(), heading_rad=self.parameters.heading_rad)
 
     def refusal(self) -> str:
         """Check that an aircraft is in the air, and that the path is inside the fence."""
         if reason := takeoff_required(self.vehicle):
             return reason
-        return "" if self.parameters.target_is_unheard else self._breach(self.target())
+        return "" if self.parameters.target_is_unknown else self._breach(self.target())
 
     def _breach(self, place: TargetPosition) -> str:
         if self.context.fence is None:
@@ -85,8 +85,8 @@ class Goto(Behavior):
 
     async def begin(self) -> None:
         self._stillness.forget()
-        if self.parameters.target_is_unheard:
-            await self.parameters.hear_target()
+        if self.parameters.target_is_unknown:
+            await self.parameters.wait_for_target()
             if reason := self._breach(self.target()):
                 raise BehaviorFailedError(reason)
         self._place = self.target()

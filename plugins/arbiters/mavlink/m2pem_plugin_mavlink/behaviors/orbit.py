@@ -57,7 +57,7 @@ class Orbit(MissionFlight):
 
     def circle(self) -> tuple[TargetPosition, float]:
         """Return the centre, and the radius in metres."""
-        return self.parameters.target_place(), self._radius_m
+        return self.parameters.target_position(), self._radius_m
 
     @property
     def center(self) -> TargetPosition:

@@ -6,13 +6,13 @@ from m2pem_plugin_mavlink.vehicle.driver import TargetPosition
 
 RELATIVE, AMSL, TERRAIN = "relative", "amsl", "terrain"
 
-HEARD_WITHIN_S = 5.0
+TARGET_WITHIN_S = 5.0
 
 _WITH_HEIGHT = frozenset({"air", "subsurface"})
 
 
 class VehicleParameters(BehaviorParameters):
-    """What a vehicle is to do; its domain may have no use for an altitude.
+    """The parameters of a behavior; altitudes are left out where the vehicle's domain has none.
 
     `adjusted_m_s`: the speed that replaces the requested one on the way; None: none.
     """
@@ -20,32 +20,35 @@ class VehicleParameters(BehaviorParameters):
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context.parameters)
         self.adjusted_m_s: float | None = None
-        self._job = context
+        self._context = context
         self.has_height = context.vehicle.domain in _WITH_HEIGHT
 
     @property
     def speed_m_s(self) -> float | None:
-        """As adjusted or asked for, or else as `set_speed` has set it; None: the vehicle's own."""
-        return self.adjusted_m_s or super().speed_m_s or self._job.cruise_m_s
+        """The adjusted or requested speed, or else the one of `set_speed`; None: the vehicle's
+        own."""
+        return self.adjusted_m_s or super().speed_m_s or self._context.cruise_m_s
 
     def altitude(
         self, own_m: float | None = None, own_frame: str = RELATIVE
     ) -> tuple[float | None, str]:
-        """The height to move at, and its frame: as the parameters say, else `own_m` (a waypoint's).
+        """Return the height to move at and its frame: the requested one, else `own_m` (a
+        waypoint's).
 
-        None: as it is.
+        None: the present height.
         """
         if not self.has_height:
             return None, RELATIVE
-        wished = self.altitude_m
-        if wished is not None:
-            return wished, self.altitude_frame
+        requested_m = self.altitude_m
+        if requested_m is not None:
+            return requested_m, self.altitude_frame
         return own_m, own_frame if own_m is not None else RELATIVE
 
     def altitude_to_fly(
         self, own_m: float | None = None, own_frame: str = RELATIVE
     ) -> tuple[float, str]:
-        """The same, with the present height for "as it is", and home's for what has none.
+        """Return the same, with the present height instead of None, and the height of home for
+        vehicles without heights.
 
         Raises:
             BehaviorFailedError: the present height is not known.
@@ -55,60 +58,60 @@ class VehicleParameters(BehaviorParameters):
             return altitude_m, frame
         if not self.has_height:
             return 0.0, RELATIVE
-        present_m = self._job.vehicle.state.altitude_above_home_m
+        present_m = self._context.vehicle.state.altitude_above_home_m
         if present_m is None:
             raise BehaviorFailedError("its height is not known yet: say the altitude to move at")
         return present_m, RELATIVE
 
-    def target_place(self) -> TargetPosition:
-        """Where `target` is now.
+    def target_position(self) -> TargetPosition:
+        """Return the present position of `target`.
 
         Raises:
-            BehaviorFailedError: it is a vehicle that was never heard.
+            BehaviorFailedError: its position is unknown.
         """
         value = self.target
         if isinstance(value, Point):
             latitude, longitude, own_m = value.position
             return TargetPosition(latitude, longitude, *self.altitude(own_m, value.altitude_frame))
         if isinstance(value, VehiclePosition):
-            return TargetPosition(*self.whereabouts(value.vehicle), *self.altitude())
+            return TargetPosition(*self.position_of_vehicle(value.vehicle), *self.altitude())
         raise BehaviorFailedError("it has no target")
 
     @property
-    def target_is_unheard(self) -> bool:
-        """Whether `target` is a vehicle whose position is not known, not yet or not any more."""
+    def target_is_unknown(self) -> bool:
+        """Whether `target` is a vehicle whose position is unknown."""
         name = self.target_vehicle
         if name is None:
             return False
-        state = state_of(self._job, name)
+        state = state_of(self._context, name)
         return state is None or state.position is None
 
-    async def hear_target(self) -> None:
-        """Wait a little for a target that is not heard yet: at the beginning of a mission some
-        vehicles are heard before others.
+    async def wait_for_target(self) -> None:
+        """Wait for the first position of a target vehicle: at the beginning of a mission, some
+        vehicles are connected before others.
 
         Raises:
-            BehaviorFailedError: it is not heard.
+            BehaviorFailedError: its position stays unknown.
         """
-        vehicle = self._job.vehicle
-        if not await vehicle.until(lambda: not self.target_is_unheard, HEARD_WITHIN_S):
+        vehicle = self._context.vehicle
+        if not await vehicle.until(lambda: not self.target_is_unknown, TARGET_WITHIN_S):
             raise BehaviorFailedError(
                 f"parameter 'target': {self.target_vehicle} has not been heard"
             )
 
-    def whereabouts(self, vehicle: str) -> LatLon:
-        """Where another vehicle was heard last.
+    def position_of_vehicle(self, vehicle: str) -> LatLon:
+        """Return the last position of another vehicle.
 
         Raises:
-            BehaviorFailedError: it was never heard.
+            BehaviorFailedError: it is unknown.
         """
-        state = state_of(self._job, vehicle)
+        state = state_of(self._context, vehicle)
         if state is None or state.position is None:
             raise BehaviorFailedError(f"the position of {vehicle} is not known")
         return state.position.latitude_deg, state.position.longitude_deg
 
 
 def state_of(context: BehaviorContext, vehicle: str) -> VehicleState | None:
-    """What another vehicle of the fleet said last."""
+    """Return the last state of another vehicle of the fleet."""
     state = context.bus.latest(ResourceId(vehicle))
     return state if isinstance(state, VehicleState) else None

@@ -141,11 +141,11 @@ class Takeoff(ChangeAltitude):
         if self.vehicle.state.landed is True:
             return False
         height = self.vehicle.state.altitude_above_home_m
-        wished = self._above_home_m()
-        if height is None or wished is None:
+        requested_m = self._above_home_m()
+        if height is None or requested_m is None:
             return False
-        near_m = height_tolerance_m(self.vehicle, min(1.0, max(0.3, 0.1 * wished)))
-        return height >= wished - near_m and self._is_level()
+        near_m = height_tolerance_m(self.vehicle, min(1.0, max(0.3, 0.1 * requested_m)))
+        return height >= requested_m - near_m and self._is_level()
 
     def _above_home_m(self) -> float | None:
         state = self.vehicle.state
@@ -172,10 +172,10 @@ class Takeoff(ChangeAltitude):
         return BehaviorState.RUNNING if climbs else state
 
     async def _has_its_mission(self) -> bool:
-        mission, wished = await self.vehicle.driver.downloaded(), self._above_home_m()
-        if not mission or wished is None or mission[0].command not in TAKEOFFS:
+        mission, requested_m = await self.vehicle.driver.downloaded(), self._above_home_m()
+        if not mission or requested_m is None or mission[0].command not in TAKEOFFS:
             return False
-        return abs(mission[0].altitude_m - wished) < LEAST_TAKEOFF_M
+        return abs(mission[0].altitude_m - requested_m) < LEAST_TAKEOFF_M
 
 
 class Land(Behavior):
