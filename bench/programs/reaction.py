@@ -21,7 +21,7 @@ from m2pem.engine.records import TokenEntered
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.testing.fakes import FakeArbiter
+from m2pem.testing.fake_arbiter import FakeArbiter
 
 FLEET = Fleet(
     "bench", "bench.yaml", {ResourceId("ugv"): Vehicle(ResourceId("ugv"), Domain.GROUND, "own", {})}

@@ -34,7 +34,7 @@ from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal.base import Entry
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.testing.fakes import FakeArbiter
+from m2pem.testing.fake_arbiter import FakeArbiter
 
 VEHICLES = 4
 PATIENCE_S = 8.0

@@ -12,7 +12,7 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class Detector:
-    """Ends with the first detection that is heard after its task started.
+    """Ends with the first detection that is published after its task started.
 
     It listens to the payloads that its roles name (a role that names a vehicle: to the detector
     payloads on it), and without roles to every detector payload of the fleet. It writes what was

@@ -1,7 +1,7 @@
-"""What plugin authors test with: contract suites, fakes, scenarios, and an executive to run them.
+"""Tests for authors of plugins: contracts, a fake arbiter, scenarios, and an executive to run them.
 
 `from m2pem.testing import ArbiterContract`: subclass it, override two fixtures, and inherit all its
-tests. It is a plugin of pytest, too, which needs no configuration (`m2pem.testing.plugin`).
+tests. A plugin of pytest (`m2pem.testing.plugin`) is loaded without configuration.
 """
 
 from importlib import import_module
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from m2pem.testing.contracts.journal import JournalContract
     from m2pem.testing.contracts.ocu import OcuContract, Operator
     from m2pem.testing.contracts.service import ServiceCase, ServiceContract
-    from m2pem.testing.fakes import FakeArbiter
-    from m2pem.testing.stage import Played, play, stage
+    from m2pem.testing.fake_arbiter import FakeArbiter
+    from m2pem.testing.harness import MissionResult, run_executive, run_mission
 
 __all__ = [
     "ArbiterCase",
@@ -22,27 +22,27 @@ __all__ = [
     "JournalContract",
     "OcuContract",
     "Operator",
-    "Played",
+    "MissionResult",
     "ServiceCase",
     "ServiceContract",
-    "play",
-    "stage",
+    "run_mission",
+    "run_executive",
 ]
 
-# Loaded when asked for: pytest imports this package wherever m2pem is installed, and rewrites the
-# assertions of a contract only if nobody imported it before.
+# Imported on first use: pytest imports this package wherever m2pem is installed, and rewrites the
+# assertions of a contract only if it was not imported before.
 _LAZY = {
     "ArbiterCase": "contracts.arbiter",
     "ArbiterContract": "contracts.arbiter",
-    "FakeArbiter": "fakes",
+    "FakeArbiter": "fake_arbiter",
     "JournalContract": "contracts.journal",
     "OcuContract": "contracts.ocu",
     "Operator": "contracts.ocu",
-    "Played": "stage",
+    "MissionResult": "harness",
     "ServiceCase": "contracts.service",
     "ServiceContract": "contracts.service",
-    "play": "stage",
-    "stage": "stage",
+    "run_mission": "harness",
+    "run_executive": "harness",
 }
 
 

@@ -1,7 +1,7 @@
-"""The pytest plugin: it reports contracts, and lends fixtures to the tests of plugins.
+"""The pytest plugin: a summary of contracts, and fixtures for the tests of plugins.
 
-It is loaded in every run of pytest where m2pem is installed, so it imports nothing of m2pem until
-a fixture is asked for.
+It is loaded in every run of pytest where m2pem is installed, so it imports m2pem only when a
+fixture is used.
 """
 
 from collections.abc import Awaitable, Callable, Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-pytest.register_assert_rewrite("m2pem.testing.contracts", "m2pem.testing.stage")
+pytest.register_assert_rewrite("m2pem.testing.contracts", "m2pem.testing.harness")
 
 _PROPERTY = "m2pem_contract"
 _NOT_SUPPORTED = "not supported: "  # as in contracts.contract, which would be imported by asking it
@@ -29,7 +29,7 @@ START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
 def virtual() -> "Callable[[Callable[[VirtualClock], Awaitable[T]]], T]":
     """Runs a coroutine function in virtual time: `virtual(main)` awaits `main(clock)`.
 
-    It begins at 2026-01-01T00:00:00Z. Nothing real can be waited for.
+    The clock begins at 2026-01-01T00:00:00Z. The coroutine cannot wait for real I/O.
     """
     from m2pem.executive.clock import run_virtual  # noqa: PLC0415
 
@@ -41,14 +41,14 @@ def virtual() -> "Callable[[Callable[[VirtualClock], Awaitable[T]]], T]":
 
 @pytest.fixture
 def executive() -> "Callable[..., AbstractAsyncContextManager[MissionControl]]":
-    """Makes executives for tests: `async with executive(fleet) as control`; see `stage`."""
-    from m2pem.testing.stage import stage  # noqa: PLC0415
+    """The function `run_executive`: `async with executive(fleet) as control`."""
+    from m2pem.testing.harness import run_executive  # noqa: PLC0415
 
-    return stage
+    return run_executive
 
 
 def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
-    """Note with each test of a contract which one it is of; notes travel with its report."""
+    """Add the name of its contract to each test, as a property of its report."""
     for item in items:
         contract = getattr(getattr(item, "cls", None), _PROPERTY, "")
         if contract:
@@ -65,7 +65,7 @@ class _Tally:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say of each contract how much is kept, and what was declared unsupported, and why."""
+    """Report for each contract how many tests pass, and what is declared unsupported, and why."""
     tallies = _tallies(terminalreporter.stats)
     if not tallies:
         return
@@ -103,7 +103,7 @@ def _tallies(stats: dict[str, list[Any]]) -> dict[str, _Tally]:
 
 
 def _unsupported(report: Any) -> str:
-    """What a skipped test says that is not supported, and why; "" if it was skipped otherwise."""
+    """Return what is not supported, and why, by a skipped test; "": it was skipped otherwise."""
     reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else ""
     _, marker, what = str(reason).partition(_NOT_SUPPORTED)
     return what if marker else ""

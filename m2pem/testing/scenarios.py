@@ -1,6 +1,6 @@
-"""Small missions and fleets for the tests of plugins: `play(one_behavior(...), fleet(...))`.
+"""Small missions and fleets for the tests of plugins: `run_mission(one_behavior(...), fleet(...))`.
 
-Missions come as BPMN, as `MissionControl.start` and `play` take them. In each, the elements have
+Missions are BPMN, as `MissionControl.start` and `run_mission` take them. In each, the elements have
 the ids that its docstring names; values of parameters are written as in a mission file ("2 m/s").
 """
 

@@ -1,4 +1,4 @@
-"""Where the template of a plugin is: `copier copy "$(python -m m2pem.testing.template)" FOLDER`."""
+"""The folder of the plugin template: `copier copy "$(python -m m2pem.testing.template)" FOLDER`."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ _CHECKOUT = Path(__file__).parents[2] / "templates" / "plugin"
 
 
 def folder() -> Path:
-    """The template's folder, in an installation or in a checkout of the sources."""
+    """Return the template's folder, in an installation or in a checkout of the sources."""
     return _INSTALLED if _INSTALLED.is_dir() else _CHECKOUT
 
 

@@ -19,7 +19,7 @@ from m2pem.api import (
 )
 from m2pem.errors import OperatorError
 from m2pem.testing import scenarios
-from m2pem.testing.stage import stage
+from m2pem.testing.harness import run_executive
 
 FLEET = scenarios.fleet("sim", {"ugv1": {}})
 
@@ -63,7 +63,7 @@ class Log(Listener):
 
 async def test_every_record_of_a_run_is_reported_once() -> None:
     log = Log()
-    async with stage(FLEET) as control:
+    async with run_executive(FLEET) as control:
         following = asyncio.create_task(follow(control, log).run())
         run = await control.start(scenarios.question("Road?"))
         await until(lambda: log.opened == ["Road?"])
@@ -80,7 +80,7 @@ async def test_every_record_of_a_run_is_reported_once() -> None:
 
 async def test_records_between_subscription_and_loading_are_reported_as_new() -> None:
     log = Log()
-    async with stage(FLEET) as control:
+    async with run_executive(FLEET) as control:
         made = follow(control, log)
         run = await control.start(scenarios.question("Road?"))
         last = (await control.records(run))[-1].seq
@@ -93,7 +93,7 @@ async def test_records_between_subscription_and_loading_are_reported_as_new() ->
 
 
 async def test_a_late_follower_loads_what_was_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with stage(FLEET) as control:
+    async with run_executive(FLEET) as control:
         run = await control.start(scenarios.question("Road?"))
         await control.pause(run, by="bob")
         log = Log()
@@ -112,7 +112,7 @@ async def test_a_follower_that_fell_behind_reads_what_it_has_missed(
     monkeypatch.setattr(follower, "BACKLOG", 5)
     monkeypatch.setattr(follower, "RETRY_S", 0.0)
     log = Log()
-    async with stage(FLEET) as control:
+    async with run_executive(FLEET) as control:
         following = asyncio.create_task(follow(control, log).run())
         run = await control.start(scenarios.question("Road?"))
         await until(lambda: log.opened == ["Road?"])
@@ -151,7 +151,7 @@ async def test_a_follower_that_was_cut_off_subscribes_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(follower, "RETRY_S", 0.0)
-    async with stage(FLEET) as control:
+    async with run_executive(FLEET) as control:
         run = await control.start(scenarios.question("Road?"))
         cut_off = CutOff(control, run)
         log = Log()

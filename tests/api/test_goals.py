@@ -12,7 +12,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 FIRST, SECOND = ResourceId("first"), ResourceId("second")
 
@@ -49,7 +49,7 @@ def test_a_vehicle_that_cannot_be_heard_does_not_deafen_the_arbiter_to_others(
     breaks, virtual
 ) -> None:
     async def main(clock):
-        async with ArbiterBench(Boats(clock, breaks), clock) as bench:
+        async with ArbiterHarness(Boats(clock, breaks), clock) as bench:
             await bench.start("r1.b1", "sail", SECOND)
             await bench.running("r1.b1")
             await bench.start("r1.b2", "sail", FIRST)
@@ -71,7 +71,7 @@ def test_to_connect_takes_no_longer_than_its_bound_when_nobody_speaks(virtual) -
 
 def test_a_refusal_of_a_subclass_reaches_the_executive(virtual) -> None:
     async def main(clock):
-        async with ArbiterBench(Boats(clock), clock) as bench:
+        async with ArbiterHarness(Boats(clock), clock) as bench:
             await bench.start("r1.b9", "sail", FIRST)
             return await bench.ended("r1.b9", 1)
 
@@ -82,7 +82,7 @@ def test_a_refusal_of_a_subclass_reaches_the_executive(virtual) -> None:
 def test_an_old_goal_of_a_vehicle_says_nothing_of_a_new_behavior_of_the_same_id(virtual) -> None:
     async def main(clock):
         boats = Boats(clock)
-        async with ArbiterBench(boats, clock) as bench:
+        async with ArbiterHarness(boats, clock) as bench:
             boats.heard(VehicleState(FIRST, 0), "goal-of-last-year", BehaviorState.SUCCEEDED)
             return await boats.query("r1.b1", "goal-of-another-run"), bench.reports
 

@@ -15,7 +15,7 @@ from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal import MemoryJournal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.testing.fakes import FakeArbiter
+from m2pem.testing.fake_arbiter import FakeArbiter
 
 START_US = 1_767_225_600_000_000
 MAX_OUTAGE_S: float | None = None

@@ -16,7 +16,7 @@ from m2pem.errors import (
     PluginError,
 )
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.testing.fakes import FakeArbiter
+from m2pem.testing.fake_arbiter import FakeArbiter
 
 from .conftest import World, behavior, flow, mission, question, sequence
 

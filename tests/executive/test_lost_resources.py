@@ -2,7 +2,7 @@
 
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.mission.catalogue import ResourceId
-from m2pem.testing.fakes import Call
+from m2pem.testing.fake_arbiter import Call
 
 from .conftest import World, behavior, mission, sequence
 

@@ -10,7 +10,7 @@ import pytest
 
 from m2pem.errors import JournalError
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, line, opened, written
+from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
 
 
 @contextmanager
@@ -43,7 +43,7 @@ async def assert_whole(journal, run, up_to):
         for number, record in enumerate(found.records, found.seq):
             assert record.reason.rstrip("x") == str(number)
         expected += len(found.records)
-    assert (await line(journal, run)).last_seq == expected - 1
+    assert (await info(journal, run)).last_seq == expected - 1
 
 
 async def kill_and_look(path, runs, lines):
@@ -59,9 +59,9 @@ async def kill_and_look(path, runs, lines):
         assert last
         for run, seq in last.items():
             await assert_whole(journal, run, seq)
-            assert not (await line(journal, run)).driven
+            assert not (await info(journal, run)).driven
             assert await journal.claim(run) == 2
-            following = (await line(journal, run)).last_seq + 1
+            following = (await info(journal, run)).last_seq + 1
             await journal.append([entry(run, following, epoch=2)])
 
 
@@ -82,12 +82,12 @@ async def test_a_run_of_a_living_process_cannot_be_taken_and_that_of_a_dead_one_
     async with opened(lambda: SqliteJournal.open(path)) as journal:
         with driving(path, 1) as child:
             durable(child, 3)
-            assert (await line(journal, "r1")).driven
+            assert (await info(journal, "r1")).driven
             with pytest.raises(JournalError, match=f"r1 is driven by process {child.pid}, which"):
                 await journal.claim("r1")
             child.kill()
             child.wait()
-            assert not (await line(journal, "r1")).driven
+            assert not (await info(journal, "r1")).driven
             assert await journal.claim("r1") == 2
 
 

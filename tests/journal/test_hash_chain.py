@@ -13,7 +13,7 @@ from m2pem.journal.database import open_for_writing
 from m2pem.journal.hash_chain import entry_hash, header_hash
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, line, opened, written
+from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
 
 
 @pytest.fixture
@@ -125,7 +125,7 @@ async def test_a_journal_from_before_the_chain_is_read_resumed_and_chained_on(
         await journal.append([entry("r1", seq, epoch=epoch) for seq in (3, 4)])
         assert [found.seq for found in await written(journal, "r1")] == [1, 2, 3, 4]
         assert [found.seq for found in await written(journal, "r1", 1)] == [2, 3, 4]
-        assert (await line(journal, "r1")).loss is None
+        assert (await info(journal, "r1")).loss is None
     change(path, "UPDATE entries SET hash = NULL WHERE seq = 4")
     async with opened(open_journal) as journal:
         with pytest.raises(JournalError, match="r1, record 4"):
@@ -140,7 +140,7 @@ async def test_a_lost_tail_is_told_with_what_was_acknowledged_and_what_is_found(
         assert "r1: the journal has lost records: it acknowledged record 5, and its last one " in (
             caplog.text
         )
-        loss = (await line(journal, "r1")).loss
+        loss = (await info(journal, "r1")).loss
         assert (loss.acknowledged, loss.found, loss.records, loss.resumable) == (5, 3, 2, True)
 
 
@@ -151,12 +151,12 @@ async def test_a_loss_is_remembered_until_the_run_goes_on(open_journal, path):
         assert epoch == 3
         await journal.append([entry("r1", seq, RunPaused(1), epoch=epoch) for seq in (4, 5, 6)])
     async with opened(open_journal) as journal:
-        assert str((await line(journal, "r1")).loss).endswith("something else is in its place")
+        assert str((await info(journal, "r1")).loss).endswith("something else is in its place")
         with pytest.raises(JournalError, match=r"no run begins: r1: .*`m2pem resume r1`"):
             await journal.create(HEADER)
         epoch = await journal.claim("r1")
         await journal.append([entry("r1", 7, RunResumed(1), epoch=epoch)])
-        assert (await line(journal, "r1")).loss is None
+        assert (await info(journal, "r1")).loss is None
         assert await journal.create(HEADER) == "r2"
 
 
@@ -166,7 +166,7 @@ async def test_a_run_that_is_gone_whole_is_told_and_its_number_not_given_again(o
     await fill(open_journal, 1)
     lose_tail(path, 2)
     async with opened(open_journal) as journal:
-        gone = await line(journal, "r2")
+        gone = await info(journal, "r2")
         assert str(gone.loss) == "the journal has lost the run: it acknowledged 1 records of it"
         assert not gone.loss.resumable
         with pytest.raises(JournalError, match=r"r2: .*`m2pem runs --accept-loss r2`"):
@@ -194,7 +194,7 @@ async def test_a_crash_between_commit_and_mark_is_no_loss(open_journal, path):
         await journal.append([entry("r1", 3, epoch=epoch), entry("r1", 4, ended, epoch=epoch)])
     path.with_name("journal.db-mark").write_bytes(mark)
     async with opened(open_journal) as journal:
-        assert (await line(journal, "r1")).loss is None
+        assert (await info(journal, "r1")).loss is None
 
 
 @pytest.mark.parametrize("harm", ["replaced", "removed", "emptied"])
@@ -226,7 +226,7 @@ async def test_a_missing_mark_is_told_once_and_begun_again(open_journal, path, c
     assert caplog.text == ""
     lose_tail(path, 2)
     async with opened(open_journal) as journal:
-        assert (await line(journal, "r2")).loss is not None
+        assert (await info(journal, "r2")).loss is not None
 
 
 async def test_a_damaged_mark_is_told(open_journal, path):
@@ -248,7 +248,7 @@ async def test_a_torn_write_of_the_mark_leaves_the_one_before_it(open_journal, p
         torn[place + 30 : place + 64] = bytes(34)
         mark.write_bytes(torn)
         async with opened(open_journal) as journal:
-            assert (await line(journal, "r1")).loss is None
+            assert (await info(journal, "r1")).loss is None
 
 
 async def test_the_mark_is_its_owners_alone(open_journal, path):

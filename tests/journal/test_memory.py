@@ -2,7 +2,7 @@ import pytest
 
 from m2pem.errors import JournalError
 from m2pem.journal.memory import MemoryJournal
-from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, line, written
+from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info, written
 
 
 class TestMemoryJournal(JournalContract):
@@ -24,7 +24,7 @@ async def filled(keep):
 @pytest.mark.parametrize("keep", [0, 1, 7, 99, 100, 1000])
 async def test_keep_holds_the_last_entries_and_at_most_twice_as_many(keep):
     journal, run = await filled(keep)
-    assert (await line(journal, run)).last_seq == 100
+    assert (await info(journal, run)).last_seq == 100
     kept = [found.seq for found in await written(journal, run, max(0, 100 - keep))]
     assert kept == list(range(max(1, 101 - keep), 101))
     (held,) = journal._runs

@@ -8,7 +8,7 @@ from m2pem.engine.records import InputIgnored
 from m2pem.errors import JournalError
 from m2pem.journal.codec import encode_body
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, line, opened, written
+from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info, opened, written
 
 
 class TestSqliteJournal(JournalContract):
@@ -108,7 +108,7 @@ async def test_a_cancelled_claim_that_fails_takes_nothing_from_who_drives(open_j
         call.cancel()
         await asyncio.wait([call])
         await journal.append([entry(run, 1)])
-        assert (await line(journal, run)).driven
+        assert (await info(journal, run)).driven
 
 
 async def test_a_cancelled_release_still_lets_go(open_journal):
@@ -118,7 +118,7 @@ async def test_a_cancelled_release_still_lets_go(open_journal):
         await asyncio.sleep(0)
         call.cancel()
         await asyncio.wait([call])
-        while (await line(journal, run)).driven:
+        while (await info(journal, run)).driven:
             await journal.release("r9")
         assert await journal.claim(run) == 2
 
@@ -131,7 +131,7 @@ async def test_a_cancelled_close_still_closes(open_journal):
     call.cancel()
     await asyncio.wait([call])
     async with opened(open_journal) as again:
-        while (await line(again, run)).driven:
+        while (await info(again, run)).driven:
             await again.release("r9")
         assert await again.claim(run) == 2
 

@@ -5,7 +5,7 @@ import pytest
 from m2pem.errors import JournalError
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE, min_free_mb, space_shortage
-from m2pem.testing.contracts.journal import HEADER, entry, line, opened
+from m2pem.testing.contracts.journal import HEADER, entry, info, opened
 
 MORE_THAN_ANY_DISK_MB = "1e15"
 
@@ -22,7 +22,7 @@ async def test_no_run_begins_below_the_bound_and_those_that_run_go_on(open_journ
         with pytest.raises(JournalError, match=r"MB are free where .* no run begins. Make room"):
             await journal.create(HEADER)
         await journal.append([entry(run, 1)])
-        assert (await line(journal, run)).last_seq == 1
+        assert (await info(journal, run)).last_seq == 1
         monkeypatch.setenv(MIN_FREE_VARIABLE, "0")
         assert await journal.create(HEADER) == "r2"
 

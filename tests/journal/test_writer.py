@@ -9,7 +9,7 @@ import pytest
 from m2pem.engine.records import InputIgnored
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, line, opened, written
+from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ async def test_a_full_disk_leaves_a_claimed_run_free(open_journal):
         journal._writing.execute("PRAGMA query_only = ON")
         with pytest.raises(JournalError, match="can only be read"):
             await journal.claim(run)
-        assert not (await line(journal, run)).driven
+        assert not (await info(journal, run)).driven
         journal._writing.execute("PRAGMA query_only = OFF")
         assert await journal.claim(run) == 2
 
@@ -84,7 +84,7 @@ async def test_after_a_failed_write_the_journal_writes_no_more(open_journal):
                 await journal.append([entry(run, 2)])
         assert len(await written(journal, run)) == 1
         await journal.release(run)
-        assert not (await line(journal, run)).driven
+        assert not (await info(journal, run)).driven
     async with opened(open_journal) as again:
         assert len(await written(again, run)) == 1
         assert await again.claim(run) == 2

@@ -38,11 +38,11 @@ class TestDetectorContract(ServiceContract):
 
     @pytest.fixture
     def case(self) -> ServiceCase:
-        return ServiceCase(detectors=FLEET, heard=[(5.0, found(GPR, "gpr"))])
+        return ServiceCase(detectors=FLEET, published=[(5.0, found(GPR, "gpr"))])
 
 
 def test_detection_is_written_with_its_source_place_and_time() -> None:
-    case = ServiceCase(detectors=FLEET, heard=[(5.0, found(GPR, "gpr"))])
+    case = ServiceCase(detectors=FLEET, published=[(5.0, found(GPR, "gpr"))])
     assert written(case) == {
         "detection.type": "gpr",
         "detection.source": "evsg1/gpr",
@@ -53,7 +53,7 @@ def test_detection_is_written_with_its_source_place_and_time() -> None:
 
 def test_without_roles_any_detector_payload_of_the_fleet_is_heard() -> None:
     case = ServiceCase(
-        detectors=FLEET, heard=[(1.0, found(CAMERA, "smoke")), (1.0, found(OTHER, "metal"))]
+        detectors=FLEET, published=[(1.0, found(CAMERA, "smoke")), (1.0, found(OTHER, "metal"))]
     )
     assert written(case)["detection.source"] == "evsg2/gpr"
 
@@ -62,13 +62,13 @@ def test_with_a_role_only_its_payload_is_heard() -> None:
     case = ServiceCase(
         roles={"scanner": OTHER},
         detectors=FLEET,
-        heard=[(1.0, found(GPR, "gpr")), (1.0, found(OTHER, "metal"))],
+        published=[(1.0, found(GPR, "gpr")), (1.0, found(OTHER, "metal"))],
     )
     assert written(case)["detection.type"] == "metal"
 
 
 def test_a_role_may_name_a_payload_that_is_not_marked_as_a_detector() -> None:
-    case = ServiceCase(roles={"eye": CAMERA}, heard=[(1.0, found(CAMERA, "smoke"))])
+    case = ServiceCase(roles={"eye": CAMERA}, published=[(1.0, found(CAMERA, "smoke"))])
     assert written(case)["detection.source"] == "evsg1/ptz"
 
 
@@ -76,7 +76,11 @@ def test_a_role_that_names_a_vehicle_means_its_detector_payloads() -> None:
     case = ServiceCase(
         roles={"driver": ResourceId("evsg2")},
         detectors=FLEET,
-        heard=[(1.0, found(GPR, "gpr")), (1.0, found(CAMERA, "smoke")), (1.0, found(OTHER, "tin"))],
+        published=[
+            (1.0, found(GPR, "gpr")),
+            (1.0, found(CAMERA, "smoke")),
+            (1.0, found(OTHER, "tin")),
+        ],
     )
     assert written(case)["detection.type"] == "tin"
 
@@ -85,7 +89,7 @@ def test_states_without_detections_are_passed_over_and_the_first_detection_count
     vehicle = VehicleState(ResourceId("evsg1"), time_us=0)
     case = ServiceCase(
         detectors=FLEET,
-        heard=[(1.0, vehicle), (1.0, found(GPR)), (1.0, found(GPR, "tin", "gpr"))],
+        published=[(1.0, vehicle), (1.0, found(GPR)), (1.0, found(GPR, "tin", "gpr"))],
     )
     assert written(case)["detection.type"] == "tin"
 
@@ -113,7 +117,7 @@ def test_what_was_detected_before_the_task_started_does_not_count() -> None:
 def test_waiting_for_nothing_is_said_and_still_waits(
     roles: dict[str, ResourceId], message: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    case = ServiceCase(roles=roles, heard=[(1.0, found(CAMERA, "smoke"))])
+    case = ServiceCase(roles=roles, published=[(1.0, found(CAMERA, "smoke"))])
     with pytest.raises(AssertionError, match="had not ended"):
         run_case(Detector(), case)
     assert message in caplog.text

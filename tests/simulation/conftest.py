@@ -15,14 +15,14 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Coordinate, Route
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.frame import FlatFrame
-from m2pem.testing.contracts.bench import JOURNAL, ORIGIN, ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import JOURNAL, ORIGIN, ArbiterHarness, context
 
 START_US = 1_767_225_600_000_000
 
 Fleet: TypeAlias = Mapping[str, tuple[str, Mapping[str, Any]]]
 """Resources by id, each with its domain and settings."""
 
-Main: TypeAlias = Callable[[ArbiterBench, SimArbiter], Awaitable[None]]
+Main: TypeAlias = Callable[[ArbiterHarness, SimArbiter], Awaitable[None]]
 
 
 class Simulate(Protocol):
@@ -57,7 +57,7 @@ def simulate() -> Simulate:
     ) -> None:
         async def connected(clock: Clock) -> None:
             arbiter = make(clock, fleet, **{"telemetry_hz": 0.0, **options})
-            async with ArbiterBench(arbiter, clock) as bench:
+            async with ArbiterHarness(arbiter, clock) as bench:
                 await main(bench, arbiter)
 
         run_virtual(connected, START_US)

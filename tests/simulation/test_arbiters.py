@@ -15,7 +15,7 @@ from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.domains import DEFAULTS
 from m2pem.simulation.effects import EffectKind
 from m2pem.simulation.faults import Fault
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 S = 1_000_000
 UGV: Fleet = {"ugv": ("ground", {"heading": "90 deg"})}
@@ -25,7 +25,7 @@ GROUND = DEFAULTS["ground"]
 DRIVE_S = 100 / 5 + 5 / 1.5 / 2 + 5 / 3 / 2
 
 
-def state(bench: ArbiterBench, vehicle: str) -> VehicleState:
+def state(bench: ArbiterHarness, vehicle: str) -> VehicleState:
     found = bench.latest(vehicle)
     assert isinstance(found, VehicleState)
     return found
@@ -36,7 +36,7 @@ def kinds(arbiter: SimArbiter, behavior: str) -> list[EffectKind]:
 
 
 def test_a_behavior_ends_exactly_when_its_motion_does(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         end = await bench.ended("r1.b1", 3600)
         assert (bench.clock.now_us() - START_US) / S == pytest.approx(DRIVE_S, abs=1e-3)
@@ -47,7 +47,7 @@ def test_a_behavior_ends_exactly_when_its_motion_does(simulate: Simulate) -> Non
 
 
 def test_a_pause_moves_the_end_by_the_pause(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.clock.sleep(10)
         await arbiter.hold(ResourceId("ugv"))
@@ -64,7 +64,7 @@ def test_a_pause_moves_the_end_by_the_pause(simulate: Simulate) -> None:
 
 
 def test_cancel_brakes_first_and_the_vehicle_stays_where_it_stopped(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.clock.sleep(10)
         await arbiter.cancel("r1.b1", 1)
@@ -84,7 +84,7 @@ def test_cancel_brakes_first_and_the_vehicle_stays_where_it_stopped(simulate: Si
 
 
 def test_a_held_behavior_can_be_cancelled(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.clock.sleep(10)
         await arbiter.hold(ResourceId("ugv"))
@@ -96,7 +96,7 @@ def test_a_held_behavior_can_be_cancelled(simulate: Simulate) -> None:
 
 
 def test_preempting_ends_the_old_at_once_and_brakes_from_its_speed(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.clock.sleep(10)
         await arbiter.cancel("r1.b1", 1)
@@ -114,7 +114,7 @@ def test_preempting_ends_the_old_at_once_and_brakes_from_its_speed(simulate: Sim
 def test_a_busy_resource_is_refused_and_a_vehicle_and_its_payload_are_held_apart(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "teleop", "ugv")
         await bench.start("r1.b2", "hold", "ugv")
         await bench.start("r1.b3", "record_video", "ugv/ptz")
@@ -143,7 +143,7 @@ def test_a_busy_resource_is_refused_and_a_vehicle_and_its_payload_are_held_apart
 def test_what_cannot_be_done_is_rejected_by_name(
     simulate: Simulate, behavior: str, parameters: dict[str, object], said: str
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", behavior, "ugv", **parameters)  # type: ignore[arg-type]
         end = await bench.ended("r1.b1", 1)
         assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
@@ -160,7 +160,7 @@ def test_a_behavior_that_the_fleet_does_not_allow_is_rejected(simulate: Simulate
         arbiter._connections[ResourceId("ugv")] = type(connection)(
             connection.resource, "ground", behaviors=("hold",)
         )
-        async with ArbiterBench(arbiter, clock) as bench:
+        async with ArbiterHarness(arbiter, clock) as bench:
             await bench.start("r1.b1", "drive_stop", "ugv")
             assert "does not allow" in (await bench.ended("r1.b1", 1)).reason
 
@@ -170,7 +170,7 @@ def test_a_behavior_that_the_fleet_does_not_allow_is_rejected(simulate: Simulate
 def test_a_restart_with_a_higher_epoch_starts_what_has_ended_and_goes_on_counting(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "hold", "ugv", duration=5.0)
         await bench.ended("r1.b1", 6)
         await bench.start("r1.b1", "hold", "ugv", duration=5.0)
@@ -197,7 +197,7 @@ def test_a_restart_with_a_higher_epoch_starts_what_has_ended_and_goes_on_countin
 def test_a_script_ends_a_behavior_before_or_after_its_motion(
     simulate: Simulate, end: str, expected: tuple[str, str], after_s: float
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.script("r1.b1", after_s, end, "ROUTE_BLOCKED")
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         report = await bench.ended("r1.b1", 3600)
@@ -210,7 +210,7 @@ def test_a_script_ends_a_behavior_before_or_after_its_motion(
 
 
 def test_a_pause_does_not_count_for_a_script(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.script("r1.b1", 10.0, "failed")
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.clock.sleep(4)
@@ -224,7 +224,7 @@ def test_a_pause_does_not_count_for_a_script(simulate: Simulate) -> None:
 
 
 def test_a_script_that_says_no_possible_end_is_an_error(simulate: Simulate) -> None:
-    async def main(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         with pytest.raises(ValueError, match="stalled or lost, not 'exploded'"):
             arbiter.script("r1.b1", 1.0, "exploded")
 
@@ -237,7 +237,7 @@ def test_faults_of_the_fleet_strike_as_often_as_they_say(simulate: Simulate) -> 
         {"kind": "fail", "after": "5 s", "error": "ROUTE_BLOCKED"},
     ]
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         ends: list[BehaviorReport] = []
         for number in range(3):
             await bench.start(f"r1.b{number}", "hold", "ugv", duration=20.0)
@@ -255,7 +255,7 @@ def test_faults_of_the_fleet_strike_as_often_as_they_say(simulate: Simulate) -> 
 def test_a_payload_does_not_inherit_the_faults_of_its_vehicle(simulate: Simulate) -> None:
     settings = {"faults": [{"kind": "reject"}]}
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "zoom", "ugv/ptz", level=2.0)
         assert (await bench.ended("r1.b1", 10)).state is BehaviorState.SUCCEEDED
 
@@ -265,7 +265,7 @@ def test_a_payload_does_not_inherit_the_faults_of_its_vehicle(simulate: Simulate
 def test_a_stalled_behavior_never_reports_again_but_cancel_frees_its_vehicle(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.inject(ResourceId("ugv"), Fault("stall", after_s=5.0))
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.clock.sleep(1000)
@@ -284,7 +284,7 @@ def test_a_stalled_behavior_never_reports_again_but_cancel_frees_its_vehicle(
 
 
 def test_a_lost_link_silences_the_vehicle_and_loses_its_behaviors(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         await bench.start("r1.b2", "record_video", "ugv/ptz")
         await bench.clock.sleep(5)
@@ -310,7 +310,7 @@ def test_a_lost_link_silences_the_vehicle_and_loses_its_behaviors(simulate: Simu
 def test_what_was_said_and_commanded_without_a_link_arrives_when_it_is_mended(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "hold", "ugv", duration=1.0)
         arbiter.lose_link(ResourceId("ugv"))
         await bench.clock.sleep(2)
@@ -326,7 +326,7 @@ def test_what_was_said_and_commanded_without_a_link_arrives_when_it_is_mended(
 
 
 def test_a_start_that_never_reached_its_vehicle_is_lost_and_never_done(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.lose_link(ResourceId("ugv"))
         await bench.clock.sleep(1)
         await bench.start("r1.b1", "hold", "ugv", duration=1.0)
@@ -341,7 +341,7 @@ def test_a_start_that_never_reached_its_vehicle_is_lost_and_never_done(simulate:
 
 
 def test_a_link_that_is_mended_in_time_loses_nothing(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         for _ in range(4):
             arbiter.lose_link(ResourceId("ugv"))
@@ -353,7 +353,7 @@ def test_a_link_that_is_mended_in_time_loses_nothing(simulate: Simulate) -> None
 
 
 def test_the_fault_of_a_link_cuts_it(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.inject(ResourceId("ugv"), Fault("lose_link", after_s=4.0))
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
         assert (await bench.ended("r1.b1", 100)).state is BehaviorState.LOST
@@ -368,7 +368,7 @@ def test_the_fault_of_a_link_cuts_it(simulate: Simulate) -> None:
 def test_an_empty_battery_fails_the_behavior_and_brings_the_vehicle_down(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "takeoff", "uav", altitude=30.0)
         await bench.ended("r1.b1", 60)
         await bench.start("r1.b2", "teleop", "uav")
@@ -387,7 +387,7 @@ def test_an_empty_battery_fails_the_behavior_and_brings_the_vehicle_down(
 def test_an_idle_aircraft_sinks_to_the_ground_when_its_battery_is_empty(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "takeoff", "uav", altitude=30.0)
         await bench.ended("r1.b1", 60)
         await bench.clock.sleep(700)
@@ -400,7 +400,7 @@ def test_an_idle_aircraft_sinks_to_the_ground_when_its_battery_is_empty(
 def test_every_twentieth_of_the_battery_is_told_without_a_telemetry_rate(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         loop = route((0, 100), (100, 100), (100, 0))
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=loop, loop=True)
         await bench.ended("r1.b1", 3601)
@@ -416,10 +416,10 @@ def test_every_twentieth_of_the_battery_is_told_without_a_telemetry_rate(
 
 
 def test_an_idle_arbiter_without_telemetry_sets_no_timer(simulate: Simulate) -> None:
-    async def main(_: ArbiterBench, __: SimArbiter) -> None:
+    async def main(_: ArbiterHarness, __: SimArbiter) -> None:
         mine = asyncio.current_task()
         names = [t.get_coro().__qualname__ for t in asyncio.all_tasks() if t is not mine]  # type: ignore[union-attr]
-        assert sorted(names) == ["ArbiterBench._read_reports", "ArbiterBench._read_states"]
+        assert sorted(names) == ["ArbiterHarness._read_reports", "ArbiterHarness._read_states"]
 
     simulate({**UGV, **UAV, "ugv/ptz": ("ground", {})}, main)
 
@@ -427,7 +427,7 @@ def test_an_idle_arbiter_without_telemetry_sets_no_timer(simulate: Simulate) -> 
 def test_telemetry_comes_at_its_rate_while_moving_and_once_a_second_while_standing(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.clock.sleep(10.5)
         assert len(bench.states) == 11
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
@@ -444,7 +444,7 @@ def test_the_same_commands_have_the_same_reports_at_the_same_times() -> None:
         async def main(clock: Clock) -> None:
             fleet: Fleet = {f"v{i}": ("air" if i % 2 else "ground", {}) for i in range(6)}
             arbiter = make(clock, fleet)
-            async with ArbiterBench(arbiter, clock) as bench:
+            async with ArbiterHarness(arbiter, clock) as bench:
                 for i in range(6):
                     await bench.start(
                         f"r1.b{i}", "goto", f"v{i}", target=Point(place(100, 50 + i % 3))
@@ -469,7 +469,7 @@ def test_ended_behaviors_are_forgotten_only_beyond_a_bound(
 ) -> None:
     monkeypatch.setattr("m2pem.simulation.memory.REMEMBERED", 5)
 
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.running", "teleop", "uav")
         for number in range(10):
             await bench.start(f"r1.b{number}", "hold", "ugv")
@@ -484,7 +484,7 @@ def test_ended_behaviors_are_forgotten_only_beyond_a_bound(
 
 
 def test_limits_are_the_time_to_stop_from_full_speed(simulate: Simulate) -> None:
-    async def main(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         limits = arbiter.limits(ResourceId("ugv"))
         assert limits.hold_within_s > GROUND.stopping_s
         assert limits.lost_after_s == 3.0
@@ -493,7 +493,7 @@ def test_limits_are_the_time_to_stop_from_full_speed(simulate: Simulate) -> None
 
 
 def test_a_silent_arbiter_promises_no_bound_for_a_link(simulate: Simulate) -> None:
-    async def main(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         assert arbiter.limits(ResourceId("ugv")).lost_after_s == math.inf
 
     simulate(UGV, main)

@@ -15,7 +15,7 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.vehicles import SimVehicle
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 STEP_S = 0.1
 VEHICLES = ("ugv", "uav")
@@ -59,7 +59,7 @@ async def watch(clock: Clock, arbiter: SimArbiter) -> None:
 async def play(clock: Clock, script: list[tuple[float, str, str | int]]) -> None:
     fleet: Fleet = {"ugv": ("ground", {}), "uav": ("air", {}), "lead": ("ground", {})}
     arbiter = make(clock, fleet, telemetry_hz=0.0)
-    async with ArbiterBench(arbiter, clock) as bench:
+    async with ArbiterHarness(arbiter, clock) as bench:
         watching = asyncio.create_task(watch(clock, arbiter))
         await bench.start("r1.lead", "goto", "lead", target=Point(place(-200, 90)))
         newest = dict.fromkeys(VEHICLES, "")

@@ -4,14 +4,14 @@ from conftest import START_US, Simulate, local, place, route
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.arbiters import SimArbiter
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 S = 1_000_000
 GPR = "ugv/gpr"
 UGV = ("ground", {"heading": "90 deg"})
 
 
-def found(bench: ArbiterBench) -> list[Detection]:
+def found(bench: ArbiterHarness) -> list[Detection]:
     return [
         detection
         for state in bench.states
@@ -23,7 +23,7 @@ def found(bench: ArbiterBench) -> list[Detection]:
 def test_a_planned_detection_comes_at_its_time_where_the_vehicle_is(simulate: Simulate) -> None:
     detector = {"detector": True, "detections": [{"at": "12 s", "type": "gpr"}]}
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=route((100, 0)))
         await bench.until(lambda: bool(found(bench)), 100)
         assert bench.clock.now_us() == START_US + 12 * S
@@ -42,7 +42,7 @@ def test_a_planned_detection_comes_at_its_time_where_the_vehicle_is(simulate: Si
 def test_a_planned_detection_may_say_its_position(simulate: Simulate) -> None:
     planned = {"at": 3, "type": "gpr", "position": [38.2, -77.3, 61.0]}
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.clock.sleep(3.1)
         [detection] = found(bench)
         assert detection.position.latitude_deg == 38.2
@@ -59,7 +59,7 @@ def test_a_planted_target_is_found_once_when_it_comes_into_range(simulate: Simul
         "range": "5 m",
     }
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         there_and_back = route((100, 0), (0, 0), (100, 0))
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=there_and_back)
         await bench.until(lambda: bool(found(bench)), 1000)
@@ -80,7 +80,7 @@ def test_a_target_that_is_never_near_is_never_found(simulate: Simulate) -> None:
         "range": "5.9 m",
     }
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=route((100, 0)))
         await bench.ended("r1.b1", 1000)
         assert found(bench) == []
@@ -92,7 +92,7 @@ def test_a_pause_delays_finding_a_planted_target(simulate: Simulate) -> None:
     latitude, longitude, _ = place(80, 0)
     detector = {"detector": True, "targets": [{"type": "m", "position": [latitude, longitude]}]}
 
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=route((100, 0)))
         await bench.clock.sleep(8)
         await arbiter.hold(ResourceId("ugv"))
@@ -107,7 +107,7 @@ def test_a_pause_delays_finding_a_planted_target(simulate: Simulate) -> None:
 
 
 def test_a_payload_that_is_no_detector_finds_nothing(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.clock.sleep(10)
         assert found(bench) == []
 
@@ -117,7 +117,7 @@ def test_a_payload_that_is_no_detector_finds_nothing(simulate: Simulate) -> None
 def test_a_detection_without_a_link_is_heard_when_it_is_mended(simulate: Simulate) -> None:
     detector = {"detector": True, "detections": [{"at": 5, "type": "gpr"}]}
 
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.lose_link(ResourceId("ugv"))
         await bench.clock.sleep(20)
         assert found(bench) == []
@@ -132,7 +132,7 @@ def test_a_detector_on_a_vehicle_elsewhere_hears_of_it_on_the_bus(simulate: Simu
     latitude, longitude, _ = place(50, 0)
     detector = {"detector": True, "targets": [{"type": "m", "position": [latitude, longitude]}]}
 
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         for east in (0.0, 30.0, 48.0):
             await bench.clock.sleep(1)
             position = arbiter._launcher._frame.to_position((east, 0.0, 0.0))

@@ -12,7 +12,7 @@ from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.gimbals import MAST_M
 from m2pem.simulation.phases import Look, Pose
 from m2pem.simulation.settings import Gimbal
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 NORTH = math.pi / 2
 VIEW = Gimbal(view_rad=math.radians(30))
@@ -81,7 +81,7 @@ def test_states_of_payloads_tell_what_they_see(simulate: Simulate) -> None:
         "other/ptz": ("air", {}),
     }
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "ptz_point_at", "uav/ptz", bearing=0.0, elevation=-1.0)
         await bench.ended("r1.b1", 60)
         frame = FlatFrame(ORIGIN)

@@ -10,7 +10,7 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.gimbals import GAZES, MAST_M
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 S = 1_000_000
 PTZ = "ugv/ptz"
@@ -18,13 +18,13 @@ FLEET: Fleet = {"ugv": ("ground", {}), PTZ: ("ground", {}), "other": ("ground", 
 SLEW = math.radians(60)
 
 
-def look(bench: ArbiterBench) -> PayloadState:
+def look(bench: ArbiterHarness) -> PayloadState:
     state = bench.latest(PTZ)
     assert isinstance(state, PayloadState)
     return state
 
 
-async def do(bench: ArbiterBench, behavior: str, **wishes: object) -> float:
+async def do(bench: ArbiterHarness, behavior: str, **wishes: object) -> float:
     began_us = bench.clock.now_us()
     id_ = f"r1.b{began_us}{behavior}"
     await bench.start(id_, behavior, PTZ, **wishes)  # type: ignore[arg-type]
@@ -39,7 +39,7 @@ def test_every_shared_payload_behavior_is_a_gaze() -> None:
 
 
 def test_pointing_takes_the_slew_and_looks_at_the_target(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         seconds = await do(bench, "ptz_point_at", target=Point(place(100, 0)))
         assert look(bench).pan_rad == pytest.approx(math.pi / 2)
         assert look(bench).tilt_rad == pytest.approx(-math.atan2(MAST_M, 100))
@@ -61,7 +61,7 @@ def test_pointing_takes_the_slew_and_looks_at_the_target(simulate: Simulate) -> 
 def test_what_is_beyond_the_limits_is_refused(
     simulate: Simulate, wishes: dict[str, float], said: str
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "ptz_point_at", PTZ, **wishes)  # type: ignore[arg-type]
         end = await bench.ended("r1.b1", 1)
         assert end.state is BehaviorState.REJECTED
@@ -74,7 +74,7 @@ def test_what_is_beyond_the_limits_is_refused(
 
 
 def test_a_sector_is_scanned_around_a_true_heading_at_its_speed(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         seconds = await do(
             bench,
             "ptz_scan_sector",
@@ -93,7 +93,7 @@ def test_a_sector_is_scanned_around_a_true_heading_at_its_speed(simulate: Simula
 def test_a_polygon_takes_more_rows_the_narrower_the_view(simulate: Simulate) -> None:
     field = area((-20, 5), (20, 5), (20, 60), (-20, 60))
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         wide_s = await do(bench, "ptz_scan_polygon", area=field, speed=0.2)
         await do(bench, "zoom", level=10.0)
         narrow_s = await do(bench, "ptz_scan_polygon", area=field, speed=0.2)
@@ -103,7 +103,7 @@ def test_a_polygon_takes_more_rows_the_narrower_the_view(simulate: Simulate) -> 
 
 
 def test_tracking_keeps_a_moving_vehicle_in_view_for_its_duration(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b0", "goto", "other", target=Point(place(300, -20)))
         await bench.start("r1.b1", "ptz_track", PTZ, target=VehiclePosition("other"), duration=90.0)
         await bench.clock.sleep(60)
@@ -118,7 +118,7 @@ def test_tracking_keeps_a_moving_vehicle_in_view_for_its_duration(simulate: Simu
 
 
 def test_tracking_without_a_duration_lasts_until_cancelled(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "ptz_track", PTZ, target=Point(place(0, 50)))
         await bench.clock.sleep(3600)
         await arbiter.cancel("r1.b1", 1)
@@ -128,7 +128,7 @@ def test_tracking_without_a_duration_lasts_until_cancelled(simulate: Simulate) -
 
 
 def test_pictures_take_their_interval_and_the_shutter(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         assert await do(bench, "take_picture") == pytest.approx(0.5)
         assert await do(bench, "take_picture", count=4, interval=3.0) == pytest.approx(9.5)
         assert await do(bench, "record_video", duration=20.0) == pytest.approx(20)
@@ -137,7 +137,7 @@ def test_pictures_take_their_interval_and_the_shutter(simulate: Simulate) -> Non
 
 
 def test_pictures_and_videos_have_names_that_missions_can_read(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "take_picture", PTZ, count=3, interval=2.0)
         taken = await bench.ended("r1.b1", 10)
         latitude, longitude = place(0, 0)[:2]
@@ -165,7 +165,7 @@ def test_pictures_and_videos_have_names_that_missions_can_read(simulate: Simulat
 def test_cancelled_pictures_are_those_that_were_taken_without_the_time_in_a_hold(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "take_picture", PTZ, count=100, interval=2.0)
         await bench.clock.sleep(3)
         await arbiter.hold(ResourceId(PTZ))
@@ -183,7 +183,7 @@ def test_cancelled_pictures_are_those_that_were_taken_without_the_time_in_a_hold
 
 
 def test_a_zoom_beyond_the_lens_is_refused(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "zoom", level=8.0)
         assert look(bench).zoom == 8.0
         await bench.start("r1.b1", "zoom", PTZ, level=99.0)
@@ -193,7 +193,7 @@ def test_a_zoom_beyond_the_lens_is_refused(simulate: Simulate) -> None:
 
 
 def test_a_kind_of_payload_has_its_own_behaviors(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         def names(resource: str) -> set[str]:
             return {spec.name for spec in arbiter.catalogue(ResourceId(resource))}
 
@@ -214,7 +214,7 @@ def test_a_kind_of_payload_has_its_own_behaviors(simulate: Simulate) -> None:
 
 
 def test_a_held_scan_goes_on_where_it_was(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start(
             "r1.b1", "ptz_scan_sector", PTZ, heading=0.0, sector=math.pi / 2, speed=0.1
         )

@@ -10,7 +10,7 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.manoeuvres import MANOEUVRES
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 S = 1_000_000
 UGV: Fleet = {"ugv": ("ground", {}), "lead": ("ground", {})}
@@ -18,21 +18,21 @@ UAV: Fleet = {"uav": ("air", {"endurance": "10 h"}), "lead": ("ground", {})}
 SQUARE = area((0, 0), (200, 0), (200, 100), (0, 100))
 
 
-def at(bench: ArbiterBench, vehicle: str) -> tuple[float, float, float]:
+def at(bench: ArbiterHarness, vehicle: str) -> tuple[float, float, float]:
     state = bench.latest(vehicle)
     assert isinstance(state, VehicleState)
     assert state.altitude_above_home_m is not None
     return (*local(state.position), state.altitude_above_home_m)
 
 
-def heading(bench: ArbiterBench, vehicle: str) -> float:
+def heading(bench: ArbiterHarness, vehicle: str) -> float:
     state = bench.latest(vehicle)
     assert isinstance(state, VehicleState)
     assert state.yaw_rad is not None
     return math.pi / 2 - state.yaw_rad
 
 
-def tracks(bench: ArbiterBench, vehicle: str) -> list[tuple[float, float, float]]:
+def tracks(bench: ArbiterHarness, vehicle: str) -> list[tuple[float, float, float]]:
     return [
         (*local(state.position), state.altitude_above_home_m or 0.0)
         for state in bench.states
@@ -40,7 +40,9 @@ def tracks(bench: ArbiterBench, vehicle: str) -> list[tuple[float, float, float]
     ]
 
 
-async def do(bench: ArbiterBench, id_: str, behavior: str, vehicle: str, **wishes: object) -> float:
+async def do(
+    bench: ArbiterHarness, id_: str, behavior: str, vehicle: str, **wishes: object
+) -> float:
     began_us = bench.clock.now_us()
     await bench.start(id_, behavior, vehicle, **wishes)  # type: ignore[arg-type]
     end = await bench.ended(id_, 36_000)
@@ -54,7 +56,7 @@ def test_every_shared_vehicle_behavior_is_a_manoeuvre() -> None:
 
 
 def test_a_landed_aircraft_takes_off_to_the_height_of_its_route(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         up = Route(route((50, 0, 40), (90, 0, 50)).waypoints)
         await do(bench, "r1.b1", "single_vehicle_routing", "uav", route=up)
         assert at(bench, "uav") == pytest.approx((90, 0, 50), abs=0.01)
@@ -64,7 +66,7 @@ def test_a_landed_aircraft_takes_off_to_the_height_of_its_route(simulate: Simula
 
 
 def test_altitudes_are_read_in_their_frame(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "takeoff", "uav", altitude=100.0, altitude_frame="amsl")
         assert at(bench, "uav")[2] == pytest.approx(40.0)
         await do(bench, "r1.b2", "change_altitude", "uav", altitude=25.0)
@@ -77,7 +79,7 @@ def test_altitudes_are_read_in_their_frame(simulate: Simulate) -> None:
 
 
 def test_a_ground_vehicle_stays_on_the_ground(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "ugv", target=Point(place(50, 0, 90)), altitude=30.0)
         assert at(bench, "ugv") == pytest.approx((50, 0, 0), abs=0.01)
 
@@ -85,7 +87,7 @@ def test_a_ground_vehicle_stays_on_the_ground(simulate: Simulate) -> None:
 
 
 def test_goto_ends_with_the_wished_heading(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         target = Point(place(50, 0))
         await do(bench, "r1.b1", "goto", "ugv", target=target, heading=math.pi)
         assert math.remainder(heading(bench, "ugv") - math.pi, math.tau) == pytest.approx(0)
@@ -94,7 +96,7 @@ def test_goto_ends_with_the_wished_heading(simulate: Simulate) -> None:
 
 
 def test_a_loop_passes_its_route_again_and_again(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start(
             "r1.b1",
             "single_vehicle_routing",
@@ -117,7 +119,7 @@ def test_a_loop_passes_its_route_again_and_again(simulate: Simulate) -> None:
 
 
 def test_hold_ends_when_the_vehicle_stands_or_after_its_duration(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         assert await do(bench, "r1.b1", "hold", "ugv") == pytest.approx(0)
         assert await do(bench, "r1.b2", "hold", "ugv", duration=30.0) == pytest.approx(30)
 
@@ -125,7 +127,7 @@ def test_hold_ends_when_the_vehicle_stands_or_after_its_duration(simulate: Simul
 
 
 def test_reverse_goes_five_metres_back_unless_told(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "reverse", "ugv")
         assert at(bench, "ugv") == pytest.approx((0, -5, 0), abs=0.01)
         await do(bench, "r1.b2", "reverse", "ugv", distance=12.0, speed=1.0)
@@ -135,7 +137,7 @@ def test_reverse_goes_five_metres_back_unless_told(simulate: Simulate) -> None:
 
 
 def test_an_aircraft_returns_high_and_lands_where_it_started(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "uav", target=Point(place(100, 50, 10)))
         await do(bench, "r1.b2", "return_to_launch", "uav")
         assert at(bench, "uav") == pytest.approx((0, 0, 0), abs=0.01)
@@ -149,7 +151,7 @@ def test_an_aircraft_returns_high_and_lands_where_it_started(simulate: Simulate)
 
 
 def test_land_comes_down_where_it_is(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "uav", target=Point(place(40, 0, 30)))
         await do(bench, "r1.b2", "land", "uav")
         assert at(bench, "uav") == pytest.approx((40, 0, 0), abs=0.01)
@@ -158,7 +160,7 @@ def test_land_comes_down_where_it_is(simulate: Simulate) -> None:
 
 
 def test_a_survey_passes_every_part_of_the_area(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "area_survey", "ugv", area=SQUARE, spacing=25.0)
         driven = [(east, north) for east, north, _ in tracks(bench, "ugv")]
         for east in range(5, 200, 10):
@@ -170,7 +172,7 @@ def test_a_survey_passes_every_part_of_the_area(simulate: Simulate) -> None:
 
 
 def test_the_heading_of_a_survey_is_that_of_its_passes(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         along_s = await do(bench, "r1.b1", "area_survey", "ugv", area=SQUARE, spacing=20.0)
         across_s = await do(
             bench, "r1.b2", "area_survey", "ugv", area=SQUARE, spacing=20.0, heading=0.0
@@ -182,7 +184,7 @@ def test_the_heading_of_a_survey_is_that_of_its_passes(simulate: Simulate) -> No
 
 
 def test_an_orbit_keeps_its_radius_for_its_turns(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         target = Point(place(100, 0))
         await do(bench, "r1.b0", "goto", "uav", target=Point(place(60, 0, 30)))
         before = len(bench.states)
@@ -202,7 +204,7 @@ def test_an_orbit_keeps_its_radius_for_its_turns(simulate: Simulate) -> None:
 
 
 def test_the_duration_of_an_orbit_counts_from_arriving_on_it(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         target = Point(place(100, 0))
         await do(bench, "r1.b0", "orbit", "uav", target=target, turns=0.0)
         seconds = await do(bench, "r1.b1", "orbit", "uav", target=target, duration=120.0)
@@ -217,7 +219,7 @@ def test_observing_lasts_until_cancelled_or_for_its_duration(
 ) -> None:
     vehicle = next(iter(fleet))
 
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "area_observe", vehicle, area=SQUARE)
         await bench.clock.sleep(5000)
         assert bench.states_of("r1.b1") == ["ACCEPTED", "RUNNING"]
@@ -234,7 +236,7 @@ def test_observing_lasts_until_cancelled_or_for_its_duration(
 def test_a_ground_vehicle_observes_from_the_edge_with_the_area_before_it(
     simulate: Simulate,
 ) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         field = area((-50, 80), (50, 80), (50, 180), (-50, 180))
         await do(bench, "r1.b1", "area_observe", "ugv", area=field, duration=1.0)
         assert at(bench, "ugv") == pytest.approx((0, 80, 0), abs=0.05)
@@ -244,7 +246,7 @@ def test_a_ground_vehicle_observes_from_the_edge_with_the_area_before_it(
 
 
 def test_set_speed_is_the_speed_of_what_follows(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         there, back = Point(place(0, 500)), Point(place(0, 0))
         usual_s = await do(bench, "r1.b1", "goto", "ugv", target=there)
         assert await do(bench, "r1.b2", "set_speed", "ugv", speed=10.0) == pytest.approx(0)
@@ -256,7 +258,7 @@ def test_set_speed_is_the_speed_of_what_follows(simulate: Simulate) -> None:
 
 
 def test_a_wished_speed_beyond_the_vehicles_own_is_its_own(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "ugv", target=Point(place(0, 500)), speed=99.0)
         speeds = [
             math.hypot(*state.velocity_enu_m_s)
@@ -269,7 +271,7 @@ def test_a_wished_speed_beyond_the_vehicles_own_is_its_own(simulate: Simulate) -
 
 
 def test_teleop_lasts_for_its_timeout(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         assert await do(bench, "r1.b1", "teleop", "ugv", timeout=45.0) == pytest.approx(45)
 
     simulate(UGV, main)
@@ -281,7 +283,7 @@ def test_following_keeps_its_station_while_the_target_moves_and_stands(
 ) -> None:
     follower = next(iter(fleet))
 
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "follow", follower, target=VehiclePosition("lead"), offset=20.0)
         await bench.start(
             "r1.b2", "single_vehicle_routing", "lead", route=route((0, 300), (300, 300))
@@ -300,7 +302,7 @@ def test_following_keeps_its_station_while_the_target_moves_and_stands(
 
 
 def test_a_held_follower_stands_and_catches_up_when_resumed(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "follow", "ugv", target=VehiclePosition("lead"))
         await bench.start("r1.b2", "goto", "lead", target=Point(place(0, 400)))
         await bench.clock.sleep(40)
@@ -317,7 +319,7 @@ def test_a_held_follower_stands_and_catches_up_when_resumed(simulate: Simulate) 
 
 
 def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         frame = arbiter._launcher._frame
         stranger = ResourceId("stranger")
         arbiter._context.bus.publish(
@@ -331,7 +333,7 @@ def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simu
 
 
 def test_areas_with_holes_are_read(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         hole = area((80, 30), (120, 30), (120, 70), (80, 70))
         both = Area((*SQUARE.rings, *hole.rings))
         await do(bench, "r1.b1", "area_survey", "ugv", area=both, spacing=20.0)
@@ -343,7 +345,7 @@ def test_a_vehicle_begins_at_home_and_altitudes_count_from_there(simulate: Simul
     latitude, longitude, _ = place(70, -30)
     home = {"home": [latitude, longitude, 90.0], "heading": "180 deg"}
 
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "takeoff", "uav", altitude=12.0)
         state = bench.latest("uav")
         assert isinstance(state, VehicleState)
@@ -357,7 +359,7 @@ def test_a_vehicle_begins_at_home_and_altitudes_count_from_there(simulate: Simul
 
 
 def test_goto_a_vehicle_goes_to_where_it_is_at_the_start(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         await do(bench, "r1.b1", "goto", "lead", target=Point(place(90, 0)))
         await do(bench, "r1.b2", "goto", "uav", target=VehiclePosition("lead"), altitude=15.0)
         assert at(bench, "uav") == pytest.approx((90, 0, 15), abs=0.01)

@@ -18,7 +18,7 @@ from m2pem.simulation.domains import DEFAULTS
 from m2pem.simulation.phases import Pose
 from m2pem.simulation.retiming import retimed
 from m2pem.simulation.track import Plan
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 UGV: Fleet = {"ugv": ("ground", {})}
 FAR = Point(place(500, 0))
@@ -26,13 +26,13 @@ U = ResourceId("ugv")
 AIR = DEFAULTS["air"]
 
 
-def speed(bench: ArbiterBench) -> float:
+def speed(bench: ArbiterHarness) -> float:
     state = bench.latest("ugv")
     assert isinstance(state, VehicleState)
     return math.hypot(*(state.velocity_enu_m_s or ()))
 
 
-def east(bench: ArbiterBench) -> float:
+def east(bench: ArbiterHarness) -> float:
     state = bench.latest("ugv")
     assert isinstance(state, VehicleState)
     return local(state.position)[0]
@@ -44,7 +44,7 @@ def test_it_is_an_arbiter_that_adjusts() -> None:
 
 @pytest.mark.parametrize("new", [2.0, 9.0])
 def test_a_vehicle_goes_on_at_the_speed_that_it_is_told(simulate: Simulate, new: float) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "goto", U, target=FAR, speed=5.0)
         await bench.clock.sleep(20)
         began_us, left_m = bench.clock.now_us(), 500.0 - east(bench)
@@ -60,7 +60,7 @@ def test_a_vehicle_goes_on_at_the_speed_that_it_is_told(simulate: Simulate, new:
 
 
 def test_who_is_held_stands_on_and_then_goes_at_the_new_speed(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "goto", U, target=FAR, speed=5.0)
         await bench.clock.sleep(20)
         await arbiter.hold(U)
@@ -81,7 +81,7 @@ def test_who_is_held_stands_on_and_then_goes_at_the_new_speed(simulate: Simulate
 
 
 def test_a_loop_is_driven_at_the_new_speed_for_ever(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         way = route((0, 0), (100, 0), (100, 100))
         await bench.start("r1.b1", "single_vehicle_routing", U, route=way, loop=True, speed=5.0)
         await bench.clock.sleep(10)
@@ -112,7 +112,7 @@ def test_what_cannot_be_adjusted_is_left_as_it_is(
     ends: list[int] = []
 
     def told(really: bool) -> None:
-        async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+        async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
             await bench.start("r1.b1", behavior, U, **parameters)  # type: ignore[arg-type]
             await bench.clock.sleep(5)
             if really:
@@ -131,7 +131,7 @@ def test_what_cannot_be_adjusted_is_left_as_it_is(
 def test_a_word_of_a_past_epoch_or_for_what_has_ended_is_ignored(
     simulate: Simulate, epoch: int
 ) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "goto", U, target=Point(place(20, 0)))
         if epoch:
             await bench.ended("r1.b1", 100)
@@ -142,7 +142,7 @@ def test_a_word_of_a_past_epoch_or_for_what_has_ended_is_ignored(
 
 
 def test_all_members_of_a_survey_are_adjusted(simulate: Simulate) -> None:
-    async def main(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         field = area((0, 0), (200, 0), (200, 100), (0, 100))
         await bench.start("r1.b1", "area_survey", "one", "two", area=field, speed=5.0)
         await bench.clock.sleep(30)

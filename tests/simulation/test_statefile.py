@@ -15,12 +15,12 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.statefile import StateFileError, recorded_effects
-from m2pem.testing.contracts.bench import JOURNAL, ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import JOURNAL, ArbiterHarness
 
 S = 1_000_000
 EAST_100 = route((50, 0), (100, 0))
 DRIVE_S = 100 / 5 + 5 / 1.5 / 2 + 5 / 3 / 2
-Life = Callable[[ArbiterBench, SimArbiter], Awaitable[None]]
+Life = Callable[[ArbiterHarness, SimArbiter], Awaitable[None]]
 
 
 @pytest.fixture
@@ -41,20 +41,20 @@ def lives(state: str, *mains: Life, gap_s: float = 0.0, **settings: object) -> N
     async def run(clock: Clock) -> None:
         for main in mains:
             arbiter = make(clock, fleet, telemetry_hz=0.0)
-            async with ArbiterBench(arbiter, clock) as bench:
+            async with ArbiterHarness(arbiter, clock) as bench:
                 await main(bench, arbiter)
             await clock.sleep(gap_s)
 
     run_virtual(run, START_US)
 
 
-async def drive(bench: ArbiterBench, _: SimArbiter) -> None:
+async def drive(bench: ArbiterHarness, _: SimArbiter) -> None:
     await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
     await bench.clock.sleep(4)
 
 
 def test_a_behavior_goes_on_while_nobody_is_there(state: str) -> None:
-    async def again(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         assert (await arbiter.query("r1.b1", "r1.b1")).state is BehaviorState.RUNNING
         await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100, epoch=2)
         end = await bench.ended("r1.b1", 100)
@@ -74,21 +74,21 @@ def test_a_behavior_of_another_journal_is_neither_taken_over_nor_repeated(state:
 
     async def run(clock: Clock) -> None:
         first = make(clock, fleet, telemetry_hz=0.0)
-        async with ArbiterBench(first, clock) as bench:
+        async with ArbiterHarness(first, clock) as bench:
             await drive(bench, first)
-        async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
             await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=EAST_100)
             end = await bench.ended("r1.b1", 10)
             assert (end.state, end.code) == (BehaviorState.REJECTED, "RESOURCE_UNAVAILABLE")
             assert f"ugv is busy with r1.b1 of journal {JOURNAL}: resume or stop it" in end.reason
-        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
             assert (await bench.arbiter.query("r1.b1", None)).state is BehaviorState.RUNNING
-        async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
             await bench.ended(f"{JOURNAL}/r1.b1", 100)  # while the other executive looks on
-        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
             found = await bench.arbiter.query("r1.b1", None)
             assert (found.id, found.state) == ("r1.b1", BehaviorState.SUCCEEDED)
-        async with ArbiterBench(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, other, telemetry_hz=0.0), clock) as bench:
             await bench.start("r1.b2", "single_vehicle_routing", "ugv", route=EAST_100)
             assert (await bench.ended("r1.b2", 100)).state is BehaviorState.SUCCEEDED
 
@@ -98,7 +98,7 @@ def test_a_behavior_of_another_journal_is_neither_taken_over_nor_repeated(state:
 
 
 def test_what_ended_while_nobody_was_there_is_told_by_query_alone(state: str) -> None:
-    async def again(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         found = await arbiter.query("r1.b1", "r1.b1")
         assert (found.state, found.number) == (BehaviorState.SUCCEEDED, 3)
         await bench.clock.sleep(10)
@@ -113,18 +113,18 @@ def test_what_ended_while_nobody_was_there_is_told_by_query_alone(state: str) ->
 
 
 def test_without_a_state_file_nothing_is_known_afterwards(tmp_path: Path) -> None:
-    async def again(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         assert (await arbiter.query("r1.b1", "r1.b1")).state is BehaviorState.UNKNOWN
 
     lives("", drive, again)
 
 
 def test_a_held_vehicle_is_found_held(state: str) -> None:
-    async def hold(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def hold(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await drive(bench, arbiter)
         await arbiter.hold(ResourceId("ugv"))
 
-    async def again(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         assert (await arbiter.query("r1.b1", None)).state is BehaviorState.RUNNING
         await arbiter.hold(ResourceId("ugv"))
         await arbiter.resume(ResourceId("ugv"))
@@ -137,22 +137,22 @@ def test_a_held_vehicle_is_found_held(state: str) -> None:
 
 
 def test_a_cancel_that_was_on_its_way_is_carried_out(state: str) -> None:
-    async def cancel(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def cancel(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await drive(bench, arbiter)
         await arbiter.cancel("r1.b1", 1)
 
-    async def again(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         assert (await arbiter.query("r1.b1", None)).state is BehaviorState.CANCELLED
 
     lives(state, cancel, again, gap_s=10.0)
 
 
 def test_a_scripted_end_outlives_the_arbiter(state: str) -> None:
-    async def scripted(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def scripted(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         arbiter.script("r1.b1", 15.0, "failed", "ROUTE_BLOCKED")
         await drive(bench, arbiter)
 
-    async def again(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def again(bench: ArbiterHarness, _: SimArbiter) -> None:
         assert (await bench.ended("r1.b1", 100)).code == "ROUTE_BLOCKED"
         assert bench.clock.now_us() == START_US + 15 * S
 
@@ -160,12 +160,12 @@ def test_a_scripted_end_outlives_the_arbiter(state: str) -> None:
 
 
 def test_a_pursuit_is_caught_up_with(state: str) -> None:
-    async def follow(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def follow(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.start("r1.b1", "follow", "ugv", target=VehiclePosition("lead"), offset=10.0)
         await bench.start("r1.b2", "goto", "lead", target=Point(place(300, 0)))
         await bench.clock.sleep(5)
 
-    async def again(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         vehicle = bench.latest("ugv")
         assert vehicle is None
         await bench.until(lambda: bench.latest("ugv") is not None, 2)
@@ -183,14 +183,14 @@ def test_a_planned_detection_counts_from_the_first_beginning_and_comes_once(
 ) -> None:
     found: list[float] = []
 
-    async def listen(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def listen(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.clock.sleep(20 if found else 4)
         for heard in bench.states:
             found.extend(
                 (detection.time_us - START_US) / S for detection in getattr(heard, "detections", ())
             )
 
-    async def second(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def second(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.clock.sleep(2)
         await listen(bench, arbiter)
 
@@ -201,7 +201,7 @@ def test_a_planned_detection_counts_from_the_first_beginning_and_comes_once(
 def test_the_battery_goes_on_draining(state: str) -> None:
     levels: list[float] = []
 
-    async def look(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def look(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await drive(bench, arbiter)
         await arbiter.cancel("r1.b1", 1)
         await bench.ended("r1.b1", 10)
@@ -210,7 +210,7 @@ def test_the_battery_goes_on_draining(state: str) -> None:
         assert vehicle.battery_fraction is not None
         levels.append(vehicle.battery_fraction)
 
-    async def again(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def again(bench: ArbiterHarness, _: SimArbiter) -> None:
         await bench.until(lambda: bench.latest("ugv") is not None, 1)
         vehicle = bench.latest("ugv")
         assert isinstance(vehicle, VehicleState)
@@ -226,12 +226,12 @@ def test_ended_behaviors_leave_the_file_beyond_a_bound(
 ) -> None:
     monkeypatch.setattr("m2pem.simulation.statefile.REMEMBERED", 5)
 
-    async def many(bench: ArbiterBench, _: SimArbiter) -> None:
+    async def many(bench: ArbiterHarness, _: SimArbiter) -> None:
         for number in range(10):
             await bench.start(f"r1.b{number}", "hold", "ugv")
             await bench.ended(f"r1.b{number}", 1)
 
-    async def again(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         states = [(await arbiter.query(f"r1.b{n}", None)).state for n in (0, 9)]
         assert states == [BehaviorState.UNKNOWN, BehaviorState.SUCCEEDED]
 
@@ -241,7 +241,7 @@ def test_ended_behaviors_leave_the_file_beyond_a_bound(
 def test_a_file_that_is_no_state_is_refused_by_name(state: str) -> None:
     Path(state).write_text("a letter to a friend, longer than the header of a database " * 9)
 
-    async def never(_: ArbiterBench, __: SimArbiter) -> None:
+    async def never(_: ArbiterHarness, __: SimArbiter) -> None:
         raise AssertionError("it connected")
 
     with pytest.raises(StateFileError, match=r"state\.sqlite"):
@@ -264,13 +264,13 @@ def test_a_file_of_another_version_is_refused(state: str, statement: str, said: 
 
 
 def test_what_could_not_be_said_before_the_end_is_known_afterwards(state: str) -> None:
-    async def unheard(bench: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def unheard(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.b1", "hold", "ugv", duration=1.0)
         arbiter.lose_link(ResourceId("ugv"))
         await bench.clock.sleep(2)
         assert (await arbiter.query("r1.b1", None)).state is BehaviorState.RUNNING
 
-    async def again(_: ArbiterBench, arbiter: SimArbiter) -> None:
+    async def again(_: ArbiterHarness, arbiter: SimArbiter) -> None:
         assert (await arbiter.query("r1.b1", None)).state is BehaviorState.SUCCEEDED
 
     lives(state, unheard, again)
@@ -281,13 +281,13 @@ import asyncio, os, signal, sys
 sys.path.insert(0, sys.argv[2])
 from conftest import make, route
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 async def main():
     clock = SystemClock()
     arbiter = make(clock, {"ugv": ("ground", {"state": sys.argv[1]})})
     await arbiter.connect()
-    bench = ArbiterBench(arbiter, clock)
+    bench = ArbiterHarness(arbiter, clock)
     await bench.start("r1.b1", "single_vehicle_routing", "ugv", route=route((0, 9000)))
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -304,7 +304,7 @@ def test_a_start_survives_being_killed_right_after_it(state: str) -> None:
 
     async def again(clock: Clock) -> None:
         arbiter = make(clock, {"ugv": ("ground", {"state": state})})
-        async with ArbiterBench(arbiter, clock) as bench:
+        async with ArbiterHarness(arbiter, clock) as bench:
             assert (await arbiter.query("r1.b1", "r1.b1")).state is BehaviorState.RUNNING
             await bench.ended("r1.b1", 3600)
 
@@ -315,11 +315,11 @@ def test_what_was_taken_while_nobody_was_there_has_its_names(state: str) -> None
     fleet = {"ugv": ("ground", {"state": state}), "ugv/cam": ("ground", {"state": state})}
 
     async def run(clock: Clock) -> None:
-        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
             await bench.start("r1.b1", "take_picture", "ugv/cam", count=2, interval=3.0)
             await bench.clock.sleep(1)
         await clock.sleep(60)
-        async with ArbiterBench(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
+        async with ArbiterHarness(make(clock, fleet, telemetry_hz=0.0), clock) as bench:
             found = await bench.arbiter.query("r1.b1", "r1.b1")
             assert found.outputs["picture.files"] == ["sim:r1/b1_1.jpg", "sim:r1/b1_2.jpg"]
             assert found.outputs["picture.time"] == "2026-01-01T00:00:03.500000Z"

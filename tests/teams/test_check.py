@@ -16,7 +16,7 @@ from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.plugins import PluginManager
-from m2pem.testing.contracts.bench import context
+from m2pem.testing.contracts.arbiter_harness import context
 
 from .conftest import one_task, route
 

@@ -8,9 +8,9 @@ import pytest
 
 from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed
 from m2pem.errors import M2pemError
-from m2pem.testing.contracts import ocu_bench
+from m2pem.testing.contracts import ocu_harness
 from m2pem.testing.contracts.ocu import OcuContract
-from m2pem.testing.contracts.ocu_bench import seated
+from m2pem.testing.contracts.ocu_harness import run_with_ocu
 
 
 class Panel:
@@ -180,7 +180,7 @@ class BreaksAtTheEnd(Panel):
 FINDS = [
     (Blind, "shows_a_question_with_its_decisions"),
     (Unlabelled, "shows_a_question_with_its_decisions"),
-    (Late, "shows_a_question_that_stood_before_it_began"),
+    (Late, "shows_a_question_that_was_open_before_it_began"),
     (OneAtATime, "shows_several_questions_at_once"),
     (Nameless, "an_answer_reaches_the_mission"),
     (AnswersTheFirst, "several_questions_are_answered_in_any_order"),
@@ -208,7 +208,7 @@ def apply(unit: type[Panel], test: str) -> None:
     offered = {
         "make_ocu": unit,
         "operate": operate,
-        "sit": lambda main: asyncio.run(seated(unit, operate, main)),
+        "with_ocu": lambda main: asyncio.run(run_with_ocu(unit, operate, main)),
     }
     check: types.FunctionType = getattr(OcuContract, f"test_{test}")
     wanted = check.__code__.co_varnames[1 : check.__code__.co_argcount]
@@ -226,7 +226,7 @@ def test_the_contract_finds_nothing_wrong_with_a_good_unit(test: str) -> None:
 def test_the_contract_finds_what_is_wrong(
     unit: type[Panel], test: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ocu_bench, "WITHIN_S", 0.3)
+    monkeypatch.setattr(ocu_harness, "WITHIN_S", 0.3)
     with pytest.raises(AssertionError):
         apply(unit, test)
 

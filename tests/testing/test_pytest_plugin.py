@@ -94,11 +94,11 @@ def test_an_executive_runs_missions(executive) -> None:
     import asyncio
 
     from m2pem.testing import scenarios
-    from m2pem.testing.stage import play_on
+    from m2pem.testing.harness import run_mission_on
 
     async def main():
         async with executive(scenarios.fleet("sim", {"ugv1": {}}), speed=10) as control:
-            return await play_on(control, scenarios.question(), {"Question": "abort"})
+            return await run_mission_on(control, scenarios.question(), {"Question": "abort"})
 
     played = asyncio.run(main())
     assert played.of("PromptAnswered")[0].decision == "abort"

@@ -3,7 +3,7 @@
 import pytest
 
 from m2pem.bpmn import parse_mission
-from m2pem.testing import play, scenarios
+from m2pem.testing import run_mission, scenarios
 
 FLEET = scenarios.fleet("sim", {"ugv1": {}, "ugv2": {}, "ugv1/camera": {}})
 NEAR = f"[{scenarios.ORIGIN[0] + 0.0001}, {scenarios.ORIGIN[1]}]"
@@ -25,26 +25,33 @@ SPEED = 100
     ],
 )
 def test_a_scenario_goes_through_its_elements(mission: bytes, visited: str) -> None:
-    assert play(mission, FLEET, speed=SPEED).visited == visited.split()
+    assert run_mission(mission, FLEET, speed=SPEED).visited == visited.split()
 
 
 def test_two_vehicles_drive_side_by_side() -> None:
-    played = play(scenarios.in_parallel("goto", "ugv1", "ugv2", target=NEAR), FLEET, speed=SPEED)
-    names = [type(record).__name__ for record in played.records]
+    result = run_mission(
+        scenarios.in_parallel("goto", "ugv1", "ugv2", target=NEAR), FLEET, speed=SPEED
+    )
+    names = [type(record).__name__ for record in result.records]
     assert names.index("BehaviorEnded") > len(names) - names[::-1].index("BehaviorRequested") - 1
-    assert played.visited[-1] == "End"
+    assert result.visited[-1] == "End"
 
 
 def test_an_error_is_caught() -> None:
     broken = {"faults": [{"kind": "fail", "error": "ROUTE_BLOCKED", "after": "1 s"}]}
     fleet = scenarios.fleet("sim", {"ugv1": broken})
     mission = scenarios.caught_error("goto", "ugv1", "ROUTE_BLOCKED", target=FAR)
-    assert play(mission, fleet, speed=SPEED).visited == ["Start", "Task", "Caught", "Handled"]
+    assert run_mission(mission, fleet, speed=SPEED).visited == [
+        "Start",
+        "Task",
+        "Caught",
+        "Handled",
+    ]
 
 
 def test_two_questions_are_asked_at_once_and_answered_by_their_names() -> None:
-    played = play(scenarios.two_questions(), FLEET, answers={"Question2": "no"})
-    written = {record.key: record.value for record in played.of("DataWritten")}
+    result = run_mission(scenarios.two_questions(), FLEET, answers={"Question2": "no"})
+    written = {record.key: record.value for record in result.of("DataWritten")}
     assert written == {"decision.Question1": "yes", "decision.Question2": "no"}
 
 

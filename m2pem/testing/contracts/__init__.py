@@ -1,1 +1,1 @@
-"""Contract suites: subclass one, override its fixtures, and inherit all its tests."""
+"""Contracts: subclass one, override its fixtures, and inherit all its tests."""

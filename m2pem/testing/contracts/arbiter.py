@@ -1,19 +1,242 @@
-"""What every arbiter must keep to, as tests to inherit."""
+"""The contract of arbiters, as tests to inherit: here, from the start of a behavior to its end.
 
-from m2pem.testing.contracts.arbiter_behaviors import ArbiterBehaviors
-from m2pem.testing.contracts.arbiter_case import ArbiterCase, CutLink, Effects, MakeArbiter
+The tests of queries, epochs, holds and links are in `m2pem.testing.contracts.arbiter_links`.
+"""
+
+from collections.abc import Callable
+from itertools import pairwise
+
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.testing.contracts.arbiter_harness import (
+    ArbiterCase,
+    ArbiterHarness,
+    CutLink,
+    Effects,
+    Main,
+    MakeArbiter,
+    start,
+    terminal,
+    with_harness,
+)
 from m2pem.testing.contracts.arbiter_links import ArbiterLinks
+from m2pem.testing.contracts.contract import needs, skip_unsupported
 
 __all__ = ["ArbiterCase", "ArbiterContract", "CutLink", "Effects", "MakeArbiter"]
 
 
-class ArbiterContract(ArbiterBehaviors, ArbiterLinks):
+class ArbiterContract(ArbiterLinks):
     """Override the fixtures `make_arbiter` and `case`; `cut_link` and `effects` too, if you can.
 
-    Say in `unsupported` what the arbiter does not support, and why, by the subjects of `subjects`:
+    Declare in `unsupported` what the arbiter does not support, with the reason, by the subjects of
+    `subjects`:
 
         class TestRover(ArbiterContract):
             unsupported = {"hold": "the base has no brake"}
 
-    Its tests are then skipped, and the report at the end lists it. Everything else must be kept.
+    Those tests are skipped, and the summary at the end lists them. All others must pass.
     """
+
+    def test_accepted_comes_before_running_and_one_terminal_report_last(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """ACCEPTED, RUNNING, then exactly one terminal report, and none after it."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            end = await harness.ended("r1.b1", case.short_s)
+            assert end.state is BehaviorState.SUCCEEDED, end
+            await harness.clock.sleep(case.watch_s)
+            assert harness.states_of("r1.b1") == [
+                BehaviorState.ACCEPTED,
+                BehaviorState.RUNNING,
+                BehaviorState.SUCCEEDED,
+            ]
+
+        with_harness(make_arbiter, run, main)
+
+    def test_report_numbers_rise_from_one(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """The executive tells old reports from new ones by their numbers."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await harness.ended("r1.b1", case.short_s)
+            numbers = [report.number for report in harness.of("r1.b1")]
+            assert numbers[0] == 1, numbers
+            assert all(a < b for a, b in pairwise(numbers)), numbers
+
+        with_harness(make_arbiter, run, main)
+
+    def test_a_second_start_of_the_same_behavior_has_no_effect(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """The executive sends a start again when it does not know whether it arrived."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await harness.ended("r1.b1", case.short_s)
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await harness.clock.sleep(case.short_s)
+            assert len(harness.of("r1.b1")) == 3, harness.of("r1.b1")
+
+        with_harness(make_arbiter, run, main)
+
+    @needs("effects")
+    def test_a_second_start_has_one_physical_effect(
+        self,
+        make_arbiter: MakeArbiter,
+        case: ArbiterCase,
+        effects: Effects | None,
+        run: Callable[[Main], None],
+    ) -> None:
+        """Whether it comes at once, meanwhile or afterwards, the vehicle begins once."""
+        if effects is None:
+            skip_unsupported("effects", "the fixture `effects` is not overridden")
+
+        async def main(harness: ArbiterHarness) -> None:
+            before = effects(harness.arbiter, case.vehicle)
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await harness.running("r1.b1")
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await harness.ended("r1.b1", case.short_s)
+            await start(harness, "r1.b1", case.short, case.vehicle)
+            await harness.clock.sleep(case.watch_s)
+            assert effects(harness.arbiter, case.vehicle) - before == 1
+
+        with_harness(make_arbiter, run, main)
+
+    def test_an_unknown_behavior_is_rejected_by_name(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """REJECTED, with a code, and a reason that names the behavior."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await harness.start("r1.b1", "no_such_behavior", case.vehicle)
+            end = await harness.ended("r1.b1", 10)
+            assert end.state is BehaviorState.REJECTED, end
+            assert end.code, "a rejection has a code"
+            assert "no_such_behavior" in end.reason, end.reason
+
+        with_harness(make_arbiter, run, main)
+
+    def test_a_bad_parameter_is_rejected_by_name(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """REJECTED, with a reason that names the parameter; nothing has moved."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            name, value = case.bad
+            behavior, parameters = case.long
+            await start(harness, "r1.b1", (behavior, {**parameters, name: value}), case.vehicle)
+            end = await harness.ended("r1.b1", 10)
+            assert end.state is BehaviorState.REJECTED, end
+            assert name in end.reason, end.reason
+            assert harness.states_of("r1.b1") == [BehaviorState.REJECTED]
+
+        with_harness(make_arbiter, run, main)
+
+    def test_an_unknown_parameter_is_rejected_by_name(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """A parameter that is not in the catalogue is not silently left out."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            behavior, parameters = case.long
+            await start(harness, "r1.b1", (behavior, {**parameters, "colour": 1.0}), case.vehicle)
+            end = await harness.ended("r1.b1", 10)
+            assert end.state is BehaviorState.REJECTED, end
+            assert "colour" in end.reason, end.reason
+
+        with_harness(make_arbiter, run, main)
+
+    def test_a_busy_vehicle_refuses_another_behavior(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """Code RESOURCE_UNAVAILABLE; what runs is not disturbed."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.long, case.vehicle)
+            await harness.running("r1.b1")
+            await start(harness, "r1.b2", case.short, case.vehicle)
+            end = await harness.ended("r1.b2", 10)
+            assert (end.state, end.code) == (BehaviorState.REJECTED, "RESOURCE_UNAVAILABLE"), end
+            assert not terminal(harness, "r1.b1"), "the first goes on"
+
+        with_harness(make_arbiter, run, main)
+
+    @needs("preempt")
+    def test_a_behavior_that_preempts_takes_the_vehicle_over(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """`preempts` names what is being cancelled: it ends CANCELLED at once."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.long, case.vehicle)
+            await harness.running("r1.b1")
+            await start(harness, "r1.b2", case.long, case.vehicle, preempts=("r1.b1",))
+            assert (await harness.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
+            await harness.running("r1.b2", 10)
+
+        with_harness(make_arbiter, run, main)
+
+    def test_cancel_ends_a_behavior_within_the_declared_bound(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """Within `limits().cancel_timeout_s`."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.long, case.vehicle)
+            await harness.running("r1.b1")
+            await harness.clock.sleep(case.watch_s / 2)
+            await harness.arbiter.cancel("r1.b1", 1)
+            bound_s = harness.arbiter.limits(case.vehicle).cancel_timeout_s
+            assert (await harness.ended("r1.b1", bound_s)).state is BehaviorState.CANCELLED
+
+        with_harness(make_arbiter, run, main)
+
+    def test_a_second_cancel_changes_nothing(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """One terminal report, however often it is cancelled."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.long, case.vehicle)
+            await harness.running("r1.b1")
+            await harness.arbiter.cancel("r1.b1", 1)
+            await harness.arbiter.cancel("r1.b1", 1)
+            await harness.ended("r1.b1", 60)
+            await harness.arbiter.cancel("r1.b1", 1)
+            await harness.clock.sleep(case.watch_s)
+            assert len(terminal(harness, "r1.b1")) == 1, harness.of("r1.b1")
+
+        with_harness(make_arbiter, run, main)
+
+    def test_cancel_of_an_unknown_behavior_is_quiet(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """No report and no exception."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await harness.arbiter.cancel("r9.b9", 1)
+            await harness.clock.sleep(case.watch_s)
+            assert harness.reports == []
+
+        with_harness(make_arbiter, run, main)
+
+    def test_a_cancelled_vehicle_can_be_commanded_again(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """The terminal report says that the vehicle is free."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.long, case.vehicle)
+            await harness.running("r1.b1")
+            await harness.arbiter.cancel("r1.b1", 1)
+            await harness.ended("r1.b1", 60)
+            await start(harness, "r1.b2", case.long, case.vehicle)
+            await harness.running("r1.b2", 10)
+
+        with_harness(make_arbiter, run, main)

@@ -1,4 +1,4 @@
-"""What all contracts share: what their authors may declare unsupported, and that it is told."""
+"""The base of all contracts: subjects that authors may declare unsupported, with a reason."""
 
 import difflib
 from collections.abc import Callable, Mapping
@@ -7,13 +7,13 @@ from typing import Any, ClassVar, NoReturn, TypeVar
 import pytest
 
 NOT_SUPPORTED = "not supported: "
-"""How the reason of a skipped test begins; the report at the end looks for it."""
+"""Prefix of the reason of a skipped test; the summary at the end searches for it."""
 
 Test = TypeVar("Test", bound=Callable[..., Any])
 
 
 def needs(*subjects: str) -> Callable[[Test], Test]:
-    """Marks a test of a contract as one of subjects that may be declared unsupported."""
+    """Mark a test of a contract with the subjects that it needs."""
 
     def mark(test: Test) -> Test:
         test.__dict__["m2pem_needs"] = subjects
@@ -23,14 +23,14 @@ def needs(*subjects: str) -> Callable[[Test], Test]:
 
 
 def skip_unsupported(subject: str, why: str) -> NoReturn:
-    """Skip a test so that the report at the end lists it."""
+    """Skip a test so that the summary at the end lists it."""
     pytest.skip(f"{NOT_SUPPORTED}{subject}: {why}")
 
 
 class Contract:
-    """Tests to inherit. `unsupported` says what is not supported, and why, by subject.
+    """Tests to inherit. `unsupported`: subjects that are not supported, each with the reason.
 
-    `subjects` are those that may be in it, each with what it means. Everything else must be kept.
+    `subjects`: those that may be in it, each with its meaning. All other tests must pass.
     """
 
     m2pem_contract: ClassVar[str] = ""
@@ -38,10 +38,10 @@ class Contract:
     unsupported: ClassVar[Mapping[str, str]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Refuses what cannot be declared.
+        """Check the declarations of a subclass.
 
         Raises:
-            TypeError: `unsupported` has a subject that there is not, or no reason for one.
+            TypeError: `unsupported` has an unknown subject, or one without a reason.
         """
         super().__init_subclass__(**options)
         for subject, why in cls.unsupported.items():
@@ -57,7 +57,7 @@ class Contract:
 
     @pytest.fixture(autouse=True)
     def m2pem_supported(self, request: pytest.FixtureRequest) -> None:
-        """Skips the tests of what is declared unsupported."""
+        """Skip the tests of subjects that are declared unsupported."""
         for subject in getattr(request.function, "m2pem_needs", ()):
             if subject in self.unsupported:
                 skip_unsupported(subject, self.unsupported[subject])

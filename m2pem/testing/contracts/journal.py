@@ -1,4 +1,4 @@
-"""What every journal promises (`m2pem.journal.base.Journal`), as tests.
+"""The contract of journals (`m2pem.journal.base.Journal`), as tests to inherit.
 
     class TestMyJournal(JournalContract):
         @pytest.fixture
@@ -55,7 +55,7 @@ OpenJournal: TypeAlias = Callable[[], Journal]
 
 @asynccontextmanager
 async def opened(open_journal: OpenJournal) -> AsyncIterator[Journal]:
-    """A journal, closed in the end."""
+    """Open a journal, and close it in the end."""
     journal = open_journal()
     try:
         yield journal
@@ -73,18 +73,18 @@ def entry(
 
 
 async def written(journal: Journal, run: str, after_seq: int = 0) -> list[Entry]:
-    """All that the journal has of a run."""
+    """Return all entries that the journal has of a run."""
     return [found async for found in journal.read(run, after_seq)]
 
 
-async def line(journal: Journal, run: str) -> RunInfo:
-    """What `runs` says of one run."""
+async def info(journal: Journal, run: str) -> RunInfo:
+    """Return the information of `runs` about one run."""
     (found,) = [some for some in await journal.runs() if some.run == run]
     return found
 
 
 async def outcomes(*calls: Awaitable[None]) -> Sequence[BaseException | None]:
-    """What each of several calls that wait together raised."""
+    """Return what each of several concurrent calls raised."""
     return await asyncio.gather(*calls, return_exceptions=True)
 
 
@@ -120,7 +120,7 @@ class JournalContract(Contract):
             assert await written(journal, run) == []
 
     async def test_an_unknown_run_is_refused_by_name(self, open_journal: OpenJournal) -> None:
-        """Whoever asks, and whether or not the name looks like one."""
+        """By every method, and whether or not the name looks like one."""
         async with opened(open_journal) as journal:
             await journal.create(HEADER)
             for run in ("r2", "r0", "r01", "1", "", "r", "r-1", "R1", "r1 ", "r" + "9" * 30):
@@ -138,23 +138,23 @@ class JournalContract(Contract):
         async with opened(open_journal) as journal:
             run = await journal.create(HEADER)
             await journal.append([entry(run, 1, RunStarted("PATROL", 77), InputIgnored("x"))])
-            assert (await line(journal, run)).started_us == 77
-            assert (await line(journal, run)).last_seq == 2
+            assert (await info(journal, run)).started_us == 77
+            assert (await info(journal, run)).last_seq == 2
             await journal.append([entry(run, 3, RunPaused(5), given=PauseRun())])
-            assert (await line(journal, run)).paused
+            assert (await info(journal, run)).paused
             await journal.append([entry(run, 4, RunResumed(6))])
-            assert not (await line(journal, run)).paused
-            assert (await line(journal, run)).outcome is None
+            assert not (await info(journal, run)).paused
+            assert (await info(journal, run)).outcome is None
             await journal.append([entry(run, 5, RunPaused(7))])
             await journal.append([entry(run, 6, RunEnded(RunOutcome.STOPPED, "by the operator"))])
-            ended = await line(journal, run)
+            ended = await info(journal, run)
             assert (ended.outcome, ended.detail) == (RunOutcome.STOPPED, "by the operator")
             assert (ended.ended_us, ended.last_seq) == (HEADER.created_us + 6, 6)
             assert not ended.paused
             await journal.append(
                 [entry(run, 7, BehaviorProgressed("b1", 1, BehaviorState.RUNNING))]
             )
-            assert (await line(journal, run)).ended_us == HEADER.created_us + 6
+            assert (await info(journal, run)).ended_us == HEADER.created_us + 6
 
     # --- entries --------------------------------------------------------------------------------
 
@@ -243,7 +243,7 @@ class JournalContract(Contract):
                     await journal.append([entry(run, 2), bad])
             assert [found.seq for found in await written(journal, run)] == [1]
             await journal.append([entry(run, 2)])
-            assert (await line(journal, run)).last_seq == 2
+            assert (await info(journal, run)).last_seq == 2
 
     async def test_an_older_epoch_is_shut_out(self, open_journal: OpenJournal) -> None:
         """Nothing of its call is written, not even to runs that it may write to."""
@@ -277,7 +277,7 @@ class JournalContract(Contract):
             ]
             assert [len(await written(journal, run)) for run in runs] == [1, 0, 0, 1]
 
-    # --- who drives -----------------------------------------------------------------------------
+    # --- claims ---------------------------------------------------------------------------------
 
     async def test_a_driven_run_cannot_be_claimed(self, open_journal: OpenJournal) -> None:
         """The process that drives it is named, and nothing changes."""
@@ -285,7 +285,7 @@ class JournalContract(Contract):
             run = await journal.create(HEADER)
             with pytest.raises(JournalError, match=str(os.getpid())):
                 await journal.claim(run)
-            assert (await line(journal, run)).epoch == 1
+            assert (await info(journal, run)).epoch == 1
             await journal.append([entry(run, 1)])
 
     async def test_a_released_run_can_be_claimed(self, open_journal: OpenJournal) -> None:
@@ -294,10 +294,10 @@ class JournalContract(Contract):
             run = await journal.create(HEADER)
             await journal.release(run)
             await journal.release(run)
-            assert not (await line(journal, run)).driven
+            assert not (await info(journal, run)).driven
             assert await journal.claim(run) == 2
-            assert (await line(journal, run)).driven
-            assert (await line(journal, run)).epoch == 2
+            assert (await info(journal, run)).driven
+            assert (await info(journal, run)).epoch == 2
 
     async def test_a_released_run_is_not_written_to(self, open_journal: OpenJournal) -> None:
         """Another may claim it at any moment."""
@@ -322,7 +322,7 @@ class JournalContract(Contract):
             await asyncio.wait([call])
             await journal.append([entry(other, 1)])
             assert [found.seq for found in await written(journal, run)] in ([], [1, 2])
-            assert (await line(journal, run)).last_seq == len(await written(journal, run))
+            assert (await info(journal, run)).last_seq == len(await written(journal, run))
 
     async def test_a_closed_journal_says_so(self, open_journal: OpenJournal) -> None:
         """Whatever is asked of it; closing it again does nothing."""
@@ -363,7 +363,7 @@ class JournalContract(Contract):
         async with opened(open_journal) as journal:
             run = await journal.create(HEADER)
             await journal.append([entry(run, 1, RunStarted("PATROL", 5), RunPaused(6))])
-            before = await line(journal, run)
+            before = await info(journal, run)
             entries = await written(journal, run)
         async with opened(open_journal) as journal:
             assert await journal.runs() == [
@@ -383,11 +383,11 @@ class JournalContract(Contract):
             assert await two.create(HEADER) == "r2"
             await one.append([entry(run, 1)])
             assert await written(two, run) == [entry(run, 1)]
-            assert (await line(two, run)).driven
+            assert (await info(two, run)).driven
             with pytest.raises(JournalError, match=str(os.getpid())):
                 await two.claim(run)
             await one.release(run)
-            assert not (await line(two, run)).driven
+            assert not (await info(two, run)).driven
             assert await two.claim(run) == 2
             await two.append([entry(run, 2, epoch=2)])
             with pytest.raises(StaleEpochError):

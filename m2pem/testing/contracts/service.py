@@ -1,4 +1,4 @@
-"""What every service must keep to, as tests to inherit."""
+"""The contract of services, as tests to inherit."""
 
 import asyncio
 import logging
@@ -26,14 +26,14 @@ KEY = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 class ServiceCase:
     """A situation in which the service ends, well or with a `ServiceError`.
 
-    `heard`: states that are published, each so many seconds after the one before, the first so many
-    after the service started. `within_s`: how long it may take after the last, in virtual seconds.
+    `published`: states of vehicles and payloads, each with the seconds after the one before (the
+    first: after the service started). `within_s`: virtual seconds that it may take after the last.
     """
 
     roles: Mapping[str, ResourceId] = field(default_factory=dict)
     properties: Mapping[str, Value] = field(default_factory=dict)
     detectors: tuple[ResourceId, ...] = ()
-    heard: Sequence[tuple[float, VehicleState | PayloadState]] = ()
+    published: Sequence[tuple[float, VehicleState | PayloadState]] = ()
     within_s: float = 3600.0
 
 
@@ -44,7 +44,7 @@ class ServiceContract(Contract):
 
     @pytest.fixture
     def service(self) -> Service:
-        """A new object, as the executive makes one for each task."""
+        """A new service, as the executive makes one for each task."""
         raise NotImplementedError("override the fixture `service`")
 
     @pytest.fixture
@@ -73,7 +73,7 @@ class ServiceContract(Contract):
         }
         assert not undeclared, f"written but not in `writes`: {sorted(undeclared)}"
         kept = msgspec.json.decode(msgspec.json.encode(result))
-        assert kept == result, "the data store holds what JSON can say, and nothing else"
+        assert kept == result, "the data store holds only JSON values"
 
     def test_an_error_has_texts_for_the_mission_to_catch(
         self, service: Service, case: ServiceCase
@@ -105,17 +105,17 @@ class ServiceContract(Contract):
 
 
 def run_case(service: Service, case: ServiceCase) -> Mapping[str, Value] | ServiceError:
-    """Run a service through a case in virtual time; what it wrote, or its error.
+    """Run a service through a case in virtual time; return what it wrote, or its error.
 
     Raises:
-        AssertionError: it did not end, or raised something that no mission can catch.
+        AssertionError: it did not end, or raised an error that no mission can catch.
     """
 
     async def main(clock: VirtualClock) -> Mapping[str, Value] | ServiceError:
         bus = Bus()
         running = asyncio.create_task(_run(service, case, clock, bus))
         await asyncio.sleep(0)
-        for after_s, state in case.heard:
+        for after_s, state in case.published:
             await clock.sleep(after_s)
             bus.publish(state)
         await asyncio.wait([running], timeout=case.within_s)
@@ -137,7 +137,7 @@ async def _run(
 
 
 def _written(key: str, value: Value) -> list[str]:
-    """The names under which a value is stored: a map is stored entry by entry."""
+    """Return the names under which a value is stored: a map is stored entry by entry."""
     if not isinstance(value, dict):
         return [key]
     return [name for part, inner in value.items() for name in _written(f"{key}.{part}", inner)]

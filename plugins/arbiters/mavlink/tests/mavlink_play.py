@@ -7,13 +7,13 @@ from mavlink_double import Body, DoubleStation, connections
 
 from m2pem.api import BehaviorReport, ResourceId
 from m2pem.executive.clock import run_virtual
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 START_US = 1_767_225_600_000_000
 V = ResourceId("v")
 
 
-class Bench(ArbiterBench):
+class Bench(ArbiterHarness):
     """A bench whose vehicle is called v."""
 
     bodies: dict[ResourceId, Body]

@@ -12,7 +12,7 @@ from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 from m2pem.api import Connection, LocalFrame, ResourceId, offset
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 HOME = (47.397742, 8.545594)
 HOME_ALTITUDE_M = 488.0
@@ -59,7 +59,7 @@ def connections(
     return made
 
 
-class Bench(ArbiterBench):
+class Bench(ArbiterHarness):
     """A bench that knows where its vehicles really are."""
 
     simulator: Simulator

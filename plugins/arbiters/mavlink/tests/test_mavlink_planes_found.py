@@ -7,7 +7,7 @@ from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_simulated import Bench, at, connections, fly
 
 from m2pem.api import BehaviorState, Point
-from m2pem.testing.contracts.bench import context
+from m2pem.testing.contracts.arbiter_harness import context
 
 
 async def found(bench, id_: str) -> None:

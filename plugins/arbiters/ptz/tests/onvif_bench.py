@@ -15,7 +15,7 @@ from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 
 from m2pem.api import Connection, ResourceId
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import context
+from m2pem.testing.contracts.arbiter_harness import context
 
 ACCOUNT = Account("operator", "s3cret: #1")
 RESOURCE = ResourceId("evsg2/ptz")

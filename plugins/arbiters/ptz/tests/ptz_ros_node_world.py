@@ -21,7 +21,7 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 COMMAND = Path(__file__).with_name("ptz_ros_sim_command.py")
 CAMERA, OTHER = ResourceId("ugv1/ptz"), ResourceId("ugv2/ptz")
@@ -85,7 +85,7 @@ def place_carriers(lent: ArbiterContext) -> None:
 class World:
     """`lent`: what the arbiter was given."""
 
-    bench: ArbiterBench
+    bench: ArbiterHarness
     lent: ArbiterContext
 
     @property
@@ -123,7 +123,7 @@ async def world(domain: int, folder: Path, **settings: Any) -> AsyncIterator[Wor
     await asyncio.to_thread(camera.__enter__)
     try:
         arbiter = RosArbiter({CAMERA: connection(CAMERA, domain, **settings)}, lent)
-        async with ArbiterBench(arbiter, clock) as bench:
+        async with ArbiterHarness(arbiter, clock) as bench:
             it = World(bench, lent)
             await it.heard()
             yield it

@@ -9,7 +9,7 @@ from ptz_fake_camera import ORIGIN, Head, HeadDriver, connection, vehicle
 
 from m2pem.api import Area, Point, ResourceId
 from m2pem.executive.clock import run_virtual
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 START_US = 1_767_225_600_000_000
 CAMERA = ResourceId("ugv/ptz")
@@ -82,7 +82,7 @@ def play(main, head=None, moves=lambda _: {}, domain="ground", others=None, **se
         made = type(made)(made.resource, domain, made.settings, made.behaviors)
         arbiter = PtzArbiter({CAMERA: made}, world.context, lambda seat: HeadDriver(seat, head))
         try:
-            async with ArbiterBench(arbiter, clock) as world.bench:
+            async with ArbiterHarness(arbiter, clock) as world.bench:
                 return await main(world)
         finally:
             publishing.cancel()

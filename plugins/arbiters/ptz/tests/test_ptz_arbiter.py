@@ -9,7 +9,7 @@ from ptz_world import CAMERA, START_US, play, point
 
 from m2pem.api import BehaviorState, LinkState, PayloadState, VehiclePosition
 from m2pem.executive.clock import run_virtual
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 
 def test_a_camera_says_five_times_a_second_where_it_looks_and_what_it_sees():
@@ -154,13 +154,13 @@ def restarted(behavior, gap_s=1.0, change=lambda head: None, folder="unused", **
         def make():
             return PtzArbiter(made, lent, lambda seat: HeadDriver(seat, head))
 
-        async with ArbiterBench(make(), clock) as bench:
+        async with ArbiterHarness(make(), clock) as bench:
             await bench.start("r1.b1", behavior, CAMERA, **parameters)
             await bench.running("r1.b1")
             reference = bench.of("r1.b1")[-1].native_ref
             await clock.sleep(gap_s)
         change(head)
-        async with ArbiterBench(make(), clock) as bench:
+        async with ArbiterHarness(make(), clock) as bench:
             found = await bench.arbiter.query("r1.b1", reference)
             if found.state is not BehaviorState.RUNNING:
                 return found, None

@@ -12,7 +12,7 @@ from ptz_fake_camera import Head, rad
 from ptz_world import CAMERA, START_US, play
 
 from m2pem.api import BehaviorState
-from m2pem.testing.contracts.bench import ORIGIN
+from m2pem.testing.contracts.arbiter_harness import ORIGIN
 
 CAPTION = Caption("r1.b3", 1, START_US, None, {"run": "r1"})
 PICTURE = Picture(START_US, b"jpeg")

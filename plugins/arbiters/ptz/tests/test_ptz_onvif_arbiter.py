@@ -12,7 +12,7 @@ from ptz_fake_camera import at, rad, vehicle
 
 from m2pem.api import ArbiterContext, BehaviorState, Connection, Point, ResourceId
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PTZ = ResourceId("a/ptz")
 SPEED_M_S, TURN_RAD_S = 4.0, rad(6)
@@ -64,7 +64,7 @@ async def bench(server, folder: Path, *, drives=False, **said):
     lent.bus.publish(vehicle("a", clock.now_us()))
     driving = asyncio.create_task(way.drive()) if drives else None
     arbiter = PtzArbiter({PTZ: Connection(PTZ, "ground", settings)}, lent)
-    async with ArbiterBench(arbiter, clock) as found:
+    async with ArbiterHarness(arbiter, clock) as found:
         yield found, way
     if driving is not None:
         driving.cancel()

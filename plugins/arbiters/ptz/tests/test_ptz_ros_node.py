@@ -10,8 +10,8 @@ from ptz_ros_node_world import AMPLE_S, CAMERA, connection, peer, world
 
 from m2pem.api import BehaviorState, LinkState, Point, RunStatus
 from m2pem.executive.clock import SystemClock
-from m2pem.testing import play, scenarios
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing import run_mission, scenarios
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 VIAS = ("topics", "action")
 
@@ -99,7 +99,7 @@ async def test_what_the_camera_itself_refuses_fails_with_its_reason(
 async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(ros_domain: int) -> None:
     clock = SystemClock()
     arbiter = RosArbiter({CAMERA: connection(CAMERA, ros_domain)}, context(clock))
-    async with ArbiterBench(arbiter, clock) as bench:
+    async with ArbiterHarness(arbiter, clock) as bench:
 
         def is_lost() -> bool:
             state = bench.latest(CAMERA)
@@ -119,12 +119,12 @@ def test_a_mission_gets_the_pictures_that_a_payload_with_a_node_took(
         "ros", {"ugv1": {"namespace": "/ugv1", "domain_id": ros_domain}, CAMERA: own}
     )
     with peer(ros_domain, CAMERA, tmp_path):
-        played = play(
+        result = run_mission(
             scenarios.one_behavior("take_picture", CAMERA, count=2, interval="0.1 s"),
             fleet,
             arbiters={"ros": RosArbiter},
         )
-    assert played.summary.status is RunStatus.COMPLETED, played.records
-    written = {record.key: record.value for record in played.of("DataWritten")}
+    assert result.summary.status is RunStatus.COMPLETED, result.records
+    written = {record.key: record.value for record in result.of("DataWritten")}
     assert len(written["picture.files"]) == 2
     assert Path(written["picture.file"]).is_file()

@@ -87,7 +87,7 @@ class OverDds(ArbiterContract):
         "test_a_behavior_that_preempts_takes_the_vehicle_over",
         "test_cancel_ends_a_behavior_within_the_declared_bound",
         "test_another_arbiter_finds_the_behavior_again",
-        "test_hold_brings_the_vehicle_to_a_stand_within_the_declared_bound",
+        "test_hold_stops_the_vehicle_within_the_declared_bound",
         "test_a_cut_link_is_lost_within_the_declared_bound",
         "test_two_vehicles_do_not_mix",
         "test_nothing_leaks_after_close",

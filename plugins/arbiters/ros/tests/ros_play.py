@@ -9,7 +9,7 @@ from ros_double import Body, arbiter, at
 
 from m2pem.api import ResourceId
 from m2pem.executive.clock import run_virtual
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 A, B = ResourceId("a"), ResourceId("b")
 JOURNAL = UUID("5a0cf3a8-1f5c-4b53-8f67-7c26a7f3b1d4")
@@ -30,7 +30,7 @@ class Play:
     @asynccontextmanager
     async def connected(self):
         made = arbiter(self.bodies, self.context, **self.settings)
-        async with ArbiterBench(made, self.clock) as bench:
+        async with ArbiterHarness(made, self.clock) as bench:
             yield bench
 
 

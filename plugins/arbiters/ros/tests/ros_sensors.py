@@ -16,7 +16,7 @@ from std_msgs.msg import String
 
 from m2pem.api import Connection, ResourceId
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PEER = Path(__file__).with_name("ros_sensors_peer.py")
 AMPLE_S = 40.0
@@ -117,5 +117,5 @@ async def connected(domain: int, payloads: dict | None = None, **settings):
     lent = replace(context(clock), origin=ORIGIN, journal=uuid4())
     body = Body()
     arbiter = RosArbiter(connections, lent, lambda seat: DoubleDriver(seat, body))
-    async with ArbiterBench(arbiter, clock) as bench:
+    async with ArbiterHarness(arbiter, clock) as bench:
         yield bench

@@ -24,7 +24,7 @@ from m2pem_plugin_ros.settings import (
 import m2pem
 from m2pem.api import Connection, Fleet, ResourceId
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import context
+from m2pem.testing.contracts.arbiter_harness import context
 
 TEXT = (Path(__file__).parents[4] / "docs" / "ros.md").read_text(encoding="utf-8")
 FLEETS = [block for block in re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL) if "ros" in block]

@@ -15,7 +15,7 @@ from ros_double import ORIGIN
 from ros_sensors import PEER, TOPICS, Sensors, V, fix, odometry, until
 
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import context
+from m2pem.testing.contracts.arbiter_harness import context
 
 NAN, INF = math.nan, math.inf
 

@@ -17,7 +17,7 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.executive.clock import SystemClock
-from m2pem.testing.contracts.bench import ArbiterBench, context
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PEER = Path(__file__).with_name("ros_payload_peer.py")
 WIPER = ResourceId("ugv1/wiper")
@@ -41,7 +41,7 @@ async def test_an_own_node_is_commanded_and_heard_as_the_docs_say(ros_domain: in
     lent = context(clock)
     with Peer(PEER, ros_domain, ["/ugv1/wiper", WIPER]):
         arbiter = RosArbiter({WIPER: connection}, lent)
-        async with ArbiterBench(arbiter, clock) as bench:
+        async with ArbiterHarness(arbiter, clock) as bench:
             await bench.start("r1.b1", "wipe_lens", WIPER, times=3)
             report = await bench.ended("r1.b1", 20.0)
             assert report.state is BehaviorState.SUCCEEDED

@@ -269,7 +269,7 @@ async def test_missions_command_it_as_any_other_vehicle(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arbiter = pytest.importorskip("m2pem_plugin_ros.arbiter", reason="there is no RosArbiter yet")
-    from m2pem.testing.stage import play_on, stage
+    from m2pem.testing.harness import run_executive, run_mission_on
 
     monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
     fleet = load_fleet(EXAMPLE / "fleet.yaml")
@@ -277,8 +277,8 @@ async def test_missions_command_it_as_any_other_vehicle(
     async with commanded(ros_domain, "hopper:=0.8", f"faster:={MISSION_SPEED}"):
         async with asyncio.timeout(PATIENCE_S):
             arbiters = {"ros": arbiter.RosArbiter}
-            async with stage(fleet, speed=MISSION_SPEED, arbiters=arbiters) as control:
-                played = await play_on(control, mission)
+            async with run_executive(fleet, speed=MISSION_SPEED, arbiters=arbiters) as control:
+                played = await run_mission_on(control, mission)
     assert played.visited == [
         *("Start", "SweepStreet", "OnHopperFull", "DriveToDepot", "EmptyHopper"),
         *("SweepStreet", "DriveHome", "End"),

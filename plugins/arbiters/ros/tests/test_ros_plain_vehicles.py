@@ -32,7 +32,7 @@ from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.telemetry.bus import Bus
-from m2pem.testing.contracts.bench import ArbiterBench
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 PEER = Path(__file__).with_name("ros_plain_peer.py")
 ORIGIN = (38.1075, -77.3192, 60.0)
@@ -85,11 +85,11 @@ def arbiter_for(domain: int, bus: Bus, epoch: int = 1, **settings: Any) -> RosAr
 @asynccontextmanager
 async def connected(
     domain: int, epoch: int = 1, **settings: Any
-) -> AsyncIterator[tuple[ArbiterBench, Truth]]:
+) -> AsyncIterator[tuple[ArbiterHarness, Truth]]:
     async with RosRuntime("watcher", domain_id=domain) as ros:
         truth = Truth(ros)
         arbiter = arbiter_for(domain, Bus(), epoch, **settings)
-        async with ArbiterBench(arbiter, SystemClock()) as bench:
+        async with ArbiterHarness(arbiter, SystemClock()) as bench:
             yield bench, truth
 
 
@@ -104,18 +104,18 @@ def ahead() -> Point:
     return Point((place.latitude_deg, place.longitude_deg, None))
 
 
-async def drives(bench: ArbiterBench, truth: Truth, id_: str = "r1.b1") -> None:
+async def drives(bench: ArbiterHarness, truth: Truth, id_: str = "r1.b1") -> None:
     await bench.start(id_, "goto", UGV1, epoch=bench.arbiter._context.epoch_of(id_), target=ahead())
     await bench.running(id_)
     await until(lambda: truth.speed() > 0.3)
 
 
-def state(bench: ArbiterBench) -> VehicleState | None:
+def state(bench: ArbiterHarness) -> VehicleState | None:
     latest = bench.latest(UGV1)
     return latest if isinstance(latest, VehicleState) else None
 
 
-def reasons(bench: ArbiterBench) -> str:
+def reasons(bench: ArbiterHarness) -> str:
     latest = state(bench)
     return "" if latest is None else "; ".join(latest.not_ready_reasons)
 
@@ -267,7 +267,7 @@ async def test_a_cancel_of_an_executive_that_was_replaced_is_refused(ros_domain:
         async with connected(ros_domain, 1) as (old, truth):
             await drives(old, truth)
             reference = old.of("r1.b1")[-1].native_ref
-            async with ArbiterBench(arbiter_for(ros_domain, Bus(), 2), SystemClock()) as new:
+            async with ArbiterHarness(arbiter_for(ros_domain, Bus(), 2), SystemClock()) as new:
                 report = await new.arbiter.query("r1.b1", reference)
                 assert report.state is BehaviorState.RUNNING
                 await old.arbiter.cancel("r1.b1", 1)

@@ -21,7 +21,7 @@ from m2pem_plugin_ros.settings import (
 
 from m2pem.api import Connection, ResourceId
 from m2pem.errors import PluginError
-from m2pem.testing.contracts.bench import context
+from m2pem.testing.contracts.arbiter_harness import context
 
 V, W, GPR = ResourceId("evsg1"), ResourceId("evsg2"), ResourceId("evsg1/gpr")
 LEAST = {"namespace": "/evsg1"}

@@ -21,8 +21,8 @@ from m2pem_plugin_ros.testing import reserved_domain
 from m2pem.api import MissionControl, ResourceId
 from m2pem.fleet.fleet import Fleet
 from m2pem.testing import scenarios
-from m2pem.testing.contracts.ocu_bench import Faults
-from m2pem.testing.stage import stage
+from m2pem.testing.contracts.ocu_harness import Faults
+from m2pem.testing.harness import run_executive
 
 PEER = Path(__file__).with_name("mocu_client_peer.py")
 ONE, OTHER = "/m2pem", "/team_b/m2pem"
@@ -179,7 +179,7 @@ class World:
 @asynccontextmanager
 async def staged(domain: int, **options: Any) -> AsyncIterator[World]:
     """A world whose unit serves."""
-    async with stage(fleet(), speed=20.0, **options) as control:
+    async with run_executive(fleet(), speed=20.0, **options) as control:
         world = World(control, domain)
         world.begin()
         try:

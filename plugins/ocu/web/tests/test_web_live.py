@@ -14,7 +14,7 @@ from web_world import VEHICLE, Live, MakeWorld, World, serving
 from m2pem.api import RunId, RunStatus, StampedRecord, follower
 from m2pem.api.records import TokenEntered
 from m2pem.testing import scenarios
-from m2pem.testing.contracts.ocu_bench import until
+from m2pem.testing.contracts.ocu_harness import until
 
 QUESTION = scenarios.question("Is the road clear?", ("proceed", "retreat"))
 LAPS = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"

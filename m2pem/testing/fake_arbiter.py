@@ -1,6 +1,6 @@
-"""A fake arbiter for tests of missions and executives: it does what the test says, when it says.
+"""A fake arbiter for tests of missions and executives: the test says what it does, and when.
 
-Real behavior is the simulated arbiter's; this one is for faults and exact orders.
+It is for faults and exact orders of events. The simulated arbiter has realistic behavior.
 """
 
 import asyncio
@@ -23,17 +23,17 @@ from m2pem.mission.values import Value
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """What was asked of the arbiter: start, cancel, query, hold or resume, and of what."""
+    """A call of the arbiter: start, cancel, query, hold or resume, and its subject."""
 
     what: str
     subject: str
 
 
 class FakeArbiter:
-    """Offers the whole shared catalogue on everything, and remembers every call in `calls`.
+    """Offers the whole shared catalogue on every resource, and keeps every call in `calls`.
 
-    `known` is what `query` answers, by behavior. `raises`: exceptions by what is asked ("start").
-    `hangs`: what is asked and never returns.
+    `known`: the answers of `query`, by behavior. `raises`: exceptions by method ("start").
+    `hangs`: methods that never return.
     """
 
     def __init__(
@@ -62,23 +62,23 @@ class FakeArbiter:
         reason: str = "",
         outputs: Mapping[str, Value] | None = None,
     ) -> None:
-        """Have the arbiter report."""
+        """Make the arbiter report the state of a behavior."""
         number = self._numbers[behavior] = self._numbers.get(behavior, 0) + 1
         self._reports.put_nowait(
             BehaviorReport(behavior, number, state, code, reason, outputs=outputs or {})
         )
 
     def say(self, state: Telemetry) -> None:
-        """Have a vehicle, a payload or a team send telemetry."""
+        """Make a vehicle, a payload or a team send telemetry."""
         self._states.put_nowait(state)
 
     async def until_called(self, what: str, subject: str | None = None, times: int = 1) -> None:
-        """Wait until it has been asked for something `times` times."""
+        """Wait until a method was called `times` times."""
         async with self._changed:
             await self._changed.wait_for(lambda: self.count(what, subject) >= times)
 
     def count(self, what: str, subject: str | None = None) -> int:
-        """How often it was asked for something."""
+        """Return how often a method was called."""
         return sum(
             1 for call in self.calls if call.what == what and subject in (None, call.subject)
         )
@@ -86,45 +86,40 @@ class FakeArbiter:
     # --- the arbiter ----------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """Everything."""
         return tuple(SHARED.values())
 
     def limits(self, resource: ResourceId) -> Limits:
-        """As set in `limit`."""
         return self.limit
 
     async def connect(self) -> None:
-        """Nothing to reach."""
+        """Do nothing: there is no vehicle to connect to."""
 
     async def start(self, request: BehaviorRequest) -> None:
-        """Remember the request."""
+        """Keep the request in `requests`."""
         self.requests[request.id] = request
         await self._called("start", request.id)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Remember it."""
         await self._called("cancel", behavior)
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What `known` says, else UNKNOWN."""
+        """Return the report in `known`, else UNKNOWN."""
         await self._called("query", behavior)
         return self.known.get(behavior, BehaviorReport(behavior, 0, BehaviorState.UNKNOWN))
 
     async def hold(self, resource: ResourceId) -> None:
-        """Remember it."""
         await self._called("hold", resource)
 
     async def resume(self, resource: ResourceId) -> None:
-        """Remember it."""
         await self._called("resume", resource)
 
     async def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Reports as the test makes them."""
+        """Yield the reports that the test makes."""
         while (report := await self._reports.get()) is not None:
             yield report
 
     async def telemetry(self) -> AsyncIterator[Telemetry]:
-        """States as the test makes them."""
+        """Yield the telemetry that the test sends."""
         while (state := await self._states.get()) is not None:
             yield state
 

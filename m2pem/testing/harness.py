@@ -1,4 +1,4 @@
-"""An executive for the tests of plugins, and `play`, which runs one mission on it."""
+"""Running an executive, or one mission on it, in the tests of plugins."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ Factories = Mapping[str, Callable[..., Any]]
 
 
 class _WithMore(PluginManager):
-    """The installed plugins, and what a test adds under names of its own."""
+    """The installed plugins, and those that a test adds under names of its own."""
 
     def __init__(self, arbiters: Factories, services: Factories) -> None:
         super().__init__()
@@ -34,7 +34,7 @@ class _WithMore(PluginManager):
 
 
 @asynccontextmanager
-async def stage(
+async def run_executive(
     fleet: Fleet,
     *,
     clock: Clock | None = None,
@@ -43,14 +43,14 @@ async def stage(
     arbiters: Factories | None = None,
     services: Factories | None = None,
 ) -> AsyncIterator[MissionControl]:
-    """A whole executive with a journal in memory; at the end all runs are stopped.
+    """Run an executive with a journal in memory; at the end all runs are stopped.
 
-    `clock`: a wall clock of `speed`, unless one is given. `simulated`: the simulated arbiter is in
-    every arbiter's place. `arbiters`, `services`: factories by name, beside those of the installed
-    plugins, so that what is tested need not be installed.
+    `clock`: a wall clock of `speed`, unless one is given. `simulated`: the simulated arbiter
+    replaces every arbiter. `arbiters`, `services`: factories by name, beside those of the installed
+    plugins, so that a tested plugin need not be installed.
 
     Raises:
-        PluginError: the fleet names an arbiter that nobody offers, or one cannot connect.
+        PluginError: the fleet names an arbiter that no plugin offers, or one cannot connect.
     """
     executive = Executive(
         fleet,
@@ -65,8 +65,8 @@ async def stage(
 
 
 @dataclass(frozen=True, slots=True)
-class Played:
-    """What a mission did."""
+class MissionResult:
+    """The result of a mission."""
 
     summary: RunSummary
     stamped: Sequence[StampedRecord]
@@ -78,7 +78,7 @@ class Played:
 
     @property
     def visited(self) -> list[str]:
-        """The ids of the elements that were entered, in order."""
+        """Ids of the elements that were entered, in order."""
         return [record.element for record in self.records if isinstance(record, TokenEntered)]
 
     def of(self, name: str) -> list[Any]:
@@ -86,49 +86,49 @@ class Played:
         return [record for record in self.records if type(record).__name__ == name]
 
 
-async def play_on(
+async def run_mission_on(
     control: MissionControl, mission: bytes, answers: Mapping[str, str] | None = None
-) -> Played:
+) -> MissionResult:
     """Run a mission to its end. `answers`: decisions by the id of the user task."""
-    notices = control.subscribe()
+    events = control.subscribe()
     run = await control.start(mission, by="test")
-    answering = asyncio.create_task(_answer(control, notices, answers or {}))
+    answering = asyncio.create_task(_answer(control, events, answers or {}))
     try:
         summary = await control.wait(run)
     finally:
         answering.cancel()
-    return Played(summary, await control.records(run, limit=1_000_000))
+    return MissionResult(summary, await control.records(run, limit=1_000_000))
 
 
-def play(
+def run_mission(
     mission: bytes,
     fleet: Fleet,
     *,
     answers: Mapping[str, str] | None = None,
     within_s: float = 60.0,
     **options: Any,
-) -> Played:
-    """Run a mission to its end on a stage of its own, within so many real seconds.
+) -> MissionResult:
+    """Run a mission to its end on an executive of its own, within `within_s` real seconds.
 
     `answers`: decisions by the id of the user task; the first one of all others. `options` are
-    those of `stage`.
+    those of `run_executive`.
 
     Raises:
         MissionError: the mission does not fit the fleet, with every finding.
         TimeoutError: it did not end.
     """
 
-    async def main() -> Played:
-        async with asyncio.timeout(within_s), stage(fleet, **options) as control:
-            return await play_on(control, mission, answers)
+    async def main() -> MissionResult:
+        async with asyncio.timeout(within_s), run_executive(fleet, **options) as control:
+            return await run_mission_on(control, mission, answers)
 
     return asyncio.run(main())
 
 
 async def _answer(
-    control: MissionControl, notices: AsyncIterator[Any], answers: Mapping[str, str]
+    control: MissionControl, events: AsyncIterator[Any], answers: Mapping[str, str]
 ) -> None:
-    async for notice in notices:
-        if isinstance(notice, OpenPrompt):
-            decision = answers.get(notice.element, notice.decisions[0].value)
-            await control.answer(notice.run, notice.prompt, decision, by="test")
+    async for event in events:
+        if isinstance(event, OpenPrompt):
+            decision = answers.get(event.element, event.decisions[0].value)
+            await control.answer(event.run, event.prompt, decision, by="test")

@@ -1,4 +1,4 @@
-"""A seat for a unit under test: a real executive, faults on request, and its operator."""
+"""The harness of OCU tests: an executive, faults on request, and the operator of the unit."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -11,11 +11,11 @@ from m2pem.api.ocu import Ocu
 from m2pem.engine.records import BehaviorProgressed, PromptAnswered
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing import scenarios
-from m2pem.testing.stage import stage
+from m2pem.testing.harness import run_executive
 
 WITHIN_S = 10.0
-LOOK_EVERY_S = 0.01
-TURNS = 100
+POLL_S = 0.01
+LOOP_ITERATIONS = 100
 SPEED = 20.0
 VEHICLE = "ugv1"
 
@@ -24,18 +24,19 @@ _MAKER: ContextVar[set[asyncio.Task[Any]] | None] = ContextVar("_MAKER", default
 
 
 class Operator(Protocol):
-    """Who sits at a unit: sees what it shows, and presses its keys."""
+    """The operator of a unit, who reads its screen and presses its keys."""
 
     def screen(self) -> str:
         """All that the unit shows now or has shown, as text."""
         ...
 
     async def answer(self, prompt: OpenPrompt, decision: str) -> None:
-        """Do what answers a question here; returns when it is done, not when it is decided."""
+        """Answer a question at the unit; returns when the keys are pressed, not when it is
+        decided."""
         ...
 
     async def stop(self, run: RunId) -> None:
-        """Do what stops a run here."""
+        """Stop a run at the unit."""
         ...
 
 
@@ -44,7 +45,7 @@ Operate = Callable[[Ocu], Operator]
 
 
 class Faults:
-    """Stands between a unit and `MissionControl`: what is called can be refused, or hang."""
+    """A proxy of `MissionControl` for a unit: calls can be refused, or hang."""
 
     def __init__(self, control: MissionControl) -> None:
         self._control = control
@@ -54,11 +55,11 @@ class Faults:
         self._mended = asyncio.Event()
 
     def refuse(self, method: str, error: Exception) -> None:
-        """Have calls of a method raise."""
+        """Make calls of a method raise an error."""
         self._refused[method] = error
 
     def hang(self, method: str) -> None:
-        """Have calls of a method wait until `mend`."""
+        """Make calls of a method wait until `mend`."""
         self._mended.clear()
         self._hanging.add(method)
 
@@ -86,8 +87,8 @@ class Faults:
         return await getattr(self._control, name)(*args, **options)
 
 
-class OcuBench:
-    """A unit that serves, its operator, and the executive behind it, past all faults."""
+class OcuHarness:
+    """A serving unit, its operator, and the executive, which is reached without the faults."""
 
     def __init__(
         self,
@@ -106,7 +107,7 @@ class OcuBench:
         self.operator: Operator
 
     def begin(self) -> None:
-        """Have the unit serve."""
+        """Make the unit serve."""
         tasks = self._tasks = _watch_tasks()
         context = copy_context()
         context.run(_MAKER.set, tasks)
@@ -120,12 +121,12 @@ class OcuBench:
         return [task for task in self._tasks if not task.done()]
 
     async def takes_notice(self) -> None:
-        """Wait until every task that can go on has gone on: a unit that breaks breaks here."""
-        for _ in range(TURNS):
+        """Let every task of the event loop continue: a unit that breaks does so here."""
+        for _ in range(LOOP_ITERATIONS):
             await asyncio.sleep(0)
 
     async def leave(self) -> None:
-        """Cancel the unit, and see it end; what broke it is raised."""
+        """Cancel the unit and wait for its end; an error of the unit is raised."""
         self._serving.cancel()
         done, _ = await asyncio.wait([self._serving], timeout=WITHIN_S)
         assert done, f"the unit goes on {WITHIN_S:g} s after it was cancelled"
@@ -137,9 +138,9 @@ class OcuBench:
             assert error is None, f"the unit broke: {error!r}"
 
     @asynccontextmanager
-    async def another(self) -> AsyncIterator["OcuBench"]:
+    async def another(self) -> AsyncIterator["OcuHarness"]:
         """A second unit at the same executive."""
-        other = OcuBench(self.control, self._make_ocu, self._operate, self.end_executive)
+        other = OcuHarness(self.control, self._make_ocu, self._operate, self.end_executive)
         other.begin()
         try:
             yield other
@@ -199,7 +200,7 @@ class OcuBench:
         assert wanted in " ".join(self.operator.screen().split()), "the unit has left"
 
     async def goes_on(self) -> None:
-        """Ask something new, and see it shown."""
+        """Open a new prompt, and check that the unit shows it."""
         self._questions += 1
         text = f"Still there, {self._questions}?"
         (prompt,) = await self.asked(scenarios.question(text))
@@ -207,7 +208,7 @@ class OcuBench:
         await self.control.answer(prompt.run, prompt.prompt, "continue", by="test")
 
     async def answers(self) -> None:
-        """Ask something new, and have it answered at the unit."""
+        """Open a new prompt, and answer it at the unit."""
         self._questions += 1
         text = f"And now, {self._questions}?"
         (prompt,) = await self.asked(scenarios.question(text))
@@ -228,11 +229,11 @@ class OcuBench:
             ]
             if found or asyncio.get_running_loop().time() > deadline:
                 return found
-            await asyncio.sleep(LOOK_EVERY_S)
+            await asyncio.sleep(POLL_S)
 
 
 def _watch_tasks() -> set[asyncio.Task[Any]]:
-    """A set that gets every task which is made in a context that has it as `_MAKER`."""
+    """Return a set that gets every task made in a context that has it as `_MAKER`."""
 
     def make(loop: asyncio.AbstractEventLoop, coro: Any, **options: Any) -> asyncio.Task[Any]:
         task: asyncio.Task[Any] = asyncio.Task(coro, loop=loop, **options)
@@ -245,34 +246,34 @@ def _watch_tasks() -> set[asyncio.Task[Any]]:
 
 
 async def until(true: Callable[[], bool]) -> bool:
-    """Wait for something to become true; False if it is not within `WITHIN_S`.
+    """Wait until `true` returns true; False: it did not within `WITHIN_S`.
 
-    A unit tells nobody that its screen has changed, so that it is looked at again and again.
+    A unit does not notify that its screen has changed, so the screen is polled.
     """
     deadline = asyncio.get_running_loop().time() + WITHIN_S
     while not true():
         if asyncio.get_running_loop().time() > deadline:
             return False
-        await asyncio.sleep(LOOK_EVERY_S)
+        await asyncio.sleep(POLL_S)
     return True
 
 
-async def seated(
+async def run_with_ocu(
     make_ocu: MakeOcu,
     operate: Operate,
-    main: Callable[[OcuBench], Awaitable[None]],
-    before: Callable[[OcuBench], Awaitable[None]] | None = None,
+    main: Callable[[OcuHarness], Awaitable[None]],
+    before: Callable[[OcuHarness], Awaitable[None]] | None = None,
 ) -> None:
-    """Run `main` with a unit that serves; `before` runs before the unit is made."""
+    """Run `main` with a serving unit; `before` runs before the unit is made."""
     fleet = scenarios.fleet("sim", {VEHICLE: {}})
     async with AsyncExitStack() as stack:
-        control = await stack.enter_async_context(stage(fleet, speed=SPEED))
-        bench = OcuBench(control, make_ocu, operate, stack.aclose)
+        control = await stack.enter_async_context(run_executive(fleet, speed=SPEED))
+        harness = OcuHarness(control, make_ocu, operate, stack.aclose)
         if before is not None:
-            await before(bench)
-        bench.begin()
+            await before(harness)
+        harness.begin()
         try:
-            await main(bench)
+            await main(harness)
         finally:
-            bench.faults.mend()
-            await bench.leave()
+            harness.faults.mend()
+            await harness.leave()
