@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeAlias
 
+from m2pem.rehearsal.svg import Canvas, text_width
+
 from bench.engines import Figure
 from bench.targets import Work
-from m2pem.rehearsal.svg import Canvas, text_width
 
 COLOURS = ("#0b6e4f", "#c1440e", "#3066be", "#8e44ad", "#7f6a00", "#00838f", "#ad1457")
 INK, FAINT, PAPER = "#222222", "#dddddd", "#ffffff"

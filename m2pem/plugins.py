@@ -40,7 +40,7 @@ __all__ = ["DEFAULT_PLUGINS", "PluginFailure", "PluginInfo", "PluginManager"]
 
 T = TypeVar("T")
 
-DEFAULT_PLUGINS = ("m2pem.simulation.plugin", "m2pem.services.plugin", "m2pem.cli.plain_plugin")
+DEFAULT_PLUGINS = ("m2pem.simulation.hooks", "m2pem.services.plugin", "m2pem.cli.plain_plugin")
 """Modules of the core that load through the same hooks as anyone's plugin."""
 
 BLOCK_VARIABLE = "M2PEM_BLOCK_PLUGINS"

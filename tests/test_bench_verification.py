@@ -13,7 +13,7 @@ from bench.verification.checkers import Found, look
 from bench.verification.measuring import Verified
 from bench.verification.works import CASES, OVERLAP, SHAPES, Case, subjects
 from m2pem.executive.loading import load_source
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.verify.check import check
 from m2pem.verify.properties.results import Verdict
 

@@ -23,7 +23,7 @@ from m2pem.bpmn import parse_mission
 from m2pem.cli.verify import asked_of, findings
 from m2pem.executive.loading import load_source
 from m2pem.executive.verification import Engine
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import search as search_as_it_does
 from m2pem.verify.ltl import parse

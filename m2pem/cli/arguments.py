@@ -24,7 +24,7 @@ def get_fleet(name: str, mission: "Mission") -> "Fleet":
         FleetError: with every finding.
     """
     if name == MADE_UP:
-        from m2pem.fleet.madeup import fleet_for
+        from m2pem.fleet.default_fleet import fleet_for
 
         return fleet_for(mission)
     from m2pem.fleet.fleet_file import load_fleet

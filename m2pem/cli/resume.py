@@ -57,7 +57,7 @@ async def _resume(
     from m2pem.cli.session import drive_run, make_executive, tidy_up
     from m2pem.engine.state import RunStatus
     from m2pem.executive.clock import SystemClock
-    from m2pem.fleet.snapshot import restore
+    from m2pem.fleet.fleet import restore
     from m2pem.journal import file_of
     from m2pem.journal.mission import mission_of
     from m2pem.plugins import PluginManager

@@ -105,7 +105,7 @@ async def _interrupted(
     journal: "Journal", fleet: "Fleet", simulated: bool, speed: float
 ) -> "tuple[list[RunInfo], list[RunInfo]]":
     """The runs that nobody drives: those with this very fleet, and the others."""
-    from m2pem.fleet.snapshot import dump
+    from m2pem.fleet.fleet import dump
 
     here = (dump(fleet), simulated, speed)
     mine: list[RunInfo] = []

@@ -30,8 +30,7 @@ from m2pem.executive.executive import Executive
 from m2pem.executive.fleet_connections import SIMULATED
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.executive.script import Script
-from m2pem.fleet.fleet import Fleet, Payload, Vehicle
-from m2pem.fleet.snapshot import dump
+from m2pem.fleet.fleet import Fleet, Payload, Vehicle, dump
 from m2pem.journal.base import Journal
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
@@ -269,7 +268,7 @@ def make_executive(
 
 
 async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
-    from m2pem.rehearsal.rehearser import rehearse_apart
+    from m2pem.rehearsal.worker import rehearse_apart
 
     return await rehearse_apart(*arguments, **options)
 

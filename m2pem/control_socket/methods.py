@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import msgspec
 
 from m2pem.api.control import MissionControl
-from m2pem.fleet.snapshot import dump
+from m2pem.fleet.fleet import dump
 from m2pem.mission.values import Value
 
 

@@ -28,8 +28,7 @@ from m2pem.control_socket.paths import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
 from m2pem.errors import OperatorError
 from m2pem.findings import Finding
-from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.snapshot import restore
+from m2pem.fleet.fleet import Fleet, restore
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.library import KeptLibrary, Source
 from m2pem.mission.mission import Mission

@@ -16,7 +16,7 @@ from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.script import Script
 from m2pem.executive.separation import Clearance
-from m2pem.fleet.availability import Availability
+from m2pem.fleet.allocation import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId

@@ -48,10 +48,8 @@ from m2pem.executive.separation import clearance_for
 from m2pem.executive.services import Services
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.findings import Severity
-from m2pem.fleet.allocation import spelled_out
-from m2pem.fleet.availability import Availability
-from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.snapshot import dump
+from m2pem.fleet.allocation import Availability, spelled_out
+from m2pem.fleet.fleet import Fleet, dump
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal, RunHeader

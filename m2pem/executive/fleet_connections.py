@@ -20,7 +20,7 @@ from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.geometry import Area
-from m2pem.teams.offers import Offers
+from m2pem.teams.capabilities import Offers
 
 if TYPE_CHECKING:
     from m2pem.teams.arbiter import Teams

@@ -11,8 +11,7 @@ from m2pem.engine.elements.behaviors import preview_control_taken
 from m2pem.engine.inputs import ControlReturned, ControlTaken
 from m2pem.errors import BusyError, OperatorError
 from m2pem.executive.runner import Runner
-from m2pem.fleet.allocation import resources_of_mission
-from m2pem.fleet.availability import Availability
+from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission

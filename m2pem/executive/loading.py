@@ -20,7 +20,7 @@ from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_named
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.elements import ServiceTask
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or

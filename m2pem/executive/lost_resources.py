@@ -15,7 +15,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
-from m2pem.fleet.availability import Availability
+from m2pem.fleet.allocation import Availability
 from m2pem.mission.catalogue import ResourceId
 
 log = logging.getLogger("m2pem.executive")

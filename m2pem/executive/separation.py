@@ -9,7 +9,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorSpec
 
 if TYPE_CHECKING:
-    from m2pem.deconfliction.ledger import Airspace
+    from m2pem.deconfliction.reservations import Airspace
 
 SEEN_WITHIN_S = 1.5
 """How long the start of a behavior waits for aircraft that have not said where they are: for those
@@ -52,7 +52,7 @@ def clearance_for(fleet: Fleet, clock: Clock) -> Clearance | None:
     """None: the fleet does not say how far its aircraft are to be apart."""
     if fleet.vertical_separation_m is None:
         return None
-    from m2pem.deconfliction.ledger import airspace_of  # noqa: PLC0415  # few fleets need it
+    from m2pem.deconfliction.reservations import airspace_of  # noqa: PLC0415  # few fleets need it
 
     airspace = airspace_of(fleet)
     return None if airspace is None else Clearance(airspace, clock)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import findings_for, refuse_errors
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.check import Report, check

@@ -14,8 +14,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import load_source
 from m2pem.executive.subprocess_worker import Given, Tell, apart, given, serve
-from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.snapshot import dump, restore
+from m2pem.fleet.fleet import Fleet, dump, restore
 from m2pem.mission.values import Value
 from m2pem.telemetry.bus import Bus
 

@@ -9,8 +9,7 @@ from pydantic import ValidationError
 from m2pem.errors import FleetError
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
 from m2pem.fleet.fleet_schema import DeconflictionModel, FleetModel, VehicleModel
-from m2pem.fleet.shape_findings import note_shape_findings
-from m2pem.fleet.yaml_source import YamlSource, read_yaml
+from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
 from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.geo.local_frame import Origin
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach

@@ -1,22 +1,20 @@
-"""Reads a YAML 1.2 file that a person wrote into plain JSON values, keeping line numbers.
-
-Only what JSON can say comes out: no tags, no objects, texts as keys, each key once. The file is
-bounded in size, in depth, and in values *after* aliases are followed, so that a few lines of nested
-aliases cannot fill the memory.
-"""
+"""Reads a YAML 1.2 file that a person wrote, keeping lines, and names what is wrong in it."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from types import UnionType
+from typing import Any, TypeAlias, get_args, get_origin
 
+from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from m2pem.findings import Finding, Severity, unreadable_remedy
 from m2pem.mission.values import MAX_DEPTH, Value
+from m2pem.suggestions import did_you_mean, suggest
 
 MAX_BYTES = 2_000_000
 MAX_VALUES = 200_000
@@ -202,3 +200,74 @@ class _Reader:
             self.source._note(line, path, "number", f"{text} is not a finite 64-bit number")
             return None
         return value
+
+
+_EXPECTED = {
+    "model_type": "is not a map",
+    "dict_type": "is not a map",
+    "list_type": "is not a list",
+    "string_type": "is not a text",
+    "float_type": "is not a number",
+    "bool_type": "is neither true nor false",
+    "too_short": "is too short",
+    "string_too_short": "is empty",
+}
+_REMEDY = {
+    "model_type": "write 'key: value' lines below it",
+    "dict_type": "write 'key: value' lines below it",
+    "list_type": "write it in [ ]",
+    "string_type": "write a text (a number or true is one in quotes)",
+    "bool_type": "YAML 1.2 reads only true and false as such",
+    "too_short": "at least one is needed",
+}
+
+
+def note_shape_findings(source: YamlSource, error: ValidationError, root: type[BaseModel]) -> None:
+    """Add a finding to `source` for everything in `error`; `root` is the model of the file."""
+    for detail in error.errors():
+        path: KeyPath = tuple(part for part in detail["loc"] if part != "[key]")
+        _note(source, detail["type"], path, detail, root)
+
+
+def _note(
+    source: YamlSource, kind: str, path: KeyPath, detail: Mapping[str, Any], root: type[BaseModel]
+) -> None:
+    last = str(path[-1]) if path else ""
+    if kind == "extra_forbidden":
+        known = _model_at(root, path[:-1]).model_fields
+        source.error(path, "unknown-key", f"unknown key '{last}'", suggest(last, known, "keys"))
+    elif kind == "missing":
+        source.error(path, "missing-key", f"'{last}' is missing")
+    elif kind == "literal_error":
+        expected = str(detail["ctx"]["expected"])
+        message = f"{detail['input']!r} is not one of {expected}"
+        choices = [choice.strip("'") for choice in expected.replace(" or ", ", ").split(", ")]
+        source.error(path, "bad-value", message, did_you_mean(str(detail["input"]), choices))
+    elif kind == "string_pattern_mismatch":
+        message = f"{detail['input']!r} is no name: it has white space or '/' in it, or is empty"
+        source.error(path, "bad-name", message)
+    elif kind == "value_error":
+        source.error(path, "bad-value", str(detail["ctx"]["error"]))
+    else:
+        message = _EXPECTED.get(kind) or detail["msg"].removeprefix("Input ")
+        shown = repr(detail["input"])
+        shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+        source.error(path, "bad-value", f"{shown} {message}", _REMEDY.get(kind, ""))
+
+
+def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel]:
+    """The model of the map at `path` below one of `model`."""
+    here: Any = model
+    for part in path:
+        if isinstance(here, type) and issubclass(here, BaseModel):
+            here = _unwrapped(here.model_fields[str(part)].annotation)
+        elif get_origin(here) in (dict, list):
+            here = _unwrapped(get_args(here)[-1])
+    return here if isinstance(here, type) and issubclass(here, BaseModel) else model
+
+
+def _unwrapped(annotation: Any) -> Any:
+    """`annotation` without an "or None"."""
+    if get_origin(annotation) is UnionType or isinstance(annotation, UnionType):
+        return next(arg for arg in get_args(annotation) if arg is not type(None))
+    return annotation

@@ -19,7 +19,7 @@ class RunHeader:
     """What a run is rebuilt from: the mission and the fleet themselves.
 
     `mission_name` is the file's name, `mission` its bytes, `library` the other files
-    that it uses; `fleet` is `m2pem.fleet.snapshot.dump(fleet)`, or b"" without one.
+    that it uses; `fleet` is `m2pem.fleet.fleet.dump(fleet)`, or b"" without one.
     `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
     the wall clock. `created_us`: by the wall clock, also where the executive's runs ahead of it.
     """

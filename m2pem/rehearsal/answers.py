@@ -30,8 +30,7 @@ from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import Finding
 from m2pem.fleet.yaml_source import YamlSource
 from m2pem.mission.mission import Mission
-from m2pem.rehearsal.answers_check import check
-from m2pem.rehearsal.answers_file import AnswersModel, TimedEntry, read_answers
+from m2pem.rehearsal.answers_file import AnswersModel, TimedEntry, check, read_answers
 
 log = logging.getLogger("m2pem.answers")
 

@@ -1,12 +1,7 @@
-"""Rehearses a mission: the whole executive on simulated vehicles, in virtual time.
-
-    result = rehearse(Path("mission.bpmn"), load_fleet("fleet.yaml"), plugins=PluginManager())
-
-The same mission, fleet and answers give the same records, byte for byte.
-"""
+"""Rehearses a mission: the whole executive on simulated vehicles, in virtual time."""
 
 import asyncio
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -25,24 +20,110 @@ from m2pem.engine.inputs import GiveUp
 from m2pem.engine.records import Record, ServiceEnded, ServiceWithdrawn
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.state import RunStatus as EngineStatus
-from m2pem.errors import AnswersError
+from m2pem.errors import AnswersError, MissionError
 from m2pem.executive.clock import US_PER_S, VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.executive.loading import load_source
 from m2pem.executive.runner import Runner
 from m2pem.executive.script import ScriptedBehavior, ScriptedService
-from m2pem.findings import has_errors
+from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
+from m2pem.mission.behavior import Behavior, ServiceCall
+from m2pem.mission.elements import (
+    Activity,
+    ScriptTask,
+    SendTask,
+    ServiceTask,
+)
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, check_answers, load_answers
-from m2pem.rehearsal.no_fleet import NO_FLEET, refuse_commands
-from m2pem.rehearsal.sampling import Sampler
 from m2pem.simulation.arbiters import SimArbiter
+
+NO_FLEET = Fleet("", "no fleet", {})
+
+
+def refuse_commands(mission: Mission) -> None:
+    """Refuse a mission that commands resources.
+
+    Raises:
+        MissionError: with a finding for each task that does.
+    """
+    findings = [
+        Finding(
+            Severity.ERROR,
+            mission.file_of(task),
+            work.line,
+            task.id,
+            "needs-fleet",
+            f"{what} needs a fleet",
+            "name one with --fleet; '--fleet sim' makes one up",
+        )
+        for task, work, what in _commands(mission)
+    ]
+    if findings:
+        raise MissionError(f"{mission.file} commands resources, and there is no fleet", findings)
+
+
+def _commands(mission: Mission) -> Iterator[tuple[Activity, Behavior | ServiceCall, str]]:
+    for task in mission.activities():
+        if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
+            # A hold of nobody is a wait.
+            if task.behavior.roles or task.behavior.name != "hold":
+                yield task, task.behavior, f"behavior {task.behavior.name}"
+        elif isinstance(task, ServiceTask) and task.call and task.call.roles:
+            yield task, task.call, f"service {task.call.service}"
+
+
+MOST_SAMPLES = 5_000
+"""Kept of a rehearsal; when there are more, every other one goes, and the interval doubles."""
+
+
+class Sampler:
+    """`samples`: one each `every_s` of mission time, later of a multiple of it.
+
+    Motion is known as a function of time until the next event: so it is asked whenever time is
+    about to jump, for the times that are jumped over.
+    """
+
+    def __init__(
+        self,
+        every_s: float,
+        started_us: int,
+        states_at: Callable[[int], Iterable[VehicleState | PayloadState]],
+    ) -> None:
+        self.samples: list[TelemetrySample] = []
+        self._every_us = max(1, round(every_s * US_PER_S))
+        self._started_us = started_us
+        self._next_us = started_us
+        self._states_at = states_at
+
+    def before(self, until_us: int) -> None:
+        """Sample up to a time, which is not passed yet."""
+        while self._next_us < until_us:
+            self.at(self._next_us)
+            self._next_us += self._every_us
+            if len(self.samples) > MOST_SAMPLES:
+                del self.samples[1::2]
+                self._every_us *= 2
+                last_us = self._started_us + round(self.samples[-1].t_s * US_PER_S)
+                self._next_us = last_us + self._every_us
+
+    def at(self, time_us: int) -> None:
+        """Sample this moment."""
+        states = list(self._states_at(time_us))
+        self.samples.append(
+            TelemetrySample(
+                (time_us - self._started_us) / US_PER_S,
+                {each.resource: each for each in states if isinstance(each, VehicleState)},
+                {each.resource: each for each in states if isinstance(each, PayloadState)},
+            )
+        )
+
 
 START_US = 1_767_225_600_000_000
 """2026-01-01T00:00:00Z, when a rehearsal begins unless said otherwise."""

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator, Mapping
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
-from m2pem.simulation.agenda import Agenda, Entry
+from m2pem.simulation.event_queue import Agenda, Entry
 from m2pem.simulation.executions import Body
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.phases import Look, Vector
-from m2pem.simulation.track import US_PER_S
+from m2pem.simulation.segments import Look, Vector
+from m2pem.simulation.trajectory import US_PER_S
 from m2pem.simulation.vehicles import SimVehicle
 
 DEFAULT_HZ = 5.0

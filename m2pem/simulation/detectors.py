@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 from m2pem.api.telemetry import Detection, GeoPosition
 from m2pem.mission.catalogue import ResourceId
-from m2pem.simulation.agenda import Agenda, Entry
+from m2pem.simulation.event_queue import Agenda, Entry
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.settings import Coordinates
-from m2pem.simulation.track import US_PER_S
+from m2pem.simulation.trajectory import US_PER_S
 from m2pem.simulation.vehicles import SimVehicle
 
 STEPS_AT_ONCE = 500

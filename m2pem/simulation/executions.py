@@ -1,7 +1,8 @@
-"""A behavior being executed: what is known of it, and the share of each resource in it."""
+"""A behavior in execution: its state, the part of each resource in it, and what it effected."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import TypeAlias, Union
 
 import msgspec
@@ -9,13 +10,37 @@ import msgspec
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.values import Value
-from m2pem.simulation.agenda import Entry
+from m2pem.simulation.event_queue import Entry
+from m2pem.simulation.gimbals import Shots
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.phases import Vector
 from m2pem.simulation.pursuit import Pursuit
-from m2pem.simulation.shots import Shots
-from m2pem.simulation.track import Warp
+from m2pem.simulation.segments import Vector
+from m2pem.simulation.trajectory import Warp
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
+
+
+class EffectKind(StrEnum):
+    """What happened."""
+
+    START = "start"
+    HOLD = "hold"
+    RESUME = "resume"
+    CANCEL = "cancel"
+    END = "end"
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """At `time_us` (microseconds since the Unix epoch). `resource` is a behavior's first one.
+
+    `behavior` is "" for a hold or resume of a resource that has none.
+    """
+
+    time_us: int
+    kind: EffectKind
+    resource: ResourceId
+    behavior: BehaviorId = ""
+
 
 Body: TypeAlias = Union[SimVehicle, SimPayload]
 

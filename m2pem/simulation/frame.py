@@ -8,7 +8,7 @@ import math
 from m2pem.api.telemetry import GeoPosition
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
 from m2pem.geo.positions import MAX_RANGE_M
-from m2pem.simulation.phases import Vector
+from m2pem.simulation.segments import Vector
 
 
 class FlatFrame(LocalFrame):

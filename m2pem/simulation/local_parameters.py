@@ -7,7 +7,7 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.mission.geometry import Area, Coordinate, Point, Route, VehiclePosition
 from m2pem.simulation.course import Craft
 from m2pem.simulation.frame import FlatFrame
-from m2pem.simulation.phases import Pose, Vector
+from m2pem.simulation.segments import Pose, Vector
 
 
 class RefusedError(Exception):

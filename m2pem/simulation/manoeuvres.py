@@ -9,9 +9,9 @@ from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.mission.geometry import Area
 from m2pem.simulation.course import Course, Craft
 from m2pem.simulation.local_parameters import LocalParameters, RefusedError
-from m2pem.simulation.phases import Pose, Vector
 from m2pem.simulation.pursuit import Pursuit
-from m2pem.simulation.track import Plan
+from m2pem.simulation.segments import Pose, Vector
+from m2pem.simulation.trajectory import Plan
 
 SURVEY_SPACING_M = 20.0
 ORBIT_RADIUS_M = 30.0

@@ -4,9 +4,9 @@ import math
 
 import msgspec
 
-from m2pem.simulation.corners import turned
-from m2pem.simulation.domains import Kinematics
-from m2pem.simulation.phases import Pose, Steer, Vector, along
+from m2pem.simulation.course import turned
+from m2pem.simulation.kinematics import Kinematics
+from m2pem.simulation.segments import Pose, Steer, Vector, along
 
 STEP_S = 1.0
 """How often a pursuit looks where its target is."""

@@ -6,13 +6,12 @@ from m2pem.api.arbiter import Connection
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.course import ALOFT_M, Course, Craft
-from m2pem.simulation.domains import STANDING_LOAD
 from m2pem.simulation.frame import FlatFrame
+from m2pem.simulation.kinematics import STANDING_LOAD
 from m2pem.simulation.manoeuvres import yaw_of
-from m2pem.simulation.phases import Pose, Stand, Vector
-from m2pem.simulation.retiming import retimed
+from m2pem.simulation.segments import Pose, Stand, Vector
 from m2pem.simulation.settings import Settings
-from m2pem.simulation.track import Plan, Track
+from m2pem.simulation.trajectory import Plan, Track, retimed
 
 _PARKING_GAP_M = 10.0
 

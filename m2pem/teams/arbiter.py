@@ -19,12 +19,11 @@ from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet, LostMemberPolicy
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.teams.behavior import TeamBehavior
+from m2pem.teams.capabilities import Offers
 from m2pem.teams.member import Member
-from m2pem.teams.offers import Offers
 from m2pem.teams.plan import TeamRefusedError
-from m2pem.teams.reference import Reference, read_reference
-from m2pem.teams.restart import FoundParts, look_for_parts
-from m2pem.teams.scene import Scene, Scheme
+from m2pem.teams.restart import FoundParts, Reference, look_for_parts, read_reference
+from m2pem.teams.team_state import Scene, Scheme
 
 REMEMBERED = 1_000
 STATES_WAITING = 1_000

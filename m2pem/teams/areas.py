@@ -1,16 +1,134 @@
-"""Plans of teams that cover an area, or stand around an area or a target."""
+"""Plans of teams that cover an area in lanes, or stand around an area or a target."""
 
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.mission.geometry import Area, Route, VehiclePosition
-from m2pem.teams.bands import Pass, bands, strips, turned
+from m2pem.teams.paths import SPACING_M
 from m2pem.teams.plan import Leg, Plan, Setting, TeamRefusedError
-from m2pem.teams.shapes import SPACING_M
-from m2pem.teams.split import reach_m, split
+
+
+def split(whole: float, weights: Sequence[float], reaches: Sequence[float]) -> list[float] | None:
+    """The share of each, their sum the whole; None: all of them together cannot do it.
+
+    A share is as its weight, or its reach where that is less; what is left is for the others.
+    """
+    if sum(reaches) < whole:
+        return None
+    shares = [0.0] * len(weights)
+    open_ = [index for index, weight in enumerate(weights) if weight > 0]
+    left = whole
+    while open_:
+        each = left / sum(weights[index] for index in open_)
+        full = [index for index in open_ if reaches[index] < each * weights[index]]
+        for index in full or open_:
+            shares[index] = reaches[index] if full else each * weights[index]
+            left -= shares[index]
+        open_ = [index for index in open_ if index not in full] if full else []
+    return shares
+
+
+def owners(lengths: Sequence[float], shares: Sequence[float]) -> list[int]:
+    """Whose each of some lengths in a row is, so that together they are nearly as the shares.
+
+    Nobody has more than a share and the longest of the lengths.
+    """
+    whole = sum(lengths) or 1.0
+    bounds = [sum(shares[: index + 1]) / sum(shares) for index in range(len(shares))]
+    last = max(index for index, share in enumerate(shares) if share > 0)
+    found = []
+    done = 0.0
+    for length in lengths:
+        middle = (done + length / 2) / whole
+        at = next((i for i, b in enumerate(bounds) if middle <= b and shares[i] > 0), last)
+        found.append(at)
+        done += length
+    return found
+
+
+def reach_m(lasts_s: float | None, way_s: float, speed_m_s: float) -> float:
+    """How far a vehicle can go that lasts so long, if it is so long under way there and back."""
+    return math.inf if lasts_s is None else max(0.0, lasts_s - way_s) * speed_m_s
+
+
+Place: TypeAlias = tuple[float, float]
+"""East and north in metres."""
+
+Pass: TypeAlias = Sequence[Place]
+"""Its two ends; or the corners of a ring, the first of them again at the end."""
+
+
+def bands(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
+    """The passes in their order, cut so that the ways over the area are as the shares."""
+    bands: list[list[Pass]] = [[] for _ in shares]
+    lengths = [math.dist(*each) for each in passes]
+    for each, index in zip(passes, owners(lengths, shares), strict=True):
+        bands[index].append(each)
+    return bands
+
+
+def strips(
+    rings: Sequence[Pass], passes: Sequence[Pass], yaw_rad: float, shares: Sequence[float]
+) -> list[list[list[Place]]]:
+    """The parts of an area between passes, as rings; nothing for whom there is no pass."""
+    level = [[turned(corner, (0.0, 0.0), yaw_rad) for corner in ring] for ring in rings]
+    low = min(y for _, y in level[0])
+    high = max(y for _, y in level[0])
+    lengths: dict[float, float] = {}
+    for each in passes:
+        y = round(turned(each[0], (0.0, 0.0), yaw_rad)[1], 6)
+        lengths[y] = lengths.get(y, 0.0) + math.dist(*each)
+    whose = owners(list(lengths.values()), shares)
+    middles = list(lengths)
+    parts: list[list[list[Place]]] = []
+    for member in range(len(shares)):
+        mine = [y for y, owner in zip(middles, whose, strict=True) if owner == member]
+        if not mine:
+            parts.append([])
+            continue
+        first, last = middles.index(mine[0]), middles.index(mine[-1])
+        bottom = low if first == 0 else (middles[first - 1] + middles[first]) / 2
+        top = high if last == len(middles) - 1 else (middles[last] + middles[last + 1]) / 2
+        cut = [_between(ring, bottom, top) for ring in level]
+        parts.append(
+            [
+                [turned(corner, (0.0, 0.0), -yaw_rad) for corner in [*ring, ring[0]]]
+                for ring in cut
+                if len(ring) > 2
+            ]
+        )
+    return parts
+
+
+def _between(ring: Pass, bottom: float, top: float) -> list[Place]:
+    """What of a closed ring lies between two y, as corners."""
+    kept = _above(list(ring[:-1]), bottom)
+    over = _above([(x, -y) for x, y in kept], -top)
+    return [(x, -y) for x, y in over]
+
+
+def _above(corners: Sequence[Place], bottom: float) -> list[Place]:
+    found: list[Place] = []
+    for a, b in zip(corners, [*corners[1:], *corners[:1]], strict=True):
+        if a[1] >= bottom:
+            found.append(a)
+        if (a[1] >= bottom) != (b[1] >= bottom):
+            found.append((a[0] + (b[0] - a[0]) * (bottom - a[1]) / (b[1] - a[1]), bottom))
+    return found
+
+
+def turned(
+    place: tuple[float, float], centre: tuple[float, float], angle_rad: float
+) -> tuple[float, float]:
+    """In a frame at the centre whose first axis points that way."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    east, north = place[0] - centre[0], place[1] - centre[1]
+    return east * cos + north * sin, north * cos - east * sin
+
 
 SURVEY_SPACING_M = 20.0
 STANDOFF_M = 20.0

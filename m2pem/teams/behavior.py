@@ -9,11 +9,11 @@ from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import TeamMemberState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.teams.marshal import Marshal
+from m2pem.teams.formation_controller import Marshal
 from m2pem.teams.member import Member
+from m2pem.teams.partition import Shares
 from m2pem.teams.plan import Plan, Stand
-from m2pem.teams.reference import Reference
-from m2pem.teams.shares import Shares
+from m2pem.teams.restart import Reference
 
 PERIOD_S = 0.25
 """How often a march is looked at."""

@@ -7,9 +7,8 @@ from itertools import accumulate, combinations, pairwise
 from m2pem.fleet.parameters import read_offsets
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
-from m2pem.teams.path import Path
+from m2pem.teams.paths import SPACING_M, Path, Vector, beside, shifted, slot, trimmed
 from m2pem.teams.plan import Leg, March, Marcher, Plan, Setting, TeamRefusedError
-from m2pem.teams.shapes import SPACING_M, Vector, beside, shifted, slot, trimmed
 
 GAP_SHARE = 0.5
 """Of the spacing: what members in one lane keep at least, along the route."""

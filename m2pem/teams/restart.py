@@ -1,14 +1,57 @@
-"""After a restart: what has become of the parts of a team behavior."""
+"""What the journal keeps of a team behavior, and what has become of it after a restart."""
 
 import asyncio
+import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Plan
-from m2pem.teams.reference import Reference
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have ended
+    well. `lost`: members that the team goes on without, and why. `version`: how often it changed.
+    `split`: the shares of the members in what they divide.
+    """
+
+    begun: Mapping[str, str | None] = field(default_factory=dict)
+    done: tuple[str, ...] = ()
+    lost: Mapping[ResourceId, str] = field(default_factory=dict)
+    version: int = 0
+    split: tuple[float, ...] = ()
+
+    def text(self) -> str:
+        """As the journal keeps it."""
+        return json.dumps(
+            {
+                "begun": dict(self.begun),
+                "done": list(self.done),
+                "lost": dict(self.lost),
+                "version": self.version,
+                "split": list(self.split),
+            },
+            separators=(",", ":"),
+        )
+
+
+def read_reference(text: str | None) -> Reference:
+    """What `Reference.text` wrote; an empty one for nothing, and for what cannot be read."""
+    try:
+        data = json.loads(text or "{}")
+        return Reference(
+            {str(name): ref for name, ref in data.get("begun", {}).items()},
+            tuple(data.get("done", ())),
+            {ResourceId(name): str(why) for name, why in data.get("lost", {}).items()},
+            int(data.get("version", 0)),
+            tuple(float(share) for share in data.get("split", ())),
+        )
+    except (ValueError, TypeError, AttributeError):
+        return Reference()
+
 
 QUERY_TIMEOUT_S = 8.0
 """Less than a team itself is given to answer."""

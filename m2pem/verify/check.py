@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.net.petri_net import PetriNet, Place, Role, Scope
 from m2pem.verify.net.simplify import simplify

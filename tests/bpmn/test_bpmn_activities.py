@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission import elements as e
 from m2pem.mission.mission import Mission
 from tests.bpmn.bpmn_text import around, findings, load, summary

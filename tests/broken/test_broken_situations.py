@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from m2pem.bpmn import parse_mission
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.verify.check import check

@@ -5,8 +5,8 @@ from typing import Any
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.deconfliction.ledger import Airspace
-from m2pem.deconfliction.volume import Separation
+from m2pem.deconfliction.operational_volume import Separation
+from m2pem.deconfliction.reservations import Airspace
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import BehaviorType

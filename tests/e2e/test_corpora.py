@@ -17,7 +17,7 @@ from m2pem.api.control import RunStatus, StampedRecord
 from m2pem.bpmn import parse_mission
 from m2pem.errors import MissionError
 from m2pem.findings import has_errors
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse

@@ -13,8 +13,8 @@ from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.codec import record_line
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
-from m2pem.simulation.effects import EffectKind
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import (
     ANSWERS,
     FLEET,

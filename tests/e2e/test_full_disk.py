@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.simulation.effects import EffectKind
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import CommandLine, fleet_with_state
 from tests.e2e.test_held import TARGET
 from tests.executive.conftest import behavior, flow, mission

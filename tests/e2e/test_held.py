@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from m2pem.simulation.effects import EffectKind
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import CommandLine, Program, fleet_with_state, install_plugin
 from tests.executive.conftest import behavior, flow, mission
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from m2pem.simulation.effects import EffectKind
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import CommandLine, fleet_with_state
 from tests.wal import commits
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pexpect
 
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine, Program, fleet_with_state
 
 STOP_DRIVING = "dc45ff2b-ef6b-45bd-96e6-c7ac8ef055c2"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine, Program, fleet_with_state
 
 ABORTED = ANSWERS / "vignette1_detection.yaml"

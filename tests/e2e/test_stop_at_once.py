@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.simulation.statefile import recorded_effects
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import (
     ANSWERS,
     MISSION,

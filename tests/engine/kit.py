@@ -8,8 +8,8 @@ from m2pem.engine import records as r
 from m2pem.engine.commands import Command
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.madeup import fleet_for
 from m2pem.journal.base import Entry
 from m2pem.journal.codec import decode_body, encode_body
 from m2pem.mission.catalogue import BehaviorState

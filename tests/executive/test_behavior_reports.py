@@ -9,8 +9,7 @@ from m2pem.engine.records import DataWritten
 from m2pem.engine.run import MissionRun
 from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
-from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
-from m2pem.fleet.snapshot import dump
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.catalogue import BehaviorState, ResourceId

@@ -19,7 +19,7 @@ from m2pem.engine.inputs import (
 from m2pem.engine.records import BehaviorRestarted, PromptOpened
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, OperatorError
-from m2pem.fleet.snapshot import dump
+from m2pem.fleet.fleet import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.catalogue import BehaviorState, ResourceId

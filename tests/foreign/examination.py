@@ -13,7 +13,7 @@ from m2pem.bpmn import NO_BPMN_RULES
 from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for, load_source
 from m2pem.findings import Finding, Severity, has_errors
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse

@@ -19,7 +19,7 @@ from m2pem.bpmn import parse_mission
 from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for
 from m2pem.findings import has_errors
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.rehearsal.rehearsal import rehearse
 from tests.engine.kit import Play

@@ -1,4 +1,4 @@
-"""Rehearsals: the paper's example step by step, and every way in which a mission can end."""
+"""Rehearsals, and the samples of vehicles that they keep."""
 
 import asyncio
 import itertools
@@ -6,12 +6,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from m2pem.api.control import RunStatus, StampedRecord
+from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import (
     BehaviorEnded,
     BehaviorRequested,
@@ -33,9 +35,36 @@ from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.memory import MemoryJournal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
+from m2pem.rehearsal import rehearsal
 from m2pem.rehearsal.answers import load_answers
-from m2pem.rehearsal.rehearsal import START_US, RehearsalResult, rehearse, rehearse_async
-from m2pem.rehearsal.rehearser import rehearse_apart
+from m2pem.rehearsal.rehearsal import START_US, RehearsalResult, Sampler, rehearse, rehearse_async
+from m2pem.rehearsal.worker import rehearse_apart
+
+SAMPLED_FROM_US = 1_000_000_000
+
+
+def states_at(time_us: int) -> Iterator[VehicleState]:
+    yield VehicleState(ResourceId("a"), time_us)
+
+
+def test_samples_stand_at_even_times_whatever_time_jumps_over() -> None:
+    sampler = Sampler(0.5, SAMPLED_FROM_US, states_at)
+    for until_s in (0.2, 0.5, 0.6, 2.1):
+        sampler.before(SAMPLED_FROM_US + round(until_s * 1_000_000))
+    assert [each.t_s for each in sampler.samples] == [0, 0.5, 1, 1.5, 2]
+    assert sampler.samples[1].vehicles[ResourceId("a")].time_us == SAMPLED_FROM_US + 500_000
+
+
+def test_a_long_rehearsal_has_samples_farther_from_each_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rehearsal, "MOST_SAMPLES", 8)
+    sampler = Sampler(1, SAMPLED_FROM_US, states_at)
+    sampler.before(SAMPLED_FROM_US + 100_000_000)
+    times = [each.t_s for each in sampler.samples]
+    assert len(times) <= 8
+    assert {after - before for before, after in pairwise(times)} == {16}
+
 
 REPOSITORY = Path(__file__).parents[2]
 VIGNETTE = REPOSITORY / "missions" / "vignette1.bpmn"
@@ -558,7 +587,7 @@ from pathlib import Path
 from m2pem.journal.codec import record_line
 from m2pem.plugins import PluginManager
 from m2pem.fleet.fleet_file import load_fleet
-from m2pem.rehearsal.rehearser import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_apart
 from m2pem.rehearsal.rehearsal import rehearse
 
 def show(stamped):

@@ -12,9 +12,9 @@ from m2pem.executive.clock import run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
-from m2pem.simulation.domains import DEFAULTS
-from m2pem.simulation.effects import EffectKind
-from m2pem.simulation.faults import Fault
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.kinematics import DEFAULTS
+from m2pem.simulation.settings import Fault
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 S = 1_000_000
@@ -467,7 +467,7 @@ def test_the_same_commands_have_the_same_reports_at_the_same_times() -> None:
 def test_ended_behaviors_are_forgotten_only_beyond_a_bound(
     simulate: Simulate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("m2pem.simulation.memory.REMEMBERED", 5)
+    monkeypatch.setattr("m2pem.simulation.state_file.REMEMBERED", 5)
 
     async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         await bench.start("r1.running", "teleop", "uav")

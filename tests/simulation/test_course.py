@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from m2pem.simulation.course import Course, Craft
-from m2pem.simulation.domains import DEFAULTS
-from m2pem.simulation.phases import Pose, Vector
-from m2pem.simulation.track import Plan
+from m2pem.simulation.kinematics import DEFAULTS
+from m2pem.simulation.segments import Pose, Vector
+from m2pem.simulation.trajectory import Plan
 
 GROUND, AIR = DEFAULTS["ground"], DEFAULTS["air"]
 

@@ -7,8 +7,7 @@ import pytest
 from m2pem.api.arbiter import Connection
 from m2pem.errors import FleetError
 from m2pem.mission.catalogue import ResourceId
-from m2pem.simulation.faults import Fault
-from m2pem.simulation.settings import PlannedDetection, Settings, Target, read_settings
+from m2pem.simulation.settings import Fault, PlannedDetection, Settings, Target, read_settings
 
 ORIGIN = (38.1, -77.3, 0.0)
 

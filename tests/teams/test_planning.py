@@ -11,18 +11,17 @@ from hypothesis import strategies as st
 
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.check import TEAM_NEEDS
 from m2pem.fleet.parameters import accepted
-from m2pem.fleet.team_needs import TEAM_NEEDS
 from m2pem.geo.lawn_mower import lawn_mower
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point, Route, VehiclePosition
-from m2pem.teams.bands import strips
-from m2pem.teams.path import Path
+from m2pem.teams.areas import strips
+from m2pem.teams.paths import Path, slot
 from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
-from m2pem.teams.planning import PLANS
-from m2pem.teams.reference import Reference, read_reference
-from m2pem.teams.shapes import slot
+from m2pem.teams.restart import Reference, read_reference
+from m2pem.teams.team_state import PLANS
 
 from .carts import FRAME
 from .conftest import area, route

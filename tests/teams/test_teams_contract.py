@@ -11,7 +11,7 @@ from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.arbiter import Teams
-from m2pem.teams.offers import Offers
+from m2pem.teams.capabilities import Offers
 from m2pem.testing import ArbiterCase, ArbiterContract
 
 from .carts import ORIGIN, CartArbiter, WillingCartArbiter, Yard

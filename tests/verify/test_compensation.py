@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.verify.check import check
 from m2pem.verify.net.petri_net import Action, Exactness, Kind, PetriNet, Role
 from m2pem.verify.net.simplify import simplify

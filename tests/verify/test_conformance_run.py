@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from m2pem.engine import records as r
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
 from m2pem.verify.conformance_run import ConformanceRun, NotPlayableError, data_for

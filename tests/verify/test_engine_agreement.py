@@ -8,7 +8,7 @@ import pytest
 
 from m2pem.bpmn import read_mission
 from m2pem.errors import MissionError
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
 from m2pem.verify.net.petri_net import Exactness, PetriNet

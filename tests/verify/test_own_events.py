@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.verify.net.petri_net import Action
 from m2pem.verify.search.explore import explore
 from m2pem.verify.spin.search import search

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.verify.net.petri_net import Action, Exactness, PetriNet, Role
 from m2pem.verify.search.explore import Limits, explore
 from m2pem.verify.translate import Options, translate

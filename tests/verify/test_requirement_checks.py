@@ -1,6 +1,6 @@
 import pytest
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.ltl import parse, propositions
 from m2pem.verify.ltl.model_check import Result

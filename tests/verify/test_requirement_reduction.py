@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Active, Completed, Formula, Proposition, rebuilt

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from m2pem import load_mission
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.verify.requirements import Names, Requirement, parse_spec
 from m2pem.verify.requirements.check import check_mission
 from m2pem.verify.requirements.patterns import PATTERNS

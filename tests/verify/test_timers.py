@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
 from m2pem.verify.net.petri_net import PetriNet, Trigger

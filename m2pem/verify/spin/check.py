@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from m2pem.errors import InternalError
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.madeup import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, size_limit_of, too_large
 from m2pem.verify.check import search as search_built_in

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.madeup import fleet_for
 from m2pem.mission import elements as e
 from m2pem.mission.events import (
     ConditionalEventDefinition,

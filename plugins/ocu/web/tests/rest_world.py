@@ -30,7 +30,7 @@ from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.rehearsal.rehearser import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_apart
 
 REPOSITORY = Path(__file__).parents[4]
 VIGNETTE = (REPOSITORY / "missions" / "vignette1.bpmn").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ from rest_world import VIGNETTE, rest_world
 from m2pem.cli.arguments import arbiters_of
 from m2pem.executive.loading import findings_for, load_source
 from m2pem.executive.verification import Engine, asked_of, prove
-from m2pem.fleet.madeup import fleet_for
+from m2pem.fleet.default_fleet import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
 from m2pem.verify.search.explore import Limits

@@ -1,0 +1,138 @@
+"""Why a behavior cannot have its room, and what would be right, for people."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from m2pem.deconfliction.operational_volume import NOTHING_M, Piece, Separation, Volume
+from m2pem.mission.catalogue import ResourceId
+
+LOWEST_M = 2.0
+HIGHEST_M = 10_000.0
+"""Above home: nothing lower or higher is proposed."""
+
+_TRIES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Occupant:
+    """Who takes up room. `behavior`: the id of what it does, `name` what that is; "" when it just
+    hovers. `lost`: that has ended, and the vehicle was not heard since."""
+
+    vehicle: ResourceId
+    volume: Volume
+    behavior: str = ""
+    name: str = ""
+    lost: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """`piece`: of the other's volume, that one would come too near to. `home_m`: the height of the
+    one's home; None: not known."""
+
+    vehicle: ResourceId
+    volume: Volume
+    home_m: float | None
+    other: Occupant
+    piece: Piece
+
+
+Again: TypeAlias = Callable[[float, bool], Conflict | None]
+"""What is met at another altitude above home, in metres; True: it changes to that first."""
+
+
+def refusal(conflict: Conflict, policy: Separation, again: Again | None) -> str:
+    """`again` None: it cannot be told an altitude."""
+    other, piece = conflict.other, conflict.piece
+    heights = _heights(piece, conflict.home_m)
+    does = f"does {other.behavior} ({other.name}){heights}" if other.behavior else f"flies{heights}"
+    if other.lost:
+        does = f"is lost, and did {other.behavior} ({other.name}){heights}"
+    why = "".join(f"; {who}: {what}" for who, what in _unknown(conflict))
+    near = f"nearer than {policy.horizontal_m:g} m and {policy.vertical_m:g} m in height"
+    altitudes = [] if again is None else _altitudes(conflict, policy, again)
+    advice = ", or ".join([*altitudes, _way_out(conflict)])
+    if not altitudes:
+        advice = f"start it {advice}"
+    return f"{conflict.vehicle} would come {near} to {other.vehicle}, which {does}{why}: {advice}"
+
+
+def _unknown(conflict: Conflict) -> list[tuple[str, str]]:
+    found = [(conflict.vehicle, conflict.volume.unknown)]
+    found.append((conflict.other.vehicle, conflict.other.volume.unknown))
+    return [(who, what) for who, what in found if what]
+
+
+def _way_out(conflict: Conflict) -> str:
+    other = conflict.other
+    if other.lost:
+        return f"when {other.vehicle} is heard again"
+    if other.behavior:
+        return f"after {other.behavior} has ended"
+    return f"after {other.vehicle} has landed or gone elsewhere"
+
+
+def _heights(piece: Piece, home_m: float | None) -> str:
+    base_m, frame = (0.0, " above mean sea level") if home_m is None else (home_m, "")
+    low, high = (f"{each - base_m:.0f}" for each in (piece.low_m, piece.high_m))
+    if math.isinf(piece.low_m) and math.isinf(piece.high_m):
+        return " at any height"
+    if math.isinf(piece.high_m):
+        return f" at {low} m{frame} or more"
+    if math.isinf(piece.low_m):
+        return f" at {high} m{frame} or less"
+    return f" at {high} m{frame}" if low == high else f" at {low} to {high} m{frame}"
+
+
+def _altitudes(conflict: Conflict, policy: Separation, again: Again) -> list[str]:
+    """Altitudes that were found to be free, the higher ones first."""
+    found = []
+    above_m = _search(conflict, lambda piece: _over(piece, policy), again)
+    if above_m is not None:
+        found.append(_said(above_m, "climb", "more", HIGHEST_M, again))
+    below_m = _search(conflict, lambda piece: _under(piece, policy), again)
+    if below_m is not None:
+        found.append(_said(below_m, "descend", "less", LOWEST_M, again))
+    return found
+
+
+def _said(altitude_m: float, change: str, beyond: str, farthest_m: float, again: Again) -> str:
+    """`change`: in which direction it changes its height; on its way it may meet somebody."""
+    at = f"{altitude_m:.0f} m"
+    if again(farthest_m, True) is None:
+        at += f" or {beyond}"
+    if again(altitude_m, False) is None:
+        return f"fly at {at}"
+    return f"{change} to {at} first"
+
+
+def _over(piece: Piece, policy: Separation) -> tuple[float, Callable[[float], int]]:
+    return piece.high_m + policy.vertical_m - NOTHING_M, math.ceil
+
+
+def _under(piece: Piece, policy: Separation) -> tuple[float, Callable[[float], int]]:
+    return piece.low_m - policy.vertical_m + NOTHING_M, math.floor
+
+
+def _search(
+    conflict: Conflict,
+    beside: Callable[[Piece], tuple[float, Callable[[float], int]]],
+    again: Again,
+) -> float | None:
+    """The nearest altitude above home at which nobody else is met either; None: there is none."""
+    met: Conflict | None = conflict
+    tried: set[float] = set()
+    while met is not None and len(tried) < _TRIES:
+        edge_m, whole = beside(met.piece)
+        if met.home_m is None or not LOWEST_M <= edge_m - met.home_m <= HIGHEST_M:
+            return None
+        altitude_m = float(whole(edge_m - met.home_m))
+        if altitude_m in tried:
+            return None
+        tried.add(altitude_m)
+        met = again(altitude_m, True)
+        if met is None:
+            return altitude_m
+    return None

@@ -1,0 +1,103 @@
+"""From a team behavior to the room that each of its members takes up, whoever makes it."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+
+from m2pem.deconfliction.aircraft import Craft, FlightParameters
+from m2pem.deconfliction.behavior_volumes import (
+    BEND_M,
+    RADIUS_M,
+    along,
+    observed,
+    survey_area,
+    volume_of,
+    way_to,
+)
+from m2pem.deconfliction.operational_volume import Piece, Volume
+from m2pem.fleet.parameters import read_offsets
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import buffered_hull, convex_hull
+from m2pem.teams.paths import SPACING_M, Vector, shifted, slot, trimmed
+
+_SHAPES = {
+    "formation": "wedge",
+    "road_following_formation": "column",
+    "road_sweep": "line",
+    "bridge_crossing": "column",
+}
+
+
+def member_volume(
+    behavior: str, parameters: FlightParameters, lead: Craft | None, index: int, start_s: float
+) -> Volume:
+    """The room of member `index` of a team (0 leads); its lead may be no aircraft, and unseen."""
+    if behavior in _SHAPES:
+        return _march(behavior, parameters, lead, index)
+    plan = _PLANS.get(behavior)
+    return volume_of(behavior, parameters, start_s) if plan is None else plan(parameters)
+
+
+def _march(behavior: str, parameters: FlightParameters, lead: Craft | None, index: int) -> Volume:
+    spacing_m = parameters.spacing_m or SPACING_M
+    back, left = slot(parameters.text("shape") or _SHAPES[behavior], index)
+    back_m, left_m = back * spacing_m, left * spacing_m
+    offsets = parameters.text("offsets")
+    if index and offsets and len(given := read_offsets(offsets)) >= index:
+        back_m, left_m = given[index - 1]
+    route = parameters.route
+    if route is None or not route.waypoints:
+        # To a place beside the lead, whichever way that looks.
+        if lead is None:
+            parameters.unknown = "where its lead stands is not known"
+            return way_to(parameters, None, parameters.span())
+        around = buffered_hull(lead.stop, math.hypot(back_m, left_m))
+        return way_to(parameters, around if index else parameters.craft.stop, parameters.span())
+    places: list[Vector] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
+    spans = parameters.waypoint_spans(route)
+    if len({place[:2] for place in places}) == 1:
+        reach_m = 2 * math.hypot(back_m, left_m)
+        return way_to(parameters, buffered_hull([places[0][:2], *_stop(lead)], reach_m), spans[0])
+    moved = [place[:2] for place in shifted(places, left_m)]
+    volume = along(parameters, moved, spans, BEND_M)
+    if back_m <= sum(math.dist(a, b) for a, b in pairwise(moved)):
+        return volume
+    # Its place is before the route's beginning: it goes there at once, or by way of the route.
+    end = trimmed([(*place, 0.0) for place in moved], back_m)[-1][:2]
+    over = spans[0]
+    for span in (*spans, parameters.craft.span):
+        over = over.to(span)
+    detour = convex_hull([*parameters.craft.stop, *moved, end])
+    low_m = over.low_m if parameters.craft.flies else min(span.low_m for span in spans)
+    extra = Piece(detour, low_m, over.high_m)
+    return Volume((*volume.pieces, extra), volume.end_m, volume.unknown)
+
+
+def _stop(lead: Craft | None) -> Sequence[EastNorth]:
+    return () if lead is None else lead.stop
+
+
+def _survey(parameters: FlightParameters) -> Volume:
+    found = survey_area(parameters)
+    return volume_of("", parameters, 0.0) if found is None else way_to(parameters, *found)
+
+
+def _observe(parameters: FlightParameters) -> Volume:
+    area, span = observed(parameters, RADIUS_M)
+    return way_to(
+        parameters, area, span if parameters.area is not None else span.to(parameters.span())
+    )
+
+
+def _escort(parameters: FlightParameters) -> Volume:
+    place, span = parameters.target_place()
+    reach_m = parameters.spacing_m or SPACING_M
+    area = None if place is None else buffered_hull([place], reach_m)
+    return way_to(parameters, area, span.to(parameters.span()))
+
+
+_PLANS: Mapping[str, Callable[[FlightParameters], Volume]] = {
+    "area_survey": _survey,
+    "area_observe": _observe,
+    "escort": _escort,
+}

@@ -1,0 +1,104 @@
+"""The process of its own in which a mission is rehearsed for an executive."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from m2pem.api.authoring import MissionSource
+from m2pem.api.control import RunSummary, SimulationResult, StampedRecord, TelemetrySample
+from m2pem.errors import OperatorError
+from m2pem.executive.subprocess_worker import Given, Tell, apart, given, serve
+from m2pem.fleet.fleet import Fleet, dump, restore
+from m2pem.mission.library import MissionFile
+from m2pem.mission.values import Value
+
+
+class Order(msgspec.Struct):
+    """What is to be rehearsed."""
+
+    mission: Given
+    fleet: bytes
+    process: str | None
+    data: dict[str, Any]
+    answers: str | None
+    answers_text: bytes | None
+    start_us: int | None
+    max_steps: int
+    search_path: list[str]
+    telemetry_every_s: float | None
+
+
+class Done(msgspec.Struct):
+    """What came of it."""
+
+    summary: RunSummary
+    records: list[StampedRecord]
+    telemetry: list[TelemetrySample]
+    files: list[MissionFile]
+
+
+async def rehearse_apart(
+    mission: MissionSource,
+    fleet: Fleet,
+    *,
+    max_steps: int,
+    search_path: Sequence[Path],
+    process: str | None = None,
+    data: Mapping[str, Value] | None = None,
+    answers: Path | str | bytes | None = None,
+    start_us: int | None = None,
+    telemetry_every_s: float | None = None,
+) -> SimulationResult:
+    """As `m2pem.rehearsal.rehearsal.rehearse`, without observers; cancelling ends the process.
+
+    Raises:
+        FindingsError: the mission or the answers cannot be used.
+        OperatorError: an option has no sense.
+    """
+    if max_steps < 1 or (telemetry_every_s is not None and not telemetry_every_s > 0):
+        raise OperatorError("max_steps and telemetry_every_s are greater than 0")
+    order = Order(
+        given(mission),
+        dump(fleet),
+        process,
+        dict(data or {}),
+        None if answers is None or isinstance(answers, bytes) else str(answers),
+        answers if isinstance(answers, bytes) else None,
+        start_us,
+        max_steps,
+        [str(each) for each in search_path],
+        telemetry_every_s,
+    )
+    answer = await apart(__name__, msgspec.msgpack.encode(order))
+    done = msgspec.msgpack.decode(answer, type=Done)
+    return SimulationResult(
+        done.summary, tuple(done.records), tuple(done.telemetry), tuple(done.files)
+    )
+
+
+def _work(content: bytes, _: Tell) -> bytes:
+    from m2pem.plugins import PluginManager  # noqa: PLC0415  # the executive has its own
+    from m2pem.rehearsal.rehearsal import START_US, rehearse  # noqa: PLC0415
+
+    order = msgspec.msgpack.decode(content, type=Order)
+    result = rehearse(
+        order.mission.source_of(),
+        restore(order.fleet),
+        plugins=PluginManager(),
+        process=order.process,
+        data=order.data,
+        answers=order.answers if order.answers_text is None else order.answers_text,
+        start_us=START_US if order.start_us is None else order.start_us,
+        max_steps=order.max_steps,
+        observed=False,
+        search_path=[Path(each) for each in order.search_path],
+        telemetry_every_s=order.telemetry_every_s,
+    )
+    done = Done(result.summary, list(result.records), list(result.telemetry), list(result.files))
+    return msgspec.msgpack.encode(done)
+
+
+if __name__ == "__main__":
+    serve(_work)

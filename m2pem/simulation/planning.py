@@ -1,0 +1,211 @@
+"""From a request to plans: which manoeuvre each resource does, or why it is refused."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from msgspec.structs import replace
+
+from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
+from m2pem.api.behavior_parameters import refusal
+from m2pem.api.telemetry import GeoPosition, VehicleState
+from m2pem.fleet.behaviors import SHARED
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.simulation.executions import Aim, Body, Chase
+from m2pem.simulation.frame import FlatFrame
+from m2pem.simulation.gimbals import GAZES, MAST_M, Shots
+from m2pem.simulation.local_parameters import LocalParameters, RefusedError
+from m2pem.simulation.manoeuvres import MANOEUVRES, Manoeuvre
+from m2pem.simulation.payloads import SimPayload
+from m2pem.simulation.segments import Pose
+from m2pem.simulation.trajectory import Plan
+from m2pem.simulation.vehicles import SimVehicle, carrier_of
+from m2pem.suggestions import suggest
+
+_EVERYWHERE = frozenset(
+    {
+        "single_vehicle_routing",
+        "goto",
+        "hold",
+        "drive_stop",
+        "return_to_launch",
+        "area_survey",
+        "orbit",
+        "area_observe",
+        "follow",
+        "teleop",
+        "set_speed",
+        "deploy",
+    }
+)
+_BY_DOMAIN: Mapping[str, frozenset[str]] = {
+    "ground": _EVERYWHERE | {"reverse"},
+    "air": _EVERYWHERE | {"takeoff", "land", "change_altitude"},
+    "surface": _EVERYWHERE | {"reverse"},
+    "subsurface": _EVERYWHERE | {"reverse", "change_altitude"},
+}
+_PICTURES = frozenset({"zoom", "take_picture", "record_video"})
+_BY_KIND: Mapping[str, frozenset[str]] = {
+    "camera": _PICTURES,
+    "ptz": _PICTURES | {"ptz_point_at", "ptz_scan_polygon", "ptz_scan_sector", "ptz_track"},
+    "gpr": frozenset(),
+}
+
+
+def vehicle_behaviors(domain: str) -> tuple[BehaviorSpec, ...]:
+    """What a vehicle of the domain can do alone. Teams are made of that, as everywhere."""
+    alone = _BY_DOMAIN.get(domain, _BY_DOMAIN["ground"])
+    return tuple(
+        spec
+        for (name, type_), spec in SHARED.items()
+        if type_ is BehaviorType.VEHICLE and name in alone
+    )
+
+
+def payload_behaviors(kind: str) -> tuple[BehaviorSpec, ...]:
+    """What a payload can do; of no kind: all that payloads can."""
+    names = _BY_KIND.get(kind)
+    return tuple(
+        spec
+        for (name, type_), spec in SHARED.items()
+        if type_ is BehaviorType.PAYLOAD and (names is None or name in names)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """What one body does: a plan (None: nothing, it is only kept busy), then a chase."""
+
+    body: Body
+    plan: Plan[Any] | None = None
+    chase: Chase | None = None
+    limit_s: float | None = None
+    cruise_m_s: float | None = None
+    shots: Shots | None = None
+
+
+class Launcher:
+    """Knows the bodies and where everybody is."""
+
+    def __init__(
+        self,
+        connections: Mapping[ResourceId, Connection],
+        context: ArbiterContext,
+        frame: FlatFrame,
+        bodies: Mapping[ResourceId, Body],
+    ) -> None:
+        self._connections = connections
+        self._context = context
+        self._frame = frame
+        self._bodies = bodies
+
+    def whereabouts(self, vehicle: str, now_us: int) -> Pose | None:
+        """How a vehicle stands: a simulated one, or as it was heard on the bus."""
+        body = self._bodies.get(ResourceId(vehicle))
+        if isinstance(body, SimVehicle):
+            return body.pose(now_us)
+        state = self._context.bus.latest(ResourceId(vehicle))
+        if not isinstance(state, VehicleState) or state.position is None:
+            return None
+        try:
+            level = self._frame.to_place(
+                (state.position.latitude_deg, state.position.longitude_deg)
+            )
+        except ValueError:
+            return None
+        up = state.position.altitude_m - self._frame.origin[2]
+        velocity = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
+        return Pose((*level, up), state.yaw_rad or 0.0, velocity)
+
+    def lens(self, payload: ResourceId, now_us: int) -> GeoPosition | None:
+        """Where a payload is; None: where its vehicle is, is not known."""
+        pose = self.whereabouts(carrier_of(payload), now_us)
+        if pose is None:
+            return None
+        east, north, up = pose.place
+        return self._frame.to_position((east, north, up + MAST_M))
+
+    def assign(self, request: BehaviorRequest, now_us: int) -> list[Assignment]:
+        """What each of the request's resources does.
+
+        Raises:
+            RefusedError: it cannot be done; the text names what is wrong.
+        """
+        bodies = [self._body(resource) for resource in request.resources]
+        if not bodies:
+            raise RefusedError(f"{request.behavior} has no resource")
+        vehicles = [body for body in bodies if isinstance(body, SimVehicle)]
+        payloads = [body for body in bodies if isinstance(body, SimPayload)]
+        type_ = _type(request.behavior)
+        acting: Sequence[Body] = payloads if type_ is BehaviorType.PAYLOAD else vehicles
+        for body in acting or bodies:
+            problem = refusal(self._spec(body, request.behavior, type_), request.parameters)
+            if problem:
+                raise RefusedError(problem)
+        parameters = LocalParameters(
+            request.parameters, self._frame, lambda vehicle: self.whereabouts(vehicle, now_us)
+        )
+        idle = [Assignment(body) for body in bodies if body not in acting]
+        if type_ is BehaviorType.PAYLOAD:
+            return [self._gaze(body, request, parameters, now_us) for body in payloads] + idle
+        crafts = [vehicle.craft(now_us) for vehicle in vehicles]
+        for craft, vehicle in zip(crafts, vehicles, strict=True):
+            if vehicle.battery_at(now_us) <= 0:
+                raise RefusedError(f"the battery of {craft.name} is empty", "BATTERY_LOW")
+        manoeuvre: Callable[..., Manoeuvre] = MANOEUVRES[request.behavior]
+        return [
+            _assignment(vehicle, manoeuvre(craft, parameters))
+            for vehicle, craft in zip(vehicles, crafts, strict=True)
+        ] + idle
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """What the resource can do."""
+        body = self._body(resource)
+        if isinstance(body, SimVehicle):
+            return vehicle_behaviors(body.domain)
+        return payload_behaviors(body.settings.kind)
+
+    def _body(self, resource: ResourceId) -> Body:
+        try:
+            return self._bodies[resource]
+        except KeyError:
+            hint = suggest(resource, self._bodies, "resources")
+            raise RefusedError(f"there is no simulated {resource}; {hint}") from None
+
+    def _spec(self, body: Body, behavior: str, type_: BehaviorType | None) -> BehaviorSpec:
+        allowed = self._connections[body.id].behaviors
+        catalogue = self.catalogue(body.id)
+        for spec in catalogue:
+            if (spec.name, spec.type) == (behavior, type_):
+                if allowed is None or behavior in allowed:
+                    return spec
+                raise RefusedError(f"the fleet does not allow {body.id} the behavior '{behavior}'")
+        hint = suggest(behavior, [spec.name for spec in catalogue], "behaviors")
+        raise RefusedError(f"{body.id} has no behavior '{behavior}'; {hint}")
+
+    def _gaze(
+        self, body: SimPayload, request: BehaviorRequest, parameters: LocalParameters, now_us: int
+    ) -> Assignment:
+        carrier = self._bodies.get(body.carrier)
+        pose = self.whereabouts(body.carrier, now_us)
+        ground = carrier.home[2] if isinstance(carrier, SimVehicle) else 0.0
+        gaze = GAZES[request.behavior](body.mount(now_us, pose, ground), parameters)
+        chase = None
+        if isinstance(gaze.aim, str):
+            chase = Aim(gaze.aim)
+        elif gaze.aim is not None:
+            chase = Aim("", gaze.aim)
+        shots = None if gaze.shots is None else replace(gaze.shots, began_us=now_us)
+        return Assignment(body, gaze.plan, chase, gaze.limit_s, shots=shots)
+
+
+def _type(behavior: str) -> BehaviorType | None:
+    """Whether a behavior is a vehicle's or a payload's; None: nobody has it."""
+    if behavior in GAZES:
+        return BehaviorType.PAYLOAD
+    return BehaviorType.VEHICLE if behavior in MANOEUVRES else None
+
+
+def _assignment(vehicle: SimVehicle, manoeuvre: Manoeuvre) -> Assignment:
+    return Assignment(vehicle, manoeuvre.plan, manoeuvre.pursuit, cruise_m_s=manoeuvre.cruise_m_s)

@@ -1,0 +1,152 @@
+"""What a team knows: where its members are, what each can do, and so what each is to do."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from m2pem.api.arbiter import Arbiter, BehaviorRequest, SightedArbiter
+from m2pem.api.behavior_parameters import BehaviorParameters
+from m2pem.api.bus import FleetBus
+from m2pem.api.clock import Clock
+from m2pem.api.telemetry import VehicleState
+from m2pem.fleet.fleet import Fleet
+from m2pem.geo.local_frame import LocalFrame
+from m2pem.mission.catalogue import ResourceId
+from m2pem.teams.areas import escort, observe, survey
+from m2pem.teams.capabilities import Offers
+from m2pem.teams.columns import march, one_by_one
+from m2pem.teams.plan import Leg, Plan, Setting, Stand, TeamRefusedError
+
+PLANS: Mapping[str, Callable[[Setting], Plan]] = {
+    "formation": partial(march, default_shape="wedge"),
+    "road_following_formation": partial(march, default_shape="column"),
+    "road_sweep": partial(march, default_shape="line"),
+    "bridge_crossing": one_by_one,
+    "area_survey": survey,
+    "area_observe": observe,
+    "escort": escort,
+}
+"""By the behavior's name. Each raises TeamRefusedError when it cannot be done."""
+
+
+def alike(request: BehaviorRequest) -> Plan:
+    """A behavior of vehicles that several are to do at once: each does it."""
+    return Plan(
+        tuple(Leg(each, request.behavior, request.parameters) for each in request.resources)
+    )
+
+
+SEEN_WITHIN_S = 1.5
+LOOK_EVERY_S = 0.1
+LEFT_OVER = 0.2
+"""Of a full battery: below it a member counts as one with a low battery, soon."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """A plan, and the plane that its places are in."""
+
+    plan: Plan
+    frame: LocalFrame
+
+
+class Scene:
+    """Looks through the fleet's bus, and through arbiters that need not wait for telemetry."""
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        offers: Offers,
+        bus: FleetBus,
+        arbiter_of: Callable[[ResourceId], Arbiter],
+    ) -> None:
+        self._fleet = fleet
+        self._offers = offers
+        self._bus = bus
+        arbiters = {vehicle: arbiter_of(vehicle) for vehicle in fleet.vehicles}
+        self._sighted = {
+            vehicle: arbiter
+            for vehicle, arbiter in arbiters.items()
+            if isinstance(arbiter, SightedArbiter)
+        }
+
+    def scheme(
+        self, request: BehaviorRequest, *, begun: bool, split: tuple[float, ...] = ()
+    ) -> Scheme:
+        """What each member of a request does. `split`: the shares that they have, if they have.
+
+        Raises:
+            TeamRefusedError: it cannot be done; the text says why.
+        """
+        if not request.resources:
+            raise TeamRefusedError(f"{request.behavior} has no members")
+        if request.behavior not in PLANS:
+            return Scheme(alike(request), LocalFrame((0.0, 0.0)))
+        states = {member: self._state(member) for member in request.resources}
+        for member, state in states.items():
+            if state is None:
+                raise TeamRefusedError(f"the position of {member} is not known")
+        first = states[request.resources[0]]
+        if first is None or first.position is None:
+            raise TeamRefusedError(f"the position of {request.resources[0]} is not known")
+        frame = LocalFrame(first.position.latlon)
+        parameters = BehaviorParameters(request.parameters)
+        seen = None
+        if parameters.target_vehicle is not None:
+            seen = self.look(ResourceId(parameters.target_vehicle), frame)
+        vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
+        setting = Setting(
+            request.resources,
+            {each: vehicle.domain.value for each, vehicle in vehicles.items()},
+            {each: self._offers.alone(each) for each in request.resources},
+            parameters,
+            frame,
+            {each: stand_of(frame, state) for each, state in states.items() if state is not None},
+            seen,
+            begun,
+            {each: v.cruise_speed_m_s for each, v in vehicles.items() if v.cruise_speed_m_s},
+            {
+                each: lasts_s(vehicle.endurance_s, states[each])
+                for each, vehicle in vehicles.items()
+                if vehicle.endurance_s
+            },
+            split,
+        )
+        return Scheme(PLANS[request.behavior](setting), frame)
+
+    async def until_seen(self, request: BehaviorRequest, clock: Clock) -> None:
+        """Wait a moment for members that have not been heard since the start of the executive."""
+        vehicles = request.resources if request.behavior in PLANS else ()
+        waited_s = 0.0
+        while waited_s < SEEN_WITHIN_S and not all(self._state(each) for each in vehicles):
+            await clock.sleep(LOOK_EVERY_S)
+            waited_s += LOOK_EVERY_S
+
+    def look(self, vehicle: ResourceId, frame: LocalFrame) -> Stand | None:
+        """Where a vehicle is; None: nobody knows."""
+        state = self._state(vehicle)
+        return None if state is None else stand_of(frame, state)
+
+    def _state(self, vehicle: ResourceId) -> VehicleState | None:
+        sighted = self._sighted.get(vehicle)
+        state = sighted.sight(vehicle) if sighted is not None else None
+        state = state or self._heard(vehicle)
+        return state if state is not None and state.position is not None else None
+
+    def _heard(self, vehicle: ResourceId) -> VehicleState | None:
+        state = self._bus.latest(vehicle)
+        return state if isinstance(state, VehicleState) else None
+
+
+def lasts_s(endurance_s: float, state: VehicleState | None) -> float:
+    """How long a vehicle can go on, until its battery is at what is to be left over."""
+    charged = state.battery_fraction if state is not None else None
+    return endurance_s * max(0.0, (1.0 if charged is None else charged) - LEFT_OVER)
+
+
+def stand_of(frame: LocalFrame, state: VehicleState) -> Stand:
+    """A vehicle on the plane; its position must be known."""
+    if state.position is None:
+        raise ValueError(f"the position of {state.resource} is not known")
+    place = frame.to_local(state.position.latlon)
+    return Stand(place, state.yaw_rad)
