@@ -9,13 +9,14 @@ import logging
 import os
 import socket
 import struct
+from inspect import isawaitable
 from pathlib import Path
 from typing import Any, Self
 
 import msgspec
 
 from m2pem.api.control import MissionControl
-from m2pem.control_socket.methods import METHODS, STREAMS
+from m2pem.control_socket.operations import OPERATIONS, Operation
 from m2pem.control_socket.paths import ControlSocketError, address, live_sockets, make_place
 from m2pem.control_socket.protocol import (
     LONGEST_LINE_BYTES,
@@ -111,22 +112,27 @@ class ControlSocket:
             await _send(writer, _refusal(None, Code.PARSE_ERROR, f"this is no JSON: {reason}"))
             return
         number = None if request.id is msgspec.UNSET else request.id
-        if request.method in STREAMS:
-            await self._stream(request, number, reader, writer)
+        operation = OPERATIONS.get(request.method)
+        if operation is not None and operation.stream:
+            await self._stream(operation, request, number, reader, writer)
             return
-        response = await self._call(request, number)
+        response = await self._call(operation, request, number)
         if request.id is not msgspec.UNSET:
             await _send(writer, response)
 
-    async def _call(self, request: Request, number: int | str | None) -> Response:
-        if request.method not in METHODS:
-            known = ", ".join([*METHODS, *STREAMS])
+    async def _call(
+        self, operation: Operation | None, request: Request, number: int | str | None
+    ) -> Response:
+        if operation is None:
+            known = ", ".join(OPERATIONS)
             what = f"there is no method {request.method!r}; known: {known}"
             return _refusal(number, Code.METHOD_NOT_FOUND, what)
-        kind, method = METHODS[request.method]
         try:
-            params = msgspec.convert(request.params, kind)
-            result = await method(self._control, params)
+            params = msgspec.convert(request.params, operation.parameters)
+            result = operation.call(self._control, params)
+            if isawaitable(result):
+                result = await result
+            result = operation.encode(result)
         except msgspec.ValidationError as error:
             return _refusal(number, Code.INVALID_PARAMS, f"{request.method}: {error}")
         except NotDrivenError as error:
@@ -140,14 +146,15 @@ class ControlSocket:
 
     async def _stream(
         self,
+        operation: Operation,
         request: Request,
         number: int | str | None,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
-        kind, method = STREAMS[request.method]
         try:
-            stream = method(self._control, msgspec.convert(request.params, kind))
+            params = msgspec.convert(request.params, operation.parameters)
+            stream = operation.call(self._control, params)
         except msgspec.ValidationError as error:
             refusal = _refusal(number, Code.INVALID_PARAMS, f"{request.method}: {error}")
             await _send(writer, refusal)

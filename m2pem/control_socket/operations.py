@@ -1,0 +1,232 @@
+"""The operations of the control socket: one table that server, remote client and docs come from.
+
+An operation has the name of the method of `MissionControl` that it calls. Its parameters have the
+names of that method's arguments, except where the field of the struct says another one.
+"""
+
+from base64 import b64decode, b64encode
+from collections.abc import Callable
+from dataclasses import dataclass
+from inspect import signature
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+
+from m2pem.api.control import (
+    Alert,
+    MissionControl,
+    OpenPrompt,
+    PromptClosed,
+    RunId,
+    RunSummary,
+    StampedRecord,
+    TakeEffect,
+)
+from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
+from m2pem.fleet.fleet import dump, restore
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.library import Source
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
+
+
+class Params(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of all parameters; `by` names who asks."""
+
+
+class Nothing(Params, frozen=True):
+    """No parameters."""
+
+
+class OfRun(Params, frozen=True):
+    """A run, and who asks."""
+
+    run: str
+    by: str = ""
+
+
+class Stop(OfRun, frozen=True):
+    """As `MissionControl.stop`."""
+
+    reason: str = ""
+
+
+class StopAll(Params, frozen=True):
+    """As `MissionControl.stop_all`."""
+
+    by: str = ""
+    reason: str = ""
+
+
+class Answer(Params, frozen=True):
+    """As `MissionControl.answer`."""
+
+    run: str
+    prompt: str
+    decision: str
+    by: str = ""
+
+
+class Signal(Params, frozen=True):
+    """As `MissionControl.signal`."""
+
+    signal: str = msgspec.field(name="id")
+    run: str | None = None
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
+    by: str = ""
+
+
+class Message(Params, frozen=True):
+    """As `MissionControl.message`."""
+
+    message: str = msgspec.field(name="id")
+    run: str | None = None
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
+    by: str = ""
+
+
+class Geometry(Params, frozen=True):
+    """As `MissionControl.set_geometry`."""
+
+    name: str
+    geometry: dict[str, Value]
+    run: str | None = None
+    by: str = ""
+
+
+class Resource(Params, frozen=True):
+    """As `MissionControl.take` and `MissionControl.give_back`."""
+
+    resource: str
+    by: str = ""
+
+
+class Preview(Params, frozen=True):
+    """As `MissionControl.preview_take`."""
+
+    resource: str
+
+
+class Page(Params, frozen=True):
+    """As `MissionControl.records`."""
+
+    run: str
+    after_seq: int = 0
+    limit: int = 1000
+
+
+class Subscribe(Params, frozen=True):
+    """As `MissionControl.subscribe`."""
+
+    run: str | None = None
+    size: int = 10_000
+
+
+class Telemetry(Params, frozen=True):
+    """As `MissionControl.telemetry`."""
+
+    size: int = 100
+
+
+class MissionFiles(msgspec.Struct, frozen=True):
+    """A mission as it is sent: its file's name and bytes, and the files that it calls."""
+
+    file: str
+    source: bytes
+    library: list[Source]
+
+
+def _mission_files(mission: Mission) -> MissionFiles:
+    return MissionFiles(mission.file, mission.source, list(mission.library))
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """One operation. `result`: the type of what is sent; of a stream, of each value that is sent.
+
+    `encode` and `decode` turn what the method returns into that and back. `kept`: the result never
+    changes, and the client asks for it once. `alone`: the client opens a connection for it, as STOP
+    waits for no other call, and no other call waits for the end of a run.
+    """
+
+    name: str
+    parameters: type[Params]
+    result: Any = None
+    stream: bool = False
+    kept: bool = False
+    alone: bool = False
+    encode: Callable[[Any], Any] = lambda value: value
+    decode: Callable[[Any], Any] = lambda value: value
+
+    def call(self, control: MissionControl, params: Params) -> Any:
+        """Call the method; returns its result, an awaitable of it, or a stream."""
+        method = getattr(control, self.name)
+        accepted = signature(getattr(MissionControl, self.name)).parameters
+        fields = self.parameters.__struct_fields__
+        return method(**{name: getattr(params, name) for name in fields if name in accepted})
+
+
+Event = StampedRecord | OpenPrompt | PromptClosed | Alert
+State = VehicleState | PayloadState | TeamState
+STREAMED: dict[str, type] = {kind.__name__: kind for kind in get_args(Event | State)}
+"""What streams consist of, by the `kind` that a notification names."""
+
+OPERATIONS: dict[str, Operation] = {
+    operation.name: operation
+    for operation in (
+        Operation("answer", Answer),
+        Operation("signal", Signal),
+        Operation("message", Message),
+        Operation("stop", Stop, alone=True),
+        Operation("stop_all", StopAll, list[RunId], alone=True),
+        Operation("pause", OfRun, alone=True),
+        Operation("resume", OfRun),
+        Operation("set_geometry", Geometry),
+        Operation("take", Resource),
+        Operation("preview_take", Preview, list[TakeEffect]),
+        Operation("give_back", Resource),
+        Operation("holders", Nothing, dict[ResourceId, str]),
+        Operation("runs", Nothing, list[RunSummary]),
+        Operation("prompts", Nothing, list[OpenPrompt]),
+        Operation("records", Page, list[StampedRecord]),
+        Operation("mission", OfRun, MissionFiles, encode=_mission_files),
+        Operation("mission_time_s", OfRun, float),
+        Operation("wait", OfRun, RunSummary, alone=True),
+        Operation(
+            "fleet",
+            Nothing,
+            str,
+            kept=True,
+            encode=lambda fleet: b64encode(dump(fleet)).decode(),
+            decode=lambda sent: restore(b64decode(sent)),
+        ),
+        Operation("catalogue", Nothing, dict[ResourceId, tuple[BehaviorSpec, ...]], kept=True),
+        Operation("simulated", Nothing, bool, kept=True),
+        Operation("speed", Nothing, float, kept=True),
+        Operation(
+            "journal_file",
+            Nothing,
+            str | None,
+            kept=True,
+            encode=lambda path: None if path is None else str(path),
+            decode=lambda sent: None if sent is None else Path(sent),
+        ),
+        Operation("subscribe", Subscribe, Event, stream=True),
+        Operation("telemetry", Telemetry, State, stream=True),
+    )
+}
+"""Calls are answered once; streams with null, and then with notifications of the same name until
+the caller hangs up."""
+
+REFUSED = {
+    "start": "missions are started where the executive runs: m2pem run",
+    "check": "missions are checked where the executive runs: m2pem check",
+    "simulate": "missions are rehearsed where the executive runs: m2pem simulate",
+    "verify": "missions are verified where the executive runs: m2pem verify",
+    "editable": "missions are edited where the executive runs",
+    "outline": "missions are edited where the executive runs",
+    "geometries": "geometries are listed where the executive runs",
+    "services": "services are listed where the executive runs",
+}
+"""The methods of `MissionControl` that the socket does not serve, and where to ask instead."""

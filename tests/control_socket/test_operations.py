@@ -1,0 +1,57 @@
+"""The table of operations, MissionControl and docs/operating.md agree."""
+
+import re
+from inspect import signature
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from m2pem.api.control import MissionControl
+from m2pem.control_socket.operations import OPERATIONS, REFUSED, Operation
+from m2pem.control_socket.remote import RemoteControl
+
+ROOT = Path(__file__).parents[2]
+OPERATION = pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
+
+
+def methods() -> set[str]:
+    return {name for name in vars(MissionControl) if not name.startswith("_")}
+
+
+def test_every_method_of_mission_control_is_an_operation_or_refused() -> None:
+    assert {*OPERATIONS, *REFUSED} == methods()
+    assert not set(OPERATIONS) & set(REFUSED)
+
+
+def test_the_remote_control_has_every_method_of_mission_control() -> None:
+    assert methods() <= set(vars(RemoteControl))
+
+
+@OPERATION
+def test_an_operation_takes_every_argument_of_its_method(operation: Operation) -> None:
+    arguments = set(signature(getattr(MissionControl, operation.name)).parameters) - {"self"}
+    assert arguments <= set(operation.parameters.__struct_fields__)
+
+
+def documented() -> dict[str, tuple[set[str], set[str]]]:
+    """The required and the optional parameters of each operation in the docs."""
+    rows = re.findall(
+        r"^\| ([a-z_, ]+) \|([^|]*)\|", (ROOT / "docs" / "operating.md").read_text("utf-8"), re.M
+    )
+    found = {}
+    for names, parameters in rows:
+        required, _, optional = parameters.partition("(")[0].partition(";")
+        pair = set(re.findall(r"\w+", required)), set(re.findall(r"\w+", optional))
+        found.update(dict.fromkeys(names.split(", "), pair))
+    return found
+
+
+@OPERATION
+def test_the_docs_name_an_operation_with_its_parameters(operation: Operation) -> None:
+    fields = msgspec.structs.fields(operation.parameters)
+    required = {each.encode_name for each in fields if each.required}
+    optional = {each.encode_name for each in fields if not each.required}
+    in_docs = documented()[operation.name]
+    assert in_docs[0] == required
+    assert optional - {"by"} <= in_docs[1] <= optional
