@@ -13,7 +13,7 @@ from typing import Any
 
 from bench.graphs import file
 from bench.programs.stage import flows
-from m2pem.api import Notice
+from m2pem.api import ControlEvent
 from m2pem.engine.records import TokenEntered
 from m2pem.executive.executive import Executive
 
@@ -92,7 +92,7 @@ class Operator:
         self._expect(PAUSED, self._orders.go)
 
     def signals(
-        self, run: str, notices: AsyncIterator[Notice], vehicles: int, times: int
+        self, run: str, notices: AsyncIterator[ControlEvent], vehicles: int, times: int
     ) -> list[float]:
         """Milliseconds from each signal to the command."""
         took_ms = []
@@ -131,7 +131,7 @@ class Operator:
     def _call(self, wish: Coroutine[Any, Any, None]) -> None:
         asyncio.run_coroutine_threadsafe(wish, self._loop).result(PATIENCE_S)
 
-    async def _back(self, notices: AsyncIterator[Notice], element: str) -> None:
+    async def _back(self, notices: AsyncIterator[ControlEvent], element: str) -> None:
         async for notice in notices:
             record = getattr(notice, "record", None)
             if isinstance(record, TokenEntered) and record.element == element:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from m2pem import load_fleet
 from m2pem.api.clock import Clock
-from m2pem.api.control import Notice, RunSummary, StampedRecord
+from m2pem.api.control import ControlEvent, RunSummary, StampedRecord
 from m2pem.engine.records import Record
 from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
@@ -31,7 +31,7 @@ def told(record: Record) -> str:
     return f"{type(record).__name__} {getattr(record, 'element', '')}".rstrip()
 
 
-async def watch(notices: AsyncIterator[Notice]) -> None:
+async def watch(notices: AsyncIterator[ControlEvent]) -> None:
     """Print records as they are committed, until the executive ends."""
     async for notice in notices:
         if isinstance(notice, StampedRecord) and type(notice.record).__name__ in SHOWN:

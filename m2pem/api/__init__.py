@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from m2pem.api.clock import Clock
     from m2pem.api.control import (
         Alert,
+        ControlEvent,
         HandedOver,
         MissionControl,
-        Notice,
         OpenPrompt,
         PromptClosed,
         RunId,
@@ -107,8 +107,8 @@ _MODULES = {
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.clock": "Clock",
     "m2pem.api.control": (
-        "Alert HandedOver MissionControl Notice OpenPrompt PromptClosed RunId RunStatus RunSummary"
-        " SimulationResult StampedRecord TelemetrySample"
+        "Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
+        " RunSummary SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.follower": "Follower Listener follow",
@@ -191,7 +191,7 @@ __all__ = [
     "MissionControl",
     "MissionFile",
     "MissionSource",
-    "Notice",
+    "ControlEvent",
     "Ocu",
     "OpenPrompt",
     "Outline",

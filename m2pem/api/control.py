@@ -139,7 +139,7 @@ class Alert:
     text: str
 
 
-Notice: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert]
+ControlEvent: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert]
 """What a subscriber gets: records and prompts in order, after they were committed, and alerts
 at once."""
 
@@ -251,7 +251,9 @@ class MissionControl(Protocol):
         """Who has each resource: an operator, a behavior ("r1.b3"), or "" when nobody does."""
         ...
 
-    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
+    def subscribe(
+        self, run: RunId | None = None, size: int = 10_000
+    ) -> AsyncIterator[ControlEvent]:
         """What is committed from this call on, and first the prompts that stand now."""
         ...
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 from m2pem.api import records as r
 from m2pem.api.control import (
     Alert,
+    ControlEvent,
     MissionControl,
-    Notice,
     OpenPrompt,
     PromptClosed,
     RunId,
@@ -83,7 +83,7 @@ class Follower:
         self.notices_taken = 0
         self._control = control
         self.listener = listener
-        self._notices: AsyncIterator[Notice] | None = control.subscribe(size=BACKLOG)
+        self._events: AsyncIterator[ControlEvent] | None = control.subscribe(size=BACKLOG)
         self._loaded_up_to: dict[RunId, int] = {}
         """The last record that was applied to a view before it was added."""
         self._read_up_to: dict[RunId, int] = {}
@@ -97,26 +97,26 @@ class Follower:
             M2pemError: it cannot be reached any more. It may be called again.
         """
         while True:
-            self._notices = self._notices or self._control.subscribe(size=BACKLOG)
+            self._events = self._events or self._control.subscribe(size=BACKLOG)
             try:
                 await self._read_runs()
                 views = self.views
-                async for notice in self._notices:
+                async for event in self._events:
                     self.notices_taken += 1
                     if (
-                        type(notice) is StampedRecord
-                        and type(notice.record) not in _SLOW_RECORDS
-                        and (view := views.get(notice.run)) is not None
-                        and notice.seq == view.seq + 1
+                        type(event) is StampedRecord
+                        and type(event.record) not in _SLOW_RECORDS
+                        and (view := views.get(event.run)) is not None
+                        and event.seq == view.seq + 1
                     ):
-                        view.apply(notice)  # most notices: this must be fast
-                        self.listener.recorded(view, notice, is_new=True)
+                        view.apply(event)  # most events: this must be fast
+                        self.listener.recorded(view, event, is_new=True)
                     else:
-                        await self._take(notice)
+                        await self._take(event)
                     if self.notices_taken % NOTICES_IN_A_ROW == 0:
                         await asyncio.sleep(0)
             except M2pemError as error:
-                self._notices = None
+                self._events = None
                 if not isinstance(error, (OperatorError, JournalError)):
                     raise
                 log.warning("%s", error)
@@ -147,7 +147,7 @@ class Follower:
     # --- what the journal has -------------------------------------------------------------------
 
     async def _read_runs(self) -> None:
-        """Read the runs that have not ended up to now: at first, and after notices were lost."""
+        """Read the runs that have not ended up to now: at first, and after events were lost."""
         for summary in await self._control.runs():
             view = self.views.get(summary.run)
             if view is not None and not view.status.ended:
@@ -188,20 +188,20 @@ class Follower:
 
     # --- what happens ---------------------------------------------------------------------------
 
-    async def _take(self, notice: Notice) -> None:
-        match notice:
+    async def _take(self, event: ControlEvent) -> None:
+        match event:
             case StampedRecord():
-                await self._take_record(notice)
+                await self._take_record(event)
             case OpenPrompt(run=run, prompt=prompt):
                 if run not in self.views:
                     await self.load(run)
                 if (run, prompt) not in self.prompts:
-                    self.prompts[run, prompt] = notice
-                    self.listener.prompt_opened(notice)
+                    self.prompts[run, prompt] = event
+                    self.listener.prompt_opened(event)
             case PromptClosed():
-                self._close(notice)
+                self._close(event)
             case Alert():
-                self.listener.alerted(notice)
+                self.listener.alerted(event)
 
     async def _take_record(self, stamped: StampedRecord) -> None:
         view = self.views.get(stamped.run)

@@ -14,7 +14,7 @@ import click
 from m2pem.cli.options import UnusableError
 from m2pem.cli.status import Standing
 from m2pem.errors import JournalError
-from m2pem.executive.runtime_directory import runtime_folder
+from m2pem.executive.runtime_directory import runtime_directory
 from m2pem.journal import Journal, MemoryJournal, RunInfo, default_url, file_of, open_journal
 
 if TYPE_CHECKING:
@@ -53,11 +53,11 @@ async def journal_to_read(url: str | None) -> AsyncIterator[Journal]:
         return
     with ExitStack() as stack:
         try:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(dir=runtime_folder()))
+            folder = stack.enter_context(tempfile.TemporaryDirectory(dir=runtime_directory()))
             copy = _copied(path.resolve(), Path(folder))
         except OSError as error:
             raise JournalError(
-                f"{path}: the disk is full, and {runtime_folder()} cannot take a copy of it: "
+                f"{path}: the disk is full, and {runtime_directory()} cannot take a copy of it: "
                 f"{error.strerror}; make room on one of them"
             ) from error
         try:

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from m2pem.api.control import LOGGED, Alert, Notice, RunId, StampedRecord
+from m2pem.api.control import LOGGED, Alert, ControlEvent, RunId, StampedRecord
 from m2pem.api.description import printable
 from m2pem.cli.line_formatter import LineFormatter
 from m2pem.cli.standard_streams import LineWriter, writer_for
@@ -71,7 +71,7 @@ class Output:
         assert self.lines is not None
         return self.lines.format(stamped)
 
-    async def follow(self, notices: AsyncIterator[Notice]) -> None:
+    async def follow(self, notices: AsyncIterator[ControlEvent]) -> None:
         """Print every record that is told, until there will be no more."""
         printed = 0
         async for notice in notices:

@@ -78,7 +78,7 @@ async def driving(
         async with (
             ControlSocket(executive.control, journal),
             executive,
-            LoopMonitor(executive.notices),
+            LoopMonitor(executive.events),
         ):
             notices = executive.control.subscribe(size=BACKLOG)
             printing = asyncio.create_task(output.follow(notices))

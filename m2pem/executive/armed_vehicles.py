@@ -11,7 +11,7 @@ ALOFT_M = 1.0
 """Higher above its home, an aircraft flies."""
 
 
-def left_armed(free: Iterable[Vehicle], bus: FleetBus) -> str:
+def describe_armed_vehicles(free: Iterable[Vehicle], bus: FleetBus) -> str:
     """A sentence about those of some vehicles that say that they are armed, or said so before their
     links were lost; "": there are none."""
     armed = [(state, each.domain) for each in free if (state := _armed(bus, each.id))]

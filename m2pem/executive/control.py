@@ -1,9 +1,9 @@
 """`MissionControl` over an executive: what OCUs, scripts and the command line call."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
@@ -15,8 +15,8 @@ from m2pem.api.authoring import (
     SearchProgress,
 )
 from m2pem.api.control import (
+    ControlEvent,
     HandedOver,
-    Notice,
     OpenPrompt,
     RunId,
     RunStatus,
@@ -33,7 +33,9 @@ from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
+from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
+from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_apart
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet
@@ -43,9 +45,7 @@ from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
-
-if TYPE_CHECKING:
-    from m2pem.executive.executive import Executive
+from m2pem.telemetry.bus import Bus
 
 REHEARSED_STEPS = 100_000
 """Engine steps after which a rehearsal beside live missions is given up, unless said otherwise."""
@@ -54,8 +54,15 @@ REHEARSED_STEPS = 100_000
 class Control:
     """Implements `m2pem.api.control.MissionControl`; see there for every promise."""
 
-    def __init__(self, executive: "Executive") -> None:
-        self._executive = executive
+    def __init__(
+        self,
+        supervisor: Supervisor,
+        bus: Bus,
+        rehearse: Callable[..., Awaitable[SimulationResult]] | None = None,
+    ) -> None:
+        self._supervisor = supervisor
+        self._bus = bus
+        self._rehearse = rehearse
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -69,27 +76,27 @@ class Control:
         even_if_busy: bool = False,
     ) -> RunId:
         """Start a mission; returns when its beginning is in the journal."""
-        return await self._executive.start(
+        return await self._supervisor.start(
             mission, process, _bounded(data), by, even_if_busy=even_if_busy
         )
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
-        immediate = self._executive.immediate
-        asked = immediate.stop(self._executive.runner(run), by, reason)
-        await immediate.written("stop", {run: asked})
+        emergency = self._supervisor.emergency
+        asked = emergency.stop(self._supervisor.runner(run), by, reason)
+        await emergency.written("stop", {run: asked})
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended."""
-        asked = self._executive.stop_at_once(by, reason)
-        await self._executive.immediate.written("stop", asked)
+        asked = self._supervisor.emergency.stop_all(self._supervisor.runners.values(), by, reason)
+        await self._supervisor.emergency.written("stop", asked)
         return list(asked)
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""
-        immediate = self._executive.immediate
-        asked = immediate.pause(self._executive.runner(run), by)
-        await immediate.written("pause", {run: asked})
+        emergency = self._supervisor.emergency
+        asked = emergency.pause(self._supervisor.runner(run), by)
+        await emergency.written("pause", {run: asked})
 
     async def resume(self, run: RunId, *, by: str = "") -> None:
         """Go on after a pause."""
@@ -106,11 +113,11 @@ class Control:
         """Emit a signal to one run or to all that are active."""
         given = _bounded(data)
         runners = (
-            [self._executive.runner(run)]
+            [self._supervisor.runner(run)]
             if run is not None
             else [
                 runner
-                for runner in self._executive.runners.values()
+                for runner in self._supervisor.runners.values()
                 if runner.run.state.status is not EngineStatus.ENDED
             ]
         )
@@ -142,7 +149,14 @@ class Control:
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
         """Answer a prompt; the first answer wins."""
-        if prompt == LOSS_PROMPT and await self._executive.losses.answer(run, decision, by):
+        if prompt == LOSS_PROMPT and self._supervisor.losses.is_open(run):
+            match decision:
+                case "go_on":
+                    await self.resume(run, by=by)
+                case "stop":
+                    await self.stop(run, by=by, reason="the journal has lost records")
+                case _:
+                    raise unknown_decision(decision)
             return
         await self._ask(run, i.PromptAnswer(prompt, decision, by))
 
@@ -150,51 +164,53 @@ class Control:
         self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
     ) -> None:
         """Hand over a route, area or point (GeoJSON)."""
-        self._executive.set_geometry(name, _bounded(geometry), run, by)
+        self._supervisor.set_geometry(name, _bounded(geometry), run, by)
 
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
-        await self._executive.handover.take(resource, by, self._executive.runners.values())
+        await self._supervisor.handover.take(resource, by, self._supervisor.runners.values())
 
     async def preview_take(self, resource: str) -> Sequence[TakeEffect]:
         """What `take` of a resource would end now."""
-        return self._executive.handover.preview(resource, self._executive.runners.values())
+        return self._supervisor.handover.preview(resource, self._supervisor.runners.values())
 
     async def give_back(self, resource: str, *, by: str = "") -> None:
         """Give it back to the missions."""
-        await self._executive.handover.give_back(resource, by, self._executive.runners.values())
+        await self._supervisor.handover.give_back(resource, by, self._supervisor.runners.values())
 
     async def holders(self) -> Mapping[ResourceId, str]:
         """Who has each resource."""
-        return self._executive.handover.holders()
+        return self._supervisor.handover.holders()
 
     async def _ask(self, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know.
 
         What came during a pause is decided with the resume, and may be ignored then: after it.
         """
-        match (await self._executive.runner(run).tell(item)).records:
+        match (await self._supervisor.runner(run).tell(item)).records:
             case [r.InputIgnored(reason), *_]:
                 raise OperatorError(f"{run}: {reason}")
 
     # --- watching -------------------------------------------------------------------------------
 
-    def subscribe(self, run: RunId | None = None, size: int = 10_000) -> AsyncIterator[Notice]:
+    def subscribe(
+        self, run: RunId | None = None, size: int = 10_000
+    ) -> AsyncIterator[ControlEvent]:
         """What is committed from now on, and first the prompts that stand now."""
-        subscription = self._executive.notices.subscribe(run, size)
+        subscription = self._supervisor.events.subscribe(run, size)
         subscription.put(self.prompts())
         return subscription
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
         """Telemetry from now on."""
-        return self._executive.bus.subscribe(size)
+        return self._bus.subscribe(size)
 
     async def records(
         self, run: RunId, after_seq: int = 0, limit: int = 1000
     ) -> Sequence[StampedRecord]:
         """A page of a run's records; it ends with those of an input, so it may be longer."""
         page: list[StampedRecord] = []
-        async for entry in self._executive.journal.read(run, after_seq):
+        async for entry in self._supervisor.journal.read(run, after_seq):
             page += (
                 StampedRecord(run, entry.seq + place, entry.t_us / 1_000_000, record)
                 for place, record in enumerate(entry.records)
@@ -205,23 +221,23 @@ class Control:
 
     async def runs(self) -> Sequence[RunSummary]:
         """Every run of the journal but those that it has lost whole."""
-        lines = await self._executive.journal.runs()
+        lines = await self._supervisor.journal.runs()
         return [summary(line) for line in lines if not line.gone]
 
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that stand now."""
         return [
             prompt
-            for runner in self._executive.runners.values()
+            for runner in self._supervisor.runners.values()
             for prompt in runner.prompts.values()
         ]
 
     async def mission(self, run: RunId) -> Mission:
         """The mission of a run, of an older one from the journal."""
-        runner = self._executive.runners.get(run)
+        runner = self._supervisor.runners.get(run)
         if runner is not None:
             return runner.run.state.mission
-        for line in await self._executive.journal.runs():
+        for line in await self._supervisor.journal.runs():
             if line.run == run:
                 if line.gone:
                     raise OperatorError(f"{run}: {line.loss}")
@@ -230,53 +246,53 @@ class Control:
 
     async def mission_time_s(self, run: RunId) -> float:
         """Seconds from the start of a run."""
-        state = self._executive.runner(run).run.state
+        state = self._supervisor.runner(run).run.state
         if state.status is EngineStatus.ENDED:
             raise OperatorError(f"{run} has ended")
-        return max(0, state.mission_time_us(self._executive.clock.now_us())) / 1_000_000
+        return max(0, state.mission_time_us(self._supervisor.clock.now_us())) / 1_000_000
 
     async def wait(self, run: RunId) -> RunSummary:
         """Wait until the run has ended and its vehicles are released."""
-        runner = self._executive.runner(run)
+        runner = self._supervisor.runner(run)
         await runner.done.wait()
         if runner.failure is not None:
             raise runner.failure
-        lines = {line.run: line for line in await self._executive.journal.runs()}
+        lines = {line.run: line for line in await self._supervisor.journal.runs()}
         return summary(lines[run])
 
     # --- what there is --------------------------------------------------------------------------
 
     def fleet(self) -> Fleet:
         """The fleet in use."""
-        return self._executive.fleet
+        return self._supervisor.fleet
 
     def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
         """What every resource can do."""
-        return self._executive.arbiters.catalogue()
+        return self._supervisor.arbiters.catalogue()
 
     def simulated(self) -> bool:
         """Whether nothing real moves."""
-        return self._executive.arbiters.nothing_is_real
+        return self._supervisor.arbiters.nothing_is_real
 
     def speed(self) -> float:
         """Seconds of mission time in a real second."""
-        return self._executive.speed
+        return self._supervisor.settings.speed
 
     def journal_file(self) -> Path | None:
         """Where the journal is; None: in memory."""
-        return self._executive.journal.file
+        return self._supervisor.journal.file
 
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use."""
-        executive = self._executive
+        supervisor = self._supervisor
         try:
-            loaded = load_source(mission, executive.search_path)
+            loaded = load_source(mission, supervisor.settings.search_path)
         except MissionError as error:
             return error.findings
-        names, arbiters, plugins = tuple(data), executive.arbiters, executive.plugins
-        simulated = executive.simulated
+        names, arbiters, plugins = tuple(data), supervisor.arbiters, supervisor.plugins
+        simulated = supervisor.settings.simulated
         return [
             *findings_for(
                 loaded,
@@ -285,22 +301,22 @@ class Control:
                 names,
                 process,
                 simulated=simulated,
-                handed_over=executive.handed_over,
+                handed_over=supervisor.handed_over,
             ),
             *requirement_findings(loaded, arbiters, plugins, names),
         ]
 
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock."""
-        executive = self._executive
-        if executive.rehearse is None:
+        supervisor = self._supervisor
+        if self._rehearse is None:
             raise OperatorError("this executive cannot rehearse missions")
         settings = {
             "max_steps": REHEARSED_STEPS,
-            "search_path": executive.search_path,
+            "search_path": supervisor.settings.search_path,
             **options,
         }
-        return await executive.rehearse(mission, executive.fleet_now, **settings)
+        return await self._rehearse(mission, supervisor.fleet_now, **settings)
 
     async def verify(
         self,
@@ -315,12 +331,12 @@ class Control:
         on_progress: Callable[[SearchProgress], None] | None = None,
     ) -> Mapping[str, Any]:
         """Verify a mission with this fleet, in a process of its own."""
-        executive = self._executive
+        supervisor = self._supervisor
         return await verify_apart(
             mission,
-            executive.fleet_now,
-            simulated=executive.simulated,
-            search_path=executive.search_path,
+            supervisor.fleet_now,
+            simulated=supervisor.settings.simulated,
+            search_path=supervisor.settings.search_path,
             process=process,
             data=data or {},
             spec=spec,
@@ -337,20 +353,20 @@ class Control:
     def outline(self, mission: bytes | Draft) -> Outline:
         """What a file has, as far as it can be read."""
         draft = mission if isinstance(mission, Draft) else Draft(Path("mission.bpmn"), mission)
-        library = library_of(mission, self._executive.search_path)
+        library = library_of(mission, self._supervisor.settings.search_path)
         return outline(draft.source, library, self.services())
 
     def geometries(self) -> Mapping[str, HandedOver]:
         """What operators have handed over for all runs."""
-        return self._executive.handed_over
+        return self._supervisor.handed_over
 
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with what each writes."""
-        return self._executive.plugins.service_writes()
+        return self._supervisor.plugins.service_writes()
 
 
 def _bounded(data: Mapping[str, Value] | None) -> dict[str, Value]:
-    """Data from outside, not nested deeper than the engine and the journal can take."""
+    """Data from context, not nested deeper than the engine and the journal can take."""
     for name, value in (data or {}).items():
         if is_too_deep(value, MAX_DEPTH - 1):
             raise OperatorError(f"{name!r} is nested deeper than {MAX_DEPTH} levels")

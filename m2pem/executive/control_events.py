@@ -11,31 +11,31 @@ from queue import Full, Queue
 from types import TracebackType
 from typing import Self
 
-from m2pem.api.control import LOGGED, Alert, Notice, RunId
+from m2pem.api.control import LOGGED, Alert, ControlEvent, RunId
 from m2pem.engine.records import Record
 from m2pem.errors import OperatorError
 
 
 class Subscription:
-    """Notices for one reader. A reader that falls `size` behind is cut off with an error."""
+    """ControlEvents for one reader. A reader that falls `size` behind is cut off with an error."""
 
     def __init__(self, run: RunId | None, size: int) -> None:
         self._run = run
         self._size = size
-        self._waiting: deque[Notice] = deque()
+        self._waiting: deque[ControlEvent] = deque()
         self._wake = asyncio.Event()
         self._overrun = False
         self._ended = False
 
-    def put(self, notices: Sequence[Notice]) -> None:
-        """Hand notices over, but those of another run."""
+    def put(self, events: Sequence[ControlEvent]) -> None:
+        """Hand events over, but those of another run."""
         if self._overrun:
             return
         if self._run is not None:
-            notices = [notice for notice in notices if notice.run in ("", self._run)]
+            events = [notice for notice in events if notice.run in ("", self._run)]
         room = self._size - len(self._waiting)
-        self._overrun = len(notices) > room
-        self._waiting.extend(notices[:room])
+        self._overrun = len(events) > room
+        self._waiting.extend(events[:room])
         self._wake.set()
 
     def end(self) -> None:
@@ -43,10 +43,10 @@ class Subscription:
         self._ended = True
         self._wake.set()
 
-    def __aiter__(self) -> AsyncIterator[Notice]:
+    def __aiter__(self) -> AsyncIterator[ControlEvent]:
         return self
 
-    async def __anext__(self) -> Notice:
+    async def __anext__(self) -> ControlEvent:
         """The next notice; ends with the executive.
 
         Raises:
@@ -55,7 +55,7 @@ class Subscription:
         while not self._waiting:
             if self._overrun:
                 raise OperatorError(
-                    f"the subscriber fell {self._size} notices behind; subscribe again and read"
+                    f"the subscriber fell {self._size} events behind; subscribe again and read"
                     " what was missed with records()"
                 )
             if self._ended:
@@ -65,7 +65,7 @@ class Subscription:
         return self._waiting.popleft()
 
 
-class Notices:
+class ControlEvents:
     """All subscriptions of an executive, held weakly: a reader that is gone leaves nothing."""
 
     def __init__(self) -> None:
@@ -73,7 +73,7 @@ class Notices:
         self._ended = False
 
     @property
-    def anybody(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether there is anyone to tell."""
         return bool(self._subscriptions)
 
@@ -90,12 +90,12 @@ class Notices:
             ]
         return subscription
 
-    def publish(self, *notices: Notice) -> None:
+    def publish(self, *events: ControlEvent) -> None:
         """Tell all."""
         for reference in self._subscriptions:
             subscription = reference()
             if subscription is not None:
-                subscription.put(notices)
+                subscription.put(events)
 
     def end(self) -> None:
         """Let every reader come to its end, after what waits for it."""
@@ -119,7 +119,7 @@ DRAINED_WITHIN_S = 5.0
 _Batch = tuple[RunId, Sequence[Record]]
 
 
-class Observers:
+class RecordObservers:
     """`observe` is called with each batch of committed records, in order.
 
     From `start` to `close` it is called from a thread; before, and where `start` is never called
@@ -127,10 +127,10 @@ class Observers:
     """
 
     def __init__(
-        self, observe: Callable[[RunId, Sequence[Record]], None], notices: Notices
+        self, observe: Callable[[RunId, Sequence[Record]], None], events: ControlEvents
     ) -> None:
         self._observe = observe
-        self._notices = notices
+        self._events = events
         self._waiting: Queue[_Batch | None] = Queue(MAX_WAITING)
         self._ended: asyncio.Event | None = None
         self._behind = False
@@ -162,7 +162,7 @@ class Observers:
                     f"plugins that observe records are more than {MAX_WAITING:,} inputs behind: "
                     "records are kept from them until they have caught up. The journal has all"
                 )
-                self._notices.publish(Alert("", "OBSERVERS_BEHIND", text))
+                self._events.publish(Alert("", "OBSERVERS_BEHIND", text))
             self._behind = True
 
     async def close(self) -> None:
@@ -177,7 +177,7 @@ class Observers:
         except TimeoutError:
             left = self._waiting.qsize()
             text = f"plugins that observe records did not end; {left} inputs were not observed"
-            self._notices.publish(Alert("", "OBSERVERS_BEHIND", text))
+            self._events.publish(Alert("", "OBSERVERS_BEHIND", text))
 
 
 LOGGERS = ("m2pem.arbiter", "m2pem.dispatch", "m2pem.executive", "m2pem.teams")
@@ -186,9 +186,9 @@ LOGGERS = ("m2pem.arbiter", "m2pem.dispatch", "m2pem.executive", "m2pem.teams")
 class LoggedAlerts(logging.Handler):
     """Between `__enter__` and `__exit__`, in an event loop: each warning or error is an alert."""
 
-    def __init__(self, notices: Notices) -> None:
+    def __init__(self, events: ControlEvents) -> None:
         super().__init__(logging.WARNING)
-        self._notices = notices
+        self._events = events
 
     def __enter__(self) -> Self:
         self._loop = asyncio.get_running_loop()
@@ -209,4 +209,4 @@ class LoggedAlerts(logging.Handler):
         """Any thread may log."""
         alert = Alert("", LOGGED, record.getMessage())
         if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._notices.publish, alert)
+            self._loop.call_soon_threadsafe(self._events.publish, alert)

@@ -15,7 +15,7 @@ from m2pem.api.clock import Clock
 from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.script import Script
-from m2pem.executive.separation import Clearance
+from m2pem.executive.separation import AircraftSeparation
 from m2pem.fleet.allocation import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.mission.behavior import BehaviorType
@@ -66,7 +66,7 @@ class Dispatcher:
         geometries: Geometries,
         post: Callable[[BehaviorReport], None],
         script: Script | None = None,
-        clearance: Clearance | None = None,
+        clearance: AircraftSeparation | None = None,
     ) -> None:
         self._arbiters = arbiters
         self._availability = availability

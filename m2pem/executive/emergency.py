@@ -9,7 +9,7 @@ import json
 import logging
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +20,12 @@ from m2pem.api.control import Alert, RunId
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
+from m2pem.engine.state import RunStatus
 from m2pem.errors import M2pemError, OperatorError
-from m2pem.executive.control_events import Notices
+from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
 from m2pem.executive.runner import Runner
-from m2pem.executive.runtime_directory import runtime_folder
+from m2pem.executive.runtime_directory import runtime_directory
 
 ACKNOWLEDGED_WITHIN_S = 1.0
 """An arbiter that has not taken a STOP or hold by then: operators are alerted."""
@@ -33,12 +34,12 @@ WRITTEN_WITHIN_S = 1.5
 """How long an operator's STOP or pause waits for the journal, before it says how things are."""
 
 
-class ImmediateCommands:
-    """Of one executive. `marks` keep a stop until the journal has it."""
+class EmergencyCommands:
+    """STOP and pause of the runs of one executive. `marks` keep a stop until the journal has it."""
 
-    def __init__(self, dispatcher: Dispatcher, notices: Notices, marks: "StopMarks") -> None:
+    def __init__(self, dispatcher: Dispatcher, events: ControlEvents, marks: "StopMarks") -> None:
         self._dispatcher = dispatcher
-        self._notices = notices
+        self._events = events
         self._marks = marks
         self._watches: set[asyncio.Task[None]] = set()
 
@@ -62,6 +63,20 @@ class ImmediateCommands:
             failed: asyncio.Future[Step] = asyncio.get_running_loop().create_future()
             failed.set_exception(error)
             return failed
+
+    def stop_all(
+        self, runners: Iterable[Runner], by: str, reason: str
+    ) -> "dict[RunId, asyncio.Future[Step]]":
+        """Send the cancels of every run that has not ended; by run: when its stop is recorded.
+
+        A run that the journal failed is one of them: its vehicles are held, or were to be.
+        """
+        return {
+            runner.id: self.stop(runner, by, reason)
+            for runner in runners
+            if not runner.done.is_set() or runner.failure is not None
+            if runner.run.state.status is not RunStatus.ENDED
+        }
 
     def pause(self, runner: Runner, by: str) -> "asyncio.Future[Step]":
         """Send the holds of a run; the future is done when its pause is in the journal.
@@ -109,7 +124,7 @@ class ImmediateCommands:
         for order, why in late:
             names = ", ".join(order.resources)
             text = f"{names} may not have received the {what} of {run}: {why}. Use its own stop"
-            self._notices.publish(Alert(run, "NOT_RECEIVED", text))
+            self._events.publish(Alert(run, "NOT_RECEIVED", text))
 
 
 def _problem(what: str, asked: "asyncio.Future[Step]") -> str:
@@ -156,7 +171,7 @@ class StopMarks:
         if file is not None:
             self._places[f"{file}-stopped-"] = Queue()
             with suppress(OSError):
-                self._places[f"{runtime_folder()}/{identity}-stopped-"] = Queue()
+                self._places[f"{runtime_directory()}/{identity}-stopped-"] = Queue()
         self._started = False
 
     def put(self, run: str, mark: StopMark) -> None:

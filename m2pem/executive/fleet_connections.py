@@ -1,19 +1,21 @@
-"""The arbiters of a fleet: which one serves which resource, and what it offers."""
+"""The arbiters of a fleet: which one serves which resource, what it offers, and its connection."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 from m2pem.api.arbiter import (
     AddressedArbiter,
     Arbiter,
     ArbiterContext,
+    BehaviorReport,
     Connection,
     DetectingArbiter,
 )
-from m2pem.errors import FleetError
+from m2pem.api.telemetry import Telemetry
+from m2pem.errors import FleetError, PluginError
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.graph import ResourceGraph
@@ -196,6 +198,66 @@ class FleetArbiters:
     def resources(self) -> Sequence[ResourceId]:
         """Every vehicle and payload."""
         return tuple(self._of)
+
+
+class FleetConnections:
+    """Connects the arbiters of a fleet, and hands on what they report until `close`."""
+
+    def __init__(
+        self,
+        arbiters: FleetArbiters,
+        on_report: Callable[[BehaviorReport], None],
+        on_telemetry: Callable[[Telemetry], None],
+    ) -> None:
+        self._arbiters = arbiters
+        self._on_report = on_report
+        self._on_telemetry = on_telemetry
+
+    async def connect(self) -> None:
+        """Connect all arbiters, or none.
+
+        Raises:
+            PluginError: an arbiter cannot connect.
+        """
+        connected: list[Arbiter] = []
+        for name, arbiter in self._arbiters.all.items():
+            try:
+                await arbiter.connect()
+            except Exception as error:
+                for other in connected:
+                    await other.close()
+                raise PluginError(f"arbiter {name} cannot connect: {error}") from error
+            connected.append(arbiter)
+
+    def listeners(self) -> Iterator[tuple[str, Callable[[], Awaitable[None]]]]:
+        """What is to be awaited beside the runs, each with its name for the log."""
+        for name, arbiter in self._arbiters.all.items():
+            yield f"reports of {name}", partial(self._read_reports, arbiter)
+            yield f"telemetry of {name}", partial(self._read_telemetry, arbiter)
+
+    def lost_after_s(self, stretch: float) -> dict[ResourceId, float]:
+        """After which silence the link of each vehicle is lost, `stretch` times as long."""
+        return {
+            vehicle.id: stretch
+            * (
+                vehicle.lost_after_s
+                or self._arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+            )
+            for vehicle in self._arbiters.fleet.vehicles.values()
+        }
+
+    async def close(self) -> None:
+        """Close all arbiters."""
+        for arbiter in self._arbiters.all.values():
+            await arbiter.close()
+
+    async def _read_reports(self, arbiter: Arbiter) -> None:
+        async for report in arbiter.reports():
+            self._on_report(report)
+
+    async def _read_telemetry(self, arbiter: Arbiter) -> None:
+        async for state in arbiter.telemetry():
+            self._on_telemetry(state)
 
 
 def _has(specs: Sequence[BehaviorSpec], team_behavior: str) -> bool:

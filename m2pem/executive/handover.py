@@ -124,7 +124,7 @@ class Handover:
         return resource
 
 
-def refuse_busy(
+def refuse_busy_resources(
     mission: Mission,
     fleet: Fleet,
     taken: Mapping[ResourceId, str],

@@ -8,8 +8,7 @@ is answered, so that a second crash asks again.
 
 import asyncio
 import logging
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.api.control import OpenPrompt, PromptClosed, RunId
@@ -18,14 +17,15 @@ from m2pem.engine.inputs import BehaviorMissing, Input
 from m2pem.engine.records import BehaviorRequested, Record, RunEnded, RunResumed
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.errors import OperatorError
+from m2pem.executive.control_events import ControlEvents
+from m2pem.executive.dispatcher import Dispatcher
+from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.handover import Handover
 from m2pem.executive.runner import Runner
-from m2pem.fleet.allocation import resources_of_mission
-from m2pem.journal.base import Loss
+from m2pem.fleet.allocation import Availability, resources_of_mission
+from m2pem.journal.base import Journal, Loss
 from m2pem.mission.behavior import Decision
 from m2pem.mission.catalogue import BehaviorState, ResourceId, ResumePolicy
-
-if TYPE_CHECKING:
-    from m2pem.executive.executive import Executive
 
 log = logging.getLogger("m2pem.resume")
 
@@ -57,11 +57,26 @@ def paused_by(loss: Loss) -> str:
     return f"m2pem, because {loss}"
 
 
-class Losses:
+class JournalLossPrompts:
     """The questions about losses that are open in one executive."""
 
-    def __init__(self, executive: "Executive") -> None:
-        self._executive = executive
+    def __init__(
+        self,
+        journal: Journal,
+        arbiters: FleetArbiters,
+        dispatcher: Dispatcher,
+        availability: Availability,
+        handover: Handover,
+        events: ControlEvents,
+        runners: Mapping[RunId, Runner],
+    ) -> None:
+        self._journal = journal
+        self._arbiters = arbiters
+        self._dispatcher = dispatcher
+        self._availability = availability
+        self._handover = handover
+        self._events = events
+        self._runners = runners
         self._held: dict[RunId, tuple[ResourceId, ...]] = {}
         self._services: dict[RunId, tuple[RunService, ...]] = {}
 
@@ -71,12 +86,11 @@ class Losses:
         Services that the run waits for begin again when it goes on.
         After the takeover, before the run is driven.
         """
-        executive = self._executive
         log.error("%s: %s; its vehicles are held and an operator is asked", runner.id, loss)
         held = self._held[runner.id] = tuple(self._allocated(runner))
         for resource in held:
-            executive.dispatcher.hold(resource)
-            executive.availability.withdraw(resource, f"held: an operator is asked of {runner.id}")
+            self._dispatcher.hold(resource)
+            self._availability.withdraw(resource, f"held: an operator is asked of {runner.id}")
         self._services[runner.id] = tuple(
             each for each in runner.run.outstanding() if isinstance(each, RunService)
         )
@@ -89,28 +103,17 @@ class Losses:
             DECISIONS,
         )
         runner.prompts[PROMPT] = prompt
-        executive.notices.publish(prompt)
+        self._events.publish(prompt)
 
-    async def answer(self, run: RunId, decision: str, by: str) -> bool:
-        """Carry out an operator's answer; False: nothing is asked about a loss of this run."""
-        if run not in self._held:
-            return False
-        control = self._executive.control
-        match decision:
-            case "go_on":
-                await control.resume(run, by=by)
-            case "stop":
-                await control.stop(run, by=by, reason="the journal has lost records")
-            case _:
-                known = ", ".join(each.value for each in DECISIONS)
-                raise OperatorError(f"{decision!r} is no decision of prompt {PROMPT}: {known}")
-        return True
+    def is_open(self, run: RunId) -> bool:
+        """Whether operators are being asked about a loss of this run."""
+        return run in self._held
 
-    def seen(self, run: RunId, records: Sequence[Record]) -> None:
+    def on_records(self, run: RunId, records: Sequence[Record]) -> None:
         """Records were committed: the question is closed when the run goes on or has ended."""
         if run not in self._held:
             return
-        runner = self._executive.runners[run]
+        runner = self._runners[run]
         for record in records:
             match record:
                 case RunResumed(by=by):
@@ -118,8 +121,8 @@ class Losses:
                     services = self._services.pop(run)
                     runner.take_up([each for each in services if each.service in open_])
                     for resource in self._close(run, "go_on", by):
-                        if self._executive.availability.holder(resource) is None:
-                            self._executive.dispatcher.resume(resource)
+                        if self._availability.holder(resource) is None:
+                            self._dispatcher.resume(resource)
                     return
                 case RunEnded():
                     # What was held stays so: nobody has said that it may move.
@@ -130,15 +133,15 @@ class Losses:
     def _close(self, run: RunId, decision: str, by: str) -> tuple[ResourceId, ...]:
         held = self._held.pop(run)
         for resource in held:
-            self._executive.handover.restore(resource)
-        self._executive.runners[run].prompts.pop(PROMPT, None)
-        self._executive.notices.publish(PromptClosed(run, PROMPT, decision, by))
+            self._handover.restore(resource)
+        self._runners[run].prompts.pop(PROMPT, None)
+        self._events.publish(PromptClosed(run, PROMPT, decision, by))
         return held
 
     def _allocated(self, runner: Runner) -> Sequence[ResourceId]:
         """Every vehicle and payload of the mission, but what another run commands now."""
-        all_of_them = resources_of_mission(runner.run.state.mission, self._executive.fleet)
-        holder = self._executive.availability.holder
+        all_of_them = resources_of_mission(runner.run.state.mission, self._arbiters.fleet)
+        holder = self._availability.holder
         return [
             each
             for each in all_of_them
@@ -148,7 +151,7 @@ class Losses:
     async def _cancel_unknown(self, runner: Runner, loss: Loss) -> list[str]:
         """Cancel behaviors of the run that its arbiters execute and its journal does not know."""
         known: set[str] = set()
-        async for entry in self._executive.journal.read(runner.id):
+        async for entry in self._journal.read(runner.id):
             known.update(each.behavior for each in entry.records if type(each) is BehaviorRequested)
         ids = (
             f"{runner.id}.b{number}"
@@ -158,7 +161,7 @@ class Losses:
         asked = [
             self._cancel_if_under_way(arbiter, behavior, runner.epoch)
             for behavior in candidates
-            for arbiter in self._executive.arbiters.by_name.values()
+            for arbiter in self._arbiters.by_name.values()
         ]
         return [found for found in await asyncio.gather(*asked) if found]
 
@@ -176,6 +179,12 @@ class Losses:
             log.exception("%s: its arbiter raised", behavior)
             return ""
         return behavior
+
+
+def unknown_decision(decision: str) -> OperatorError:
+    """The error for an answer that the prompt does not offer."""
+    known = ", ".join(each.value for each in DECISIONS)
+    return OperatorError(f"{decision!r} is no decision of prompt {PROMPT}: {known}")
 
 
 def _text(run: RunId, loss: Loss, held: Sequence[str], unknown: Sequence[str]) -> str:

@@ -30,7 +30,7 @@ SAY_EVERY = 10
 """A reason that stays the same is logged the first time, and then each time of so many."""
 
 
-class Returning:
+class LostResources:
     """The resources that were lost, until they are free again.
 
     `epoch_of`: with which epoch the run of a behavior is driven here. `show`: to operators, how a
@@ -73,7 +73,7 @@ class Returning:
         if resource not in self._handover.taken:
             self._availability.withdraw(resource, self._silent[resource])
 
-    def heard(self, state: VehicleState | PayloadState) -> None:
+    def on_telemetry(self, state: VehicleState | PayloadState) -> None:
         """A resource has said something. If it was lost, it is told to stop from now on."""
         resource = state.resource
         if resource not in self._lost or state.link is LinkState.LOST:
@@ -85,7 +85,7 @@ class Returning:
         task = asyncio.get_running_loop().create_task(self._stop(resource))
         self._stopping[resource] = task
 
-    def shown(self, state: VehicleState | PayloadState) -> VehicleState | PayloadState:
+    def annotated(self, state: VehicleState | PayloadState) -> VehicleState | PayloadState:
         """The state as operators see it: what is not free yet is not ready, and says why."""
         why = self._why.get(state.resource)
         if why is None:

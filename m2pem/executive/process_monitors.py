@@ -1,6 +1,6 @@
 """Watches the event loop: a plugin that blocks it delays everything, STOP included.
 
-    async with LoopMonitor(executive.notices):
+    async with LoopMonitor(executive.events):
         ...
 
 A thread sees that the loop does not turn, and reads off its stack which module keeps it.
@@ -17,7 +17,7 @@ from types import FrameType
 from typing import Self
 
 from m2pem.api.control import Alert
-from m2pem.executive.control_events import Notices
+from m2pem.executive.control_events import ControlEvents
 from m2pem.journal.storage_checks import space_shortage
 
 log = logging.getLogger("m2pem.loop")
@@ -31,8 +31,8 @@ class LoopMonitor:
     """Of the loop in which its block runs. While the loop is blocked, the log says so; operators
     get an alert as soon as it turns again."""
 
-    def __init__(self, notices: Notices) -> None:
-        self._notices = notices
+    def __init__(self, events: ControlEvents) -> None:
+        self._events = events
         self._ticked_s = time.monotonic()
         self._ended = threading.Event()
         self._blocked_by = ""
@@ -61,7 +61,7 @@ class LoopMonitor:
                 f"{self._blocked_by} blocked the executive"
             )
             self._blocked_by = ""
-            self._notices.publish(Alert("", "BLOCKED", text))
+            self._events.publish(Alert("", "BLOCKED", text))
         self._timer = self._loop.call_later(TICK_S, self._tick)
 
     def _watch(self) -> None:
@@ -112,7 +112,7 @@ AGAIN_AFTER = 30
 CODE = "JOURNAL_SPACE"
 
 
-async def watch_space(journal: Path, notices: Notices) -> None:
+async def watch_space(journal: Path, events: ControlEvents) -> None:
     """Look at the disk until cancelled. A disk that hangs keeps nothing else waiting."""
     short_for = 0
     while True:
@@ -122,8 +122,8 @@ async def watch_space(journal: Path, notices: Notices) -> None:
             log.warning("%s: its disk cannot be asked for free space: %s", journal, error.strerror)
             text = ""
         if text and short_for % AGAIN_AFTER == 0:
-            notices.publish(Alert("", CODE, text))
+            events.publish(Alert("", CODE, text))
         elif not text and short_for:
-            notices.publish(Alert("", CODE, f"there is room again in {journal.parent}"))
+            events.publish(Alert("", CODE, f"there is room again in {journal.parent}"))
         short_for = short_for + 1 if text else 0
         await asyncio.sleep(EVERY_S)

@@ -58,7 +58,8 @@ async def take_over(
     `outage_s`: for how long nobody drove it. Longer than the fleet's `max_outage`, every behavior
     is held and an operator is asked. `lost`: is called for each resource whose arbiter cannot be
     asked, which must stop before it is free again. `loss`: what the journal has lost of it: the
-    run is paused, and an operator is asked about every behavior when it goes on (see `Losses`).
+    run is paused, and an operator is asked about every behavior when it goes on
+    (see `JournalLossPrompts`).
     """
     state = runner.run.state
     runner.post(ClaimRun(runner.epoch, lost=loss.records if loss is not None else 0))

@@ -28,7 +28,7 @@ from m2pem.engine.inputs import (
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.errors import InternalError, M2pemError, OperatorError, StaleEpochError
-from m2pem.executive.control_events import Notices
+from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.services import Services
 from m2pem.journal.base import Entry, Journal
@@ -49,14 +49,14 @@ STALLED_AFTER_S = 2.0
 
 
 @dataclass(slots=True)
-class Outside:
+class RunContext:
     """Where a run's commands go and its records are told."""
 
     journal: Journal
     clock: Clock
     dispatcher: Dispatcher
     services: Services
-    notices: Notices
+    events: ControlEvents
     observe: Callable[[RunId, Sequence[r.Record]], None]
 
 
@@ -71,7 +71,7 @@ class Runner:
         self,
         run: MissionRun,
         epoch: int,
-        outside: Outside,
+        context: RunContext,
         max_steps: int | None = None,
         steps_between_waits: int | None = None,
     ) -> None:
@@ -80,7 +80,7 @@ class Runner:
         self.epoch = epoch
         self.failure: M2pemError | None = None
         self.prompts: dict[str, OpenPrompt] = {}
-        self._outside = outside
+        self._context = context
         self._max_steps = max_steps
         self._steps_between_waits = steps_between_waits
         self._steps_at_wait = 0
@@ -193,7 +193,7 @@ class Runner:
                     return [self._pause_by_itself() if self._never_waits() else Continue()]
                 continue
             due_us = self.run.next_due_us
-            if due_us is not None and due_us <= self._outside.clock.now_us():
+            if due_us is not None and due_us <= self._context.clock.now_us():
                 return [self._pause_by_itself() if self._never_waits() else Tick()]
             self._steps_at_wait = self.run.steps_done
             self._wake.clear()
@@ -222,12 +222,12 @@ class Runner:
             f"paused: {why}: a loop of the mission may have no end. Stop it, or resume it for as "
             "many steps more; the fleet's steps_between_waits is the bound"
         )
-        self._outside.notices.publish(Alert(self.id, "NEVER_WAITS", text))
+        self._context.events.publish(Alert(self.id, "NEVER_WAITS", text))
         return PauseRun(f"m2pem, as {why}")
 
     async def _wait_until(self, due_us: int) -> None:
         woken = asyncio.ensure_future(self._wake.wait())
-        due = asyncio.ensure_future(self._outside.clock.sleep_until(due_us))
+        due = asyncio.ensure_future(self._context.clock.sleep_until(due_us))
         try:
             await asyncio.wait((woken, due), return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -255,7 +255,7 @@ class Runner:
                 await asyncio.sleep(0)  # subscribers keep up, and STOP does not wait
 
     def _decide(self, item: Input) -> Step:
-        step = self.run.receive(item, self._outside.clock.now_us())
+        step = self.run.receive(item, self._context.clock.now_us())
         if isinstance(item, _EARLY):
             self._dispatch_early(step)
         if isinstance(item, PauseRun):
@@ -266,7 +266,7 @@ class Runner:
         loop = asyncio.get_running_loop()
         stalled = loop.call_later(STALLED_AFTER_S, self._alert_of_stall)
         try:
-            await self._outside.journal.append(
+            await self._context.journal.append(
                 [
                     Entry(
                         self.id,
@@ -288,7 +288,7 @@ class Runner:
             f"the journal has not written for {STALLED_AFTER_S:g} s: the run commands nothing new "
             "until it does. STOP and pause reach its vehicles all the same"
         )
-        self._outside.notices.publish(Alert(self.id, "JOURNAL_STALLED", text))
+        self._context.events.publish(Alert(self.id, "JOURNAL_STALLED", text))
 
     def _settle_pause(self) -> None:
         """The pause that was sent ahead is decided: from here on the run's own state counts."""
@@ -307,7 +307,7 @@ class Runner:
             return
         strays, self._strays = self._strays, frozenset()
         for resource in sorted(strays):
-            self._outside.dispatcher.resume(resource)
+            self._context.dispatcher.resume(resource)
         if not self._is_held:
             self._release_withheld()
 
@@ -322,15 +322,15 @@ class Runner:
     # --- what follows a commit ------------------------------------------------------------------
 
     def _publish(self, step: Step) -> None:
-        outside = self._outside
-        outside.observe(self.id, step.records)
+        context = self._context
+        context.observe(self.id, step.records)
         for record in step.records:
             if type(record) is r.BehaviorEnded:
-                outside.dispatcher.ended(record.behavior)
-        if outside.notices.anybody:
+                context.dispatcher.ended(record.behavior)
+        if context.events.has_subscribers:
             t_s = step.t_us / 1_000_000
             places = enumerate(step.records, step.seq)
-            outside.notices.publish(
+            context.events.publish(
                 *(StampedRecord(self.id, seq, t_s, record) for seq, record in places)
             )
 
@@ -339,14 +339,14 @@ class Runner:
             if isinstance(command, c.CancelBehavior):
                 self._cancel(command)
             elif isinstance(command, c.HoldResource) and command.resource not in self._held_at_once:
-                self._outside.dispatcher.hold(command.resource)
+                self._context.dispatcher.hold(command.resource)
 
     def _cancel(self, command: c.CancelBehavior) -> None:
         if command.behavior not in self._cancelled_at_once:
-            self._outside.dispatcher.cancel(command)
+            self._context.dispatcher.cancel(command)
 
     def _dispatch(self, command: c.Command, *, early_done: bool = False) -> None:
-        outside = self._outside
+        context = self._context
         match command:
             case c.StartBehavior():
                 self._start(command)
@@ -355,10 +355,10 @@ class Runner:
                     self._cancel(command)
             case c.HoldResource(resource=resource):
                 if not early_done:
-                    outside.dispatcher.hold(resource)
+                    context.dispatcher.hold(resource)
             case c.ResumeResource(resource=resource):
                 if not self._is_held:
-                    outside.dispatcher.resume(resource)
+                    context.dispatcher.resume(resource)
                     self._release_withheld()
             case c.OpenPrompt():
                 prompt = OpenPrompt(
@@ -370,16 +370,16 @@ class Runner:
                     command.role,
                 )
                 self.prompts[command.prompt] = prompt
-                outside.notices.publish(prompt)
+                context.events.publish(prompt)
             case c.ClosePrompt():
                 if self.prompts.pop(command.prompt, None) is not None:
-                    outside.notices.publish(
+                    context.events.publish(
                         PromptClosed(self.id, command.prompt, command.decision, command.by)
                     )
             case c.RunService():
-                outside.services.run(self, command)
+                context.services.run(self, command)
             case c.CancelService():
-                outside.services.cancel(self.id, command.service)
+                context.services.cancel(self.id, command.service)
 
     def _start(self, command: c.StartBehavior) -> None:
         """Start it, unless it is unwanted by now; while paused, nothing starts."""
@@ -389,7 +389,7 @@ class Runner:
         if self._is_held:
             self._withheld.append(command)
         else:
-            self._outside.dispatcher.start(command)
+            self._context.dispatcher.start(command)
 
     @property
     def _is_held(self) -> bool:
@@ -403,13 +403,13 @@ class Runner:
 
     def _hold_everything(self, failure: M2pemError) -> None:
         self.failure = failure
-        resources = ", ".join(sorted(self._outside.dispatcher.hold_all(self.id)))
+        resources = ", ".join(sorted(self._context.dispatcher.hold_all(self.id)))
         text = (
             f"held: {failure}. Commanded to hold: {resources or 'no vehicle'}. Mend the cause, "
             f"start again and go on with `m2pem resume {self.id}`"
         )
         log.error("%s: %s", self.id, text)
-        self._outside.notices.publish(Alert(self.id, "RUN_HELD", text))
+        self._context.events.publish(Alert(self.id, "RUN_HELD", text))
 
     # --- taking over after a restart --------------------------------------------------------------
 

@@ -8,7 +8,7 @@ VARIABLE = "M2PEM_RUNTIME_DIR"
 """The environment variable that names the folder."""
 
 
-def runtime_folder() -> Path:
+def runtime_directory() -> Path:
     """A folder of this user's own: not of the session, whose environment may say another one.
 
     Raises:

@@ -1,4 +1,4 @@
-"""A scripted outside world, as an answers file tells it (docs/rehearsal.md).
+"""A scripted context world, as an answers file tells it (docs/rehearsal.md).
 
 The executive asks it before it runs a service or starts a behavior; `m2pem.rehearsal.answers`
 reads one from a file.

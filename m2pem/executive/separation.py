@@ -18,7 +18,7 @@ of the behavior, and once for all that there are."""
 LOOK_EVERY_S = 0.1
 
 
-class Clearance:
+class AircraftSeparation:
     """`airspace` is told by the executive what is seen."""
 
     def __init__(self, airspace: "Airspace", clock: Clock) -> None:
@@ -26,8 +26,8 @@ class Clearance:
         self._clock = clock
         self._waited_for_all = False
 
-    def heard(self, state: object) -> None:
-        """A resource has said how it is."""
+    def on_telemetry(self, state: object) -> None:
+        """A vehicle published its state."""
         if isinstance(state, VehicleState):
             self.airspace.heard(state)
 
@@ -48,11 +48,11 @@ class Clearance:
         return airspace.claim(request, spec.type, now_us, takes_altitude=takes_altitude)
 
 
-def clearance_for(fleet: Fleet, clock: Clock) -> Clearance | None:
+def separation_for(fleet: Fleet, clock: Clock) -> AircraftSeparation | None:
     """None: the fleet does not say how far its aircraft are to be apart."""
     if fleet.vertical_separation_m is None:
         return None
     from m2pem.deconfliction.reservations import airspace_of  # noqa: PLC0415  # few fleets need it
 
     airspace = airspace_of(fleet)
-    return None if airspace is None else Clearance(airspace, clock)
+    return None if airspace is None else AircraftSeparation(airspace, clock)

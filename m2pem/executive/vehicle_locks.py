@@ -14,7 +14,7 @@ from pathlib import Path
 
 from m2pem.errors import M2pemError
 from m2pem.executive.fleet_connections import SIMULATED, FleetArbiters
-from m2pem.executive.runtime_directory import VARIABLE, runtime_folder
+from m2pem.executive.runtime_directory import VARIABLE, runtime_directory
 from m2pem.mission.catalogue import ResourceId
 
 
@@ -63,7 +63,7 @@ class VehicleLocks:
 
     def _take(self, address: str) -> str | None:
         """Lock an address; returns what its holder has written, if another one has it."""
-        path = runtime_folder() / f"{hashlib.sha256(address.encode()).hexdigest()[:32]}.lock"
+        path = runtime_directory() / f"{hashlib.sha256(address.encode()).hexdigest()[:32]}.lock"
         if path in self._held:
             return None
         while True:

@@ -6,9 +6,9 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 
 from m2pem.api import (
+    ControlEvent,
     Listener,
     MissionControl,
-    Notice,
     OpenPrompt,
     PromptClosed,
     RunStatus,
@@ -26,7 +26,7 @@ FLEET = scenarios.fleet("sim", {"ugv1": {}})
 
 async def until(condition: Callable[[], bool]) -> None:
     async with asyncio.timeout(20):
-        while not condition():  # noqa: ASYNC110  # any notice may change it
+        while not condition():  # noqa: ASYNC110  # any event may change it
             await asyncio.sleep(0)
 
 
@@ -124,7 +124,7 @@ async def test_a_follower_that_fell_behind_reads_what_it_has_missed(
     await following
     assert log.new == [(run, seq) for seq in range(1, last + 1)]
     assert [closed.by for closed in log.closed] == ["anna"]
-    assert "fell 5 notices behind" in caplog.text
+    assert "fell 5 events behind" in caplog.text
 
 
 class CutOff:
@@ -138,7 +138,7 @@ class CutOff:
     def __getattr__(self, name: str) -> object:
         return getattr(self._control, name)
 
-    async def subscribe(self, size: int) -> AsyncIterator[Notice]:
+    async def subscribe(self, size: int) -> AsyncIterator[ControlEvent]:
         self.subscriptions += 1
         if self.subscriptions == 1:
             await self._control.pause(self._run, by="bob")

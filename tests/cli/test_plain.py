@@ -9,8 +9,8 @@ from typing import Any, cast
 import pytest
 
 from m2pem.api.control import (
+    ControlEvent,
     MissionControl,
-    Notice,
     OpenPrompt,
     PromptClosed,
     RunStatus,
@@ -42,11 +42,11 @@ class Control:
 
     def __init__(self) -> None:
         self.calls: list[tuple[Any, ...]] = []
-        self.notices: asyncio.Queue[Notice] = asyncio.Queue()
+        self.notices: asyncio.Queue[ControlEvent] = asyncio.Queue()
         self.refuse: OperatorError | None = None
         self.status = RunStatus.RUNNING
 
-    async def subscribe(self, size: int) -> AsyncIterator[Notice]:
+    async def subscribe(self, size: int) -> AsyncIterator[ControlEvent]:
         while True:
             yield await self.notices.get()
             self.notices.task_done()
@@ -87,7 +87,7 @@ class Operator:
             self._lines.task_done()
         self._lines.task_done()
 
-    async def hear(self, *notices: Notice | Record, run: str = "r1") -> None:
+    async def hear(self, *notices: ControlEvent | Record, run: str = "r1") -> None:
         for notice in notices:
             if not isinstance(notice, (OpenPrompt, PromptClosed, StampedRecord)):
                 notice = StampedRecord(run, 1, 0.0, notice)  # noqa: PLW2901

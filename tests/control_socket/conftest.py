@@ -11,6 +11,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
+from m2pem.telemetry.bus import Bus
 from tests.executive.conftest import FakePlugins, Fakes, fleet, mission, question, sequence
 
 
@@ -21,6 +22,7 @@ class Served:
     control: Control
     journal: Path
     path: Path
+    bus: Bus
 
     async def asked(self) -> tuple[str, str]:
         """Start the mission; returns its run and its prompt, which stands."""
@@ -42,4 +44,4 @@ async def served(tmp_path: Path) -> AsyncIterator[Served]:
     )
     async with executive, ControlSocket(executive.control, journal) as server:
         assert server.path is not None
-        yield Served(executive.control, journal, server.path)
+        yield Served(executive.control, journal, server.path, executive.bus)

@@ -99,7 +99,7 @@ async def test_telemetry_passes(served: Served, state: Telemetry) -> None:
         stream = remote.telemetry()
         next_state = asyncio.ensure_future(anext(stream))
         while not next_state.done():
-            served.control._executive.bus.publish(state)
+            served.bus.publish(state)
             await asyncio.wait([next_state], timeout=0.01)
         assert next_state.result() == state
 

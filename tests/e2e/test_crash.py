@@ -30,10 +30,10 @@ SCRIPT = ("--answers", ANSWERS / "vignette1_detection.yaml")
 DYING = """
 import os, signal
 
-from m2pem.executive.control_events import Observers
+from m2pem.executive.control_events import RecordObservers
 
 seen = 0
-put = Observers.put
+put = RecordObservers.put
 
 def die():
     os.kill(os.getpid(), signal.SIGKILL)
@@ -49,7 +49,7 @@ def look(self, run_id, records):
         if " ".join(here) == os.environ.get("DIE_AT"):
             die()
 
-Observers.put = look
+RecordObservers.put = look
 
 if "DIE_IN" in os.environ:
     from m2pem.simulation.arbiters import SimArbiter

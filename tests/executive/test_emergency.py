@@ -12,7 +12,7 @@ import pytest
 from m2pem.api.control import Alert, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunPaused
 from m2pem.errors import OperatorError
-from m2pem.executive.control_events import MAX_WAITING, Notices, Observers
+from m2pem.executive.control_events import MAX_WAITING, ControlEvents, RecordObservers
 from m2pem.executive.process_monitors import LoopMonitor, blocking
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry
@@ -295,9 +295,9 @@ async def test_an_observer_that_hangs_delays_nobody_and_is_waited_for_within_a_b
         goes_on.wait(30)
         seen.append(run)
 
-    notices = Notices()
+    notices = ControlEvents()
     told = notices.subscribe(None, 10)
-    observers = Observers(observe, notices)
+    observers = RecordObservers(observe, notices)
     observers.start()
     for number in range(MAX_WAITING + 2):
         observers.put(f"r{number}", [])
@@ -310,7 +310,7 @@ async def test_an_observer_that_hangs_delays_nobody_and_is_waited_for_within_a_b
 
 
 async def test_what_blocks_the_event_loop_is_named(caplog: pytest.LogCaptureFixture) -> None:
-    notices = Notices()
+    notices = ControlEvents()
     told = notices.subscribe(None, 10)
     found = threading.Event()
     caplog.set_level("ERROR")
@@ -343,7 +343,7 @@ async def test_what_runs_the_event_loop_is_not_named_for_what_blocks_it() -> Non
 
 
 async def test_an_alert_says_how_long_the_loop_was_blocked_though_it_has_turned_since() -> None:
-    notices = Notices()
+    notices = ControlEvents()
     alerts = notices.subscribe(None, 10)
     async with LoopMonitor(notices) as monitor:
         monitor._blocked_s, monitor._blocked_by = 0.7, "a plugin"

@@ -241,7 +241,7 @@ def test_a_subscriber_that_does_not_read_is_cut_off_and_told(play):
         await control.start(ASK)
         for _ in range(5):
             await anext(stream)
-        with pytest.raises(OperatorError, match="5 notices behind"):
+        with pytest.raises(OperatorError, match="5 events behind"):
             await anext(stream)
 
     play(story)

@@ -7,7 +7,7 @@ import pytest
 
 from m2pem.api.control import Alert
 from m2pem.executive import process_monitors as space
-from m2pem.executive.control_events import Notices
+from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.process_monitors import watch_space
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 
@@ -17,7 +17,7 @@ async def test_operators_are_warned_when_space_runs_short_and_when_there_is_room
 ) -> None:
     monkeypatch.setattr(space, "EVERY_S", 0.0)
     monkeypatch.setenv(MIN_FREE_VARIABLE, "1e15")
-    notices = Notices()
+    notices = ControlEvents()
     subscription = notices.subscribe(None, 10)
     watching = asyncio.create_task(watch_space(tmp_path / "journal.db", notices))
     warning = await anext(subscription)

@@ -31,9 +31,9 @@ def look(self, run_id, records):
         die()
 
 if "DIE_AT_REQUEST" in os.environ:
-    from m2pem.executive.control_events import Observers
+    from m2pem.executive.control_events import RecordObservers
 
-    Observers.put = look
+    RecordObservers.put = look
 
 if "DIE_WHEN_TOLD" in os.environ:
     from m2pem_plugin_ros.vehicle import Vehicle

@@ -222,7 +222,7 @@ async def test_nothing_is_cut_off_in_80_columns(world: World) -> None:
 async def test_the_executives_end_is_told(world: World) -> None:
     async with world.terminal() as terminal:
         await terminal.until_shown("no mission is running")
-        world.executive.notices.end()
+        world.executive.events.end()
         await terminal.until_shown("The executive has ended.")
 
 

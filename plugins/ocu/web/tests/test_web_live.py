@@ -338,7 +338,7 @@ async def test_what_came_too_fast_is_counted_from_the_journal(
         await here.control.stop(run)
         await ended(live, run)
         assert hits(live) == await counted(here, run)
-        assert "fell 5 notices behind" in caplog.text
+        assert "fell 5 events behind" in caplog.text
 
 
 async def test_only_so_many_pages_are_served(

@@ -1,0 +1,416 @@
+"""The supervisor: starts, resumes and drives every run of one executive, and routes what happens.
+
+Reports of arbiters, faults of vehicles and geometries of operators become inputs of the runs that
+they concern.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from m2pem.api.arbiter import BehaviorId, BehaviorReport
+from m2pem.api.authoring import MissionSource
+from m2pem.api.clock import Clock
+from m2pem.api.control import Alert, HandedOver, RunId
+from m2pem.api.service import ServiceContext
+from m2pem.api.telemetry import TeamState, Telemetry
+from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
+from m2pem.engine.records import Record, RunEnded
+from m2pem.engine.run import MissionRun
+from m2pem.engine.state import RunStatus
+from m2pem.errors import JournalError, NotDrivenError, OperatorError
+from m2pem.executive.armed_vehicles import describe_armed_vehicles
+from m2pem.executive.behavior_reports import reported
+from m2pem.executive.control_events import ControlEvents, RecordObservers
+from m2pem.executive.dispatcher import Dispatcher
+from m2pem.executive.emergency import EmergencyCommands, StopMarks
+from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.handover import Handover, refuse_busy_resources
+from m2pem.executive.journal_loss import JournalLossPrompts
+from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
+from m2pem.executive.lost_resources import LostResources
+from m2pem.executive.recovery import replay, take_over
+from m2pem.executive.runner import RunContext, Runner
+from m2pem.executive.script import Script
+from m2pem.executive.separation import separation_for
+from m2pem.executive.services import Services
+from m2pem.findings import Severity
+from m2pem.fleet.allocation import Availability
+from m2pem.fleet.fleet import Fleet, dump
+from m2pem.geo.geojson import GeometryError, parse_geojson
+from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
+from m2pem.journal.base import Journal, RunHeader
+from m2pem.journal.mission import mission_of
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Geometry
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
+from m2pem.plugins import PluginManager
+from m2pem.telemetry.bus import Bus
+
+log = logging.getLogger("m2pem.executive")
+
+REMEMBERED_RUNS = 100
+"""Ended runs whose last state is kept in memory; the journal has them all."""
+
+STEPS_AT_ONCE = 1_000
+"""Engine steps after which a run that does not wait lets others run: STOP waits no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How an executive drives its runs.
+
+    `simulated`: every arbiter is the simulated one. `speed`: of the clock against the wall clock,
+    kept in the journal for a resume. `search_path`: folders of processes that missions call.
+    `script`, `max_steps`: of a rehearsal; see `Script` and `Runner`.
+    """
+
+    simulated: bool = False
+    speed: float = 1.0
+    search_path: tuple[Path, ...] = ()
+    script: Script | None = None
+    max_steps: int | None = None
+
+
+class Supervisor:
+    """Every run of one executive. `runners`: the runs that it drives, and the last that ended.
+
+    `observers`: the plugins that observe records; None: none is called.
+    """
+
+    def __init__(
+        self,
+        journal: Journal,
+        plugins: PluginManager,
+        clock: Clock,
+        arbiters: FleetArbiters,
+        bus: Bus,
+        events: ControlEvents,
+        settings: RunSettings,
+        *,
+        observers: RecordObservers | None = None,
+    ) -> None:
+        self.fleet: Fleet = arbiters.fleet
+        self.journal = journal
+        self.plugins = plugins
+        self.clock = clock
+        self.arbiters = arbiters
+        self.events = events
+        self.settings = settings
+        self.runners: dict[RunId, Runner] = {}
+        self.handed_over: dict[str, HandedOver] = {}
+        self.availability = Availability(self.fleet)
+        self._bus = bus
+        self._observers = observers
+        self._separation = separation_for(self.fleet, clock)
+        self._marks = StopMarks(journal.file, journal.identity)
+        self._tasks: dict[RunId, asyncio.Task[None]] = {}
+        # Of two starts at once the second must see what the first one takes.
+        self._starting = asyncio.Lock()
+        self.dispatcher = Dispatcher(
+            arbiters,
+            self.availability,
+            clock,
+            self._geometry,
+            self._post_report,
+            settings.script,
+            self._separation,
+        )
+        self.emergency = EmergencyCommands(self.dispatcher, events, self._marks)
+        self.handover = Handover(arbiters, self.availability)
+        self.losses = JournalLossPrompts(
+            journal,
+            arbiters,
+            self.dispatcher,
+            self.availability,
+            self.handover,
+            events,
+            self.runners,
+        )
+        self._lost_resources = LostResources(
+            arbiters, self.availability, self.handover, clock, self.epoch_of, bus.publish
+        )
+        self._services = Services(
+            plugins.service,
+            ServiceContext(clock, bus, logging.getLogger("m2pem.service"), arbiters.detectors),
+            settings.script,
+        )
+
+    # --- life -----------------------------------------------------------------------------------
+
+    def begin_tasks_in(self, group: asyncio.TaskGroup) -> None:
+        """Say in which task group the runs are driven."""
+        self._group = group
+
+    async def stop_all(self, reason: str) -> None:
+        """Stop what still runs and wait for it.
+
+        A run whose journal failed stays held: it can be resumed.
+        """
+        for runner in self.runners.values():
+            if not runner.done.is_set() and runner.run.state.status is not RunStatus.ENDED:
+                self.emergency.stop(runner, "", reason)
+        await asyncio.gather(*self._tasks.values())
+
+    async def end_calls(self) -> None:
+        """Let go of lost resources, services and calls of arbiters, once every run has ended."""
+        await self._lost_resources.close()
+        await self._services.close()
+        await self.dispatcher.close()
+
+    async def close(self) -> None:
+        """Let the marks of stopped runs be written."""
+        await self._marks.close()
+
+    # --- starting and resuming ------------------------------------------------------------------
+
+    @property
+    def fleet_now(self) -> Fleet:
+        """The fleet, with the geometries that operators have handed over for all runs."""
+        given = {name: parse_geojson(each.geometry) for name, each in self.handed_over.items()}
+        return replace(self.fleet, geometries={**self.fleet.geometries, **given})
+
+    def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
+        """Check a mission; returns the id of the process to begin with.
+
+        Raises:
+            MissionError: with every finding.
+        """
+        findings = findings_for(
+            loaded,
+            self.arbiters,
+            self.plugins,
+            known_data(data),
+            process,
+            simulated=self.settings.simulated,
+            handed_over=self.handed_over,
+        )
+        refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
+        return loaded.process(process).id
+
+    def _load(
+        self, mission: MissionSource, process: str | None, data: Mapping[str, Value] | None
+    ) -> tuple[Mission, str]:
+        loaded = load_source(mission, self.settings.search_path)
+        return loaded, self.admit(loaded, process, data)
+
+    async def start(
+        self,
+        mission: MissionSource,
+        process: str | None,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        even_if_busy: bool = False,
+    ) -> RunId:
+        """Begin a run. Returns when its first records are durable.
+
+        Raises:
+            MissionError: with every finding.
+            BusyError: other runs or operators have what it names, unless `even_if_busy`.
+        """
+        # Reading and checking take a while, and a URL may take longer: not in the event loop.
+        loaded, process_id = await asyncio.to_thread(self._load, mission, process, data)
+        if even_if_busy:
+            return await self.begin(loaded, process_id, data, by)
+        async with self._starting:
+            ended = RunStatus.ENDED
+            over = {run for run, one in self.runners.items() if one.run.state.status is ended}
+            taken, holder = self.handover.taken, self.availability.holder
+            refuse_busy_resources(loaded, self.fleet, taken, holder, over)
+            return await self.begin(loaded, process_id, data, by)
+
+    async def begin(
+        self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str
+    ) -> RunId:
+        """Begin a run of a mission that was admitted. Returns when its beginning is durable."""
+        header = RunHeader(
+            loaded.file,
+            loaded.source,
+            process_id,
+            dump(self.fleet),
+            self.settings.simulated,
+            self.settings.speed,
+            self.clock.now_us() if self.settings.speed == 1.0 else time.time_ns() // 1000,
+            loaded.library,
+        )
+        number = await self.journal.create(header)
+        batch = min(STEPS_AT_ONCE, self.settings.max_steps or STEPS_AT_ONCE)
+        runner = self._runner(MissionRun(loaded, self.fleet, number, batch), 1)
+        begun = runner.tell(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
+        for name, given in self.handed_over.items():
+            runner.post(GeometrySet(name, dict(given.geometry), given.by))
+        self._drive(runner)
+        await begun
+        return number
+
+    async def resume(self, number: RunId) -> None:
+        """Take up a run that its executive left without ending it.
+
+        Raises:
+            JournalError: there is no such run, or an executive that is alive drives it.
+            OperatorError: it has ended.
+        """
+        lines = {line.run: line for line in await self.journal.runs()}
+        line = lines.get(number)
+        if line is None:
+            known = ", ".join(lines) or "none"
+            raise JournalError(f"there is no run {number}; the journal has: {known}")
+        if line.loss is not None and not line.loss.resumable:
+            raise OperatorError(f"{number}: {line.loss}. {line.loss.remedy(number)}")
+        if line.outcome is not None:
+            raise OperatorError(f"{number} has ended: {line.outcome.value}")
+        if line.last_seq == 0:
+            raise OperatorError(f"{number} never began: start its mission again")
+        epoch = await self.journal.claim(number)
+        mission = mission_of(line.header)
+        for finding in mission.warnings:
+            if finding.severity is Severity.ERROR:
+                log.warning(
+                    "%s goes on as it was begun, but would not begin now: %s", number, finding
+                )
+        run = MissionRun(mission, self.fleet, number, STEPS_AT_ONCE)
+        last_us = await replay(self.journal, run, self.settings.script)
+        runner = self._runner(run, epoch)
+        self.handover.take_up(run.state.taken)
+        outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
+        mark = self._marks.get(number)
+        if mark is not None:
+            log.warning("%s was stopped before its executive ended; it stays stopped", number)
+            runner.tell_stop(StopRun(mark.by, mark.reason), frozenset())
+        await take_over(runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss)
+        if line.loss is not None:
+            await self.losses.ask(runner, line.loss)
+        self._drive(runner)
+
+    def _runner(self, run: MissionRun, epoch: int) -> Runner:
+        context = RunContext(
+            self.journal, self.clock, self.dispatcher, self._services, self.events, self._observe
+        )
+        bound = self.fleet.steps_between_waits
+        runner = Runner(run, epoch, context, self.settings.max_steps, bound)
+        self.runners[runner.id] = runner
+        return runner
+
+    def _drive(self, runner: Runner) -> None:
+        self._tasks[runner.id] = self._group.create_task(self._drive_and_release(runner))
+
+    async def _drive_and_release(self, runner: Runner) -> None:
+        await runner.drive()
+        await self.journal.release(runner.id)
+        del self._tasks[runner.id]
+        every, taken = self.fleet.vehicles.values(), self.handover.taken
+        free = [
+            each
+            for each in every
+            if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
+        ]
+        if not self.settings.simulated and (text := describe_armed_vehicles(free, self._bus)):
+            self.events.publish(Alert(runner.id, "LEFT_ARMED", text))
+        over = [each for each in self.runners.values() if each.done.is_set()]
+        for oldest in over[:-REMEMBERED_RUNS]:
+            del self.runners[oldest.id]
+
+    def _is_held_by_another(self, run: RunId, vehicle: ResourceId) -> bool:
+        """A vehicle whose link was lost is held by the behavior that it had then."""
+        holder = self.availability.holder(vehicle)
+        return holder is not None and not holder.startswith(f"{run}.")
+
+    def _observe(self, run: RunId, records: Sequence[Record]) -> None:
+        self.losses.on_records(run, records)
+        if self.settings.script is not None:
+            self.settings.script.seen(run, records)
+        if self._observers is not None:
+            self._observers.put(run, records)
+        if any(isinstance(record, RunEnded) for record in records[-3:]):
+            self._marks.remove(run)
+
+    # --- what happens outside of the runs -------------------------------------------------------
+
+    def _post_report(self, report: BehaviorReport) -> None:
+        run = report.id.partition(".")[0]
+        runner = self.runners.get(run)
+        if runner is None:
+            # After a restart an arbiter may report before its run is taken up, which then asks it.
+            log.info("a report for %s, which no run here asked for", report.id)
+            return
+        runner.post(reported(report, runner.run.state.behaviors.get(report.id), self.arbiters))
+
+    def on_report(self, report: BehaviorReport) -> None:
+        """An arbiter reported what became of a behavior."""
+        self.dispatcher.reported(report)
+
+    def on_telemetry(self, state: Telemetry) -> None:
+        """An arbiter published the state of a vehicle, payload or team."""
+        if not isinstance(state, TeamState):
+            self._lost_resources.on_telemetry(state)
+            state = self._lost_resources.annotated(state)
+        self._bus.publish(state)
+        if self._separation is not None:
+            self._separation.on_telemetry(state)
+
+    def fault(self, fault: ResourceFault) -> None:
+        """A vehicle or payload failed, or its link was lost: tell the runs that command it."""
+        log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
+        resource = ResourceId(fault.resource)
+        if not fault.reachable:
+            self._lost(resource, fault.reason)
+        with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
+        for runner in self.runners.values():
+            if not with_team and fault.resource in runner.run.state.held:
+                runner.post(fault)
+
+    def _lost(self, resource: ResourceId, reason: str) -> None:
+        self._lost_resources.lost(resource, reason)
+        if self._separation:
+            self._separation.airspace.lost(resource)
+
+    def set_geometry(
+        self, name: str, geometry: Mapping[str, Value], run: RunId | None, by: str
+    ) -> None:
+        """Make a route, area or point known to one run, or to all now and later.
+
+        Raises:
+            OperatorError: it is no geometry that m2pem knows.
+        """
+        try:
+            parsed = parse_geojson(geometry)
+        except GeometryError as error:
+            raise OperatorError(f"geometry {name!r} {error}") from error
+        origin = self.fleet.origin
+        if origin != NO_ORIGIN and (wrong := geometry_out_of_reach(parsed, origin)):
+            raise OperatorError(f"geometry {name!r}: {wrong[0]}; {wrong[1]}")
+        item = GeometrySet(name, dict(geometry), by)
+        if run is None:
+            self.handed_over[name] = HandedOver(dict(geometry), by, self.clock.now_us())
+        for runner in self.runners.values() if run is None else [self.runner(run)]:
+            if not runner.done.is_set():
+                runner.post(item)
+
+    def runner(self, run: RunId) -> Runner:
+        """The runner of a run that is driven here.
+
+        Raises:
+            NotDrivenError: it is not.
+        """
+        runner = self.runners.get(run)
+        if runner is None:
+            known = ", ".join(self.runners) or "none"
+            raise NotDrivenError(f"{run} is not driven by this executive; it drives: {known}")
+        return runner
+
+    def epoch_of(self, behavior: BehaviorId) -> int:
+        """With which epoch the run of a behavior is driven here; 0: it is not."""
+        runner = self.runners.get(behavior.partition(".")[0])
+        return runner.epoch if runner is not None else 0
+
+    def _geometry(self, run: str, name: str) -> Geometry | None:
+        runner = self.runners.get(run)
+        given = runner.run.state.geometries.get(name) if runner is not None else None
+        if given is None and name in self.handed_over:
+            given = dict(self.handed_over[name].geometry)
+        return self.fleet.geometries.get(name) if given is None else parse_geojson(given)
