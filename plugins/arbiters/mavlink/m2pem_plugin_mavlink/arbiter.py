@@ -186,7 +186,7 @@ class MavlinkArbiter:
                 for controller in self._controllers.values()
             )
         )
-        for vehicle in vehicles.values():  # who is commanded first may be told to follow another
+        for vehicle in vehicles.values():  # the first behavior may follow another vehicle
             self._states.put(vehicle.telemetry())
         self._tasks += [create(self._check(vehicle)) for vehicle in vehicles.values()]
         for resource, is_known in zip(vehicles, known, strict=True):

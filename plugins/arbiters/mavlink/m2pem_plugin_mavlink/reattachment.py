@@ -14,7 +14,7 @@ SOON_S = 60.0
 """A person who walks up to the vehicle later than that does not expect it to move by itself."""
 
 SAME_PLACE_M = 3.0
-"""Positions of a vehicle that stands drift so far within that time."""
+"""The reported position of a stopped vehicle drifts by up to this distance within that time."""
 
 
 def take_snapshot(vehicle: Vehicle, now_s: float) -> VehicleSnapshot | None:

@@ -25,11 +25,11 @@ from m2pem_plugin_mavlink.vehicle.takeover_monitor import TEXTS_BEFORE_S, Cause,
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 LOOK_EVERY_S = 0.2
-"""So often is a behavior asked whether it is finished."""
+"""The interval at which a behavior is checked for completion."""
 
 KNOWN_WITHIN_S = 5.0
 STOP_SHARE = 0.8
-"""Of the time in which a cancelled vehicle must be free: a stop that takes longer has failed."""
+"""The share of the cancel timeout after which a stop has failed."""
 
 _FAILSAFES = frozenset({FlightMode.RETURN, FlightMode.LAND})
 """What autopilots do by themselves when a link is lost, beside standing (BRAKE, HOLD, LOITER)."""
@@ -161,7 +161,7 @@ class VehicleController:
         mode = "" if state.custom_mode is None else driver.mode_name(state.custom_mode)
         if state.armed and state.mode in _FAILSAFES and not self._stands():
             return f"it is heard again in {mode}, which is not interrupted: free when it stands"
-        # PX4 goes to a place in the mode in which it also stands.
+        # PX4 uses the same mode to go to a place and to stay there.
         stands = (
             state.mode is FlightMode.HOLD
             and state.custom_mode != self.vehicle.commanded.custom_mode
@@ -271,7 +271,7 @@ class VehicleController:
         )
         stillness = StillnessTimer(active.behavior.context)
         try:
-            # A restart comes first: one that fell from the air looks like one that has landed.
+            # Check for a restart first: a vehicle that fell looks like one that has landed.
             while not self._has_restarted() and not active.behavior.finished():
                 if steps.done():
                     steps.result()

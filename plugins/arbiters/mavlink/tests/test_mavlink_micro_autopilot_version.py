@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.microservices.message_requests import (
 )
 from m2pem_plugin_mavlink.microservices.parameters import ParameterEncoding
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES
 from mavlink_lossy import VEHICLE, Played, play_table
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -30,7 +30,7 @@ def test_the_version_is_read_or_it_fails_clearly_whatever_the_link_does() -> Non
     play_table(
         lambda: (ReadAutopilotVersion(VEHICLE), Commanded(gives)),
         check,
-        lambda _: PATIENCE.bound_s,
+        lambda _: RETRIES.bound_s,
     )
 
 

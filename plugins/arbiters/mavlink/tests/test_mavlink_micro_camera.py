@@ -20,7 +20,7 @@ from m2pem_plugin_mavlink.microservices.camera import (
     zoom,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError
 from mavlink_lossy import VEHICLE, Played, Silent, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -62,13 +62,13 @@ def test_one_image_is_taken_or_it_fails_clearly_whatever_the_link_does() -> None
     play_table(
         lambda: (take_image(VEHICLE, 5), Commanded(photographs)),
         check,
-        lambda _: PATIENCE.bound_s,
+        lambda _: RETRIES.bound_s,
     )
 
 
 def test_several_images_are_asked_for_only_once_as_they_would_be_taken_again() -> None:
     assert len(run(take_images(VEHICLE, 2.0, count=3), Silent()).sent) == 1
-    assert len(run(take_images(VEHICLE, 2.0), Silent()).sent) == PATIENCE.tries
+    assert len(run(take_images(VEHICLE, 2.0), Silent()).sent) == RETRIES.tries
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from typing import Any
 
 from m2pem_plugin_mavlink.microservices.camera_images import KEPT, CapturedImages, ReadImage
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES
 from mavlink_lossy import VEHICLE, Played, over_the_wire, play_table
 from mavlink_peers import Commanded, ack
 
@@ -54,4 +54,4 @@ def test_a_missing_image_is_told_or_it_fails_clearly_whatever_the_link_does() ->
     def check(played: Played, _: Commanded) -> None:
         assert played.error is not None or played.result.index == 6
 
-    play_table(lambda: (ReadImage(VEHICLE, 6), Commanded(gives)), check, lambda _: PATIENCE.bound_s)
+    play_table(lambda: (ReadImage(VEHICLE, 6), Commanded(gives)), check, lambda _: RETRIES.bound_s)

@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.microservices.commands import (
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
-    PATIENCE,
+    RETRIES,
     ExchangeError,
     NoAnswerError,
     RefusedError,
@@ -26,7 +26,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 TAKEOFF: int = dialect.MAV_CMD_NAV_TAKEOFF
 ARM: int = dialect.MAV_CMD_COMPONENT_ARM_DISARM
-BOUND_S = PATIENCE.bound_s + REASON_S
+BOUND_S = RETRIES.bound_s + REASON_S
 
 
 def test_a_takeoff_is_done_once_or_fails_clearly_whatever_the_link_does() -> None:
@@ -50,14 +50,14 @@ def test_confirmation_counts_up_and_the_parameters_stay() -> None:
     assert [each.confirmation for each in played.sent] == [0, 1, 2, 3, 4]
     assert all((each.param7, each.command) == (30.0, TAKEOFF) for each in played.sent)
     assert all(math.isnan(each.param4) for each in played.sent)
-    assert played.ended_s == PATIENCE.bound_s
+    assert played.ended_s == RETRIES.bound_s
 
 
 def test_what_must_not_be_done_twice_is_sent_once() -> None:
     played = run(Command(VEHICLE, TAKEOFF, once=True), Silent())
     assert len(played.sent) == 1
     assert isinstance(played.error, NoAnswerError)
-    assert played.ended_s == PATIENCE.bound_s
+    assert played.ended_s == RETRIES.bound_s
 
 
 def test_a_place_is_sent_in_whole_numbers() -> None:
@@ -266,4 +266,4 @@ def test_an_answer_that_never_comes_is_told_from_silence() -> None:
     played = run(request(), Answers(*[[ack(command)]] * 9))
     assert isinstance(played.error, ExchangeError)
     assert played.error.reason == "REQUEST_MESSAGE: accepted, but the answer does not come"
-    assert len(played.sent) == PATIENCE.tries
+    assert len(played.sent) == RETRIES.tries

@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.microservices.gimbal import (
     take_control,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError
 from mavlink_lossy import GROUND, VEHICLE, Played, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -45,7 +45,7 @@ def test_a_gimbal_is_found_or_it_fails_clearly_whatever_the_link_does() -> None:
     play_table(
         lambda: (FindGimbal(VEHICLE, 2), Commanded(manages)),
         check,
-        lambda _: PATIENCE.bound_s + REASON_S,
+        lambda _: RETRIES.bound_s + REASON_S,
     )
     assert run(FindGimbal(VEHICLE), Commanded(manages)).result.device == 1
 
@@ -58,7 +58,7 @@ def test_a_gimbal_points_once_or_it_fails_clearly_whatever_the_link_does() -> No
     play_table(
         lambda: (point(VEHICLE, Aim(-1.0, 0.5)), Commanded(manages)),
         check,
-        lambda _: PATIENCE.bound_s,
+        lambda _: RETRIES.bound_s,
     )
 
 

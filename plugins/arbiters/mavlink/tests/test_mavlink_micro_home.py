@@ -13,7 +13,7 @@ from m2pem_plugin_mavlink.microservices.home import (
     set_home,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, ExchangeError, NoAnswerError
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, ExchangeError, NoAnswerError
 from mavlink_lossy import VEHICLE, Played, Silent, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -35,7 +35,7 @@ def test_home_and_origin_are_read_or_it_fails_clearly_whatever_the_link_does(
     def check(played: Played, _: Commanded) -> None:
         assert played.result == (PLACE if played.error is None else None)
 
-    play_table(lambda: (read(VEHICLE), Commanded(gives)), check, lambda _: PATIENCE.bound_s)
+    play_table(lambda: (read(VEHICLE), Commanded(gives)), check, lambda _: RETRIES.bound_s)
 
 
 def test_home_is_set_to_a_place_or_to_where_the_vehicle_is() -> None:
@@ -70,7 +70,7 @@ def test_the_origin_is_set_once_or_it_fails_clearly_whatever_the_link_does() -> 
         assert played.result == (PLACE if played.error is None else None)
         assert vehicle.places in ([], [tuple(AT.values())])
 
-    play_table(lambda: (SetOrigin(VEHICLE, PLACE), Origin()), check, lambda _: PATIENCE.bound_s)
+    play_table(lambda: (SetOrigin(VEHICLE, PLACE), Origin()), check, lambda _: RETRIES.bound_s)
     assert isinstance(run(SetOrigin(VEHICLE, PLACE), Silent()).error, NoAnswerError)
 
 

@@ -13,14 +13,14 @@ from m2pem_plugin_mavlink.microservices.message_requests import (
     as_it_is,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError, RefusedError
 from mavlink_lossy import VEHICLE, Answers, Played, Silent, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 ATTITUDE: int = message_type("ATTITUDE").id
 FASTEST_US = 20_000
-BOUND_S = (1 + SLOWER_TRIES) * PATIENCE.bound_s + REASON_S
+BOUND_S = (1 + SLOWER_TRIES) * RETRIES.bound_s + REASON_S
 INTERVAL = message_type("MESSAGE_INTERVAL")
 
 
@@ -100,7 +100,7 @@ def test_a_message_is_sent_once_or_it_fails_clearly_whatever_the_link_does() -> 
             Commanded(gives),
         ),
         check,
-        lambda _: PATIENCE.bound_s,
+        lambda _: RETRIES.bound_s,
     )
 
 
@@ -111,4 +111,4 @@ def test_a_message_that_is_not_there_is_told_of() -> None:
     assert played.error.reason == "request for ATTITUDE: failed"
     silent = run(RequestMessage(VEHICLE, "ATTITUDE", as_it_is), Silent())
     assert isinstance(silent.error, NoAnswerError)
-    assert silent.ended_s == PATIENCE.bound_s
+    assert silent.ended_s == RETRIES.bound_s

@@ -12,7 +12,7 @@ from m2pem_plugin_mavlink.microservices.missions import (
     SetCurrentItem,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError, RefusedError
 from mavlink_lossy import VEHICLE, Answers, Played, Silent, play_table, run
 from mavlink_peers import Commanded, Stored, ack, mission_ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -68,7 +68,7 @@ def test_the_current_item_is_set_or_it_fails_clearly_whatever_the_link_does() ->
     play_table(
         lambda: (SetCurrentItem(VEHICLE, 3), Commanded(goes_to)),
         check,
-        lambda _: PATIENCE.bound_s,
+        lambda _: RETRIES.bound_s,
     )
 
 
@@ -93,7 +93,7 @@ def test_where_the_command_is_not_known_the_message_sets_it() -> None:
     play_table(
         lambda: (SetCurrentItem(VEHICLE, 3), KnowsNoCommand()),
         check,
-        lambda _: 2 * PATIENCE.bound_s,
+        lambda _: 2 * RETRIES.bound_s,
     )
     played = run(
         SetCurrentItem(VEHICLE, 3),
@@ -118,7 +118,7 @@ def test_one_item_is_read_or_it_fails_clearly_whatever_the_link_does() -> None:
         assert played.result == (HOME if played.error is None else None)
         assert played.error is None or isinstance(played.error, NoAnswerError)
 
-    play_table(lambda: (ReadMissionItem(VEHICLE, 0), storing()), check, lambda _: PATIENCE.bound_s)
+    play_table(lambda: (ReadMissionItem(VEHICLE, 0), storing()), check, lambda _: RETRIES.bound_s)
 
 
 def test_an_item_that_is_not_there_is_told() -> None:

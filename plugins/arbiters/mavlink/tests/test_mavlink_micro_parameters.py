@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.microservices.parameters import (
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
-    PATIENCE,
+    RETRIES,
     ExchangeError,
     NoAnswerError,
     RefusedError,
@@ -39,7 +39,7 @@ def test_a_parameter_is_read_or_it_fails_clearly_whatever_the_link_does() -> Non
             assert isinstance(played.error, NoAnswerError)
 
     play_table(
-        lambda: (ReadParameter(VEHICLE, "RTL_ALT"), vehicle()), check, lambda _: PATIENCE.bound_s
+        lambda: (ReadParameter(VEHICLE, "RTL_ALT"), vehicle()), check, lambda _: RETRIES.bound_s
     )
 
 
@@ -59,7 +59,7 @@ def test_a_parameter_is_set_once_or_it_fails_clearly_whatever_the_link_does(
     play_table(
         lambda: (SetParameter(VEHICLE, LONG_NAME, -123456, encoding), vehicle(bytewise=bytewise)),
         check,
-        lambda _: 2 * PATIENCE.bound_s,
+        lambda _: 2 * RETRIES.bound_s,
     )
 
 
@@ -68,7 +68,7 @@ def test_a_parameter_that_is_not_there_is_answered_by_silence_or_an_error() -> N
     assert isinstance(played.error, NoAnswerError)
     said = "parameter NONE: no answer: perhaps it has no such parameter"
     assert played.error.reason == said
-    assert played.ended_s == PATIENCE.bound_s
+    assert played.ended_s == RETRIES.bound_s
 
     error = message_type("PARAM_ERROR").make(
         param_id=b"NONE", error=dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST

@@ -127,7 +127,7 @@ def test_a_return_ends_at_home_or_at_a_rally_point_and_nowhere_else(rally) -> No
         bench.body.up, bench.body.armed = 0.0, False
         end = await bench.ended("r1.b1", 20)
         assert end.state is (SUCCEEDED if rally else BehaviorState.FAILED)
-        where = "" if rally else "it stands on the ground, 11"
+        where = "" if rally else "it is on the ground, 11"
         assert end.reason.startswith(where)
         assert rally or "Crash: Disarming" in end.reason
 

@@ -271,7 +271,7 @@ def test_a_crash_is_the_cause_of_a_disarming(virtual: Run) -> None:
     [
         (3, None),
         (0, None),  # an autopilot that does not say it
-        (7, "another ground station has replaced the mission: it has 7 items, ours 3"),
+        (7, "another ground station has replaced the mission: it has 7 items, not 3"),
         (0xFFFF, "another ground station has cleared the mission"),
     ],
 )

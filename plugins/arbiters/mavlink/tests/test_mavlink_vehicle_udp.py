@@ -179,7 +179,7 @@ async def test_a_rover_drives_a_mission() -> None:
 @pytest.mark.parametrize(
     ("replaced", "words"),
     [
-        (ROUTE[:2], "has replaced the mission: it has 2 items, ours 4"),
+        (ROUTE[:2], "has replaced the mission: it has 2 items, not 4"),
         ((TAKEOFF, *(waypoint(47.396 - n / 1000) for n in range(3))), "is not ours"),
     ],
 )

@@ -12,7 +12,7 @@ from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 STANDS_BELOW_M_S = 0.3
-"""Positions of a vehicle that stands drift; a gust moves one that hovers."""
+"""The reported position of a stopped vehicle drifts; a gust moves one that hovers."""
 
 HEIGHT_TOLERANCE_M = 1.0
 CIRCLING_HEIGHT_TOLERANCE_M = 5.0
@@ -131,7 +131,7 @@ def on_the_ground(vehicle: Vehicle) -> bool:
 def takeoff_required(vehicle: Vehicle) -> str:
     """Return why a motion cannot begin before a takeoff; "" if it can."""
     if on_the_ground(vehicle):
-        return f"{vehicle.resource} stands on the ground: let it take off first (takeoff)"
+        return f"{vehicle.resource} is on the ground: take off first (takeoff)"
     return ""
 
 

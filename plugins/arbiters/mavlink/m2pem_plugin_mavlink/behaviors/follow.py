@@ -15,8 +15,8 @@ REPEAT_S = 0.5
 STALE_S = 3.0
 MOVED_M = 0.5
 LEAD_S = 2.0
-"""It is sent where its station will be by then: told twice a second, and slowing down before each
-place that it is told, it lags so much behind."""
+"""The vehicle is sent to where the position will be then: it slows down before each target, and
+so lags behind by about this time."""
 
 COURSE_ABOVE_M_S = 1.0
 """Who moves faster points where it moves; its bow counts only if that is not known."""

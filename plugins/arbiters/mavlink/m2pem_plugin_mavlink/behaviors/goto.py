@@ -31,13 +31,13 @@ from m2pem_plugin_mavlink.behaviors.parameters import VehicleParameters
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
-"""How near is there, if nobody says; what autopilots take for a waypoint's radius."""
+"""The default tolerances by domain: the usual waypoint radii of autopilots."""
 
 NEAREST_M = 0.5
 """Nearer than this a satellite receiver cannot tell."""
 
 SETTLED_S = 10.0
-"""Who stands for so long near its target considers itself arrived."""
+"""A vehicle that has stopped near its target for this long counts as arrived."""
 
 SETTLED_WITHIN_M = 10.0
 TURNED_RAD = math.radians(10.0)
@@ -45,7 +45,7 @@ TURN_S = 10.0
 """A vehicle at its target has turned by then."""
 
 MOVED_M = 1.0
-"""A target that has moved by so much is told to the vehicle again."""
+"""A target that has moved by this distance is sent to the vehicle again."""
 
 REPEAT_S = 0.5
 
@@ -119,7 +119,7 @@ class Goto(Behavior):
         as its autopilot goes. A vehicle that cannot stop has arrived when it circles the place.
 
         Raises:
-            BehaviorFailedError: it stands outside of a tolerance that was asked for.
+            BehaviorFailedError: it has stopped outside of a requested tolerance.
         """
         place = self._place or self.target()
         away = distance_to_m(self.vehicle, (place.latitude_deg, place.longitude_deg))
@@ -177,7 +177,7 @@ class Hold(Behavior):
         """Stop the vehicle; one that is not armed has stopped."""
         self._at = position_of(self.vehicle)
         if on_the_ground(self.vehicle) or self.vehicle.state.armed is False:
-            self.modes = frozenset(FlightMode)  # it stands already, in whatever mode
+            self.modes = frozenset(FlightMode)  # it has stopped, in whatever mode
         else:
             await self.vehicle.driver.stop()
         self._since_s = self.context.now_s()

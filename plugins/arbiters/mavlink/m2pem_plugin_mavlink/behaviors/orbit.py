@@ -51,7 +51,7 @@ class Orbit(MissionFlight):
             self.modes |= {FlightMode.GUIDED}  # a plane is sent to a place with a radius
 
     ends = True
-    """Whether it ends after one turn when nobody says otherwise."""
+    """Whether it ends after one turn by default."""
 
     # --- where ----------------------------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 SPEED_M_S = 1.0
 BEYOND_M = 5.0
-"""Autopilots stop some way before the place that they were told: it lies so far beyond."""
+"""Autopilots stop before their target, so the target is this distance further."""
 
 STOPPING_S = 0.25
 LOOK_EVERY_S = 0.1

@@ -41,7 +41,7 @@ LEVEL_M_S = 0.5
 """Climbing or sinking by less is hovering."""
 
 DISARMS_WITHIN_S = 10.0
-"""An autopilot disarms by itself so soon after landing; one that doesn't is told to."""
+"""An autopilot disarms itself within this time after a landing, or is disarmed."""
 
 LANDS_WITHIN_M = 15.0
 """An aircraft that returns lands so near to its home, or to a rally point."""
@@ -292,17 +292,17 @@ class ReturnToLaunch(Behavior):
         circling for long), others stopped.
 
         Raises:
-            BehaviorFailedError: an aircraft stands somewhere else.
+            BehaviorFailedError: an aircraft has landed somewhere else.
         """
         air = self.vehicle.domain == "air" and self.modes is not ANY_MODE
         if air:
-            # A LAND far from there is not the end of this return: its battery, or somebody else.
+            # A LAND far from there is not the end of this return: it is a failsafe or a takeover.
             lands = self._off_m() <= LANDS_WITHIN_M
             self.modes = _RETURNS | {FlightMode.LAND} if lands else _RETURNS
         if self._is_there_already():
             if air and self._off_m() > LANDS_WITHIN_M:
                 said = "; ".join(self.vehicle.recent_texts(TEXTS_WITHIN_S))
-                reason = f"it stands on the ground, {self._home_m():.0f} m from its home"
+                reason = f"it is on the ground, {self._home_m():.0f} m from its home"
                 raise BehaviorFailedError(f"{reason}; it said: {said}" if said else reason)
             return True
         home, radius_m = self.vehicle.state.home, self.vehicle.state.home_loiter_radius_m

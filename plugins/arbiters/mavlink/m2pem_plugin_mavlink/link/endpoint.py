@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.protocol.url import Url
 logger = logging.getLogger(__name__)
 
 MAX_UNKNOWN_SENDERS = 64
-"""Senders at one peer that nobody asked for, of which something is kept."""
+"""The largest number of senders without a route that are counted at one peer."""
 
 
 class Endpoint(ABC):

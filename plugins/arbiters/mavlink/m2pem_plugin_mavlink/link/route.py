@@ -19,7 +19,7 @@ from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.url import Url
 
 AdmitSender: TypeAlias = Callable[["Peer", Sender], bool]
-"""Is told of a new sender at a peer; False: it is not to be heard."""
+"""Called with a new sender at a peer; returns False to drop its frames."""
 
 
 class Peer:
@@ -179,7 +179,7 @@ class Route:
 
     def _give(self, owner: _ComponentOwner, claim: _Claim) -> None:
         before = owner.holder
-        # Who is not believed is met anew when it is heard next: it may be believed another time.
+        # Other senders are forgotten; their next frame makes them competitors again.
         for other in (before, *owner.competitors):
             if other is not claim:
                 other.sender.wanted = NOTHING

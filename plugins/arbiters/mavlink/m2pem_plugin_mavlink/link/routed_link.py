@@ -20,7 +20,7 @@ T = TypeVar("T")
 _logger = logging.getLogger(__name__)
 
 GROUND_STATION = Address(255, 190)
-"""Who we are, if nobody says otherwise: what MAVLink gives to ground stations."""
+"""The default address of this ground station, as MAVLink assigns it."""
 
 SILENT_S = 2.5
 """Longer than this without anything, and another endpoint is tried."""

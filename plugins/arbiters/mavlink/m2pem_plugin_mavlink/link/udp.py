@@ -70,7 +70,7 @@ class UdpEndpoint(Endpoint):
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:
-                continue  # what was sent before did not arrive: nobody listens there, yet
+                continue  # an earlier datagram did not arrive: no process listens there yet
             peer = peers.get(address)
             if peer is None:
                 self._receive_from_new_peer(data, address, now_s)

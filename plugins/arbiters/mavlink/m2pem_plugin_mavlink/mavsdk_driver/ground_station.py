@@ -29,7 +29,7 @@ class GroundStation:
         self._search: asyncio.Task[None] | None = None
 
     def join(self, link: MavsdkLink) -> None:
-        """Attach a link as soon as its vehicle is heard."""
+        """Attach a link as soon as MAVSDK has found its vehicle."""
         self.links.append(link)
         system = self._systems.get(link.address.system)
         if system is not None:

@@ -54,7 +54,7 @@ class PendingCalls:
     def _done(self, task: "asyncio.Task[Any]") -> None:
         self._tasks.discard(task)
         if not task.cancelled():
-            task.exception()  # so that nobody says that nobody has asked
+            task.exception()  # else asyncio logs that it was never retrieved
 
     async def finish(self) -> None:
         """Wait until all calls have returned; each does so soon, as MAVSDK waits for no vehicle

@@ -49,7 +49,7 @@ class CapturedImages:
         return image
 
     def missing(self) -> tuple[int, ...]:
-        """Indexes between those that came of which nothing was heard: `ReadImage` asks for them."""
+        """The indexes that are missing between received ones: `ReadImage` requests them."""
         if not self.images:
             return ()
         indexes = range(min(self.images), max(self.images))

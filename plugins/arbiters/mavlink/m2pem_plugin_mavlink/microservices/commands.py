@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.microservices.texts import StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
-    PATIENCE,
+    RETRIES,
     ExchangeError,
     NoAnswerError,
     RefusedError,
@@ -58,7 +58,7 @@ def with_reason(what: str, texts: Sequence[Text]) -> str:
 T = TypeVar("T")
 
 PROGRESS_S = 10.0
-"""What was in progress and says nothing for so long is not heard of any more."""
+"""A command in progress without a message for this long has failed."""
 
 LONGEST_S = 120.0
 """A command may be in progress for so long."""
@@ -100,10 +100,10 @@ class CommandExchange(Transaction[T]):
         params: its param1 and so on, as many as matter; the others are 0.
         place: its param5 to param7, which are then sent as whole numbers (COMMAND_INT).
         once: never sent again, as it would be done again; silence then says nothing.
-        progress: is told how far it is, in percent, or None where the vehicle does not say.
+        progress: called with the progress in percent; None if the vehicle does not report it.
 
     Fails with `RefusedError` (a MAV_RESULT; with the texts that the vehicle sent meanwhile) or
-    `NoAnswerError`, at the latest after `LONGEST_S`, and without progress after `patience`.
+    `NoAnswerError`, at the latest after `LONGEST_S`, and without progress after `retry_policy`.
     """
 
     wants = frozenset({_ACK, _TEXT})
@@ -116,7 +116,7 @@ class CommandExchange(Transaction[T]):
         *,
         place: CommandPosition | None = None,
         once: bool = False,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
         progress: Callable[[int | None], None] | None = None,
     ) -> None:
         super().__init__(("command", target, command))
@@ -144,7 +144,7 @@ class CommandExchange(Transaction[T]):
             self._ask(now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """An acknowledgement or a text; those of other commands and for others are not ours."""
+        """Receive an acknowledgement or a text; others are ignored."""
         if message.TYPE.id == _TEXT:
             self._texts.take(message, sender, now_s)
         elif message.TYPE.id == _ACK and not self.done and self._refused is None:
@@ -281,7 +281,7 @@ class Request(CommandExchange[T]):
         answer: int,
         read: Callable[[Message], T | None],
         *,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         super().__init__(target, command, params, retry_policy=retry_policy)
         self.wants = frozenset({_ACK, _TEXT, answer})
@@ -289,7 +289,7 @@ class Request(CommandExchange[T]):
         self._accepted_s: float | None = None
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """The message, or what any command is told."""
+        """Receive the message or an acknowledgement."""
         if message.TYPE.id == self._answer and sender == self.target:
             result = self._read(message) if self.for_us(message) else None
             if result is not None:

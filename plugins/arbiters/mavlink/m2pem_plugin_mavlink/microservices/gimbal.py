@@ -1,8 +1,9 @@
 """Commanding gimbals through their manager (mavlink.io, "Gimbal Protocol v2",
 services/gimbal_v2.html), which is the autopilot unless a camera brings its own.
 
-Whoever points a gimbal takes control of it first and releases it at the end. A `device` of 0 is all
-gimbals of the manager. Pitch is positive upwards from the horizon, yaw positive to the right.
+A client takes control of a gimbal before it points it, and releases control at the end.
+A `device` of 0 is all gimbals of the manager. Pitch is positive upwards from the horizon, yaw
+positive to the right.
 """
 
 import math
@@ -110,7 +111,7 @@ def take_control(manager: Address, controller: Address, device: int = ALL) -> Co
 
 
 def release(manager: Address, device: int = ALL) -> Command:
-    """Leave the gimbal to others; refused if it is not ours."""
+    """Release control of the gimbal; refused without control."""
     params = (LET_GO, LET_GO, UNCHANGED, UNCHANGED, 0, 0, device)
     return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, params)
 
@@ -139,7 +140,7 @@ def pointing(manager: Address, aim: Aim, device: int = ALL) -> Message:
 
 
 def stop(manager: Address, yaw_frame: YawFrame = YawFrame.VEHICLE, device: int = ALL) -> Command:
-    """Turn no further: to be told to turn at a rate of 0."""
+    """Stop turning: a rate of 0."""
     flags = Aim(yaw_frame=yaw_frame).flags
     params = (math.nan, math.nan, 0.0, 0.0, flags, 0, device)
     return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, params)

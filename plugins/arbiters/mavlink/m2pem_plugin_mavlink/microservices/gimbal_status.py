@@ -33,7 +33,7 @@ class GimbalAttitude:
 
 
 class GimbalStatus:
-    """What was heard last of each gimbal of a vehicle. Give it each message of `WANTED`.
+    """The last state of each gimbal of a vehicle. Pass each message of `WANTED` to it.
 
     Gimbals are told apart by who sends of them, and by the id of the device (0: a gimbal with an
     address of its own).
@@ -55,12 +55,12 @@ class GimbalStatus:
             self.controllers[gimbal] = Address(system, component)
 
     def attitude(self, device: int = 0) -> GimbalAttitude | None:
-        """Of a device, or with 0 of the gimbal that was heard last."""
+        """Return the state of a device; 0: of the gimbal that has sent last."""
         found = [each for (_, id_), each in self.attitudes.items() if device in (0, id_)]
         return max(found, key=lambda each: each.at_s, default=None)
 
     def controller(self, manager: Address, device: int = 0) -> Address | None:
-        """Who is in control; system 0 is nobody, None: the manager has not said."""
+        """The address in control; system 0: none is, None: the manager has not reported it."""
         return next(
             (
                 each

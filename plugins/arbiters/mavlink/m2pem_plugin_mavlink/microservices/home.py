@@ -9,7 +9,7 @@ from m2pem_plugin_mavlink.microservices.commands import Command, CommandPosition
 from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
-    PATIENCE,
+    RETRIES,
     ExchangeError,
     NoAnswerError,
     Transaction,
@@ -72,7 +72,7 @@ class SetOrigin(Transaction[GroundPlace]):
                 target_system=self.target.system,
             )
         )
-        self.deadline_s = now_s + PATIENCE.answer_s
+        self.deadline_s = now_s + RETRIES.answer_s
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """It says where its origin is."""
@@ -81,7 +81,7 @@ class SetOrigin(Transaction[GroundPlace]):
 
     def expire(self, now_s: float) -> None:
         """Ask again, or give up."""
-        if self._tries < PATIENCE.tries:
+        if self._tries < RETRIES.tries:
             self.begin(now_s)
         else:
             asked = f"no answer, though asked {self._tries} times"

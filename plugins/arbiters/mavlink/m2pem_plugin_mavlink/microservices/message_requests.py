@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from m2pem_plugin_mavlink.microservices.commands import CommandExchange, Request, message_name
 from m2pem_plugin_mavlink.microservices.parameters import ParameterEncoding
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
-from m2pem_plugin_mavlink.protocol.transaction import PATIENCE, RetryPolicy
+from m2pem_plugin_mavlink.protocol.transaction import RETRIES, RetryPolicy
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ class SetMessageInterval(CommandExchange[float]):
         message_id: int,
         interval_s: float,
         *,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         self._message_id, self._interval_s = message_id, interval_s
         self._slower_left = SLOWER_TRIES if interval_s > 0 else 0
@@ -69,7 +69,7 @@ class ReadMessageInterval(Request[float]):
     has no such message. (GET_MESSAGE_INTERVAL, which more autopilots know than its successor.)"""
 
     def __init__(
-        self, target: Address, message_id: int, *, retry_policy: RetryPolicy = PATIENCE
+        self, target: Address, message_id: int, *, retry_policy: RetryPolicy = RETRIES
     ) -> None:
         def read(message: Message) -> float | None:
             if message.message_id != message_id:
@@ -96,7 +96,7 @@ class RequestMessage(Request[T]):
         read: Callable[[Message], T | None],
         *,
         index: int = 0,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         id_ = message_type(name).id
         command = dialect.MAV_CMD_REQUEST_MESSAGE

@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.microservices.mission_items import (
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
-    PATIENCE,
+    RETRIES,
     NoAnswerError,
     RefusedError,
     RetryPolicy,
@@ -86,7 +86,7 @@ class SetCurrentItem(CommandExchange[None]):
     wants = CommandExchange.wants | {_CURRENT.id}
 
     def __init__(
-        self, target: Address, sequence: int, *, retry_policy: RetryPolicy = PATIENCE
+        self, target: Address, sequence: int, *, retry_policy: RetryPolicy = RETRIES
     ) -> None:
         command = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
         super().__init__(target, command, (sequence,), retry_policy=retry_policy)
@@ -108,7 +108,7 @@ class SetCurrentItem(CommandExchange[None]):
             super().refused(result, now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """What any command is told, or the current item."""
+        """Receive an acknowledgement or the current item."""
         if message.TYPE is not _CURRENT:
             super().receive(message, sender, now_s)
         elif self._by_message and (message.seq, sender) == (self._sequence, self.target):
@@ -151,7 +151,7 @@ class ReadMissionItem(Transaction[MissionItem]):
         sequence: int,
         mission_type: MissionType = MissionType.MISSION,
         *,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         super().__init__(("mission", target))
         self.target, self.mission_type, self.retry_policy = target, mission_type, retry_policy

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import (
-    PATIENCE,
+    RETRIES,
     ExchangeError,
     NoAnswerError,
     RefusedError,
@@ -152,7 +152,7 @@ class ReadParameter(Transaction[Parameter]):
         name: str,
         encoding: ParameterEncoding = ParameterEncoding.C_CAST,
         *,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         super().__init__(("parameter", target, name))
         self.target, self.name, self.encoding, self.retry_policy = (
@@ -174,7 +174,7 @@ class ReadParameter(Transaction[Parameter]):
         self._ask(now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """A value or an error; other parameters, and those of other components, are not ours."""
+        """Receive a value or an error; other parameters and components are ignored."""
         is_ours = (message.param_id, sender) == (self._encoded, self.target)
         if self.done or not is_ours or not self.for_us(message):
             return
@@ -217,7 +217,7 @@ class SetParameter(ReadParameter):
         value: float,
         encoding: ParameterEncoding = ParameterEncoding.C_CAST,
         *,
-        retry_policy: RetryPolicy = PATIENCE,
+        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         super().__init__(target, name, encoding, retry_policy=retry_policy)
         self.value = value

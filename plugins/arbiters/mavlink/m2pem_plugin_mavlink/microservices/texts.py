@@ -63,7 +63,7 @@ class _Pieces:
 
 
 class StatusTexts:
-    """Collects the texts of one vehicle. Give it each STATUSTEXT that is heard; `read` is called
+    """Collects the texts of one vehicle. Pass each received STATUSTEXT to it; `read` is called
     with each text that is whole, or given up."""
 
     def __init__(self, read: Callable[[Text], None] = lambda _: None) -> None:

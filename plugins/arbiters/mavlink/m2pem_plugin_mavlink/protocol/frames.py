@@ -40,7 +40,7 @@ _CRC = Struct("<H")
 
 class Frame(NamedTuple):
     """What is known of a frame. `sender`: system + 256 * component; `checked`: its checksum is
-    right (False: the message is unknown, or nobody looked)."""
+    right (False: the message is unknown, or it was not checked)."""
 
     sequence: int
     sender: int

@@ -61,14 +61,14 @@ class Sender(Reception):
 
 
 AdmitSender: TypeAlias = Callable[[Sender], bool]
-"""Is told of a new sender, and may set what is wanted of it; False: it is not to be heard."""
+"""Called with a new sender; may set `wanted`. Returns False to drop its frames."""
 
 
 class Inbound:
     """One peer. A sender becomes known by a frame with a right checksum.
 
     `junk_bytes`: those that belong to no frame; `bad_frames`: with a wrong checksum, or of a
-    sender that nobody knows and that cannot be checked.
+    sender that is unknown and cannot be checked.
     """
 
     __slots__ = ("_admit", "_marked", "_marked_s", "_rest", "bad_frames", "junk_bytes", "senders")

@@ -41,8 +41,8 @@ class Transaction(ABC, Generic[T]):
     """One exchange. It ends by `succeed` or `fail`, once; what comes after that changes nothing.
 
     `wants`: ids of the messages that it is to be handed. `key`: of two exchanges with the same key
-    with one vehicle, the second waits for the first to end. `source`: who we are, set by whoever
-    runs it, before `begin`; None: nobody else is there to be answered.
+    with one vehicle, the second waits for the first to end. `source`: the address of this
+    ground station, set by the link before `begin`; None: all answers are for it.
     """
 
     wants: frozenset[int]
@@ -112,6 +112,6 @@ class RetryPolicy:
         return self.tries * self.answer_s
 
 
-PATIENCE = RetryPolicy(tries=5, answer_s=1.0)
+RETRIES = RetryPolicy(tries=5, answer_s=1.0)
 """For questions with one answer. mavlink.io, "Command Protocol", leaves times to the sender; ground
 stations wait 0.5 to 1.5 s, three to five times. Links by satellite or mesh answer after 4 s."""

@@ -121,7 +121,7 @@ def _socket(text: str, way: Way, rest: str) -> SocketUrl:
     if place["port"] is None or not re.fullmatch(r"[0-9]{1,5}", place["port"]):
         raise UrlError(f"{text}: its port must be a number, as in {way}://{place['host']}:14550")
     port = int(place["port"])
-    # A listener may ask for any free port; nobody can be sent to at 0.
+    # A listener may ask for any free port; nothing can be sent to port 0.
     lowest = 0 if way in (Way.UDP_IN, Way.TCP_IN) else 1
     if not lowest <= port <= 65535:
         raise UrlError(f"{text}: its port must be from {lowest} to 65535")

@@ -46,8 +46,8 @@ class Series:
 class Camera(Component):
     """`pictures`: how many it has taken; `zoom`: 0 to 100; `recording`: it takes a video.
 
-    `untold`: of so many more pictures nobody is told, unless they ask. `spoilt`: so many more
-    pictures cannot be taken, which is told.
+    `untold`: so many more pictures are reported only on request. `spoilt`: so many more
+    pictures cannot be taken, which is reported.
     """
 
     component_id = dialect.MAV_COMP_ID_CAMERA

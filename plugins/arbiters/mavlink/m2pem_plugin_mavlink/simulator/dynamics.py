@@ -350,7 +350,7 @@ class RoverDynamics:
         forward = towards(forward, speed, self.acceleration_mps2 * dt_s)
         most_rps = min(self.turn_rps, abs(forward) / self.turn_radius_m)
         if isinstance(setpoint, DriveSetpoint):
-            # Told to turn, even a standing one does: it has tracks or thrusters.
+            # A vehicle that does not move can turn, too: it has tracks or thrusters.
             most_rps = self.turn_rps
         body.yaw_rps = max(-most_rps, min(most_rps, rate))
         body.yaw_rad = wrapped_rad(body.yaw_rad + body.yaw_rps * dt_s)

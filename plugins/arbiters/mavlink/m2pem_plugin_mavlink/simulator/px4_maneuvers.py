@@ -15,7 +15,7 @@ THERE_M = 0.5
 class TakeOff(Maneuver):
     """AUTO.TAKEOFF: climb once armed, then hold; the mode may be entered before.
 
-    `up_m`: the height above the frame's origin; None: MIS_TAKEOFF_ALT above where it stands.
+    `up_m`: the height above the frame's origin; None: MIS_TAKEOFF_ALT above the start.
     """
 
     up_m: float | None = None

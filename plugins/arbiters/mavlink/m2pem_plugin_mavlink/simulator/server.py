@@ -62,7 +62,7 @@ class VehiclePort(asyncio.DatagramProtocol):
         self.inward.carry(data, addr[:2], self.autopilot.now_s)
 
     def error_received(self, exc: Exception) -> None:
-        """Nobody listens there (yet): it will be sent anew."""
+        """No process listens at the peer (yet); later messages may arrive."""
 
     def step(self, now_s: float) -> None:
         """Advance simulated time, and send messages."""

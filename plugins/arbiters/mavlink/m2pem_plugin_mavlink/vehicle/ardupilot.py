@@ -29,7 +29,7 @@ _FRAMES = {
 _STOP_MODES = {
     # BRAKE stops hardest, and whatever the sticks say: from 10 m/s within 4 s, from 5 m/s within 3.
     Kind.COPTER: ("BRAKE", "LOITER"),
-    Kind.PLANE: ("LOITER",),  # it never stands: it circles where it was
+    Kind.PLANE: ("LOITER",),  # it cannot stop: it circles where it was
     Kind.VTOL: ("LOITER",),
     Kind.ROVER: ("HOLD",),
     Kind.BOAT: ("LOITER", "HOLD"),
@@ -93,7 +93,7 @@ class ArdupilotDriver(Autopilot):
         if self.in_the_air:
             await self.go_to(self._here(altitude_m))
             return
-        await self._locate()  # its mission begins where it stands
+        await self._locate()  # its mission begins at its position
         here = self._here(altitude_m)
         vtol = self.kind is Kind.VTOL
         takeoff = dialect.MAV_CMD_NAV_VTOL_TAKEOFF if vtol else dialect.MAV_CMD_NAV_TAKEOFF
@@ -154,7 +154,7 @@ class ArdupilotDriver(Autopilot):
         speed, also that of the command for the target."""
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
-        # Unless it is told, a plane circles as far from there as from the place before.
+        # Without a radius a plane uses the one of the place before.
         await self._reposition(place, self.state.loiter_radius_m or 0.0)
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)
@@ -209,7 +209,7 @@ class ArdupilotDriver(Autopilot):
             raise cannot(f"a {self.kind} takes no velocities")
         guided = self.modes.number("GUIDED")
         if self.state.custom_mode != guided:
-            if self._left_by_somebody(guided) and not self.commanded.changing:
+            if self._was_left(guided) and not self.commanded.changing:
                 raise not_now(f"it is in mode {self.modes.name(self.state.custom_mode or 0)} now")
             await self._arm_to_drive()
             await self.set_mode(FlightMode.GUIDED)

@@ -235,7 +235,7 @@ class Autopilot(ABC):
     async def _until(self, ready: Callable[[], bool], within_s: float) -> None:
         """Wait; show operators the reasons, and changes of them."""
         end_s = self.link.now_s() + within_s
-        told = ""
+        shown = ""
 
         def reasons() -> str:
             return _SECONDS.sub("", "; ".join(self.readiness().reasons))
@@ -244,11 +244,11 @@ class Autopilot(ABC):
             left_s = end_s - self.link.now_s()
             if left_s <= 0:
                 raise self._not_ready()
-            if (now := reasons()) and now != told:
-                told = now
-                self.vehicle.warn(f"waits until it is ready: {told}")
-            await self.vehicle.until(lambda told=told: ready() or reasons() != told, left_s)  # type: ignore[misc]
-        if told:
+            if (now := reasons()) and now != shown:
+                shown = now
+                self.vehicle.warn(f"waits until it is ready: {shown}")
+            await self.vehicle.until(lambda shown=shown: ready() or reasons() != shown, left_s)  # type: ignore[misc]
+        if shown:
             self.vehicle.warn("is ready")
 
     def _is_located(self) -> bool:
@@ -292,7 +292,7 @@ class Autopilot(ABC):
         if self.state.armed:
             return
         if self.kind in (Kind.COPTER, Kind.PLANE, Kind.VTOL):
-            raise not_now("it stands on the ground, not armed: it must take off first")
+            raise not_now("it is on the ground, not armed: it must take off first")
         await self.arm()
 
     # --- velocity -------------------------------------------------------------------------------
@@ -311,7 +311,7 @@ class Autopilot(ABC):
             )
         )
 
-    def _left_by_somebody(self, custom_mode: int) -> bool:
+    def _was_left(self, custom_mode: int) -> bool:
         """Return whether the vehicle was brought into a mode from here and has left it since."""
         return self.commanded.custom_mode == custom_mode and self.state.custom_mode != custom_mode
 

@@ -49,7 +49,7 @@ class Driver(Protocol):
     for a mode, not the acknowledgement), after retries; it does not wait until the motion ends.
 
     Raises:
-        ExchangeError: the vehicle refuses (with its STATUSTEXT as the reason) or is not heard.
+        ExchangeError: the vehicle refuses (with its STATUSTEXT as the reason) or does not answer.
     """
 
     name: str

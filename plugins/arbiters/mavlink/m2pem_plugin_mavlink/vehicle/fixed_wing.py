@@ -17,11 +17,11 @@ from m2pem_plugin_mavlink.vehicle.identity import Firmware, Identity, Kind
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 
 WINGED = frozenset({Kind.PLANE, Kind.VTOL})
-"""Kinds that fly on, whatever they are told."""
+"""Kinds that cannot stop in the air."""
 
 
 class _Radii(NamedTuple):
-    """Parameters, and what the first one is if nobody has set it, in metres."""
+    """Parameters, and the default of the first one, in metres."""
 
     name: str
     home_name: str

@@ -163,7 +163,7 @@ class Px4Driver(Autopilot):
         """Send one velocity setpoint. Raise an error if another client has left OFFBOARD."""
         offboard = self.modes.number("OFFBOARD")
         if self.state.custom_mode != offboard:
-            if self._left_by_somebody(offboard) and not self.commanded.changing:
+            if self._was_left(offboard) and not self.commanded.changing:
                 raise not_now(f"it is in mode {self.modes.name(self.state.custom_mode or 0)} now")
             await self._arm_to_drive()
             await self._enter_offboard(offboard, velocity_ned_m_s)

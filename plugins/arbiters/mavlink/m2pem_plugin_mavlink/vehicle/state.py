@@ -14,7 +14,7 @@ class AutopilotState:
 
     `changes` counts the messages that were taken in. By the link's clock: `at_s` and `heartbeat_s`
     are when the last message and the last heartbeat came, `boot_s` when it was first heard since it
-    was switched on; `boots` counts how often that was. `landed`: stands on the ground
+    was switched on; `boots` counts how often that was. `landed`: it is on the ground
     (EXTENDED_SYS_STATE, or where that is not sent, what the heights and speeds say).
     """
 
@@ -56,7 +56,7 @@ class AutopilotState:
     boot_s: float | None = None
     boots: int = 0
     clock_s: float | None = None
-    """When it told its own clock last (`time_boot_ms`)."""
+    """When it sent its own clock last (`time_boot_ms`)."""
     messages_s: dict[int, float] = field(default_factory=dict)
     """When each kind of message came last, by its id."""
 

@@ -122,10 +122,10 @@ class TakeoverMonitor:
         return Takeover(Cause.RESTART, "its autopilot has restarted, and its motors have stopped")
 
     def takeover(self, modes: Collection[FlightMode]) -> Takeover | None:
-        """Whether somebody else has taken over a vehicle that is to be in one of these modes.
+        """Return a takeover of a vehicle that should be in one of these modes; None: there is none.
 
         A change that was just seen is judged `SETTLES_S` later, or once a text explains it. The
-        mode of a vehicle that is not armed is nobody's concern.
+        mode of a vehicle that is not armed does not matter.
         """
         return self._disarmed_by(modes) or self._mode_by(modes) or self._mission_by(modes)
 
@@ -242,7 +242,7 @@ class TakeoverMonitor:
             return
         if state.mission_total is not None and state.mission_total != len(mission):
             self._replaced = (
-                f"replaced the mission: it has {state.mission_total} items, ours {len(mission)}"
+                f"replaced the mission: it has {state.mission_total} items, not {len(mission)}"
                 if state.mission_total
                 else "cleared the mission"
             )
@@ -267,7 +267,7 @@ class TakeoverMonitor:
         except ExchangeError:
             return  # what is not answered proves nothing
         if self.vehicle.commanded.mission is mission and not _same(found, mission[item]):
-            self._replaced = f"replaced the mission: its item {item + 1} is not ours"
+            self._replaced = f"replaced the mission: its item {item + 1} was not uploaded here"
 
     def _receive_from_mission_protocol(self, message: Message, sender: Address) -> None:
         """Receive the vehicle's messages about missions to another ground station. Not all links

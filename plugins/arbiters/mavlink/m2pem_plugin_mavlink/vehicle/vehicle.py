@@ -95,7 +95,7 @@ HOME_EVERY_S = 5.0
 class Vehicle:
     """A vehicle of the fleet behind its link, between `open` and `close`.
 
-    Nothing is sent before its heartbeat has told what it is; then it is asked for the messages that
+    Nothing is sent before its heartbeat has identified it; then it is asked for the messages that
     `state` is made of, and again when they stop coming. All times are of the arbiter's clock.
     """
 
@@ -163,7 +163,7 @@ class Vehicle:
         """The driver of its autopilot.
 
         Raises:
-            NoAnswerError: it was not heard yet, so that nobody knows.
+            NoAnswerError: it has not sent a heartbeat yet.
         """
         if self._driver is None:
             raise NoAnswerError(f"{self.resource} was not heard yet")

@@ -124,7 +124,7 @@ class Faults:
         return {each.name: each.number for each in self.autopilot.modes.by_number.values()}
 
     def take_over(self, mode: str) -> None:
-        """Somebody else changes the mode.
+        """Another ground station, or a pilot, changes the mode.
 
         Raises:
             ValueError: the vehicle has no such mode.
@@ -134,7 +134,7 @@ class Faults:
         self.autopilot.modes.switch(self.modes[mode])
 
     def replace_mission(self, items: Sequence[Item]) -> None:
-        """Somebody else has uploaded another mission."""
+        """Another ground station uploads another mission."""
         self.autopilot.plans[MISSION] = tuple(items)
 
     # --- time -------------------------------------------------------------------------------------

@@ -226,7 +226,7 @@ class ArduPilot(Firmware):
         return (ArduPilotFailsafes,)
 
     def default_streams(self) -> Mapping[int, float]:
-        """Next to nothing until somebody asks."""
+        """Return the few messages that are sent without a request."""
         return {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 10.0}
 
     def base_mode(self, autopilot: AutopilotInterface) -> int:

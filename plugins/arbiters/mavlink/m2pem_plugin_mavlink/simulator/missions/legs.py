@@ -165,7 +165,7 @@ class Return(Leg):
         self._return.begin()
 
     def step(self, dt_s: float) -> MotionSetpoint:
-        """Home; a copter has then landed, a rover stands, a plane circles for ever."""
+        """Home; there a copter has landed, a rover has stopped, a plane circles."""
         autopilot = self.autopilot
         if autopilot.spec.kind is Kind.COPTER and self._return.arrived and autopilot.body.on_ground:
             # Its motors stop when that was reported.

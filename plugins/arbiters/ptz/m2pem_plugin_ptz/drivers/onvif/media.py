@@ -97,7 +97,7 @@ async def _idle_job(session: Session, token: str) -> str | None:
 LARGEST = 32 * 1024 * 1024
 """Bytes."""
 
-PATIENCE = 4.0
+RETRIES = 4.0
 """So many times as long as a call: a picture is more to carry."""
 
 CHUNK = 64 * 1024
@@ -115,7 +115,7 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
 
     settings = session.settings
     try:
-        async with asyncio.timeout(settings.timeout_s * PATIENCE):
+        async with asyncio.timeout(settings.timeout_s * RETRIES):
             async with aiohttp.ClientSession() as client:
                 content = await _ask(client, session, url)
     except Exception as error:
