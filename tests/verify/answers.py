@@ -26,7 +26,7 @@ def atoms_of(dice: Random, net: PetriNet, count: int = 3) -> list[f.Formula]:
         for transition in net.transitions
         for step in transition.steps
         if step.action is Action.COMPLETED
-        and (transition.kind is Kind.OUTSIDE or dice.random() < 0.3)
+        and (transition.kind is Kind.EXTERNAL or dice.random() < 0.3)
     ]
     found: list[f.Formula] = []
     for _ in range(count):

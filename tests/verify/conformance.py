@@ -68,7 +68,7 @@ def play(
         return Played(tuple(inputs), tuple(steps), "the engine begins otherwise")
     for number in run:
         transition = net.transitions[number]
-        if transition.kind is not Kind.OUTSIDE:
+        if transition.kind is not Kind.EXTERNAL:
             continue
         if engine.state.status is RunStatus.ENDED:
             return Played(tuple(inputs), tuple(steps), f"the run is over before {transition.name}")

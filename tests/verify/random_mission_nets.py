@@ -76,7 +76,7 @@ class _Draft:
         getattr(self, f"_{kind}")(source, target, depth)
 
     def _task(self, source: int, target: int, depth: int) -> None:
-        self.transition(Kind.OUTSIDE, [source], [target], assign=self._assignment(15))
+        self.transition(Kind.EXTERNAL, [source], [target], assign=self._assignment(15))
 
     def _step(self, source: int, target: int, depth: int) -> None:
         self.transition(Kind.INTERNAL, [source], [target], assign=self._assignment(30))
@@ -92,7 +92,7 @@ class _Draft:
         ends = [self.place() for _ in starts]
         inside = set(starts)
         self.scopes.append(inside)
-        self.transition(self.dice.choice([Kind.INTERNAL, Kind.OUTSIDE]), [source], starts)
+        self.transition(self.dice.choice([Kind.INTERNAL, Kind.EXTERNAL]), [source], starts)
         for start, end in zip(starts, ends, strict=True):
             self._branch(start, end, depth)
         self.scopes.remove(inside)
@@ -107,7 +107,7 @@ class _Draft:
     def _branch(self, source: int, target: int, depth: int) -> None:
         if self.dice.random() < self.failing:
             last = self.place()
-            self.transition(Kind.OUTSIDE, [last], [target])
+            self.transition(Kind.EXTERNAL, [last], [target])
             target = last
         self.block(source, target, depth + 1)
 
@@ -117,7 +117,7 @@ class _Draft:
         for value in range(2):
             start = self.place()
             guard = ((variable.index, frozenset({value})),) if guarded else ()
-            kind = Kind.INTERNAL if guarded else self.dice.choice([Kind.INTERNAL, Kind.OUTSIDE])
+            kind = Kind.INTERNAL if guarded else self.dice.choice([Kind.INTERNAL, Kind.EXTERNAL])
             self.transition(kind, [source], [start], guard=guard)
             self.block(start, target, depth + 1)
         if guarded and len(variable.values) > 2:
@@ -126,7 +126,7 @@ class _Draft:
     def _loop(self, source: int, target: int, depth: int) -> None:
         after = self.place()
         self.block(source, after, depth + 1)
-        kind = self.dice.choice([Kind.OUTSIDE, Kind.OUTSIDE, Kind.INTERNAL])
+        kind = self.dice.choice([Kind.EXTERNAL, Kind.EXTERNAL, Kind.INTERNAL])
         self.transition(kind, [after], [source])
         self.transition(kind, [after], [target])
 
@@ -143,32 +143,32 @@ class _Draft:
         everything = tuple(sorted(inside))
         waits = tuple(p for p in everything if p not in ends)
         self.transition(
-            self.dice.choice([Kind.INTERNAL, Kind.OUTSIDE]), [source], [running, *starts]
+            self.dice.choice([Kind.INTERNAL, Kind.EXTERNAL]), [source], [running, *starts]
         )
         self.transition(
             Kind.INTERNAL, [running], [target], inhibit=waits, reset=everything, quiet=True
         )
-        for kind in (Kind.OUTSIDE, Kind.INTERNAL):
+        for kind in (Kind.EXTERNAL, Kind.INTERNAL):
             if self.dice.random() < 0.6:
-                thrown = [running] if kind is Kind.OUTSIDE else [running, self._thrown(waits)]
+                thrown = [running] if kind is Kind.EXTERNAL else [running, self._thrown(waits)]
                 reset = tuple(p for p in everything if p not in thrown)
                 self.transition(kind, thrown, [handler], reset=reset)
         if self.dice.random() < self.failing:  # whatever is done may fail
-            done = {p for r in self.transitions if r.kind is Kind.OUTSIDE for p, _ in r.consume}
+            done = {p for r in self.transitions if r.kind is Kind.EXTERNAL for p, _ in r.consume}
             for place in waits:
                 if place in done and self.dice.random() < 0.9:
-                    self.transition(Kind.OUTSIDE, [running, place], [handler], reset=everything)
+                    self.transition(Kind.EXTERNAL, [running, place], [handler], reset=everything)
         self.block(handler, target, depth + 2)
         if self.dice.random() < 0.25:  # what does not interrupt
             beside = self.place()
             for scope in self.scopes:
                 scope.add(beside)
-            self.transition(Kind.OUTSIDE, [running], [running, beside])
+            self.transition(Kind.EXTERNAL, [running], [running, beside])
 
     def _thrown(self, inside: tuple[int, ...]) -> int:
         """A place to which something in a scope comes if it goes wrong."""
         place = self.place()
-        self.transition(Kind.OUTSIDE, [self.dice.choice(inside)], [place])
+        self.transition(Kind.EXTERNAL, [self.dice.choice(inside)], [place])
         return place
 
     def _assignment(self, percent: int) -> tuple[tuple[int, int], ...]:
@@ -195,7 +195,7 @@ class _Draft:
                 transition = replace(transition, read=tuple({*transition.read, place}))
             case 4:
                 transition = replace(
-                    transition, kind=self.dice.choice([Kind.INTERNAL, Kind.OUTSIDE])
+                    transition, kind=self.dice.choice([Kind.INTERNAL, Kind.EXTERNAL])
                 )
             case 5:
                 value = self.dice.randrange(2)

@@ -15,7 +15,7 @@ from m2pem.verify.net.petri_net import (
     Variable,
 )
 
-_KINDS = (Kind.INTERNAL, Kind.INTERNAL, Kind.JOIN, Kind.OUTSIDE, Kind.OUTSIDE)
+_KINDS = (Kind.INTERNAL, Kind.INTERNAL, Kind.JOIN, Kind.EXTERNAL, Kind.EXTERNAL)
 _ENDS = 3
 
 

@@ -216,7 +216,7 @@ def test_a_throw_does_not_wait_for_what_another_one_undoes() -> None:
     rests = [
         {net.places[p].element for p in found.marking(state).tokens if _shows(net, p)}
         for state in range(len(found.states))
-        if all(net.transitions[r].kind is Kind.OUTSIDE for r, _ in found.successors(state))
+        if all(net.transitions[r].kind is Kind.EXTERNAL for r, _ in found.successors(state))
     ]
     assert [each for each in rests if "unA" in each] == [{"unA", "one"}, {"unA", "two"}]
 

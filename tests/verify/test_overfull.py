@@ -20,7 +20,7 @@ def fills(*made: tuple[int, int]) -> PetriNet:
     step = (Step("start", Action.COMPLETED),)
     transitions = (
         Transition(0, "begin", Kind.INTERNAL, step, consume=((START, 1),), produce=made),
-        Transition(1, "work", Kind.OUTSIDE, step, consume=((WORK, 1),)),
+        Transition(1, "work", Kind.EXTERNAL, step, consume=((WORK, 1),)),
     )
     return PetriNet(
         "m.bpmn",

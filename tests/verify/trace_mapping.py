@@ -67,7 +67,7 @@ class Follower:
             net, {p.index: bits for p in net.places if p.role not in (Role.END,)}
         )
         self._affected = affected_transitions(self.encoding)
-        self._outside = [r.index for r in net.transitions if r.kind is Kind.OUTSIDE]
+        self._outside = [r.index for r in net.transitions if r.kind is Kind.EXTERNAL]
         self._joins = [r.index for r in net.transitions if r.kind is Kind.JOIN]
         self._internal = [r.index for r in net.transitions if r.kind is Kind.INTERNAL]
         self._paths = [

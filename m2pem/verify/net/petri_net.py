@@ -37,7 +37,7 @@ class Kind(StrEnum):
     """A step that the executive does by itself."""
     JOIN = "join"
     """An inclusive or complex join completes. It waits until nothing else can move."""
-    OUTSIDE = "outside"
+    EXTERNAL = "outside"
     """An answer, report, timer, signal or message. It comes when the executive has nothing to do.
     """
 
@@ -285,7 +285,7 @@ def with_outcomes(transitions: Sequence[Transition]) -> list[Transition]:
 
 
 def _decided(transition: Transition) -> _Decided:
-    if transition.kind is not Kind.OUTSIDE:
+    if transition.kind is not Kind.EXTERNAL:
         return (transition.index,)
     return (
         transition.trigger,

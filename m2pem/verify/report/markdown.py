@@ -36,7 +36,7 @@ def _lines(findings: Findings, pictures: Mapping[int, Sequence[str]]) -> Iterato
     rough = findings.net.approximations
     if rough:
         yield ""
-        yield "## Where the rules are not exactly the mission"
+        yield "## Where the net is not exactly the mission"
         yield ""
         for each in rough:
             yield f"- `{each.element}` ({each.exactness.value}): {_plain(each.what)}"

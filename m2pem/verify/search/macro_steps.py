@@ -72,7 +72,7 @@ class MacroSteps:
         self._wanting: dict[int, int] = {}
         self._barred: dict[int, int] = {}
         for transition in transitions:
-            if transition.kind is not Kind.OUTSIDE:
+            if transition.kind is not Kind.EXTERNAL:
                 self._register(transition.index)
         self._wanting_any = Union(self._wanting)
         self._barred_any = Union(self._barred)
@@ -301,7 +301,7 @@ class DeferrableArrivals:
         """The bit from which a deferrable transition takes its token; 0: it is not deferrable."""
         read_write, transitions = self.read_write, self.encoding.net.transitions
         transition, c = transitions[number], self.encoding.transitions[number]
-        if self._visible >> number & 1 or transition.kind is not Kind.OUTSIDE or not c.plain:
+        if self._visible >> number & 1 or transition.kind is not Kind.EXTERNAL or not c.plain:
             return 0
         source = read_write.needs[number]
         if source & (source - 1) or not source & self._safe or read_write.clears[number] != source:
@@ -311,7 +311,7 @@ class DeferrableArrivals:
         users = read_write.needing.get(source, 0)
         for low in bits_of(users):
             user = low.bit_length() - 1
-            outside = transitions[user].kind is Kind.OUTSIDE
+            outside = transitions[user].kind is Kind.EXTERNAL
             if not outside or not source & self.encoding.transitions[user].need:
                 return 0
         return source

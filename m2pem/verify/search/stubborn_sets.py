@@ -143,7 +143,7 @@ class _Chooser:
         self.deferrable = DeferrableArrivals(encoding, read_write, seen, safe)
         self.seen = seen
         self.internal = _mask(r.index for r in self.transitions if r.kind is Kind.INTERNAL)
-        self.outside = _mask(r.index for r in self.transitions if r.kind is Kind.OUTSIDE)
+        self.outside = _mask(r.index for r in self.transitions if r.kind is Kind.EXTERNAL)
         self.every = (1 << len(self.transitions)) - 1
         self.unsafe = encoding.places_mask(p.index for p in net.places if p.index not in safe)
         self._bit = [1 << transition.index for transition in self.transitions]

@@ -54,7 +54,7 @@ _SHARED_CLEARS = 4
 _HEADINGS = {
     Kind.INTERNAL: "what the executive does by itself",
     Kind.JOIN: "joins that wait until nothing else can move",
-    Kind.OUTSIDE: "what comes from outside",
+    Kind.EXTERNAL: "what comes from outside",
 }
 
 

@@ -18,7 +18,7 @@ from m2pem.verify.requirements.propositions import Labels
 
 _STEP = re.compile(r"^\s*(\d+):\s+proc\s+0 \(\S+\) \S+?:(\d+) \(state ")
 _CYCLE = "<<<<<START OF CYCLE>>>>>"
-_RANK = {Kind.INTERNAL: 0, Kind.JOIN: 1, Kind.OUTSIDE: 2}
+_RANK = {Kind.INTERNAL: 0, Kind.JOIN: 1, Kind.EXTERNAL: 2}
 
 
 @dataclass(frozen=True, slots=True)

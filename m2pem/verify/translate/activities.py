@@ -168,7 +168,7 @@ def _behavior(
         done = _ended(instance, instance.leave())
         after_us = _hold_us(behavior)
         made = [
-            net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=after_us)
+            net.transition(effect, Kind.EXTERNAL, Trigger.TIMER, due_us=after_us)
             for effect in product([done], instance.done())
         ]
         runs(context, instance.active, after_us, (instance.active,), made)
@@ -230,14 +230,14 @@ def _outside_work(context: TranslationContext, instance: ActivityInstance) -> li
     for key in context.data.written_anyhow(instance.node):
         well = context.data.write(well, key, None, instance.outer, instance.node)
     for effect in product(well, instance.done()):
-        net.transition(effect, Kind.OUTSIDE, Trigger.SUCCEEDS)
+        net.transition(effect, Kind.EXTERNAL, Trigger.SUCCEEDS)
     if context.options.failures:
         codes = dict.fromkeys((*catchable(context, instance.outer, instance), "FAILED"))
         for code in codes:
             for effect in failing(context, instance, code, Flag.UNCAUGHT_FAILURE):
                 both = badly.then(effect)
                 if both is not None:
-                    net.transition(both, Kind.OUTSIDE, Trigger.FAILS, code)
+                    net.transition(both, Kind.EXTERNAL, Trigger.FAILS, code)
     return [instance.begin()]
 
 
@@ -253,11 +253,11 @@ def _user_task(
             answered, prompt.store, literal(decision.value), instance.outer, node
         )
         for effect in product(answered, instance.done()):
-            net.transition(effect, Kind.OUTSIDE, Trigger.ANSWER, decision.value)
+            net.transition(effect, Kind.EXTERNAL, Trigger.ANSWER, decision.value)
     if prompt.timeout is not None:
         late = Effect(consume=(instance.active,))
         made = [
-            net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=due_us(prompt.timeout))
+            net.transition(effect, Kind.EXTERNAL, Trigger.TIMER, due_us=due_us(prompt.timeout))
             for effect in product(
                 [late], failing(context, instance, "PROMPT_TIMEOUT", Flag.UNCAUGHT_FAILURE)
             )

@@ -113,7 +113,7 @@ def _boundary(
             elif not event.interrupting:
                 running = net.place(event, instance.inside, Role.CONTROL, f":armed{number}")
                 comes = _once(instance, comes, running)
-            made = net.transition(comes, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+            made = net.transition(comes, Kind.EXTERNAL, Trigger.TIMER, due_us=timer_us(definition))
             runs(context, instance.active, fixed(definition), (running,), [made])
         case SignalEventDefinition() | MessageEventDefinition():
             caught = net.place(event, instance.outer, Role.TRIGGERED, f":{number}")
@@ -237,7 +237,7 @@ def _boundary_condition(
         net.approximate(event, Exactness.MORE, "its condition may become true at any time")
         if not event.interrupting:
             comes = _again(context, instance, event, comes)
-        net.transition(comes, Kind.OUTSIDE, Trigger.CONDITION)
+        net.transition(comes, Kind.EXTERNAL, Trigger.CONDITION)
         return
     for guard, truth in context.data.cases([condition], instance.outer, event, first):
         if event.interrupting:
@@ -284,7 +284,9 @@ def arm_handler(context: TranslationContext, scope: ScopeDraft, start: e.StartEv
                         when = when.then(Effect(consume=(armed,))) or when
                         running = (armed,)
                 made = [
-                    net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                    net.transition(
+                        effect, Kind.EXTERNAL, Trigger.TIMER, due_us=timer_us(definition)
+                    )
                     for effect in product([when], begun)
                 ]
                 holder = holder_of(context, scope)
@@ -364,7 +366,7 @@ def _handler_condition(
         if not start.interrupting:
             when = when.then(_once_at_a_time(context, scope, start)) or when
         for effect in product([when], begun):
-            net.transition(effect, Kind.OUTSIDE, Trigger.CONDITION)
+            net.transition(effect, Kind.EXTERNAL, Trigger.CONDITION)
         return
     for guard, truth in context.data.cases([condition], scope, start, first):
         asked = when.then(Effect(guard=guard))

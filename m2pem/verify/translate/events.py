@@ -135,7 +135,7 @@ def _trigger(
     match definition:
         case TimerEventDefinition():
             return [
-                net.transition(effect, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                net.transition(effect, Kind.EXTERNAL, Trigger.TIMER, due_us=timer_us(definition))
                 for effect in product([came], ways)
             ]
         case SignalEventDefinition() | MessageEventDefinition():
@@ -148,7 +148,7 @@ def _trigger(
             if not context.data.is_followed([condition], node):
                 net.approximate(node, Exactness.MORE, "its condition may become true at any time")
                 for effect in product([came], ways):
-                    net.transition(effect, Kind.OUTSIDE, Trigger.CONDITION)
+                    net.transition(effect, Kind.EXTERNAL, Trigger.CONDITION)
                 return []
             for guard, truth in context.data.cases([condition], scope, node, first):
                 if truth is True:

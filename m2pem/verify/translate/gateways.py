@@ -175,7 +175,7 @@ def complex_gateway(context: TranslationContext, node: e.FlowNode, scope: ScopeD
             )
             for effect in product([come], ways):
                 if active is None:
-                    context.net.transition(effect, Kind.OUTSIDE, Trigger.CONDITION)
+                    context.net.transition(effect, Kind.EXTERNAL, Trigger.CONDITION)
                 else:
                     context.net.transition(effect)
         if len(places) > 1:

@@ -182,7 +182,7 @@ def _begun_by(
             for effect in product([Effect(read=frozenset({context.running}))], ways):
                 context.net.transition(
                     effect,
-                    Kind.OUTSIDE,
+                    Kind.EXTERNAL,
                     Trigger.TIMER if timer else Trigger.CONDITION,
                     due_us=due,
                 )
@@ -267,7 +267,7 @@ def _from_outside(context: TranslationContext, what: str, ref: str) -> None:
         on = Effect(read=frozenset({context.running}))  # what it begins, it begins in the run
         for effect in product([on], effects):
             named = effect.with_step(_receiver(context, catchers, effect), Action.TRIGGERED, ref)
-            context.net.transition(named, Kind.OUTSIDE, trigger, ref)
+            context.net.transition(named, Kind.EXTERNAL, trigger, ref)
         return
     effects = signal_effects(context, ref)
     begins = bool(context.begins.get((what, ref)))
@@ -282,13 +282,13 @@ def _from_outside(context: TranslationContext, what: str, ref: str) -> None:
         )
         if catcher.waiting not in seen:
             for effect in product([when], effects):
-                context.net.transition(effect, Kind.OUTSIDE, trigger, ref)
+                context.net.transition(effect, Kind.EXTERNAL, trigger, ref)
         seen.append(catcher.waiting)
     if begins:
         unawaited = Effect(inhibit=frozenset(seen), read=frozenset({context.running}))
         for effect in product([unawaited], effects):
             if effect.produce:
-                context.net.transition(effect, Kind.OUTSIDE, trigger, ref)
+                context.net.transition(effect, Kind.EXTERNAL, trigger, ref)
 
 
 def _receiver(context: TranslationContext, catchers: list[Catcher], effect: Effect) -> str:

@@ -102,7 +102,7 @@ def await_all(
         )
         match definition:
             case TimerEventDefinition():
-                net.transition(seen, Kind.OUTSIDE, Trigger.TIMER, due_us=timer_us(definition))
+                net.transition(seen, Kind.EXTERNAL, Trigger.TIMER, due_us=timer_us(definition))
             case SignalEventDefinition() | MessageEventDefinition():
                 what, ref = what_and_ref(definition)
                 register_catcher(context, what, ref, waiting, caught, False, event)
@@ -110,7 +110,7 @@ def await_all(
                 if not context.data.is_followed([condition], event):
                     said = "its condition may become true at any time"
                     net.approximate(event, Exactness.MORE, said)
-                    net.transition(seen, Kind.OUTSIDE, Trigger.CONDITION)
+                    net.transition(seen, Kind.EXTERNAL, Trigger.CONDITION)
                     continue
                 false = Effect(
                     steps=(Step(event.id, Action.ENTERED, "its condition is false"),),

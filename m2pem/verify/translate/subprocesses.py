@@ -137,7 +137,7 @@ def ad_hoc(context: TranslationContext, instance: ActivityInstance) -> list[Effe
     if node.completion is None:
         when = Effect() if node.cancel_remaining else when_empty(inside)
         for effect in product(product([when], [over]), instance.done()):
-            net.transition(effect, Kind.OUTSIDE, Trigger.ANSWER, "complete")
+            net.transition(effect, Kind.EXTERNAL, Trigger.ANSWER, "complete")
         net.transition(Effect(steps=(Step(node.id, Action.ENTERED, "asks"),), consume=(asked,)))
     else:
         for guard, truth in context.data.cases([node.completion], inside, node, lambda t: t[0]):
@@ -172,7 +172,7 @@ def translate_choices(context: TranslationContext) -> None:
         }
         both = effect.then(Effect(inhibit=frozenset(busy)))
         assert both is not None
-        net.transition(both, Kind.OUTSIDE, Trigger.ANSWER, entry.id)
+        net.transition(both, Kind.EXTERNAL, Trigger.ANSWER, entry.id)
 
 
 def call(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
