@@ -45,7 +45,7 @@ class Clock(datetime):
 
 
 class Null:
-    """A name that nobody wrote, as in m2pem: None, and neither more nor less than anything."""
+    """A name without a value, as in m2pem: None, and neither more nor less than anything."""
 
     def __eq__(self, other: object) -> bool:
         return other is None or isinstance(other, Null)

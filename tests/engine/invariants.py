@@ -59,7 +59,7 @@ def _check_done(scope: Scope, *, looked_at: bool) -> None:
         assert token is None or token.compensates is compensation
         assert token is None or scope.tokens[token.id] is token
     for token in scope.tokens.values():
-        assert token.kept_scope is None, "what is kept has been handed over"
+        assert token.kept_scope is None, "a kept scope belongs to its completed activity"
         compensates = token.compensates
         assert compensates is None or (scope.compensations or {})[compensates.id] is compensates
     kept = [scope]
@@ -120,9 +120,9 @@ def _check_waits(state: RunState) -> None:
     assert set(state.conditions) <= set(state.waits)
     assert set(caught) <= set(state.waits)
     for (trigger, ref), waits in state.catchers.items():
-        assert waits, "nobody catches: absent"
-        for letter in state.kept_messages.get(ref, ()) if trigger.value == "message" else ():
-            assert letter.keys, "a letter and its catcher"
+        assert waits, "a key without catchers is absent"
+        for message in state.kept_messages.get(ref, ()) if trigger.value == "message" else ():
+            assert message.keys, "a kept message and a wait that matches it"
 
 
 def _check_work(state: RunState) -> None:

@@ -123,7 +123,7 @@ def test_the_vehicle_is_released_when_the_cancelled_behavior_has_ended() -> None
 
 
 @pytest.mark.parametrize("state", [SUCCEEDED, FAILED, BehaviorState.LOST])
-def test_however_a_cancelled_behavior_ends_nobody_waits_for_it(state: BehaviorState) -> None:
+def test_however_a_cancelled_behavior_ends_its_task_is_not_affected(state: BehaviorState) -> None:
     play = Play(INTERRUPTED).start()
     play.signal("go").report("b1", state, "ROUTE_BLOCKED")
     assert play.at == "back"
@@ -262,7 +262,7 @@ def test_a_reachable_resource_whose_behavior_is_being_cancelled_already_is_left_
     assert play.fault("evsg2").ignored()
 
 
-def test_a_fault_that_nobody_catches_fails_the_run() -> None:
+def test_a_fault_that_no_event_catches_fails_the_run() -> None:
     play = two("evsg1", "evsg2").fault("evsg1", "BATTERY_LOW")
     assert play.ended == "failed"
     assert "BATTERY_LOW" in play.detail

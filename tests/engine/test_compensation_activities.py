@@ -77,7 +77,7 @@ def test_an_error_in_a_compensation_activity_goes_up_as_any_other() -> None:
     assert play.ended == "completed"
 
 
-def test_an_error_in_a_compensation_activity_that_nobody_catches_fails_the_run() -> None:
+def test_an_error_in_a_compensation_activity_that_no_event_catches_fails_the_run() -> None:
     play = Play(
         """
         <startEvent id="start"/> <task id="a"/> <endEvent id="back">compensate</endEvent>

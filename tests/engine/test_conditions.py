@@ -70,7 +70,7 @@ def test_it_goes_on_before_the_next_step_of_another_branch() -> None:
 
 
 def test_a_condition_is_looked_at_after_the_whole_step() -> None:
-    # Between two statements of one script nobody looks.
+    # Conditions are not evaluated between two statements of one script.
     play = Play(CATCH + writing("x = 4; x = 0")).start()
     assert play.answer().at == "catch second"
 

@@ -193,7 +193,7 @@ def test_a_call_that_never_stops_calling_itself_throws_recursion() -> None:
     assert play.at == "after"
 
 
-def test_recursion_that_nobody_catches_fails_the_run() -> None:
+def test_recursion_that_no_event_catches_fails_the_run() -> None:
     play = Play("""
         <startEvent id="s"/> <callActivity id="again" calledElement="MAIN"/>
         s -> again

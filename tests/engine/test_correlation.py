@@ -42,7 +42,7 @@ def test_a_message_goes_to_the_instance_that_has_its_key() -> None:
     assert at(play, "done") == [2]
 
 
-def test_one_that_fits_nobody_yet_is_kept_for_whom_it_fits() -> None:
+def test_a_message_that_matches_no_receiver_yet_is_kept_for_the_one_it_matches() -> None:
     text = CALLS.replace("s -> wait", "<userTask id='first'/>\ns -> first -> wait")
     play = keyed(text, KEY).start()
     play.message("REPLY", {"n": 2}).message("REPLY", {"n": 1}).message("REPLY", {"n": 3})

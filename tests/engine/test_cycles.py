@@ -19,7 +19,7 @@ def cycle(text: str, *, interrupting: bool = False) -> Play:
 
 
 def outage(play: Play, seconds: float) -> Play:
-    """Nobody looks at the clock for that long."""
+    """No tick comes for that long."""
     play.now_us += round(seconds * 1_000_000)
     return play.give(Tick())
 
@@ -30,7 +30,7 @@ def due(play: Play) -> float | None:
     return None if at_us is None else (at_us - START_US) / 1_000_000
 
 
-# --- rounds that nobody was there for ---------------------------------------------------------
+# --- rounds that were missed --------------------------------------------------------------------
 
 
 def test_missed_rounds_come_once() -> None:

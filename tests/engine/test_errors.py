@@ -81,7 +81,7 @@ def test_an_error_goes_up_scope_by_scope(thrown: str, caught: str) -> None:
     assert play.ended == "completed"
 
 
-def test_an_error_that_nobody_catches_fails_the_run_and_cancels_every_behavior() -> None:
+def test_an_error_that_no_event_catches_fails_the_run_and_cancels_every_behavior() -> None:
     play = Play("""
         <startEvent id="start"/> <userTask id="u"/>
         <endEvent id="bad" name="Oh no">error E</endEvent>
@@ -111,7 +111,7 @@ def test_an_error_that_nobody_catches_fails_the_run_and_cancels_every_behavior()
     assert not play.run.state.behaviors
 
 
-def test_an_error_in_a_triggered_instance_has_nobody_above_it() -> None:
+def test_an_error_in_a_triggered_instance_has_no_catcher_around_it() -> None:
     play = Play("""
         <process id="MAIN" isExecutable="true"> <startEvent id="start"/> <userTask id="u"/>
           start -> u

@@ -69,7 +69,7 @@ def test_an_interrupting_boundary_is_reached_by_an_end_event_too() -> None:
     assert "done" not in play.entered()
 
 
-def test_an_escalation_that_nobody_catches_is_recorded_and_changes_nothing() -> None:
+def test_an_escalation_that_no_event_catches_is_recorded_and_changes_nothing() -> None:
     play = Play(f"""
         <startEvent id="s"/> <userTask id="u"/> {THROW}
     """).start()

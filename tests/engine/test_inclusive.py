@@ -148,7 +148,7 @@ def test_the_join_waits_for_a_subprocess_by_its_activity_however_deep_its_tokens
     assert play.answer(prompt="deep").at == "after"
 
 
-def test_a_token_that_can_also_reach_a_taken_flow_keeps_nobody_waiting() -> None:
+def test_a_token_that_can_also_reach_a_taken_flow_does_not_delay_the_join() -> None:
     # Table 13.3: the path to the empty flow counts only if the token can't reach a taken one.
     play = Play("""
         <startEvent id="start"/> <parallelGateway id="fork"/> <userTask id="a"/>
@@ -164,7 +164,9 @@ def test_a_token_that_can_also_reach_a_taken_flow_keeps_nobody_waiting() -> None
     assert play.answer(prompt="b").at == "after after"
 
 
-def test_a_token_that_must_pass_the_join_to_reach_an_empty_flow_keeps_nobody_waiting() -> None:
+def test_a_token_that_must_pass_the_join_to_reach_an_empty_flow_does_not_delay_it() -> (
+    None
+):
     play = Play(
         """
         <startEvent id="start"/> <inclusiveGateway id="join"/> <userTask id="work"/>

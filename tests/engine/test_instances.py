@@ -97,7 +97,7 @@ def test_a_message_goes_to_its_own_boundary_event_before_others_who_wait_longer(
     assert play.answer(prompt="u").at == "other caught"
 
 
-def test_an_error_that_nobody_catches_fails_the_run() -> None:
+def test_an_error_that_no_event_catches_fails_the_run() -> None:
     play = thrown('<errorEventDefinition id="d" errorRef="E"/>', ONE, boundary="signal S")
     assert play.answer(prompt="u").ended == "failed"
     assert "error E from u" in play.detail

@@ -1,4 +1,4 @@
-"""Messages go to one receiver, and are kept until somebody waits."""
+"""Messages go to one receiver, and are kept until a receiver waits."""
 
 from m2pem.engine.inputs import MessageReceived
 from tests.engine.kit import Play
@@ -21,7 +21,7 @@ def test_a_message_goes_to_the_one_that_has_waited_longest() -> None:
     assert play.message("m").ended == "completed"
 
 
-def test_a_message_is_kept_with_its_data_until_somebody_waits() -> None:
+def test_a_message_is_kept_with_its_data_until_a_receiver_waits() -> None:
     play = Play("""
         <startEvent id="start"/> <userTask id="u"/> <receiveTask id="get" messageRef="m"/>
         <receiveTask id="next" messageRef="m"/> <receiveTask id="last" messageRef="m"/>
@@ -100,7 +100,7 @@ def test_a_receive_task_with_a_boundary_for_the_same_message_takes_it_at_the_bou
     assert play.answer().at == "b"
 
 
-def test_messages_start_an_instance_for_each_once_nobody_waits() -> None:
+def test_messages_start_an_instance_for_each_once_no_receiver_waits() -> None:
     play = Play("""
         <process id="MAIN" isExecutable="true"> <startEvent id="start"/>
           <receiveTask id="get" messageRef="m"/> <userTask id="u"/>

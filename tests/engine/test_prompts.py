@@ -66,7 +66,7 @@ TIMED = """
 """
 
 
-def test_a_prompt_that_nobody_answers_in_time_throws_prompt_timeout() -> None:
+def test_a_prompt_that_is_not_answered_in_time_throws_prompt_timeout() -> None:
     play = Play(TIMED.format(timeout="PT5M", error="PROMPT_TIMEOUT")).start()
     assert play.advance(299).at == "ask"
     assert play.advance(1).at == "after"
@@ -80,7 +80,7 @@ def test_an_answer_in_time_disarms_the_timeout() -> None:
     assert play.run.next_due_us is None
 
 
-def test_a_timeout_that_nobody_catches_fails_the_run() -> None:
+def test_a_timeout_that_no_event_catches_fails_the_run() -> None:
     play = Play(TIMED.format(timeout="PT5M", error="OTHER")).start()
     assert play.advance(300).ended == "failed"
     assert play.detail.startswith("error PROMPT_TIMEOUT from ask")

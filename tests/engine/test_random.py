@@ -1,4 +1,4 @@
-"""Random missions under random inputs: the laws hold whatever happens."""
+"""Random missions under random inputs: the invariants hold after every input."""
 
 import builtins
 import random

@@ -1,4 +1,4 @@
-"""Random missions with compensation and transactions: the laws hold whatever happens."""
+"""Random missions with compensation and transactions: the invariants hold after every input."""
 
 from collections.abc import Callable, Iterable
 from random import Random

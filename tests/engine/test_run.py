@@ -196,7 +196,7 @@ def test_a_stuck_run_with_a_behavior_that_still_ends_has_failed_all_the_same() -
     assert play.report("b1", CANCELLED).run.state.held == {}
 
 
-# --- the laws -----------------------------------------------------------------------------------
+# --- invariants ---------------------------------------------------------------------------------
 
 
 def test_deciding_reads_no_clock_no_randomness_and_no_file(

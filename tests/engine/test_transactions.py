@@ -127,7 +127,7 @@ def test_an_error_during_the_rollback_is_a_hazard() -> None:
     assert play.ended == "completed"
 
 
-def test_a_cancel_that_nobody_catches_ends_the_branch() -> None:
+def test_a_cancel_that_no_event_catches_ends_the_branch() -> None:
     play = Play(
         """
         <startEvent id="start"/>

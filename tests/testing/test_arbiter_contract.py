@@ -225,7 +225,7 @@ class ClosesOnce(SimArbiter):
 
 
 class DrivesOn(SimArbiter):
-    """Its vehicles are on their way when they are heard again, and nobody stops them."""
+    """Its vehicles still move when their links return, and are not stopped."""
 
     task: asyncio.Task[None]
 

@@ -63,7 +63,7 @@ def test_a_payload_goes_on_while_its_vehicle_is_taken() -> None:
     assert play.at == "scan"
 
 
-def test_taking_twice_and_giving_back_what_nobody_has_changes_nothing() -> None:
+def test_taking_twice_and_releasing_what_no_operator_has_changes_nothing() -> None:
     play = Play(WAITS).start()
     play.give(ControlReturned("evsg1", "ben"))
     assert play.ignored() == "evsg1 is not with an operator"
