@@ -90,15 +90,15 @@ def test_spin_finds_it_at_the_same_elements(expected: Expected) -> None:
 
 
 @every_one
-def test_what_goes_on_in_a_story_has_begun_in_it(expected: Expected) -> None:
+def test_what_goes_on_in_a_run_has_begun_in_it(expected: Expected) -> None:
     found = findings(SITUATIONS[expected.name].broken)
     for violation in found.violations:
         begun: list[str] = []
-        for told in (*violation.story, *violation.loop):
-            if told.trigger in ("succeeds", "fails", "answer"):
-                name = found.mission.elements[told.element].name
+        for run_step in (*violation.run_steps, *violation.loop):
+            if run_step.trigger in ("succeeds", "fails", "answer"):
+                name = found.mission.elements[run_step.element].name
                 assert any(name in each for each in begun), (
-                    f"{violation.found.message}: {told.text}"
+                    f"{violation.found.message}: {run_step.text}"
                 )
-            if "begins" in told.text or "asks" in told.text:
-                begun.append(told.text)
+            if "begins" in run_step.text or "asks" in run_step.text:
+                begun.append(run_step.text)
