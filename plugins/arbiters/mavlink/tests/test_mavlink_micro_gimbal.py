@@ -112,5 +112,5 @@ def test_what_a_gimbal_can_do_is_in_its_capabilities() -> None:
     locks = dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK
     plain = Gimbal(VEHICLE, 1, 0, (-1.0, 1.0), (-1.0, 1.0))
     able = Gimbal(VEHICLE, 1, locks | 2048, (-1.0, 1.0), (-1.0, 1.0))
-    assert (plain.locks_yaw, plain.turns_endlessly) == (False, False)
-    assert (able.locks_yaw, able.turns_endlessly) == (True, True)
+    assert (plain.locks_yaw, plain.has_endless_yaw) == (False, False)
+    assert (able.locks_yaw, able.has_endless_yaw) == (True, True)

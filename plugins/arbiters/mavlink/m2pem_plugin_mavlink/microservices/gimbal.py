@@ -72,7 +72,7 @@ class Gimbal:
         return bool(self.capabilities & capability)
 
     @property
-    def turns_endlessly(self) -> bool:
+    def has_endless_yaw(self) -> bool:
         """Whether it can pan on and on in one direction."""
         return self.has(dialect.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_INFINITE_YAW)
 

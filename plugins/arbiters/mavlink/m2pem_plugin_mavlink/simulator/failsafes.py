@@ -63,15 +63,15 @@ class Heartbeats:
     """Tracks the heartbeats of the ground station; before the first one it is not missed."""
 
     def __init__(self) -> None:
-        self._heard_s: float | None = None
+        self._received_s: float | None = None
 
-    def heard(self, now_s: float) -> None:
+    def received(self, now_s: float) -> None:
         """Just now."""
-        self._heard_s = now_s
+        self._received_s = now_s
 
     def missed(self, seconds: float, now_s: float) -> bool:
         """For longer than that."""
-        return self._heard_s is not None and now_s - self._heard_s > seconds
+        return self._received_s is not None and now_s - self._received_s > seconds
 
 
 EKF_S = 1.0
@@ -109,11 +109,11 @@ class ArduPilotFailsafes(Component):
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Heartbeats of the one ground station that counts."""
-        return {"HEARTBEAT": self._heard}
+        return {"HEARTBEAT": self._received}
 
-    def _heard(self, message: Any, sender: Sender) -> None:
+    def _received(self, message: Any, sender: Sender) -> None:
         if sender.system == self.autopilot.parameters["MAV_GCS_SYSID"]:
-            self._heartbeats.heard(self.autopilot.now_s)
+            self._heartbeats.received(self.autopilot.now_s)
 
     def step(self, dt_s: float) -> None:
         """Check all three conditions."""
@@ -262,11 +262,11 @@ class Px4Failsafes(Component):
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Heartbeats of any ground station."""
-        return {"HEARTBEAT": self._heard}
+        return {"HEARTBEAT": self._received}
 
-    def _heard(self, message: Any, sender: Sender) -> None:
+    def _received(self, message: Any, sender: Sender) -> None:
         if message.type == dialect.MAV_TYPE_GCS:
-            self._heartbeats.heard(self.autopilot.now_s)
+            self._heartbeats.received(self.autopilot.now_s)
 
     def step(self, dt_s: float) -> None:
         """Check all three conditions."""

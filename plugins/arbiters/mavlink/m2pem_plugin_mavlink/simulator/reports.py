@@ -27,15 +27,15 @@ class Texts(Component):
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
         self._next_id = 1
-        self._heard_s: dict[Peer, float] = {}
+        self._received_s: dict[Peer, float] = {}
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Heartbeats of ground stations."""
-        return {"HEARTBEAT": self._heard}
+        return {"HEARTBEAT": self._received}
 
-    def _heard(self, message: Any, sender: Sender) -> None:
+    def _received(self, message: Any, sender: Sender) -> None:
         if message.type == dialect.MAV_TYPE_GCS:
-            self._heard_s[sender.peer] = self.autopilot.now_s
+            self._received_s[sender.peer] = self.autopilot.now_s
 
     def say(self, text: str, severity: int) -> None:
         """A text; one that fits into a message has id 0."""
@@ -52,7 +52,7 @@ class Texts(Component):
         if not self.autopilot.firmware.texts_need_heartbeats:
             self.autopilot.send(message)
             return
-        for peer, heard_s in self._heard_s.items():
+        for peer, heard_s in self._received_s.items():
             if self.autopilot.now_s - heard_s <= RECENT_S:
                 self.autopilot.send(message, peer)
 

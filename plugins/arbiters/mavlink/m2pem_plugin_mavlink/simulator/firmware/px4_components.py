@@ -56,21 +56,21 @@ class OffboardMonitor(Component):
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
-        self._heard_s = -1e9
+        self._received_s = -1e9
 
     @property
     def streaming(self) -> bool:
         """Setpoints are coming."""
         autopilot = self.autopilot
-        return autopilot.now_s - self._heard_s <= autopilot.parameters["COM_OF_LOSS_T"]
+        return autopilot.now_s - self._received_s <= autopilot.parameters["COM_OF_LOSS_T"]
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """The setpoints; what they ask for is the maneuver's."""
         names = ("LOCAL_NED", "GLOBAL_INT")
-        return {f"SET_POSITION_TARGET_{name}": self._heard for name in names}
+        return {f"SET_POSITION_TARGET_{name}": self._received for name in names}
 
-    def _heard(self, message: Any, sender: Sender) -> None:
-        self._heard_s = self.autopilot.now_s
+    def _received(self, message: Any, sender: Sender) -> None:
+        self._received_s = self.autopilot.now_s
 
     def refusals(self) -> Iterator[str]:
         """It is not armed in OFFBOARD without setpoints."""

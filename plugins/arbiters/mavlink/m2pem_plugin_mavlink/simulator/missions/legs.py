@@ -127,7 +127,7 @@ class LoiterTime(Loiter):
         return super().there(dt_s)
 
 
-class LoiterTurns(Leg):
+class LoiterLaps(Leg):
     """Go around as often as the first parameter says; the third is the radius."""
 
     _turned_rad = 0.0
@@ -223,7 +223,7 @@ class Delay(Leg):
 LEGS: Mapping[int, type[Leg]] = {
     16: Leg,
     17: Loiter,
-    18: LoiterTurns,
+    18: LoiterLaps,
     19: LoiterTime,
     20: Return,
     21: Land,

@@ -170,14 +170,14 @@ class GimbalHead:
         if self._found is None:
             return reach
         known = self._found.gimbal
-        turns_round = known.turns_endlessly or known.yaw_rad[1] - known.yaw_rad[0] >= math.tau
+        turns_round = known.has_endless_yaw or known.yaw_rad[1] - known.yaw_rad[0] >= math.tau
         return Reach(
             pan_rad=_both(reach.pan_rad, None if turns_round else known.yaw_rad),
             tilt_rad=_both(reach.tilt_rad, known.pitch_rad),
             zoom_max=reach.zoom_max,
             rate_rad_s=reach.rate_rad_s,
             view_rad=reach.view_rad,
-            endless=reach.endless and known.turns_endlessly,
+            endless=reach.endless and known.has_endless_yaw,
         )
 
     @property
