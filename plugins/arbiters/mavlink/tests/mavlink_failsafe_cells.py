@@ -54,6 +54,10 @@ def _restart(play: Play) -> None:
     play.station.start_anew()
 
 
+def _nothing(_: Play) -> None:
+    """The vehicle flies into it."""
+
+
 def _charge(left: float) -> Act:
     return lambda play: play.station.battery(left, 10.3)
 
@@ -102,6 +106,33 @@ DRIVING = _phases(
     Phase("in RTL", (DRIVE, RETURN), lambda s: s.mode == "RTL"),
 )
 
+
+def _store_a_landing(s: Station) -> None:
+    """The landing of a plane, which m2pem keeps behind its own missions (docs/mavlink.md)."""
+    land, start = dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_DO_LAND_START
+    approach = [
+        s.item(dialect.MAV_CMD_NAV_WAYPOINT, at) for at in ((500.0, 0, 50.0), (250.0, 0, 25.0))
+    ]
+    s.mission("a landing", [s.item(start), *approach, s.item(land, (0.0, 0.0, 0.0))])
+    s.forget()
+
+
+GLIDING = _phases(
+    Phase("on the ground", (UP,), lambda s: s.located, before=True),
+    Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
+    Phase(
+        "in a survey",
+        (UP, SURVEY),
+        lambda s: s.mode == "AUTO" and s.height_m > 25.0 and int(s.known.get("current", 0)) > 2,
+    ),
+    Phase("in RTL", (UP, DRIVE, RETURN), lambda s: s.mode == "RTL"),
+    Phase(
+        "landing",
+        (UP, DRIVE, ("land", {})),
+        lambda s: s.mode == "AUTO" and s.height_m < 24.0 and s.distance_m() < 480.0,
+    ),
+)
+
 # --- vehicles -------------------------------------------------------------------------------------
 
 COPTER = Vehicle(
@@ -135,6 +166,13 @@ COPTER = Vehicle(
         ),
         Failsafe("motors fail, crash check", {"SIM_ENGINE_MUL": 0.0}, _set("SIM_ENGINE_FAIL", 15)),
         Failsafe("the autopilot restarts", {}, _restart),
+        Failsafe(
+            "no data about the terrain",
+            {"TERRAIN_ENABLE": 1},
+            _nothing,
+            phases=("in a survey",),
+            survey={"altitude_frame": "terrain"},
+        ),
         Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 5)),
         Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 6)),
         Failsafe("a second ground station: clears the mission", {}, _clear),
@@ -178,6 +216,45 @@ ROVER = Vehicle(
     ),
 )
 
+PLANE = Vehicle(
+    name="arduplane",
+    title="ArduPlane 4.7",
+    variable="M2PEM_ARDUPLANE",
+    kind=Kind.PLANE,
+    firmware="ardupilot",
+    model="plane",
+    domain="air",
+    resource="uav1",
+    failsafe="return_to_launch",
+    speed=10,
+    parameters={"FS_GCS_ENABL": 1, "FS_LONG_ACTN": 1, "FS_LONG_TIMEOUT": 5},
+    phases=GLIDING,
+    prepare=_store_a_landing,
+    circles=True,
+    failsafes=_failsafes(
+        Failsafe("ground station lost for 20 s, RTL", {}, _cut, _mend),
+        Failsafe("battery low, no action", {"BATT_FS_LOW_ACT": 0}, _set(VOLTS, 10.4)),
+        Failsafe("battery low, RTL", {"BATT_FS_LOW_ACT": 1}, _set(VOLTS, 10.4)),
+        Failsafe(
+            "battery critical, land",
+            {"BATT_CRT_VOLT": 10.45, "BATT_FS_CRT_ACT": 2},
+            _set(VOLTS, 10.3),
+        ),
+        Failsafe("radio of the pilot lost, RTL", {"THR_FAILSAFE": 1}, _set("SIM_RC_FAIL", 1)),
+        Failsafe("no GPS", {}, _set("SIM_GPS1_ENABLE", 0)),
+        Failsafe(
+            "fence breached, RTL",
+            {"FENCE_TYPE": 1, "FENCE_ALT_MAX": 100, "FENCE_ACTION": 1, "FENCE_ENABLE": 1},
+            _set("FENCE_ALT_MAX", 10),
+        ),
+        Failsafe("the motor fails", {"SIM_ENGINE_MUL": 0.0}, _set("SIM_ENGINE_FAIL", 15)),
+        Failsafe("the autopilot restarts", {}, _restart),
+        Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 12)),
+        Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 11)),
+        Failsafe("a second ground station: clears the mission", {}, _clear),
+    ),
+)
+
 PX4 = Vehicle(
     name="px4copter",
     title="PX4 main, a copter",
@@ -204,4 +281,4 @@ PX4 = Vehicle(
     ),
 )
 
-VEHICLES = {each.name: each for each in (COPTER, ROVER, PX4)}
+VEHICLES = {each.name: each for each in (COPTER, ROVER, PLANE, PX4)}

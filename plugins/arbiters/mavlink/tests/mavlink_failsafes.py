@@ -12,7 +12,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,6 +39,8 @@ FILE = Path(__file__).parent / "traces/failsafes.json"
 AFTERWARDS_S = 90.0
 """So long the vehicle is watched after the mission, unless its motors stop."""
 STANDS_M_S = 0.3
+CIRCLES_WITHIN_M = 150.0
+"""Of its home a plane circles, at most: WP_LOITER_RAD, RTL_RADIUS and what it drifts."""
 GROUND_STATION_PORT = 14550
 """Every PX4 sends there, too."""
 LATITUDE, LONGITUDE, ALTITUDE_M = ORIGIN
@@ -66,19 +68,28 @@ class Phase(NamedTuple):
 
 
 class Failsafe(NamedTuple):
-    """`parameters`: set from the beginning; `cause`: brings it about; `end`: ends it after 20 s."""
+    """`parameters`: set from the beginning; `cause`: brings it about; `end`: ends it after 20 s;
+    `phases`: the only ones in which it is played, if there are any; `survey`: more parameters of
+    the survey."""
 
     name: str
     parameters: Mapping[str, float]
     cause: Callable[["Play"], None]
     end: Callable[["Play"], None] = lambda play: None
+    phases: tuple[str, ...] = ()
+    survey: Mapping[str, object] = {}
+
+    def plays_in(self, phase: Phase) -> bool:
+        """Whether it is played in this phase."""
+        return not self.phases or phase.name in self.phases
 
 
 class Vehicle(NamedTuple):
     """A program with its parameters, and what is played with it.
 
     `name`: in the traces; `title`: for people; `variable`: of the environment, names the program;
-    `model`: of its simulation; `speed`: how much faster than real time."""
+    `model`: of its simulation; `speed`: how much faster than real time; `prepare`: what the second
+    ground station does before the mission; `circles`: it circles where others stand or land."""
 
     name: str
     title: str
@@ -93,6 +104,8 @@ class Vehicle(NamedTuple):
     parameters: Mapping[str, float]
     phases: Mapping[str, Phase]
     failsafes: Mapping[str, Failsafe]
+    prepare: Callable[[Station], None] = lambda station: None
+    circles: bool = False
 
     @property
     def flies(self) -> bool:
@@ -162,7 +175,7 @@ def play(
     `modes`: of the vehicle, from the failsafe on; `texts`: its warnings; `end`: how the behavior
     ended; `said`: what operators read from the failsafe on; `status`: of m2pem; `disarmed`: the
     motors stopped; `stands`: at the end, it did not move; `at home`: it was then within 4 m of
-    where it began.
+    where it began (a plane that flies: within 150 m).
     """
     px4 = vehicle.firmware == "px4"
     wire = UdpWire(vehicle.kind, vehicle.firmware, GROUND_STATION_PORT if px4 else 0)
@@ -214,10 +227,15 @@ def _played(
     s.beats = False
     s.connect()
     s.ready()
+    vehicle.prepare(s)
     if phase.before:
         failsafe.cause(cell)
         s.watch(3.0)
-    with _mission(vehicle, phase, s.system, cell.relay.to_port, folder) as (process, lines):
+    steps = [
+        (behavior, {**values, **(failsafe.survey if behavior == "area_survey" else {})})
+        for behavior, values in phase.steps
+    ]
+    with _mission(vehicle, steps, s.system, cell.relay.to_port, folder) as (process, lines):
         s.until("begun", lambda: bool(lines) or process.poll() is not None, 120.0)
         if not phase.before:
             if not s.until("phase", lambda: phase.now(s), 200.0):
@@ -244,7 +262,7 @@ def _played(
         "status": status if over else None,
         "disarmed": not s.armed,
         "stands": s.speed_mps < STANDS_M_S,
-        "at home": s.distance_m() < 4.0,
+        "at home": s.distance_m() < (CIRCLES_WITHIN_M if vehicle.circles and s.armed else 4.0),
     }
 
 
@@ -255,9 +273,13 @@ def _plain(line: str) -> str:
 
 @contextmanager
 def _mission(
-    vehicle: Vehicle, phase: Phase, system: int, port: int, folder: Path
+    vehicle: Vehicle,
+    steps: Sequence[tuple[str, Mapping[str, object]]],
+    system: int,
+    port: int,
+    folder: Path,
 ) -> Iterator[tuple["subprocess.Popen[str]", list[str]]]:
-    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *phase.steps))
+    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *steps))
     (folder / "field.geojson").write_text(json.dumps(AREA), encoding="utf-8")
     fleet = FLEET.format(vehicle=vehicle, system=system, port=port)
     (folder / "fleet.yaml").write_text(fleet, encoding="utf-8")

@@ -741,3 +741,84 @@ def hold_of_a_plane(s: Station) -> None:
     s.watch(30.0)
     s.note("near", s.distance_m() < 1000.0)
     s.set_mode("GUIDED")
+
+
+# --- gimbal -------------------------------------------------------------------------------------
+
+MOUNTED = ("arducopter-gimbal",)
+"""A copter whose mount is turned by servos; its manager is the autopilot."""
+PITCH_YAW = dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+CONFIGURE = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+LEVEL = dialect.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
+FROM_NORTH = LEVEL | dialect.GIMBAL_MANAGER_FLAGS_YAW_LOCK
+UNCHANGED = -1.0
+OURS, LET_GO = -2.0, -3.0
+"""Instead of a system id in DO_GIMBAL_MANAGER_CONFIGURE."""
+
+
+@of(*MOUNTED)
+def gimbal_points(s: Station) -> None:
+    """At angles from the nose and from north, then without aim, then beyond its limits."""
+    s.ready()
+    s.gimbal()
+    s.command("point ahead and down", PITCH_YAW, -30, 40, math.nan, math.nan, LEVEL)
+    s.note_gimbal()
+    s.command("point east", PITCH_YAW, -10, 90, math.nan, math.nan, FROM_NORTH)
+    s.note_gimbal()
+    neutral = dialect.GIMBAL_MANAGER_FLAGS_NEUTRAL
+    s.command("neutral", PITCH_YAW, 0, 0, math.nan, math.nan, neutral)
+    s.note_gimbal()
+    s.command("point up", PITCH_YAW, 80, 0, math.nan, math.nan, LEVEL)
+    s.note_gimbal()
+    nothing = (math.nan,) * 4
+    s.command("point nowhere", PITCH_YAW, *nothing, LEVEL)
+    s.command("another device", PITCH_YAW, 0, 0, math.nan, math.nan, LEVEL, 0, 5)
+
+
+@of(*MOUNTED)
+def gimbal_turns(s: Station) -> None:
+    """At a rate, until it is stopped."""
+    s.ready()
+    s.gimbal()
+    s.command("level", PITCH_YAW, 0, 0, math.nan, math.nan, LEVEL)
+    s.note_gimbal()
+    s.command("turn", PITCH_YAW, math.nan, math.nan, 0, 10, LEVEL, settle_s=3.0)
+    s.command("stop", PITCH_YAW, math.nan, math.nan, 0, 0, LEVEL)
+    first = s.latest["GIMBAL_DEVICE_ATTITUDE_STATUS"].q
+    s.watch(3.0)
+    last = s.latest["GIMBAL_DEVICE_ATTITUDE_STATUS"].q
+    s.note("stands", all(abs(a - b) < 0.02 for a, b in zip(first, last, strict=True)))
+    s.note("has turned", abs(2 * math.atan2(last[3], last[0])) > math.radians(15))
+
+
+@of(*MOUNTED)
+def gimbal_looks_at_a_place(s: Station) -> None:
+    s.airborne(20.0)
+    s.gimbal()
+    roi = dialect.MAV_CMD_DO_SET_ROI_LOCATION
+    s.command_int("look at a place", roi, (0, 0, 0, 0), (0.0, 40.0, 0.0))
+    s.note_gimbal()
+    s.command("look at none", dialect.MAV_CMD_DO_SET_ROI_NONE)
+    s.note_gimbal()
+
+
+@of(*MOUNTED)
+def gimbal_in_other_hands(s: Station) -> None:
+    """Another ground station takes control, points it, and lets it go."""
+    s.ready()
+    s.gimbal()
+    rest = (UNCHANGED, UNCHANGED, 0, 0, 0)
+    s.command("take control", CONFIGURE, OURS, OURS, *rest)
+    s.note_gimbal(2.0)
+    s.command("the second station takes control", CONFIGURE, OURS, OURS, *rest, system=SECOND)
+    s.note_gimbal(2.0)
+    s.command("point", PITCH_YAW, -30, 40, math.nan, math.nan, LEVEL)
+    s.note_gimbal()
+    s.command(
+        "the second station points", PITCH_YAW, -60, 0, math.nan, math.nan, LEVEL, system=SECOND
+    )
+    s.note_gimbal()
+    s.command("let go", CONFIGURE, LET_GO, LET_GO, *rest)
+    s.note_gimbal(2.0)
+    s.command("the second station lets go", CONFIGURE, LET_GO, LET_GO, *rest, system=SECOND)
+    s.note_gimbal(2.0)

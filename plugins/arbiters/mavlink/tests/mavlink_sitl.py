@@ -7,13 +7,16 @@ folder of its own, as `m2pem sitl` starts it, and speaks to a UDP port of this m
 import os
 import socket
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from m2pem_plugin_mavlink.sitl.launch import Launch, Start, ardupilot_launch, px4_launch, running
 from m2pem_plugin_mavlink.sitl.programs import FRAMES, ardupilot_program, find_px4
 
 __all__ = [
     "HOME",
+    "MOUNT",
     "SPEED",
     "Launch",
     "ardupilot",
@@ -26,6 +29,13 @@ __all__ = [
 
 HOME = (47.397742, 8.545594, 488.0)
 SPEED = 5
+MOUNT: Mapping[str, float] = MappingProxyType(
+    {
+        **{"MNT1_TYPE": 1, "SERVO9_FUNCTION": 6, "SERVO10_FUNCTION": 7, "SERVO11_FUNCTION": 8},
+        **{"MNT1_DEFLT_MODE": 1, "MNT1_YAW_MIN": -160, "MNT1_YAW_MAX": 160, "MNT1_PITCH_MIN": -90, "MNT1_PITCH_MAX": 25},
+    }
+)
+"""A mount of ArduPilot that three servos turn (docs: ArduPilot, "Servo Gimbal")."""
 
 
 def free_port() -> int:
@@ -43,7 +53,12 @@ def program(variable: str) -> Path | None:
 
 
 def ardupilot(
-    binary: Path, model: str, instance: int, port: int, system_id: int | None = None
+    binary: Path,
+    model: str,
+    instance: int,
+    port: int,
+    system_id: int | None = None,
+    parameters: Mapping[str, float] = MappingProxyType({}),
 ) -> Launch:
     """Of a frame of ArduPilot; `system_id` is `instance` + 1 if left out."""
     frame = FRAMES[model]
@@ -56,6 +71,7 @@ def ardupilot(
         instance=instance,
         system_id=system,
         ports=[port],
+        parameters=parameters,
     )
 
 

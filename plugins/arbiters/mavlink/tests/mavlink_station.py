@@ -6,7 +6,7 @@ seconds of the autopilot's own clock (`time_boot_ms`), places metres from where 
 
 import math
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from m2pem_plugin_mavlink.simulator.specification import Kind
@@ -33,6 +33,10 @@ STREAMS_HZ = {
     dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2,
     dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 2,
     dialect.MAVLINK_MSG_ID_FENCE_STATUS: 2,
+}
+GIMBAL_STREAMS_HZ = {
+    dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: 5,
+    dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: 5,
 }
 
 At = tuple[float, float, float]
@@ -405,23 +409,7 @@ class Station(Recording):
         """Hear the autopilot and ask it for the streams that the trace is made of."""
         while "HEARTBEAT" not in self.latest:
             self.pump()
-        for id_, hz in STREAMS_HZ.items():
-            self.send(
-                dialect.MAVLink_command_long_message(
-                    self.system,
-                    1,
-                    dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
-                    0,
-                    id_,
-                    1e6 / hz,
-                    0,
-                    0,
-                    0,
-                    0,
-                    0,
-                )
-            )
-            self._acked(dialect.MAV_CMD_SET_MESSAGE_INTERVAL)
+        self._stream(STREAMS_HZ)
         while "SYSTEM_TIME" not in self.latest:
             self.pump()
         version = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
@@ -431,6 +419,38 @@ class Station(Recording):
         )
         self._acked(ask)
         self.answer("AUTOPILOT_VERSION", within_s=1.0)
+
+    def _stream(self, rates_hz: Mapping[int, int]) -> None:
+        interval = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+        for id_, hz in rates_hz.items():
+            params = (id_, 1e6 / hz, 0, 0, 0, 0, 0)
+            message = dialect.MAVLink_command_long_message(self.system, 1, interval, 0, *params)
+            self.send(message)
+            self._acked(interval)
+
+    def gimbal(self) -> None:
+        """Ask for what the gimbal and its manager say; nothing of that is in the trace."""
+        self._stream(GIMBAL_STREAMS_HZ)
+        while not {"GIMBAL_DEVICE_ATTITUDE_STATUS", "GIMBAL_MANAGER_STATUS"} <= set(self.latest):
+            self.pump()
+        self.forget()
+
+    def note_gimbal(self, settle_s: float = 8.0) -> None:
+        """Part of a step: wait, then write down where the gimbal points and who controls it.
+
+        Angles in degrees, to the nearest 5; the yaw as the message has it, from the nose or from
+        north."""
+        self.watch(settle_s)
+        attitude = self.latest["GIMBAL_DEVICE_ATTITUDE_STATUS"]
+        north = bool(attitude.flags & dialect.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+        w, x, y, z = attitude.q
+        pitch_deg = math.degrees(math.asin(max(-1.0, min(1.0, 2 * (w * y - x * z)))))
+        yaw_deg = math.degrees(math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+        self.note("pitch", 5 * round(pitch_deg / 5))
+        self.note("yaw", 5 * round(yaw_deg / 5))
+        self.note("yaw from", "north" if north else "the nose")
+        status = self.latest["GIMBAL_MANAGER_STATUS"]
+        self.note("controlled by", status.primary_control_sysid)
 
     def start_anew(self) -> None:
         """The autopilot restarts: hear it again, and ask it again for its streams."""

@@ -17,7 +17,7 @@ from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.sitl.launch import px4_port
 from mavlink_recording import Trace
 from mavlink_scenarios import Scenario
-from mavlink_sitl import ardupilot, px4, running
+from mavlink_sitl import MOUNT, ardupilot, px4, running
 from mavlink_station import Station
 from mavlink_wires import SimulatedWire, UdpWire
 
@@ -28,13 +28,15 @@ NEAR_S, NEAR_SHARE = 4.0, 0.4
 
 class Vehicle(NamedTuple):
     """`model`: of the program's own simulation; `parameters`: what the file of parameters or the
-    start script that belongs to it sets; `estimator_s`: of the simulated one."""
+    start script that belongs to it sets; `estimator_s`: of the simulated one; `given`: parameters
+    that the real one is started with."""
 
     kind: Kind
     firmware: str
     model: str
     parameters: Mapping[str, float] = MappingProxyType({})
     estimator_s: float = VehicleSpec().estimator_s
+    given: Mapping[str, float] = MappingProxyType({})
 
 
 VEHICLES = {
@@ -43,6 +45,7 @@ VEHICLES = {
         Kind.ROVER, "ardupilot", "rover", {"WP_SPEED": 5.0, "CRUISE_SPEED": 5.0, "WP_RADIUS": 3.0}
     ),
     "arduplane": Vehicle(Kind.PLANE, "ardupilot", "plane"),
+    "arducopter-gimbal": Vehicle(Kind.COPTER, "ardupilot", "quad", given=MOUNT),
     # PX4's start script multiplies these by the speed of time, and knows where it is soon after.
     "px4copter": Vehicle(
         *(Kind.COPTER, "px4", "sihsim_quadx"),
@@ -87,7 +90,7 @@ def reasons(vehicle: str, scenario: str) -> dict[str, str]:
 
 def play_simulated(vehicle: str, scenario: Scenario) -> Trace:
     """The trace of the simulated autopilot."""
-    kind, firmware, _, parameters, estimator_s = VEHICLES[vehicle]
+    kind, firmware, _, parameters, estimator_s, _ = VEHICLES[vehicle]
     spec = VehicleSpec(kind, firmware=firmware, parameters=parameters, estimator_s=estimator_s)
     station = Station(SimulatedWire(spec))
     station.connect()
@@ -106,13 +109,13 @@ def play_real(vehicle: str, binary: Path, scenario: Scenario, instance: int) -> 
 
 @contextmanager
 def _real(vehicle: str, binary: Path, instance: int) -> Iterator[Station]:
-    kind, firmware, model, _, _ = VEHICLES[vehicle]
+    kind, firmware, model, _, _, given = VEHICLES[vehicle]
     wire = UdpWire(kind, firmware, px4_port(instance) if firmware == "px4" else 0)
     with TemporaryDirectory() as folder:
         if firmware == "px4":
             launch = px4(binary, instance, Path(folder))
         else:
-            launch = ardupilot(binary, model, instance, wire.port)
+            launch = ardupilot(binary, model, instance, wire.port, parameters=given)
         with running([launch], Path(folder)):
             try:
                 yield Station(wire, instance + 1)

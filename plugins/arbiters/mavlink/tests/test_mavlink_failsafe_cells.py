@@ -12,10 +12,11 @@ from mavlink_sitl import program
 REPOSITORY = Path(__file__).parents[4]
 KEPT = json.loads(FILE.read_text(encoding="utf-8"))
 CELLS = [
-    (vehicle, failsafe, phase)
+    (vehicle, failsafe.name, phase.name)
     for vehicle in VEHICLES.values()
-    for failsafe in vehicle.failsafes
-    for phase in vehicle.phases
+    for failsafe in vehicle.failsafes.values()
+    for phase in vehicle.phases.values()
+    if failsafe.plays_in(phase)
 ]
 RECORDED = [cell for cell in CELLS if cell[2] in KEPT[cell[0].name].get(cell[1], {})]
 RETURNS = ("RTL", "LAND", "DESCEND")

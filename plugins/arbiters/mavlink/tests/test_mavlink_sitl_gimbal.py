@@ -28,12 +28,6 @@ SCANNED_AT_DEG = -20.0
 
 TOWER: At = (60.0, 40.0)
 """East and north of the origin, on the ground, m."""
-MOUNT = {
-    **{"MNT1_TYPE": 1, "SERVO9_FUNCTION": 6, "SERVO10_FUNCTION": 7, "SERVO11_FUNCTION": 8},
-    "LOG_DISARMED": 1,
-    **{"MNT1_YAW_MIN": -160, "MNT1_YAW_MAX": 160, "MNT1_PITCH_MIN": -90, "MNT1_PITCH_MAX": 25},
-}
-"""Three servos turn the mount (docs: ArduPilot, "Servo Gimbal")."""
 
 
 def _at(east_m: float, north_m: float) -> str:
@@ -69,7 +63,7 @@ def fleet(tmp_path: Path) -> Path:
                 "connection": {
                     "url": f"udpin://127.0.0.1:{mavlink_sitl.free_port()}",
                     "system_id": 1,
-                    "sitl": {"parameters": MOUNT},
+                    "sitl": {"parameters": {**mavlink_sitl.MOUNT, "LOG_DISARMED": 1}},
                 },
                 "payloads": {
                     "cam": {
