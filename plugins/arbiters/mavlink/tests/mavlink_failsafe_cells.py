@@ -82,12 +82,20 @@ def _failsafes(*failsafes: Failsafe) -> dict[str, Failsafe]:
     return {each.name: each for each in failsafes}
 
 
+def _in_auto(s: Station) -> bool:
+    return s.mode == s.auto
+
+
 def _in_its_mission(s: Station) -> bool:
     return s.mode == s.auto and int(s.known.get("current", 0)) > 1
 
 
 ON_THE_FIELD = {"area": "field", "spacing": "20 m"}
 SURVEY: tuple[str, Mapping[str, object]] = ("area_survey", {**ON_THE_FIELD, "altitude": "30 m"})
+ABOVE_TERRAIN: tuple[str, Mapping[str, object]] = (
+    "area_survey",
+    {**ON_THE_FIELD, "altitude": "30 m", "altitude_frame": "terrain"},
+)
 FLYING = _phases(
     Phase("on the ground", (UP,), lambda s: s.located, before=True),
     Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
@@ -125,7 +133,7 @@ GLIDING = _phases(
         (UP, SURVEY),
         lambda s: s.mode == "AUTO" and s.height_m > 25.0 and int(s.known.get("current", 0)) > 2,
     ),
-    Phase("in RTL", (UP, DRIVE, RETURN), lambda s: s.mode == "RTL"),
+    Phase("in RTL", (UP, DRIVE, RETURN), lambda s: s.mode == "RTL" and s.height_m > HIGH_M),
     Phase(
         "landing",
         (UP, DRIVE, ("land", {})),
@@ -170,8 +178,7 @@ COPTER = Vehicle(
             "no data about the terrain",
             {"TERRAIN_ENABLE": 1},
             _nothing,
-            phases=("in a survey",),
-            survey={"altitude_frame": "terrain"},
+            phases=(Phase("in a survey above terrain", (UP, ABOVE_TERRAIN), _in_auto),),
         ),
         Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 5)),
         Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 6)),
@@ -226,8 +233,8 @@ PLANE = Vehicle(
     domain="air",
     resource="uav1",
     failsafe="return_to_launch",
-    speed=10,
-    parameters={"FS_GCS_ENABL": 1, "FS_LONG_ACTN": 1, "FS_LONG_TIMEOUT": 5},
+    speed=4,
+    parameters={"FS_GCS_ENABL": 1, "FS_LONG_ACTN": 1, "FS_LONG_TIMEOUT": 8, "RTL_AUTOLAND": 3},
     phases=GLIDING,
     prepare=_store_a_landing,
     circles=True,

@@ -12,7 +12,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -69,19 +69,13 @@ class Phase(NamedTuple):
 
 class Failsafe(NamedTuple):
     """`parameters`: set from the beginning; `cause`: brings it about; `end`: ends it after 20 s;
-    `phases`: the only ones in which it is played, if there are any; `survey`: more parameters of
-    the survey."""
+    `phases`: in which it is played, if they are not those of all failsafes of the vehicle."""
 
     name: str
     parameters: Mapping[str, float]
     cause: Callable[["Play"], None]
     end: Callable[["Play"], None] = lambda play: None
-    phases: tuple[str, ...] = ()
-    survey: Mapping[str, object] = {}
-
-    def plays_in(self, phase: Phase) -> bool:
-        """Whether it is played in this phase."""
-        return not self.phases or phase.name in self.phases
+    phases: tuple[Phase, ...] = ()
 
 
 class Vehicle(NamedTuple):
@@ -106,6 +100,10 @@ class Vehicle(NamedTuple):
     failsafes: Mapping[str, Failsafe]
     prepare: Callable[[Station], None] = lambda station: None
     circles: bool = False
+
+    def phases_of(self, failsafe: Failsafe) -> Mapping[str, Phase]:
+        """The phases in which a failsafe is played, by their names."""
+        return {each.name: each for each in failsafe.phases} or self.phases
 
     @property
     def flies(self) -> bool:
@@ -231,11 +229,7 @@ def _played(
     if phase.before:
         failsafe.cause(cell)
         s.watch(3.0)
-    steps = [
-        (behavior, {**values, **(failsafe.survey if behavior == "area_survey" else {})})
-        for behavior, values in phase.steps
-    ]
-    with _mission(vehicle, steps, s.system, cell.relay.to_port, folder) as (process, lines):
+    with _mission(vehicle, phase, s.system, cell.relay.to_port, folder) as (process, lines):
         s.until("begun", lambda: bool(lines) or process.poll() is not None, 120.0)
         if not phase.before:
             if not s.until("phase", lambda: phase.now(s), 200.0):
@@ -273,13 +267,9 @@ def _plain(line: str) -> str:
 
 @contextmanager
 def _mission(
-    vehicle: Vehicle,
-    steps: Sequence[tuple[str, Mapping[str, object]]],
-    system: int,
-    port: int,
-    folder: Path,
+    vehicle: Vehicle, phase: Phase, system: int, port: int, folder: Path
 ) -> Iterator[tuple["subprocess.Popen[str]", list[str]]]:
-    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *steps))
+    (folder / "mission.bpmn").write_bytes(one_after_another(vehicle.resource, *phase.steps))
     (folder / "field.geojson").write_text(json.dumps(AREA), encoding="utf-8")
     fleet = FLEET.format(vehicle=vehicle, system=system, port=port)
     (folder / "fleet.yaml").write_text(fleet, encoding="utf-8")

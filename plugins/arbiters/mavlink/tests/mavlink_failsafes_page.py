@@ -24,8 +24,9 @@ with it the heartbeats of the ground station: a vehicle that stays in the air th
 own ground station failsafe.
 
 Of PX4, not every failsafe was played yet. Rovers say "Radio Failsafe" when it is the ground station
-that they have lost. Terrain failsafes are not among the rows: m2pem commands no heights above
-terrain unless a mission says so.
+that they have lost. m2pem commands heights above terrain only where a mission says
+`altitude_frame: terrain`, and serves no terrain data: a vehicle that has none does not move. Planes
+circle where copters stand.
 """
 
 SET = """
@@ -41,6 +42,7 @@ ROUTINE = re.compile(
     r"^(Start|End|Task\d|r1 of \w+ started|Task\d: \w+ begins .*|r1 completed"
     r"|Task\d: \w+ ends .*: succeeded|Task\d: error .*|r1 failed: .*"
     r"|WARNING m2pem.arbiter: \w+: nothing happens when its battery is low.*"
+    r"|WARNING m2pem.arbiter: \w+: fleet says .*"
     r"|WARNING m2pem.arbiter: \w+ is ready|.*waits until it is ready: EKF: .*"
     r"|.*where it is was not heard yet)$"
 )
@@ -56,11 +58,13 @@ def _page() -> Iterator[str]:
     yield PAGE
     kept = json.loads(FILE.read_text(encoding="utf-8"))
     for vehicle in VEHICLES.values():
+        if vehicle.name not in kept:
+            continue
         parameters = ", ".join(f"`{key}` {value:g}" for key, value in vehicle.parameters.items())
         yield f"\n## {vehicle.title}\n{SET.format(vehicle=vehicle, parameters=parameters)}"
         for name, phases in kept[vehicle.name].items():
             yield f"\n### {vehicle.title}: {name}\n{HEAD}"
-            for phase in vehicle.phases:
+            for phase in vehicle.phases_of(vehicle.failsafes[name]):
                 if phase in phases:
                     seen = phases[phase]
                     yield f"| {phase} | {_vehicle(seen)} | {_mission(seen)} | {_read(seen)} |\n"

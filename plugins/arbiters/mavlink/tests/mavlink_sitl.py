@@ -32,10 +32,12 @@ SPEED = 5
 MOUNT: Mapping[str, float] = MappingProxyType(
     {
         **{"MNT1_TYPE": 1, "SERVO9_FUNCTION": 6, "SERVO10_FUNCTION": 7, "SERVO11_FUNCTION": 8},
-        **{"MNT1_DEFLT_MODE": 1, "MNT1_YAW_MIN": -160, "MNT1_YAW_MAX": 160, "MNT1_PITCH_MIN": -90, "MNT1_PITCH_MAX": 25},
+        **{"MNT1_YAW_MIN": -160, "MNT1_YAW_MAX": 160, "MNT1_PITCH_MIN": -90, "MNT1_PITCH_MAX": 25},
+        "MNT1_DEFLT_MODE": 1,
     }
 )
-"""A mount of ArduPilot that three servos turn (docs: ArduPilot, "Servo Gimbal")."""
+"""A mount of ArduPilot that three servos turn (docs: ArduPilot, "Servo Gimbal"). While nothing
+commands it, it looks ahead, and not where the stick of a pilot points it."""
 
 
 def free_port() -> int:

@@ -97,6 +97,8 @@ def test_a_failsafe_that_watches_another_station_is_found() -> None:
     [
         ({"BATT_FS_LOW_ACT": 0.0}, "BATT_FS_LOW_ACT"),
         ({"FS_OPTIONS": 2.0}, "FS_OPTIONS"),
+        ({"FS_OPTIONS": 16.0}, "FS_OPTIONS"),
+        ({"FS_OPTIONS": 8.0}, ""),
         ({"FS_THR_ENABLE": 4.0}, ""),
         ({"FS_THR_ENABLE": 3.0}, "FS_THR_ENABLE"),
         ({"FS_THR_ENABLE": 5.0}, "FS_THR_ENABLE"),

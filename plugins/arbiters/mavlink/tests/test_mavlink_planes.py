@@ -7,6 +7,8 @@ from itertools import pairwise
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.simulator.specification import Kind
+from m2pem_plugin_mavlink.vehicle import exchanges
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
 from mavlink_simulated import AMPLE_S, at, fly
 
 from m2pem.api import Area, BehaviorState, Point, Route
@@ -204,5 +206,27 @@ def test_it_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -
         assert not bench.truth().armed
         assert bench.truth().up_m == pytest.approx(0, abs=0.3)
         assert math.dist(bench.level(), (0, 0)) < 150
+
+    fly(main, Kind.PLANE)
+
+
+def test_a_survey_that_goes_on_with_the_stored_landing_has_not_succeeded() -> None:
+    """As a battery failsafe of ArduPlane does it: in AUTO, without a change of mode."""
+
+    async def main(bench) -> None:
+        vehicle = bench.arbiter._controllers["v1"].vehicle
+        assert await vehicle.identified(AMPLE_S)
+        await vehicle.driver.upload([stored(WAYPOINT, 0, 900, 50), *LANDING])
+        await bench.do("r1.b1", "takeoff", altitude=60.0)
+        route = Route(tuple((*at(east, 900), 60.0) for east in (0, 900, 1800)))
+        await bench.start("r1.b2", "single_vehicle_routing", "v1", route=route)
+        await bench.running("r1.b2", AMPLE_S)
+        begins = landing_begins(await vehicle.driver.downloaded())
+        await exchanges.set_current(vehicle.link, begins + 1)
+        end = await bench.ended("r1.b2", AMPLE_S)
+        assert end.state is BehaviorState.FAILED
+        assert "has started its landing" in end.reason
+        # Nothing interrupts it: it lands.
+        assert bench.truth().mode == "AUTO"
 
     fly(main, Kind.PLANE)

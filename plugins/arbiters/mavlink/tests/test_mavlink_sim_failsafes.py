@@ -63,6 +63,19 @@ def test_in_auto_a_copter_may_be_told_to_go_on() -> None:
     assert "GCS Failsafe - Continuing Auto Mode" in bench.texts()
 
 
+@pytest.mark.parametrize(("options", "then"), [(16, "BRAKE"), (0, "RTL")])
+def test_a_copter_that_is_held_stays_there_unless_its_options_say_otherwise(
+    options: int, then: str
+) -> None:
+    bench = Bench(parameters={"FS_GCS_ENABLE": 1, "FS_OPTIONS": options}).airborne()
+    assert bench.command(176, 1, 17) == 0
+    beat(bench, 2)
+    bench.run(10)
+    assert mode(bench) == then
+    stays = "GCS Failsafe - Continuing Pilot Control" in bench.texts()
+    assert stays == (then == "BRAKE")
+
+
 def test_on_the_ground_the_motors_stop() -> None:
     bench = Bench(parameters={"FS_GCS_ENABLE": 1, "DISARM_DELAY": 0}).ready()
     beat(bench, 2)

@@ -147,10 +147,17 @@ def test_px4_moves_it_only_for_who_is_in_control() -> None:
     assert angles(bench) == pytest.approx((-30, 0), abs=0.5)
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_a_gimbal_accepts_no_angles_as_a_real_one_does_and_stays() -> None:
     bench = Bench()
-    assert bench.command(PITCH_YAW, NAN, NAN, NAN, NAN, 0) == 4
-    assert bench.command(PITCH_YAW, 0, 0, NAN, NAN, 0, 0, 9) == 2
+    before = angles(bench)
+    assert bench.command(PITCH_YAW, NAN, NAN, NAN, NAN, 0) == 0
+    bench.run(5)
+    assert angles(bench) == pytest.approx(before, abs=1e-3)
+
+
+def test_a_gimbal_refuses_another_device_and_values_that_are_no_numbers() -> None:
+    bench = Bench()
+    assert bench.command(PITCH_YAW, 0, 0, NAN, NAN, 0, 0, 9) == 4
     assert bench.command(PITCH_YAW, 0, 0, NAN, NAN, NAN) == 2
     assert bench.command(dialect.MAV_CMD_DO_SET_ROI_LOCATION, 0, 0, 0, 0, 99, 0, 0) == 2
 

@@ -203,9 +203,11 @@ class MissionFlight(Behavior):
         last, place = self._end
         driver = self.vehicle.driver
         reached, current = driver.reached_item, driver.current_item
-        if reached is not None and reached >= last:
+        # Behind the last item and a plane's circle comes a landing that was not commanded.
+        own = range(last, last + (2 if self.vehicle.state.loiter_radius_m is not None else 1))
+        if reached is not None and reached in own:
             return True
-        if current is None or current < last:
+        if current is None or current not in own:
             return False
         near_m = 2 * TOLERANCES_M.get(self.vehicle.domain, 2.5)
         if distance_to_m(self.vehicle, place) > arrival_radius_m(self.vehicle, near_m):

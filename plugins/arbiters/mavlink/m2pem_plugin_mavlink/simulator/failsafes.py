@@ -77,7 +77,10 @@ class Heartbeats:
 EKF_S = 1.0
 """For how long the estimator must be without a position."""
 CONTINUE_AUTO_WITHOUT_GCS = 1 << 1
+CONTINUE_PILOTED_WITHOUT_GCS = 1 << 4
 """FS_OPTIONS."""
+PILOTED = ("STABILIZE", "ACRO", "ALT_HOLD", "LOITER", "POSHOLD", "BRAKE")
+"""Modes of copters that count as controlled by a pilot (ArduCopter: Mode::is_autopilot)."""
 SURFACE = (Kind.ROVER, Kind.BOAT)
 
 Modes = Mapping[int, str]
@@ -140,10 +143,15 @@ class ArduPilotFailsafes(Component):
             autopilot.warn("GCS Failsafe Cleared")
         if change is not Change.WRONG:
             return
-        auto = autopilot.modes.mode.name == "AUTO"
+        mode = autopilot.modes.mode.name
+        auto = mode == "AUTO"
         if kind is Kind.COPTER:
-            goes_on = int(p["FS_OPTIONS"]) & CONTINUE_AUTO_WITHOUT_GCS and auto
-            self._act("GCS", COPTER_GCS.get(enabled), "Continuing Auto Mode" if goes_on else "")
+            options, instead = int(p["FS_OPTIONS"]), ""
+            if options & CONTINUE_AUTO_WITHOUT_GCS and auto:
+                instead = "Continuing Auto Mode"
+            elif options & CONTINUE_PILOTED_WITHOUT_GCS and mode in PILOTED:
+                instead = "Continuing Pilot Control"
+            self._act("GCS", COPTER_GCS.get(enabled), instead)
         elif kind in SURFACE:
             # Rovers look after radio and ground station together, and name the radio
             # (Rover::failsafe_trigger).

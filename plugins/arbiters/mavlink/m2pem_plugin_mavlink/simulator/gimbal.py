@@ -181,11 +181,13 @@ class Gimbal(Component):
         return free or who in (self.primary, self.secondary)
 
     def _pitch_yaw(self, command: Command) -> Result:
-        if int(command.z) not in (0, DEVICE) or not self._may(command.sender):
+        if not self._may(command.sender):
             return Result.DENIED
+        if int(command.z) not in (0, DEVICE):
+            return Result.FAILED
         angles = (command.param1, command.param2, command.param3, command.param4)
-        done = self._point(command.flags, *map(math.radians, angles))
-        return Result.ACCEPTED if done else Result.FAILED
+        self._point(command.flags, *map(math.radians, angles))
+        return Result.ACCEPTED  # also of no angles, which change nothing
 
     def _watch(self, command: Command) -> Result:
         if not command.has_position or not math.isfinite(command.z):

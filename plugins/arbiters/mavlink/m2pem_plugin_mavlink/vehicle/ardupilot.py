@@ -244,6 +244,7 @@ class ArdupilotDriver(Autopilot):
         if self.kind not in WINGED:
             await self.arm()
         self.state.reached_sequence = None
+        self.commanded.first_item = first
         if self.state.mode is FlightMode.MISSION:
             await self.set_mode(FlightMode.GUIDED)
         await exchanges.set_current(self.link, first + self.home_items)

@@ -133,6 +133,9 @@ _OUR_STATION = ("MAV_GCS_SYSID", "SYSID_MYGCS")
 _RETURN_HEIGHT = ("RTL_ALT_M", "RTL_ALT")
 _PILOT = _COPTER_RC.names[0]
 _GOES_ON_IN_AUTO = 1 << 1
+_STAYS_WHERE_HELD = 1 << 4
+"""FS_OPTIONS of ArduCopter. The second one, "continue if in pilot control", is its default. BRAKE
+and LOITER, in which m2pem holds a copter, count as controlled by a pilot."""
 
 
 def parameters_of_interest(identity: Identity) -> tuple[str, ...]:
@@ -237,7 +240,14 @@ def _copter_findings(word: str, values: Values) -> _Found:
         yield (
             "FS_OPTIONS",
             f"fleet says {word} on loss of link, FS_OPTIONS is {options}: in AUTO it goes on; "
-            f"set it to {options & ~_GOES_ON_IN_AUTO}",
+            f"set it to {options & ~_GOES_ON_IN_AUTO & ~_STAYS_WHERE_HELD}",
+        )
+    elif word in (RETURN, LAND) and options & _STAYS_WHERE_HELD:
+        yield (
+            "FS_OPTIONS",
+            f"fleet says {word} on loss of link, FS_OPTIONS is {options}: while it is held (BRAKE, "
+            "LOITER) it stays in the air until its battery is low; "
+            f"set it to {options & ~_STAYS_WHERE_HELD}",
         )
     pilot = values.get(_PILOT)
     if word != CONTINUE and pilot is not None and round(pilot) in _COPTER_RC.meanings:

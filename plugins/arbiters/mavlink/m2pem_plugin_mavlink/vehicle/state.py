@@ -84,13 +84,15 @@ class CommandedState:
 
     `custom_mode`: the mode asked for last; `changing`: how many commands that change it are on
     their way. `mission`: what was uploaded last, as the driver's `upload` takes it; `exchanging`:
-    how many exchanges of missions go on. `disarming`: it was asked to disarm.
+    how many exchanges of missions go on; `first_item`: with which item a mission was started last.
+    `disarming`: it was asked to disarm.
     """
 
     custom_mode: int | None = None
     changing: int = 0
     mission: tuple[MissionItem, ...] | None = None
     exchanging: int = 0
+    first_item: int = 0
     disarming: bool = False
 
 

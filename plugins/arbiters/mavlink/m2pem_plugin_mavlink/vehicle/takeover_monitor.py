@@ -18,6 +18,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_typ
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -89,6 +90,7 @@ class TakeoverMonitor:
         self._mission: tuple[MissionItem, ...] | None = None
         self._mission_s = 0.0
         self._replaced = ""
+        self._landing_s: float | None = None
         self._checked: int | None = None
         self._check: asyncio.Task[None] | None = None
 
@@ -127,7 +129,12 @@ class TakeoverMonitor:
         A change that was just seen is judged `SETTLES_S` later, or once a text explains it. The
         mode of a vehicle that is not armed does not matter.
         """
-        return self._disarmed_by(modes) or self._mode_by(modes) or self._mission_by(modes)
+        return (
+            self._disarmed_by(modes)
+            or self._mode_by(modes)
+            or self._mission_by(modes)
+            or self._landing_by(modes)
+        )
 
     def mode_is_commanded(self, modes: Collection[FlightMode]) -> bool:
         """Return whether the vehicle is in the commanded mode, or in one of these modes that it
@@ -182,6 +189,17 @@ class TakeoverMonitor:
             return None
         return Takeover(Cause.STATION, f"another ground station has {self._replaced}")
 
+    def _landing_by(self, modes: Collection[FlightMode]) -> Takeover | None:
+        """Whether the mission went on with the landing that is stored behind it. Failsafes of
+        ArduPlane do that in AUTO; what m2pem stores ends with a circle before the landing."""
+        if FlightMode.MISSION not in modes or self._landing_s is None:
+            return None
+        return self._explained(
+            self._landing_s,
+            "its mission went on with its landing",
+            Takeover(Cause.STATION, "another ground station has started its landing"),
+        )
+
     def _explained(self, since_s: float, changed: str, otherwise: Takeover) -> Takeover | None:
         """Return the takeover that the texts explain; without a text `otherwise`, after
         `SETTLES_S`."""
@@ -230,10 +248,21 @@ class TakeoverMonitor:
         if commanded.mission is not self._mission:
             self._mission, self._replaced, self._checked = commanded.mission, "", None
             self._mission_s = now_s
+        self._landing_s = (self._landing_s or now_s) if self._lands_unasked() else None
         # What it said before it was stored may still come in.
         settled = now_s - self._mission_s > SETTLES_S
         if commanded.mission is not None and settled and not commanded.exchanging:
             self._check_mission(commanded.mission)
+
+    def _lands_unasked(self) -> bool:
+        state, commanded = self.vehicle.state, self.vehicle.commanded
+        item = self.vehicle.driver.current_item
+        if commanded.mission is None or item is None or commanded.exchanging or commanded.changing:
+            return False
+        begins = landing_begins(commanded.mission)
+        if begins is None or state.loiter_radius_m is None:
+            return False
+        return state.mode is FlightMode.MISSION and commanded.first_item < begins <= item
 
     def _check_mission(self, mission: tuple[MissionItem, ...]) -> None:
         state = self.vehicle.state

@@ -33,7 +33,7 @@ EVERY = {
     "FS_CRASH_CHECK": 1,
     "FS_EKF_ACTION": 1,
     "FS_EKF_THRESH": 0.8,
-    "FS_OPTIONS": 0,
+    "FS_OPTIONS": 16,
     "GPS1_TYPE": 1,
     "LOG_BITMASK": 65535,
     "MAV_GCS_SYSID": 255,
