@@ -8,7 +8,7 @@ import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from m2pem_plugin_mavlink.vehicle import exchanges
-from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from mavlink_simulated import AMPLE_S, at, fly
 
 from m2pem.api import Area, BehaviorState, Point, Route
@@ -221,7 +221,7 @@ def test_a_survey_that_goes_on_with_the_stored_landing_has_not_succeeded() -> No
         route = Route(tuple((*at(east, 900), 60.0) for east in (0, 900, 1800)))
         await bench.start("r1.b2", "single_vehicle_routing", "v1", route=route)
         await bench.running("r1.b2", AMPLE_S)
-        begins = landing_begins(await vehicle.driver.downloaded())
+        begins = landing_start(await vehicle.driver.downloaded())
         await exchanges.set_current(vehicle.link, begins + 1)
         end = await bench.ended("r1.b2", AMPLE_S)
         assert end.state is BehaviorState.FAILED

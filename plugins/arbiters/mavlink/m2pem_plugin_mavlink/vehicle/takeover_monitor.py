@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_typ
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
-from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_begins
+from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
 from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -259,7 +259,7 @@ class TakeoverMonitor:
         item = self.vehicle.driver.current_item
         if commanded.mission is None or item is None or commanded.exchanging or commanded.changing:
             return False
-        begins = landing_begins(commanded.mission)
+        begins = landing_start(commanded.mission)
         if begins is None or state.loiter_radius_m is None:
             return False
         return state.mode is FlightMode.MISSION and commanded.first_item < begins <= item
