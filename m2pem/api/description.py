@@ -271,13 +271,20 @@ def _data_written(_: RunView, record: r.DataWritten) -> _Sentence:
 
 
 def _event_awaited(view: RunView, record: r.EventAwaited) -> _Sentence:
-    trigger = record.trigger.value
-    what = f" {view.reference(record.ref)}" if record.ref else ""
-    return f"{view.label(record.element)}: waits for {trigger}{what}", Importance.NORMAL
+    event = _event(view, record.trigger, record.ref)
+    return f"{view.label(record.element)}: waits for {event}", Importance.NORMAL
 
 
-def _event_triggered(_: RunView, record: r.EventTriggered) -> _Sentence:
-    return f"awaited event {record.wait} occurred", Importance.DETAIL
+def _event_triggered(view: RunView, record: r.EventTriggered) -> _Sentence:
+    wait = view.wait(record.wait)
+    if wait is None:
+        return f"awaited event {record.wait} occurred", Importance.DETAIL
+    event = _event(view, wait.trigger, wait.ref)
+    return f"{view.label(wait.element)}: {event} occurred", Importance.NORMAL
+
+
+def _event(view: RunView, trigger: r.Trigger, ref: str) -> str:
+    return f"{trigger.value} '{view.reference(ref)}'" if ref else trigger.value
 
 
 def _signal_thrown(view: RunView, record: r.SignalThrown) -> _Sentence:

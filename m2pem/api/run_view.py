@@ -26,7 +26,7 @@ NEWEST = 200
 """The last records, as many as `RunView.newest` keeps."""
 
 NAMED = 1000
-"""Behaviors and prompts that were closed last, of which the names are kept for `describe`."""
+"""The last behaviors, prompts and waits that are over: `describe` needs their names."""
 
 Place: TypeAlias = tuple[str, str]
 """The ids of a process and of an element in it."""
@@ -194,6 +194,7 @@ class RunView:
         self.changes: Changes | None = None
         self._ended_behaviors: dict[str, Behavior] = {}
         self._closed_prompts: dict[str, r.PromptOpened] = {}
+        self._past_waits: dict[int, Wait] = {}
         self._paused_us = 0
         self._paused_at_us = 0
 
@@ -244,6 +245,10 @@ class RunView:
     def prompt(self, id_: str) -> r.PromptOpened | None:
         """Return a prompt that is open, or that was among the last to be closed."""
         return self.prompts.get(id_) or self._closed_prompts.get(id_)
+
+    def wait(self, id_: int) -> Wait | None:
+        """Return an event that is awaited, or that was among the last to occur."""
+        return self.waits.get(id_) or self._past_waits.get(id_)
 
     def active(self) -> list[ActiveElement]:
         """Return the elements with tokens, in the order in which the first token came."""
@@ -493,11 +498,13 @@ class RunView:
 
     def _trigger_event(self, record: r.EventTriggered) -> None:
         wait = self.waits.pop(record.wait, None)
+        if wait is not None:
+            _keep(self._past_waits, record.wait, wait)
         if wait is not None and (token := self.tokens.get(wait.token)):
             token.waits.pop(record.wait, None)
 
 
-def _keep(kept: dict[str, Any], id_: str, value: Any) -> None:
+def _keep(kept: dict[Any, Any], id_: str | int, value: Any) -> None:
     kept[id_] = value
     if len(kept) > NAMED:
         del kept[next(iter(kept))]

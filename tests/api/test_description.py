@@ -43,6 +43,13 @@ def sentence(*records: r.Record) -> str:
             [r.BehaviorEnded(*ON_ROUTE, "r1.b1", BehaviorState.SUCCEEDED, "")],
             "DRIVE ROUTE: r1.b1: succeeded",
         ),
+        (
+            [
+                r.EventAwaited(*ON_ROUTE, 3, r.Trigger.TIMER, due_us=5_000_000),
+                r.EventTriggered(3),
+            ],
+            "DRIVE ROUTE: timer occurred",
+        ),
         ([r.RunYielded(())], "RunYielded"),
         ([r.TokensGathered(*ON_ROUTE)], "TokensGathered: DRIVE ROUTE"),
     ],

@@ -1,4 +1,4 @@
-"""What the keys of the operator control unit do."""
+"""The keys of the operator control unit, and what they do."""
 
 import time
 from collections.abc import Awaitable, Callable
@@ -74,7 +74,7 @@ class TerminalApp(Display):
         return len(self.screen_stack) > 1
 
     def _carry_out(self, what: str, call: Awaitable[Any]) -> None:
-        """Ask the executive without waiting; what it refuses is told."""
+        """Ask the executive without waiting; show what it refuses."""
 
         async def asked() -> None:
             try:
@@ -92,7 +92,7 @@ class TerminalApp(Display):
         return view
 
     def action_stop(self) -> None:
-        """STOP, at the second press."""
+        """Stop the run at the second press."""
         view = self._active_run()
         if view is not None and self.stop_press.press(f"STOP {view.run}"):
             self.say(f"Stopping {view.run} ...", alarm=True)
@@ -103,7 +103,7 @@ class TerminalApp(Display):
         self.show()
 
     def action_stop_all(self) -> None:
-        """STOP of every run, at the second press."""
+        """Stop every run at the second press."""
         if self.stop_press.press(STOP_ALL):
             self.say("Stopping all runs ...", alarm=True)
             while self._in_dialog:
@@ -112,7 +112,7 @@ class TerminalApp(Display):
         self.show()
 
     def action_interrupt(self) -> None:
-        """Ctrl-C: STOP; when nothing runs, leave."""
+        """Ctrl-C: stop the run; when no run is active, quit."""
         view = self.view
         if view is not None and not view.status.ended:
             self.action_stop()
@@ -121,7 +121,7 @@ class TerminalApp(Display):
         self.show()
 
     def action_disarm(self) -> None:
-        """Not STOP after all; or the whole log again."""
+        """Escape: take back the first press of STOP, or show the whole log."""
         if self.stop_press.armed:
             self.stop_press.disarm()
         else:
@@ -129,7 +129,7 @@ class TerminalApp(Display):
         self.show()
 
     def action_answer(self, number: int) -> None:
-        """Answer the question that is shown."""
+        """Answer the prompt that is shown."""
         prompt, decision = self.prompt_pane.current, self.prompt_pane.decision_on(number)
         if prompt is None or decision is None:
             return
@@ -148,12 +148,12 @@ class TerminalApp(Display):
         self._carry_out("Not taken", answer())
 
     def action_next_prompt(self) -> None:
-        """Tab."""
+        """Tab: show the next prompt."""
         self.prompt_pane.show_next()
         self.show()
 
     def action_pause(self) -> None:
-        """Pause, or go on."""
+        """Pause the run, or resume it."""
         view = self._active_run()
         if view is None:
             return
@@ -163,7 +163,7 @@ class TerminalApp(Display):
             self._carry_out("Pause", self.control.pause(view.run, by=self.by))
 
     async def action_signals(self) -> None:
-        """Choose a signal by its name; those that are awaited come first."""
+        """Choose a signal to send by its name; awaited signals come first."""
         view = self._active_run()
         if view is None:
             return
@@ -184,7 +184,7 @@ class TerminalApp(Display):
         self.show()
 
     async def action_take(self) -> None:
-        """Choose a vehicle or payload to take from the missions, or to give back."""
+        """Choose a vehicle or payload to take from the missions, or to give back to them."""
         try:
             holders = await self.control.holders()
         except M2pemError as error:
@@ -238,7 +238,7 @@ class TerminalApp(Display):
         await self._confirm("Give back", f"Give back {resource}?", Text(RETURNED), give_back)
 
     async def _give_back(self, resource: str) -> None:
-        """Not what has become another's since the list was shown: anybody may give back."""
+        """Give it back, unless another operator has taken it since the list was shown."""
         holder = (await self.control.holders()).get(ResourceId(resource), "")
         if with_operator(holder) and holder != self.by:
             raise OperatorError(f"{resource} is with {holder}")
@@ -251,7 +251,7 @@ class TerminalApp(Display):
         return self.follower.views[behavior.rpartition(".")[0]].label(found.element)
 
     async def action_runs(self) -> None:
-        """Choose the run to look at."""
+        """Choose the run to show."""
         try:
             runs = await self.control.runs()
         except M2pemError as error:
@@ -276,16 +276,16 @@ class TerminalApp(Display):
             self.look_at(run)
 
     def action_filter(self) -> None:
-        """Type what log lines must have in them."""
+        """Let the operator type a text; only log lines with it are shown."""
         self.log_pane.ask_filter()
 
     async def action_help(self) -> None:
-        """All keys."""
+        """Show all keys."""
         await self.push_screen(Read("Keys", help_text()))
         self.show()
 
     async def action_leave(self) -> None:
-        """Leave; what becomes of a mission that runs is asked."""
+        """Quit; ask first if the mission has not ended."""
         view = self.view
         if view is None or view.status.ended:
             self.exit()
@@ -301,10 +301,10 @@ class TerminalApp(Display):
         self.show()
 
     def action_scroll(self, what: str, lines: int) -> None:
-        """Move through what does not fit."""
+        """Scroll a pane."""
         found = self.screen_stack[0].query_one(what, VerticalScroll)
         found.scroll_relative(y=lines, animate=False)
 
     def action_scroll_log(self, lines: int) -> None:
-        """Move through the log."""
+        """Scroll the log."""
         self.log_pane.move(lines)

@@ -21,7 +21,7 @@ WIDTH = 60
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A line to choose: what it stands for, what it says, and a remark in grey."""
+    """A line of a list: its value, its label, and a remark in grey."""
 
     value: str
     label: str
@@ -127,7 +127,7 @@ KEYS = (
 
 
 def help_text() -> Text:
-    """All keys."""
+    """Show all keys."""
     text = Text()
     for key, what in KEYS:
         text.append(f"{key:<11}", "bold #c8d0d9")

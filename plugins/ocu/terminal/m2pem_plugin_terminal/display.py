@@ -1,4 +1,4 @@
-"""The screen of the operator control unit: its panes, and how they are kept up to date."""
+"""The screen of the operator control unit: its panes, which follow the executive."""
 
 import time
 from collections import deque
@@ -121,7 +121,7 @@ class Display(App[None], Listener, inherit_bindings=False):
     # --- life -----------------------------------------------------------------------------------
 
     def compose(self) -> ComposeResult:
-        """From top to bottom."""
+        """Compose the panes from top to bottom."""
         yield self._header
         yield Horizontal(self._mission, self._around, id="middle")
         yield self.prompt_pane
@@ -130,7 +130,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         yield StopBar()
 
     def on_mount(self) -> None:
-        """Begin to follow."""
+        """Begin to follow the executive."""
         self.register_theme(THEME)
         self.theme = THEME.name
         self._mission.border_title = "Mission"
@@ -161,7 +161,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         return self.follower.views.get(self.run_shown)
 
     def show(self) -> None:
-        """Bring everything up to date."""
+        """Update every pane."""
         view, now = self.view, self.now()
         if view is not None and not view.status.ended and not self._asking_time:
             self._asking_time = True
@@ -220,7 +220,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         return view.label(prompt.element) if view is not None else prompt.element
 
     def look_at(self, run: RunId) -> None:
-        """Show another run."""
+        """Show this run."""
         self.run_shown = run
         view = self.follower.views[run]
         self._time_s = view.t_s
@@ -228,7 +228,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.show()
 
     def say(self, text: str, *, alarm: bool = False) -> None:
-        """Tell the operator something, for some seconds."""
+        """Show a text to the operator for some seconds."""
         self._notice.say(text, alarm=alarm)
 
     # --- what happens ---------------------------------------------------------------------------

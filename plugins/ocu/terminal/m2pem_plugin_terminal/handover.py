@@ -1,4 +1,4 @@
-"""Who has which vehicle and payload, and the list from which to take them or give them back."""
+"""Taking vehicles and payloads from the missions, and giving them back: the list and its texts."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -23,12 +23,12 @@ BEHAVIOR = re.compile(r"r\d+\.b\d+")
 
 
 def with_operator(holder: str) -> bool:
-    """Whether a holder is an operator, and no behavior."""
+    """Whether a holder is an operator, not a behavior."""
     return bool(holder) and BEHAVIOR.fullmatch(holder) is None
 
 
 def taken(holders: Mapping["ResourceId", str]) -> dict[str, str]:
-    """What operators have, and who."""
+    """Return the resources that operators have taken, with the operator of each."""
     return {resource: holder for resource, holder in holders.items() if with_operator(holder)}
 
 
@@ -48,7 +48,7 @@ def choices(
 
 
 def effects_text(resource: str, effects: Sequence["TakeEffect"]) -> Text:
-    """What taking a resource does to the missions, as the operator must know it before."""
+    """Return what taking a resource does to the missions, to be read before it is taken."""
     text = Text()
     for each in effects:
         text.append(f"{each}.\n", "" if each.caught_by else "bold #e07a6a")

@@ -88,29 +88,29 @@ class LogPane(Vertical):
         yield self._asked
 
     def on_mount(self) -> None:
-        """Begin without a filter."""
+        """Show the title."""
         self.border_title = "Log"
 
     def show(self, lines: Iterable[Line]) -> None:
-        """Show these instead."""
+        """Replace the lines."""
         self._lines = list(lines)
         self._rewrite()
 
     def add(self, line: Line) -> None:
-        """One more."""
+        """Add a line."""
         self._lines.append(line)
         if self._passes(line):
             self._shown.write(_styled(line, self._width), scroll_end=self._following)
 
     def move(self, lines: int) -> None:
-        """Look further up or down; at its end, the log follows what happens again."""
+        """Scroll; at its end, the log follows new lines again."""
         end = self._shown.max_scroll_y
         target = max(0, min(end, round(self._shown.scroll_target_y) + lines))
         self._following = target == end
         self._shown.scroll_to(y=target, animate=False)
 
     def ask_filter(self) -> None:
-        """Let the operator type."""
+        """Open the field for the filter."""
         self._asked.display = True
         self._asked.focus()
 
@@ -125,13 +125,13 @@ class LogPane(Vertical):
         return bool(self._filter) or self._asked.has_focus
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """The lines follow while it is typed."""
+        """Filter the lines while the text is typed."""
         self._filter = event.value.strip().lower()
         self.border_title = f"Log: {self._filter}" if self._filter else "Log"
         self._rewrite()
 
     def on_input_submitted(self) -> None:
-        """The filter stays; keys are commands again."""
+        """Close the field; the filter stays, and keys are commands again."""
         self._close()
 
     def _close(self) -> None:
@@ -144,7 +144,7 @@ class LogPane(Vertical):
         return self.content_size.width - 1
 
     def on_resize(self) -> None:
-        """Lines break elsewhere now."""
+        """Wrap the lines for the new width."""
         self._rewrite()
 
     def _passes(self, line: Line) -> bool:

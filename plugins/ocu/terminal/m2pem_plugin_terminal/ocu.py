@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_terminal.app import TerminalApp
 
 LINGERS_FOR_S = 2.0
-"""How long the end of a mission is shown when whoever serves this is done with it."""
+"""How long the end of a mission is still shown after the unit was cancelled."""
 
 
 class TerminalOcu:

@@ -1,4 +1,4 @@
-"""Puts the app together: what looks at requests first, the routers, and the page."""
+"""The ASGI app: checks of requests, the routers, and the page."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,11 +9,9 @@ from starlette.types import ASGIApp
 
 from m2pem_plugin_web import pages
 from m2pem_plugin_web import tiles as map_tiles
-from m2pem_plugin_web.access.bodies import BoundedBodies
-from m2pem_plugin_web.access.entry import Entry
 from m2pem_plugin_web.access.guard import Guard
-from m2pem_plugin_web.access.headers import SafeHeaders
-from m2pem_plugin_web.access.slots import Slots
+from m2pem_plugin_web.access.requests import BoundedBodies, SafeHeaders
+from m2pem_plugin_web.access.sign_in import Entry
 from m2pem_plugin_web.live import socket
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.pages import Pages
@@ -23,16 +21,14 @@ from m2pem_plugin_web.rest import (
     checks,
     geometries,
     missions,
-    prompts,
     rehearsals,
-    resources,
     runs,
     session,
     steering,
-    templates,
     tracks,
     verifications,
 )
+from m2pem_plugin_web.server import Slots
 from m2pem_plugin_web.services import Services
 from m2pem_plugin_web.settings import Settings
 from m2pem_plugin_web.tracks.recorder import Recorder
@@ -43,7 +39,7 @@ OPENAPI = "/api/openapi.json"
 def routers_of(
     services: Services, settings: Settings, hub: Hub, entry: Entry, recorder: Recorder
 ) -> list[APIRouter]:
-    """All that browsers may ask for."""
+    """Return all routers."""
     control, folder = services.control, services.folder
     tiles = map_tiles.Tiles(settings.tiles) if settings.tiles is not None else None
     return [
@@ -51,10 +47,10 @@ def routers_of(
         runs.router(control, folder),
         tracks.router(control, recorder),
         steering.router(control, hub),
-        prompts.router(control, hub),
-        resources.router(control),
+        steering.prompt_router(control, hub),
+        steering.resource_router(control),
         missions.router(control, folder),
-        templates.router(),
+        missions.template_router(),
         checks.router(control, folder),
         verifications.router(control, folder, services.verifications),
         rehearsals.router(control, folder, services.rehearsals),
@@ -69,7 +65,7 @@ def routers_of(
 def create_app(
     routers: Iterable[APIRouter], entry: Entry, settings: Settings, slots: Slots
 ) -> ASGIApp:
-    """The app. `entry` says who may come in; `slots` are the server's connections."""
+    """The app. `entry` signs users in; `slots` are the server's connections."""
     # The pages of FastAPI about an API load scripts from elsewhere.
     app = FastAPI(title="m2pem", openapi_url=OPENAPI, docs_url=None, redoc_url=None)
     for router in routers:

@@ -75,7 +75,7 @@ def list_users(path: Path) -> None:
 @click.argument("name")
 @users_option
 def remove_user(name: str, path: Path) -> None:
-    """Forget a user: whoever has signed in under that name is out at once."""
+    """Remove a user; all sessions of that name end at once."""
     from m2pem_plugin_web.access.users import Users, write_users  # noqa: PLC0415
 
     users = dict(Users(path).all())
@@ -89,11 +89,11 @@ def remove_user(name: str, path: Path) -> None:
 def url() -> None:
     """Print the address of each page that this user's executives serve.
 
-    It has a token that signs in whoever opens it, once; then another one is printed.
+    It has a token that signs in the browser that opens it, once; then another one is printed.
     """
-    from m2pem_plugin_web.access import places  # noqa: PLC0415
+    from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
 
-    found = list(places.pages(places.folder(os.environ)))
+    found = list(page_addresses.pages(page_addresses.folder(os.environ)))
     if not found:
         raise OperatorError("no page is served by this user: m2pem serve --fleet FLEET --ocu web")
     for page in found:

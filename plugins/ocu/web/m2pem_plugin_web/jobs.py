@@ -1,4 +1,4 @@
-"""Work that browsers order and come back for: verifications and rehearsals."""
+"""Jobs that browsers start and poll: verifications and rehearsals."""
 
 import asyncio
 import logging
@@ -10,22 +10,22 @@ from enum import StrEnum
 from typing import Generic, TypeVar
 
 from m2pem.errors import FindingsError, M2pemError
-from m2pem_plugin_web.missions.calling import Called
+from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import ProblemError
 
 T = TypeVar("T")
 
 AT_ONCE = 2
-"""Jobs of a kind that work; each takes a processor. Others wait."""
+"""Jobs of a kind that run at once, as each takes a processor. Others wait."""
 MOST_WAITING = 20
 KEPT = 20
-"""Results of a kind; the oldest are forgotten."""
+"""Results of a kind that are kept; the oldest are dropped."""
 
 log = logging.getLogger("m2pem.ocu.web")
 
 
 class JobState(StrEnum):
-    """Where a job is; one that waits for others is running too."""
+    """The state of a job; one that waits for others counts as running."""
 
     RUNNING = "running"
     DONE = "done"
@@ -35,7 +35,7 @@ class JobState(StrEnum):
 
 @dataclass(slots=True, eq=False)
 class Job(Generic[T]):
-    """One of them. `problem`: why it failed, with all `findings` if a file cannot be used."""
+    """A job. `problem`: why it failed, with all `findings` if a file cannot be used."""
 
     id: str
     by: str
@@ -47,16 +47,16 @@ class Job(Generic[T]):
 
 
 class Jobs(Generic[T]):
-    """Those of one kind; `kind` is what messages call them, `called` what they call files."""
+    """Jobs of one kind. `kind`: the name in messages; `called`: replaces paths in them."""
 
-    def __init__(self, kind: str, called: Called) -> None:
+    def __init__(self, kind: str, called: PathNames) -> None:
         self._kind = kind
         self._called = called
         self._jobs: dict[str, Job[T]] = {}
         self._free = asyncio.Semaphore(AT_ONCE)
 
     def begin(self, by: str, work: Callable[[str], Awaitable[T]]) -> Job[T]:
-        """Begin a job, now or when others have ended. `work` is told its id.
+        """Begin a job, now or when others have ended. `work` is called with its id.
 
         Raises:
             ProblemError: too many wait already.
@@ -73,7 +73,7 @@ class Jobs(Generic[T]):
         return job
 
     def get(self, identifier: str) -> Job[T]:
-        """The job of an id.
+        """Return a job by its id.
 
         Raises:
             ProblemError: 404, there is none.
@@ -84,7 +84,7 @@ class Jobs(Generic[T]):
         return job
 
     async def cancel(self, identifier: str) -> None:
-        """End a job; nothing happens to one that has ended.
+        """Cancel a job; one that has ended stays as it is.
 
         Raises:
             ProblemError: 404, there is none.
@@ -96,7 +96,7 @@ class Jobs(Generic[T]):
                 await asyncio.wait([job.task])
 
     async def close(self) -> None:
-        """End all."""
+        """Cancel all jobs."""
         tasks = [each.task for each in self._jobs.values() if each.task is not None]
         for task in tasks:
             task.cancel()

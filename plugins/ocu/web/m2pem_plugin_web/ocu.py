@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
     from m2pem.api import MissionControl
-    from m2pem_plugin_web.access.entry import Entry
+    from m2pem_plugin_web.access.sign_in import Entry
 
 
 class WebOcu:
@@ -29,24 +29,24 @@ class WebOcu:
     def __init__(
         self, control: "MissionControl", *, environment: Mapping[str, str] = os.environ
     ) -> None:
-        from m2pem_plugin_web.access import places  # noqa: PLC0415  # starting up must be fast
+        from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
         from m2pem_plugin_web.app import create_app, routers_of  # noqa: PLC0415
         from m2pem_plugin_web.live.hub import Hub  # noqa: PLC0415
         from m2pem_plugin_web.server import Server  # noqa: PLC0415
         from m2pem_plugin_web.services import services_of  # noqa: PLC0415
         from m2pem_plugin_web.tracks.recorder import Recorder  # noqa: PLC0415
-        from m2pem_plugin_web.tracks.stores import place_beside  # noqa: PLC0415
+        from m2pem_plugin_web.tracks.stores import store_beside  # noqa: PLC0415
 
         settings = read_settings(environment)
-        self._where = places.folder(environment)
+        self._where = page_addresses.folder(environment)
         self._server = Server(settings)
         self.url = ""
         """Where it is served; with the token that is valid, if there is one."""
         try:
             entry = self._entry(settings)
             self.hub = Hub(control)
-            place = place_beside(control.journal_file())
-            self._recorder = Recorder(control, self.hub.follower.views, self.hub.fleet, place)
+            store = store_beside(control.journal_file())
+            self._recorder = Recorder(control, self.hub.follower.views, self.hub.fleet, store)
             self._services = services_of(control, settings.missions)
 
             def app() -> "ASGIApp":
@@ -64,7 +64,7 @@ class WebOcu:
 
         import click  # noqa: PLC0415
 
-        from m2pem_plugin_web.access import places  # noqa: PLC0415
+        from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
 
         click.echo(f"m2pem: the page is at {self.url}", err=True)
         try:
@@ -76,29 +76,29 @@ class WebOcu:
                 tasks.create_task(self._server.serve(app), name="web: server")
         finally:
             self._server.close()
-            places.withdraw(self._where, self._server.port)
+            page_addresses.withdraw(self._where, self._server.port)
             await self._services.close()
 
     def _entry(self, settings: Settings) -> "Entry":
-        """Who may come in; where it is served is told to `m2pem web url`."""
+        """Return who may sign in; `m2pem web url` finds the address."""
         from m2pem.api.operator import operator_name  # noqa: PLC0415
-        from m2pem_plugin_web.access import places  # noqa: PLC0415
-        from m2pem_plugin_web.access.entry import Entry, owner_of  # noqa: PLC0415
+        from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
+        from m2pem_plugin_web.access.sign_in import Entry, owner_of  # noqa: PLC0415
         from m2pem_plugin_web.access.users import Users  # noqa: PLC0415
 
         where, port = self._where, self._server.port
         address = settings.address(port)
 
         def renewed(token: str) -> None:
-            page = places.Page(os.getpid(), port, address, token)
-            places.announce(where, page)
+            page = page_addresses.Page(os.getpid(), port, address, token)
+            page_addresses.announce(where, page)
             self.url = page.url
 
         users = Users(settings.users) if settings.users is not None else None
         if users is not None:
             users.all()
             renewed("")
-        kept: Path | None = places.sessions_of(where, port) if settings.port else None
+        kept: Path | None = page_addresses.sessions_of(where, port) if settings.port else None
         return Entry(
             port,
             secure=settings.scheme == "https",

@@ -1,4 +1,4 @@
-"""The page itself: its files, and the same `index.html` for every address of it."""
+"""The files of the page, and `index.html` for each of its addresses."""
 
 import asyncio
 import gzip
@@ -22,10 +22,10 @@ ADDRESSES = (
     "/runs/{run}",
     "/rehearsals/{rehearsal}",
 )
-"""Addresses of the page; what is shown there, it decides by itself."""
+"""Addresses of the page; its own router shows what belongs there."""
 
 FOR_EVER = "public, max-age=31536000, immutable"
-"""Files below assets/ have hashes of what is in them in their names."""
+"""Files below assets/ have a hash of their content in their names."""
 
 TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".woff2": "font/woff2"}
 COMPRESSED = ("text/", "application/json", "image/svg+xml", "application/javascript")
@@ -42,14 +42,14 @@ class _File:
 
 
 class Pages:
-    """Files of a folder, each read and compressed once, in a thread: the engine waits for none."""
+    """Files of a folder, each read and compressed once, in a thread."""
 
     def __init__(self, folder: Path = STATIC) -> None:
         self._folder = folder.resolve()
         self._files: dict[tuple[Path, int], _File] = {}
 
     async def answer(self, name: str, headers: Headers) -> Response:
-        """A file of the folder.
+        """Return a file of the folder.
 
         Raises:
             ProblemError: 404, there is none.

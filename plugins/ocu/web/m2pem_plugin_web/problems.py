@@ -1,4 +1,4 @@
-"""Refusals and failures as `application/problem+json` (RFC 9457), all in one form."""
+"""Refusals and failures as `application/problem+json` (RFC 9457)."""
 
 import logging
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from m2pem.errors import (
     OperatorError,
     PluginError,
 )
-from m2pem_plugin_web.missions.calling import Called
+from m2pem_plugin_web.missions.names import PathNames
 
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 MEDIA_TYPE = "application/problem+json"
@@ -60,11 +60,11 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
     }
 }
-"""For every route: how it says what went wrong."""
+"""The responses of every route for what goes wrong."""
 
 
 class ProblemError(HTTPException):
-    """A refusal with more to say than its text: `more` goes beside it."""
+    """A refusal; `more`: further fields of the answer."""
 
     def __init__(
         self, status: int, detail: str, *, headers: dict[str, str] | None = None, **more: Any
@@ -76,7 +76,7 @@ class ProblemError(HTTPException):
 def problem(
     status: int, detail: str, headers: Mapping[str, str] | None = None, **more: Any
 ) -> JSONResponse:
-    """A response that says what went wrong."""
+    """Return a response for what went wrong."""
     content = {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
@@ -88,8 +88,8 @@ def problem(
 
 
 def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
-    """Have whatever goes wrong in an app said in this form. `missions`: their folder."""
-    called = Called(missions)
+    """Register the handlers of an app's exceptions. `missions`: the folder of missions."""
+    called = PathNames(missions)
 
     @app.exception_handler(M2pemError)
     def refused(_: Request, error: M2pemError) -> JSONResponse:
@@ -117,8 +117,8 @@ def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
             {"where": ".".join(map(str, each["loc"])), "what": each["msg"]}
             for each in error.errors()
         ]
-        told = "; ".join(f"{each['where']}: {each['what']}" for each in wrong)
-        return problem(422, told, wrong=wrong)
+        text = "; ".join(f"{each['where']}: {each['what']}" for each in wrong)
+        return problem(422, text, wrong=wrong)
 
     @app.exception_handler(Exception)
     def broke(_: Request, error: Exception) -> JSONResponse:

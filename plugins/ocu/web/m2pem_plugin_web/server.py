@@ -1,10 +1,14 @@
-"""uvicorn in an event loop that is another's: it handles no signals, and ends when cancelled."""
+"""uvicorn in an event loop that it does not own: it handles no signals, and ends when cancelled.
+
+Connections are bounded, so that strangers who open many lock out no user who has signed in.
+"""
 
 import asyncio
 import socket
 import ssl
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +19,69 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from m2pem.errors import PluginError
-from m2pem_plugin_web.access.slots import Slots
 from m2pem_plugin_web.live.socket import ABORT, LONGEST_MESSAGE
 from m2pem_plugin_web.settings import HOST, PORT, Settings
 
+MOST_STRANGERS = 128
+MOST_OF_AN_ADDRESS = 32
+"""Connections without a signed-in user: of all addresses, and of one."""
+
+MOST_KNOWN = 256
+"""Connections of people who have signed in; then all is refused to them but STOP."""
+
+Peer = tuple[str, int]
+
+
+@dataclass(slots=True)
+class _Connection:
+    abort: Callable[[], None]
+    known: bool = False
+
+
+class Slots:
+    """Open connections by their peers (address and port), the oldest first.
+
+    A new connection always has a slot: the oldest one without a signed-in user is closed, first
+    of those from the same address. That is most likely a request that never came whole.
+    """
+
+    def __init__(self) -> None:
+        self._open: dict[Peer, _Connection] = {}
+
+    def opened(self, peer: Peer, abort: Callable[[], None]) -> None:
+        """Add a connection; `abort` ends it."""
+        strangers = [each for each, slot in self._open.items() if not slot.known]
+        own = [each for each in strangers if each[0] == peer[0]]
+        if len(own) >= MOST_OF_AN_ADDRESS:
+            self._drop(own[0])
+        elif len(strangers) >= MOST_STRANGERS:
+            self._drop(strangers[0])
+        self._open[peer] = _Connection(abort)
+
+    def closed(self, peer: Peer) -> None:
+        """Remove a connection that has ended, or that has become a WebSocket."""
+        self._open.pop(peer, None)
+
+    def known(self, peer: Peer) -> None:
+        """Note that the user has signed in: the connection stays."""
+        if (slot := self._open.get(peer)) is not None:
+            slot.known = True
+
+    @property
+    def full(self) -> bool:
+        """Whether there are too many connections even of people who have signed in."""
+        return sum(slot.known for slot in self._open.values()) > MOST_KNOWN
+
+    def _drop(self, peer: Peer) -> None:
+        self._open.pop(peer).abort()
+
+
 LAST_WORDS_S = 1
-"""For responses that are being sent when it ends."""
+"""Seconds for responses that are being sent when the server ends."""
 
 BACKLOG = 128
 HEADERS_S = 10.0
-"""Within which the head of a request comes, once a connection is there or its head has begun."""
+"""Seconds for the head of a request, from the connection or from its first byte."""
 
 
 def listen(settings: Settings) -> socket.socket:
@@ -54,7 +111,7 @@ def listen(settings: Settings) -> socket.socket:
 
 
 class _Http(H11Protocol):
-    """Lets go of connections on which the head of a request does not come."""
+    """Closes connections on which no head of a request comes."""
 
     slots: Slots
     _patience: asyncio.TimerHandle | None = None
@@ -94,7 +151,7 @@ class _Http(H11Protocol):
 
 class _WebSocket(WebSocketsSansIOProtocol):
     async def run_asgi(self) -> None:
-        """Let the app end a connection that takes nothing any more."""
+        """Let the app abort a connection that receives nothing any more."""
         self.scope[ABORT] = self.transport.abort  # type: ignore[literal-required]
         await super().run_asgi()
 
@@ -102,7 +159,7 @@ class _WebSocket(WebSocketsSansIOProtocol):
 class _Uvicorn(uvicorn.Server):
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Signals are the executive's."""
+        """Leave signals to the executive."""
         yield
 
 
@@ -123,7 +180,7 @@ class Server:
         self.port: int = self._listener.getsockname()[1]
 
     def close(self) -> None:
-        """Listen no more."""
+        """Close the socket."""
         self._listener.close()
 
     async def serve(self, app: ASGIApp) -> None:

@@ -1,18 +1,18 @@
-"""What the routers of missions work with, beside the executive."""
+"""What the routers share: the executive, the folder of missions, and jobs."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from m2pem.api import MissionControl, SimulationResult
 from m2pem_plugin_web.jobs import Jobs
-from m2pem_plugin_web.missions.calling import Called
 from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.rest.verifications import Report
 
 
 @dataclass(frozen=True, slots=True)
 class Services:
-    """The executive, the folder of missions, and the work that was ordered."""
+    """The executive, the folder of missions, and the jobs."""
 
     control: MissionControl
     folder: MissionFolder
@@ -20,14 +20,14 @@ class Services:
     rehearsals: Jobs[SimulationResult]
 
     async def close(self) -> None:
-        """End the work that goes on."""
+        """Cancel all jobs."""
         await self.verifications.close()
         await self.rehearsals.close()
 
 
 def services_of(control: MissionControl, missions: Path) -> Services:
-    """Those of an executive; `missions`: the folder."""
-    called = Called(missions)
+    """Return the services of an executive. `missions`: the folder."""
+    called = PathNames(missions)
     return Services(
         control, MissionFolder(missions), Jobs("verification", called), Jobs("rehearsal", called)
     )

@@ -17,7 +17,7 @@ USERS = "M2PEM_WEB_USERS"
 CERTIFICATE = "M2PEM_WEB_CERT"
 KEY = "M2PEM_WEB_KEY"
 TILES = "M2PEM_WEB_TILES"
-"""A file of pictures for the map."""
+"""A file of image tiles for the map."""
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8700
@@ -33,14 +33,14 @@ class SettingError(PluginError):
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Where and whom to serve. `port` 0: any free one. `users` None: whoever has the token."""
+    """Where and whom to serve. `port` 0: any free one. `users` None: who has the token."""
 
     host: str = DEFAULT_HOST
     port: int = DEFAULT_PORT
     names: frozenset[str] = LOCAL_NAMES
     """By which browsers may call this machine, without ports."""
     called: str = DEFAULT_HOST
-    """The one of them that is told to people."""
+    """The name that is shown to people."""
     missions: Path = Path(DEFAULT_MISSIONS)
     users: Path | None = None
     certificate: Path | None = None

@@ -14,7 +14,7 @@ from fastapi import APIRouter
 from fastapi import Path as InPath
 from fastapi.responses import Response
 
-from m2pem_plugin_web.access.people import Viewer
+from m2pem_plugin_web.access.roles import Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.settings import TILES, SettingError
 
@@ -45,7 +45,7 @@ class Tiles:
     """The tiles of a file.
 
     Raises:
-        SettingError: it cannot be read, is no MBTiles, or has no pictures but data of shapes.
+        SettingError: it cannot be read, is no MBTiles, or has vector data, not images.
     """
 
     def __init__(self, file: Path) -> None:
@@ -64,7 +64,7 @@ class Tiles:
         if kind not in MEDIA_TYPES:
             self.close()
             raise SettingError(
-                f"{TILES}={file} has tiles of the format {kind!r}: the map shows pictures alone "
+                f"{TILES}={file} has tiles of the format {kind!r}: the map shows images only "
                 f"({', '.join(MEDIA_TYPES)})"
             )
         attribution = html.unescape(_MARKUP.sub("", str(said.get("attribution", ""))))
@@ -100,7 +100,7 @@ def router(tiles: Tiles | None) -> APIRouter:
         responses={200: {"content": {"image/*": {}}}, 204: {"description": "No tile is there."}},
     )
     async def tile(_: Viewer, zoom: Zoom, column: Step, row: Step) -> Response:
-        """A picture of 256 x 256 pixels, in the web Mercator projection; rows from the north."""
+        """An image of 256 x 256 pixels, in the web Mercator projection; rows from the north."""
         found = None
         if tiles is not None:
             found = await asyncio.to_thread(tiles.tile, zoom, column, row)

@@ -9,8 +9,7 @@ from typing import Any
 
 import httpx
 from fastapi import FastAPI
-from m2pem_plugin_web.access.people import SCOPE_KEY
-from m2pem_plugin_web.access.roles import Person, Role
+from m2pem_plugin_web.access.roles import SCOPE_KEY, Person, Role
 from m2pem_plugin_web.problems import handle_problems
 from m2pem_plugin_web.rest import (
     catalogue,
@@ -19,7 +18,6 @@ from m2pem_plugin_web.rest import (
     missions,
     rehearsals,
     runs,
-    templates,
     verifications,
 )
 from m2pem_plugin_web.services import Services, services_of
@@ -59,7 +57,7 @@ def app_of(services: Services) -> FastAPI:
     for router in (
         missions.router(control, folder),
         runs.router(control, folder),
-        templates.router(),
+        missions.template_router(),
         checks.router(control, folder),
         verifications.router(control, folder, services.verifications),
         rehearsals.router(control, folder, services.rehearsals),

@@ -7,7 +7,7 @@ import click
 import m2pem_plugin_web
 import pytest
 from click.testing import CliRunner, Result
-from m2pem_plugin_web.access import places
+from m2pem_plugin_web.access import page_addresses
 from m2pem_plugin_web.access.private_files import NotPrivateError, private_folder
 from m2pem_plugin_web.access.users import Users
 from web_world import MakeWorld
@@ -86,19 +86,19 @@ async def test_the_address_of_a_page_has_the_token_that_is_valid(
 
 
 def test_addresses_are_in_the_runtime_directory_where_there_is_one(tmp_path: Path) -> None:
-    assert places.folder({"XDG_RUNTIME_DIR": str(tmp_path)}) == tmp_path / "m2pem-web"
+    assert page_addresses.folder({"XDG_RUNTIME_DIR": str(tmp_path)}) == tmp_path / "m2pem-web"
     said = {"XDG_RUNTIME_DIR": str(tmp_path / "none"), "XDG_STATE_HOME": str(tmp_path / "state")}
-    assert places.folder(said) == tmp_path / "state" / "m2pem-web"
+    assert page_addresses.folder(said) == tmp_path / "state" / "m2pem-web"
 
 
 def test_pages_of_dead_executives_are_forgotten(tmp_path: Path) -> None:
     where = private_folder(tmp_path / "m2pem-web")
     dead = 2**22 + 1  # more than Linux gives out
-    places.announce(where, places.Page(dead, 1, "http://127.0.0.1:1/", "t"))
-    places.announce(where, places.Page(os.getpid(), 2, "http://127.0.0.1:2/", ""))
+    page_addresses.announce(where, page_addresses.Page(dead, 1, "http://127.0.0.1:1/", "t"))
+    page_addresses.announce(where, page_addresses.Page(os.getpid(), 2, "http://127.0.0.1:2/", ""))
     (where / "page-3.json").write_text("{")
-    assert [page.url for page in places.pages(where)] == ["http://127.0.0.1:2/"]
-    assert not places.file_of(where, 1).exists()
+    assert [page.url for page in page_addresses.pages(where)] == ["http://127.0.0.1:2/"]
+    assert not page_addresses.file_of(where, 1).exists()
 
 
 def test_a_folder_of_secrets_is_closed_to_others_and_no_link(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from m2pem_plugin_web.access.slots import MOST_KNOWN, MOST_OF_AN_ADDRESS, MOST_STRANGERS, Slots
+from m2pem_plugin_web.server import MOST_KNOWN, MOST_OF_AN_ADDRESS, MOST_STRANGERS, Slots
 from web_world import MakeWorld, World
 
 HALF_OPEN = 290

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from m2pem_plugin_web.access.lateness import GIVEN, LONGEST_S
+from m2pem_plugin_web.access.requests import GIVEN, LATEST_S
 from web_world import VEHICLE, MakeWorld, World
 
 from m2pem.api import RunStatus
@@ -15,7 +15,7 @@ async def clock(world: World) -> float:
     return float((await live.watch(None))["now"])
 
 
-@pytest.mark.parametrize("age", [LONGEST_S + 1, 90.0])
+@pytest.mark.parametrize("age", [LATEST_S + 1, 90.0])
 async def test_a_late_command_is_refused_with_its_age(world: MakeWorld, age: float) -> None:
     async with world() as here:
         prompt = await here.asked()

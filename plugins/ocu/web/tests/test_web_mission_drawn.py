@@ -171,7 +171,7 @@ async def watch_detection(page: Page) -> None:
     await picture(page, "running")
     await expect(answer(page, "Continue")).to_be_enabled()
     events = page.get_by_role("region", name="Events")
-    await expect(events).to_contain_text("Signal Stop driving")
+    await expect(events).to_contain_text("signal 'Stop driving'")
     # Both have been left: they fade from green to gray.
     await page.get_by_role("tab", name="DETECTION").click()
     await wait_for_colour(page, "DRIVE ROUTE", GRAY)
@@ -200,7 +200,7 @@ async def stop(page: Page) -> None:
     await press_twice(page, page.locator("header button.stop").click)
     ended = page.get_by_role("dialog", name="The run has ended")
     await expect(ended).to_contain_text("was stopped")
-    await expect(ended).to_contain_text("anna decided “continue”")
+    await expect(ended).to_contain_text("continue, answered by anna")
     await picture(page, "stopped")
 
 

@@ -12,8 +12,7 @@ from m2pem_plugin_web.missions.folder import (
     NoMissionError,
 )
 from m2pem_plugin_web.missions.names import why_not
-from m2pem_plugin_web.missions.versions import version_of
-from m2pem_plugin_web.missions.writing import write
+from m2pem_plugin_web.missions.versions import version_of, write
 from rest_world import VIGNETTE, rest_world
 
 BROKEN = VIGNETTE.replace('targetRef="EndMission"', 'targetRef="Nowhere"')

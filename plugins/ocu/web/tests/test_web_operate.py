@@ -98,7 +98,7 @@ async def test_a_signal_moves_the_token_that_waits_for_it(desk: Desk) -> None:
     await expect(element(page, "DriveRoute")).to_contain_class("m2-done")
     await expect(element(page, "DriveStop")).to_have_class(re.compile("m2-(active|done)"))
     log = page.get_by_role("region", name="Events")
-    await expect(log).to_contain_text("Signal Stop driving")
+    await expect(log).to_contain_text("anna: signal 'Stop driving'")
 
 
 async def test_a_route_is_drawn_with_the_keyboard(desk: Desk) -> None:
@@ -130,11 +130,11 @@ async def test_a_vehicle_is_taken_and_given_back(desk: Desk) -> None:
     await card.get_by_role("button", name="Take over", exact=True).click()
     await expect(card).to_contain_text("with anna")
     assert await holder(desk, "evsg2") == "anna"
-    await expect(log.get_by_text("anna took evsg2")).to_be_visible()
+    await expect(log.get_by_text("evsg2 taken by anna")).to_be_visible()
     await card.get_by_role("button", name="Give back", exact=True).click()
     await expect(card.get_by_role("button", name="Take over", exact=True)).to_be_visible()
     assert await holder(desk, "evsg2") == ""
-    await expect(log.get_by_text("anna gave evsg2 back")).to_be_visible()
+    await expect(log.get_by_text("evsg2 given back by anna")).to_be_visible()
 
 
 async def test_a_payload_is_taken_without_its_vehicle(desk: Desk) -> None:

@@ -101,7 +101,7 @@ async def test_operators_see_the_same_and_the_first_answer_counts(
         await otto.page.get_by_role("button", name="Pause", exact=True).click()
         for each in (anna, otto):
             log = each.page.get_by_role("region", name="Events")
-            await expect(log).to_contain_text("USER SEND ROUTE: anna decided “continue”")
+            await expect(log).to_contain_text("USER SEND ROUTE: continue, answered by anna")
             await expect(element(each.page, "DriveRoute")).to_contain_class("m2-active")
             await wait_for_status(each.page, "Paused")
             each.assert_well()

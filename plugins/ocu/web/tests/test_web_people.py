@@ -6,12 +6,11 @@ import time
 from pathlib import Path
 
 import pytest
-from m2pem_plugin_web.access.entry import OF_A_NAME_HERE
 from m2pem_plugin_web.access.passwords import hash_password
 from m2pem_plugin_web.access.private_files import NotPrivateError
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.access.sessions import IDLE_S, LONGEST_S, Sessions, hash_of
-from m2pem_plugin_web.access.throttle import WITHIN_S, Throttle
+from m2pem_plugin_web.access.sign_in import OF_A_NAME_HERE, WITHIN_S, Throttle
 from m2pem_plugin_web.access.users import User, Users, write_users
 from m2pem_plugin_web.live.socket import SIGNED_OUT
 from web_world import PASSWORD, VEHICLE, MakeWorld

@@ -10,8 +10,8 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 import websockets
-from m2pem_plugin_web.access.bodies import LARGEST_BYTES, BoundedBodies
-from m2pem_plugin_web.access.throttle import WITHIN_S
+from m2pem_plugin_web.access.requests import LARGEST_BYTES, BoundedBodies
+from m2pem_plugin_web.access.sign_in import WITHIN_S
 from m2pem_plugin_web.live.socket import BURST, FLOOD, LONGEST_MESSAGE, MALFORMED
 from m2pem_plugin_web.pages import ADDRESSES
 from starlette.requests import Request

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from m2pem_plugin_web.tracks.stores import Folder
+from m2pem_plugin_web.tracks.stores import FolderStore
 from m2pem_plugin_web.tracks.thinning import SPACING_S
 from m2pem_plugin_web.tracks.track import Head, Track
 from test_web_restart import left_by_a_crash
@@ -100,7 +100,7 @@ async def test_a_track_is_kept_over_a_crash_and_told_by_pages(tmp_path: Path) ->
         browser = await first.browser()
         before = await tracked(browser, run, lambda found: len(states_of(found)) > 5)
         copy = left_by_a_crash(tmp_path)
-    stale = Track(Folder(copy / "journal.db-tracks"), Head("r7", 1), 0.0)
+    stale = Track(FolderStore(copy / "journal.db-tracks"), Head("r7", 1), 0.0)
     stale.close()
     async with AsyncExitStack() as stack:
         second = await begun(stack, copy)

@@ -12,10 +12,9 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from m2pem_plugin_web.tracks.reading import page_of
-from m2pem_plugin_web.tracks.stores import Folder, HeldError, Memory, Place
+from m2pem_plugin_web.tracks.stores import FolderStore, HeldError, MemoryStore, TrackStore
 from m2pem_plugin_web.tracks.thinning import Sample, Thinner, differs, thinned
-from m2pem_plugin_web.tracks.track import Head, Track
+from m2pem_plugin_web.tracks.track import Head, Track, page_of
 
 from m2pem.api import GeoPosition, LinkState, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
@@ -52,23 +51,27 @@ def north_of(each: Any) -> float:
 
 
 @pytest.fixture(params=["folder", "memory"])
-def place(request: pytest.FixtureRequest, tmp_path: Path) -> Place:
-    return Folder(tmp_path / "tracks", 20_000) if request.param == "folder" else Memory(2, 20_000)
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> TrackStore:
+    return (
+        FolderStore(tmp_path / "tracks", 20_000)
+        if request.param == "folder"
+        else MemoryStore(2, 20_000)
+    )
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Folder:
-    return Folder(tmp_path / "tracks")
+def folder(tmp_path: Path) -> FolderStore:
+    return FolderStore(tmp_path / "tracks")
 
 
-def written(place: Place, *samples: Sample, now_s: float = math.inf) -> Track:
-    track = Track(place, HEAD, now_s)
+def written(store: TrackStore, *samples: Sample, now_s: float = math.inf) -> Track:
+    track = Track(store, HEAD, now_s)
     track.append(samples)
     return track
 
 
-def kept(place: Place, after_s: float | None = None, limit: int = 1000) -> list[Sample]:
-    return list(page_of(place, "r1", HEAD.started_us, after_s, limit).samples)
+def kept(store: TrackStore, after_s: float | None = None, limit: int = 1000) -> list[Sample]:
+    return list(page_of(store, "r1", HEAD.started_us, after_s, limit).samples)
 
 
 # --- what says something ------------------------------------------------------------------------
@@ -169,88 +172,90 @@ def test_a_vehicle_that_rests_is_kept_beside_one_that_moves() -> None:
     assert 10 <= len([each for each in fewer if "v" in each.vehicles]) <= 12
 
 
-def test_a_track_that_is_too_large_doubles_its_spacing(place: Place) -> None:
-    track = Track(place, HEAD, 0.0)
+def test_a_track_that_is_too_large_doubles_its_spacing(store: TrackStore) -> None:
+    track = Track(store, HEAD, 0.0)
     for t_s in range(1000):
         track.append([sample(float(t_s), float(t_s))])
-        assert len(place.read("r1")) <= place.most_bytes
+        assert len(store.read("r1")) <= store.most_bytes
     assert track.thinner.spacing_s > 1.0
-    left = kept(place)
+    left = kept(store)
     assert left[0].t == 0.0 and left[-1].t == 999.0
     assert all(b.t - a.t <= 2 * track.thinner.spacing_s for a, b in pairwise(left))
     again = track.thinner.spacing_s
     track.close()
-    assert Track(place, HEAD, 1000.0).thinner.spacing_s == again
+    assert Track(store, HEAD, 1000.0).thinner.spacing_s == again
 
 
 # --- files --------------------------------------------------------------------------------------
 
 
-def test_a_track_goes_on_after_a_restart(place: Place) -> None:
-    written(place, sample(0.0, 0.0), sample(1.0, 1.0)).close()
-    track = Track(place, HEAD, 2.0)
+def test_a_track_goes_on_after_a_restart(store: TrackStore) -> None:
+    written(store, sample(0.0, 0.0), sample(1.0, 1.0)).close()
+    track = Track(store, HEAD, 2.0)
     assert not track.is_new
     assert not track.thinner.wants(5.0, VehicleState(ResourceId("v"), 7, at(1.2).position))
     assert track.thinner.wants(5.0, VehicleState(ResourceId("v"), 7, at(2.0).position))
     track.append([sample(5.0, 2.0)])
-    assert [north_of(each) for each in kept(place)] == [0.0, 1.0, 2.0]
+    assert [north_of(each) for each in kept(store)] == [0.0, 1.0, 2.0]
 
 
-def test_a_past_that_did_not_come_about_is_dropped(place: Place) -> None:
-    written(place, sample(0.0, 0.0), sample(4.0, 4.0)).close()
-    track = Track(place, HEAD, 3.0)
+def test_a_past_that_did_not_come_about_is_dropped(store: TrackStore) -> None:
+    written(store, sample(0.0, 0.0), sample(4.0, 4.0)).close()
+    track = Track(store, HEAD, 3.0)
     track.append([sample(3.0, 1.0)])
-    assert [(each.t, north_of(each)) for each in kept(place)] == [(0.0, 0.0), (3.0, 1.0)]
+    assert [(each.t, north_of(each)) for each in kept(store)] == [(0.0, 0.0), (3.0, 1.0)]
 
 
-def test_a_track_of_another_journals_run_is_not_shown_and_gives_way(place: Place) -> None:
-    written(place, sample(0.0, 0.0)).close()
-    assert page_of(place, "r1", 2_000, None, 10).samples == ()
-    Track(place, Head("r1", 2_000), 5.0)
-    assert kept(place) == []
+def test_a_track_of_another_journals_run_is_not_shown_and_gives_way(store: TrackStore) -> None:
+    written(store, sample(0.0, 0.0)).close()
+    assert page_of(store, "r1", 2_000, None, 10).samples == ()
+    Track(store, Head("r1", 2_000), 5.0)
+    assert kept(store) == []
 
 
 @given(st.data())
 def test_what_a_crash_has_torn_is_not_there(data: Any) -> None:
-    place = Memory()
+    store = MemoryStore()
     samples = [sample(float(t_s), float(t_s)) for t_s in range(5)]
-    written(place, *samples)
-    whole = place.read("r1")
+    written(store, *samples)
+    whole = store.read("r1")
     cut = data.draw(st.integers(0, len(whole)))
-    place.open("r1").replace(whole[:cut])
+    store.open("r1").replace(whole[:cut])
     left = whole[:cut].count(b"\n") - 1
-    assert kept(place) == samples[: max(0, left)]
-    track = Track(place, HEAD, math.inf)
+    assert kept(store) == samples[: max(0, left)]
+    track = Track(store, HEAD, math.inf)
     track.append([sample(9.0, 9.0)])
-    assert kept(place) == [*samples[: max(0, left)], sample(9.0, 9.0)]
+    assert kept(store) == [*samples[: max(0, left)], sample(9.0, 9.0)]
 
 
 @given(st.binary(max_size=300), st.integers(0, 400))
 def test_damage_takes_no_more_than_what_it_hit(damage: bytes, where: int) -> None:
-    place = Memory()
-    written(place, *(sample(float(t_s), float(t_s)) for t_s in range(8)))
-    text = bytearray(place.read("r1"))
+    store = MemoryStore()
+    written(store, *(sample(float(t_s), float(t_s)) for t_s in range(8)))
+    text = bytearray(store.read("r1"))
     text[where : where + len(damage)] = damage
-    place.open("r1").replace(bytes(text))
-    for each in kept(place):
+    store.open("r1").replace(bytes(text))
+    for each in kept(store):
         assert isinstance(each, Sample)
-    written(place, sample(9.0, 9.0)).close()
-    assert kept(place)[-1] == sample(9.0, 9.0)
+    written(store, sample(9.0, 9.0)).close()
+    assert kept(store)[-1] == sample(9.0, 9.0)
 
 
-def test_pages_hold_all_of_a_moment_together(place: Place) -> None:
+def test_pages_hold_all_of_a_moment_together(store: TrackStore) -> None:
     two = [sample(1.0, 1.0), sample(1.0, 1.0, who="w")]
-    written(place, sample(0.0, 0.0), *two, sample(2.0, 2.0))
+    written(store, sample(0.0, 0.0), *two, sample(2.0, 2.0))
     pages, after_s = [], None
     while True:
-        page = page_of(place, "r1", HEAD.started_us, after_s, 2)
+        page = page_of(store, "r1", HEAD.started_us, after_s, 2)
         pages.append([each.t for each in page.samples])
         if (after_s := page.after) is None:
             break
     assert pages == [[0.0, 1.0, 1.0], [2.0]]
 
 
-def test_files_are_their_owners_alone_and_of_runs_alone(folder: Folder, tmp_path: Path) -> None:
+def test_files_are_their_owners_alone_and_of_runs_alone(
+    folder: FolderStore, tmp_path: Path
+) -> None:
     written(folder, sample(0.0, 0.0))
     path = tmp_path / "tracks" / "r1.jsonl"
     assert path.stat().st_mode & 0o777 == 0o600
@@ -264,7 +269,7 @@ def test_files_are_their_owners_alone_and_of_runs_alone(folder: Folder, tmp_path
     assert list(folder.runs()) == ["r1"]
 
 
-def test_a_link_is_not_followed(folder: Folder, tmp_path: Path) -> None:
+def test_a_link_is_not_followed(folder: FolderStore, tmp_path: Path) -> None:
     (tmp_path / "tracks").mkdir()
     precious = tmp_path / "precious"
     precious.write_text("do not touch")
@@ -274,7 +279,7 @@ def test_a_link_is_not_followed(folder: Folder, tmp_path: Path) -> None:
     assert precious.read_text() == "do not touch"
 
 
-def test_one_writes_a_track_and_others_leave_it(folder: Folder) -> None:
+def test_one_writes_a_track_and_others_leave_it(folder: FolderStore) -> None:
     first = written(folder, sample(0.0, 0.0))
     with pytest.raises(HeldError):
         Track(folder, HEAD, 0.0)
@@ -283,7 +288,7 @@ def test_one_writes_a_track_and_others_leave_it(folder: Folder) -> None:
 
 
 def test_a_full_disk_takes_nothing_back_that_was_there(
-    folder: Folder, monkeypatch: pytest.MonkeyPatch
+    folder: FolderStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     track = written(folder, sample(0.0, 0.0))
     write = os.write
@@ -302,7 +307,7 @@ def test_a_full_disk_takes_nothing_back_that_was_there(
 
 
 def test_memory_forgets_the_oldest_runs() -> None:
-    place = Memory(most=2)
+    store = MemoryStore(most=2)
     for run in ("r1", "r2", "r3"):
-        Track(place, Head(run, 1), 0.0)
-    assert list(place.runs()) == ["r2", "r3"]
+        Track(store, Head(run, 1), 0.0)
+    assert list(store.runs()) == ["r2", "r3"]

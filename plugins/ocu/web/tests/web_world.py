@@ -12,9 +12,9 @@ from urllib.parse import parse_qs, urlsplit
 import httpx
 import pytest
 import websockets
-from m2pem_plugin_web.access.entry import KEY_HEADER, KEY_SUBPROTOCOL, SUBPROTOCOL
 from m2pem_plugin_web.access.passwords import hash_password
 from m2pem_plugin_web.access.roles import Role
+from m2pem_plugin_web.access.sign_in import KEY_HEADER, KEY_SUBPROTOCOL, SUBPROTOCOL
 from m2pem_plugin_web.access.users import User, write_users
 from m2pem_plugin_web.ocu import WebOcu
 

@@ -1,4 +1,4 @@
-"""Looks at every request before anything else does: where it comes from, and who asks."""
+"""Checks every request before its route: its origin, and the user of its session."""
 
 from collections.abc import Collection
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from m2pem_plugin_web.access.entry import KEY_HEADER, Entry, key_of
-from m2pem_plugin_web.access.origins import SAFE_METHODS, foreign, wrong_host
-from m2pem_plugin_web.access.people import SCOPE_KEY
-from m2pem_plugin_web.access.slots import Slots
+from m2pem_plugin_web.access.requests import SAFE_METHODS, foreign, wrong_host
+from m2pem_plugin_web.access.roles import SCOPE_KEY
+from m2pem_plugin_web.access.sign_in import KEY_HEADER, Entry, key_of
 from m2pem_plugin_web.problems import problem
+from m2pem_plugin_web.server import Slots
 
 API = "/api"
 SIGN_IN = "/api/session"
@@ -25,7 +25,7 @@ NO_KEY = (
 
 
 class Guard:
-    """Below /api it refuses requests without a session, but for signing in. `names`: our own.
+    """Below /api it refuses requests without a session, but for signing in. `names`: this server's.
 
     The cookie alone is not enough there: browsers send it to other ports of this host, whose
     servers could send it here.

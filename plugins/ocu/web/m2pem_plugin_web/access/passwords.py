@@ -40,7 +40,7 @@ class PasswordChecker:
         self._waiting = 0
 
     async def matches(self, hashed: str | None, password: str) -> bool:
-        """Whether a password is that of a hash; None: of nobody.
+        """Whether a password is that of a hash; None: no user has that name.
 
         Raises:
             BusyError: too many are being checked.

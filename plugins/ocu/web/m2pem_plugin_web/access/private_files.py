@@ -11,13 +11,13 @@ OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
 
 class NotPrivateError(PluginError):
-    """A file that holds secrets can be read by others, or cannot be kept from them."""
+    """A file with secrets can be read by other users, or cannot be protected from them."""
 
     exit_status = 2
 
 
 def private_folder(path: Path) -> Path:
-    """A folder that only its owner may enter; it is made where it is missing.
+    """Make a folder that only its owner may enter, if it is missing.
 
     Raises:
         NotPrivateError: it is another's, or cannot be made.
@@ -58,7 +58,7 @@ def write_private(path: Path, text: str) -> None:
 
 
 def read_private(path: Path) -> str:
-    """The text of a file that only its owner may read.
+    """Return the text of a file that only its owner may read.
 
     Raises:
         FileNotFoundError: there is none.

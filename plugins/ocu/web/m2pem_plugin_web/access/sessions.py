@@ -1,4 +1,4 @@
-"""Who has signed in: two random secrets in the browser, and their hashes here.
+"""Sessions of signed-in users: two random secrets in the browser, and their hashes here.
 
 One is in a cookie. Browsers send cookies to every port of a host, so to servers of other programs
 and users as well. The other, the key, is known to the page's own origin alone, which has the port.
@@ -21,10 +21,10 @@ IDLE_S = 12 * 3600.0
 """A session ends when it was not used for this long."""
 
 LONGEST_S = 7 * 24 * 3600.0
-"""However much it is used, somebody has to sign in again after a week."""
+"""A session ends after a week, however much it is used."""
 
 MOST = 1000
-"""The one that was not used for longest goes, when there are more."""
+"""Beyond that, the session that was not used for longest ends."""
 
 KEY_BYTES = 32
 
@@ -32,7 +32,7 @@ log = logging.getLogger("m2pem.ocu.web")
 
 
 class Secrets(NamedTuple):
-    """What a browser has of a session: the value of its cookie, and the key."""
+    """The secrets of a session in the browser: the value of its cookie, and the key."""
 
     cookie: str
     key: str
@@ -123,5 +123,5 @@ def _read(path: Path) -> dict[str, Session]:
 
 
 def hash_of(secret: str) -> str:
-    """What is kept of a secret."""
+    """Return the hash of a secret."""
     return hashlib.sha256(secret.encode(errors="replace")).hexdigest()

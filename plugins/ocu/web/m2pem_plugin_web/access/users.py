@@ -21,7 +21,7 @@ class User(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Users:
-    """Read again whenever the file has changed, so that whoever is removed is out at once."""
+    """Read again when the file has changed, so that a removed user is signed out at once."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -1,1 +1,1 @@
-"""What browsers are told without asking: the pictures of runs, pushed over WebSockets."""
+"""What is pushed to browsers over WebSockets: views of runs, prompts and states of the fleet."""

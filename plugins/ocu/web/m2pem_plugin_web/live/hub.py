@@ -31,7 +31,7 @@ from m2pem.api import (
 from m2pem.api import records as r
 from m2pem.api.run_view import Place
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.lateness import now_s
+from m2pem_plugin_web.access.requests import now_s
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
 from m2pem_plugin_web.live.live_run import LiveRun, command

@@ -10,8 +10,8 @@ from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect, WebSocketDisconnected
 
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.entry import SUBPROTOCOL, Entry, key_of
-from m2pem_plugin_web.access.people import person_of
+from m2pem_plugin_web.access.roles import person_of
+from m2pem_plugin_web.access.sign_in import SUBPROTOCOL, Entry, key_of
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
 from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
@@ -145,7 +145,7 @@ async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
 
 
 async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
-    """Have a run shown; while a long one is read, the page hears that the server goes on."""
+    """Watch a run; while a long one is read, the page gets signs of life."""
     watching = asyncio.ensure_future(hub.watch(viewer, run))
     try:
         while not (await asyncio.wait({watching}, timeout=HEARTBEAT_S))[0]:
@@ -166,7 +166,7 @@ async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:
 
 
 async def _close(socket: WebSocket, leave: _Leave) -> None:
-    """Say why, and hang up soon, whether or not it was heard: it may be read behind a flood."""
+    """Close with a reason, and abort soon after: the browser may not read the reason."""
     abort = socket.scope.get(ABORT)
     if abort is not None:
         asyncio.get_running_loop().call_later(LAST_WORDS_S, abort)

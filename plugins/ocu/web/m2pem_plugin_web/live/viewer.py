@@ -15,10 +15,10 @@ WINDOW = 2
 """Paced messages that a browser may have on its way or before it."""
 
 SILENT_S = 10.0
-"""A browser that has not taken in a message after this long is let go; it may come again."""
+"""A browser that acknowledges no message for so long is disconnected; it may connect again."""
 
 URGENT = 1000
-"""Messages that may wait unpaced; whoever is further behind than this is let go."""
+"""Messages that may wait unpaced; a browser that is further behind is disconnected."""
 
 HEARTBEAT_S = 1.0
 """Without a change: so that the page knows the mission time, and that it is still connected."""

@@ -1,4 +1,7 @@
-"""Reads and saves missions: never over what somebody else has changed, and never for good."""
+"""The folder of missions: reads and saves them, and lists each with its title.
+
+A save never replaces what another user has changed since, and deletes nothing for good.
+"""
 
 import fcntl
 import os
@@ -9,13 +12,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
-from m2pem.errors import M2pemError
+from m2pem.api import Draft, MissionControl, Severity
+from m2pem.errors import M2pemError, MissionError
 from m2pem_plugin_web.missions.names import SUFFIX, why_not
-from m2pem_plugin_web.missions.versions import FOLDER, Version, Versions, version_of
-from m2pem_plugin_web.missions.writing import sync_folder, write
+from m2pem_plugin_web.missions.versions import (
+    FOLDER,
+    Version,
+    Versions,
+    sync_folder,
+    version_of,
+    write,
+)
 
 LARGEST_BYTES = 20 * 1024 * 1024
-"""Of a mission, as m2pem reads them."""
+"""The most bytes of a mission that m2pem reads."""
 
 
 class NoMissionError(M2pemError):
@@ -23,11 +33,11 @@ class NoMissionError(M2pemError):
 
 
 class BadNameError(M2pemError):
-    """A mission cannot be called that."""
+    """The name of a mission is not allowed."""
 
 
 class ChangedError(M2pemError):
-    """The mission on the disk is not the one that was read; `current` is, None: there is none."""
+    """The mission on the disk has changed. `current`: as it is now; None if it was deleted."""
 
     def __init__(self, name: str, current: "Saved | None") -> None:
         what = "was changed" if current is not None else "was deleted"
@@ -41,7 +51,7 @@ class FolderError(M2pemError):
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """A mission on the disk. `by`: who saved it here, "" if it came there in another way."""
+    """A mission on the disk. `by`: the user who saved it; "" if it came in another way."""
 
     name: str
     path: Path
@@ -59,7 +69,7 @@ class MissionFolder:
         self._lock = Lock()
 
     def file(self, name: str) -> Path:
-        """Where the mission of a name is, or would be.
+        """Return the path of a mission, which need not exist.
 
         Raises:
             BadNameError: no mission can be called that.
@@ -70,7 +80,7 @@ class MissionFolder:
         return self.path / f"{name}{SUFFIX}"
 
     def names(self) -> Sequence[str]:
-        """What is there, in the order of the alphabet."""
+        """Return the names of all missions in alphabetical order."""
         try:
             files = [each.name for each in os.scandir(self.path) if each.is_file()]
         except FileNotFoundError:
@@ -81,7 +91,7 @@ class MissionFolder:
         return sorted((each for each in names if not why_not(each)), key=str.casefold)
 
     def read(self, name: str) -> Saved:
-        """A mission as it is on the disk.
+        """Read a mission from the disk.
 
         Raises:
             NoMissionError: there is none.
@@ -104,7 +114,7 @@ class MissionFolder:
         return Saved(name, path, source, version, kept.saved_at_us, kept.by)
 
     def save(self, name: str, source: bytes, base: str | None, by: str) -> Saved:
-        """Save a mission that was made of version `base`; None: it is a new one.
+        """Save a mission that was edited from version `base`; None for a new one.
 
         Raises:
             ChangedError: another version is there.
@@ -147,12 +157,12 @@ class MissionFolder:
                 raise FolderError(f"{path}: {error.strerror}") from error
 
     def versions(self, name: str) -> Sequence[Version]:
-        """All that is kept of a mission, the oldest first."""
+        """Return all versions of a mission, the oldest first."""
         self.file(name)
         return Versions(self.path, name).all()
 
     def version(self, name: str, number: int) -> tuple[Version, bytes]:
-        """One of them, with its content.
+        """Return a version with its content.
 
         Raises:
             NoMissionError: there is none.
@@ -164,7 +174,7 @@ class MissionFolder:
         return found, source
 
     def source(self, name: str, version: str | None) -> bytes:
-        """The content of a mission: the one on the disk, or that of a `version` of it.
+        """Return the content of a mission: the one on the disk, or that of a version.
 
         Raises:
             NoMissionError: there is none.
@@ -186,7 +196,7 @@ class MissionFolder:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """Nobody else saves here, in this process or in another one of m2pem."""
+        """Lock the folder against other saves, in this process and in others of m2pem."""
         with self._lock:
             try:
                 hidden = self.path / FOLDER
@@ -199,3 +209,59 @@ class MissionFolder:
                 yield
             finally:
                 os.close(handle)
+
+
+_USES_OTHERS = (b"callActivity", b"import")
+"""A file with one of these may depend on other files of the folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A mission of the folder. `runnable`: a check finds no errors."""
+
+    saved: Saved
+    title: str
+    runnable: bool
+
+
+class Summaries:
+    """Summaries of missions, cached until a file changes. Calls block: use threads."""
+
+    def __init__(self, control: MissionControl, folder: MissionFolder) -> None:
+        self._control = control
+        self._folder = folder
+        self._known: dict[tuple[str, str, tuple[str, ...]], tuple[str, bool]] = {}
+
+    def all(self) -> Sequence[Summary]:
+        """Return the summaries of all missions in alphabetical order.
+
+        Raises:
+            FolderError: it cannot be read.
+        """
+        found = []
+        for name in self._folder.names():
+            try:
+                found.append(self._folder.read(name))
+            except (NoMissionError, FolderError):  # it went in the meantime, or is locked away
+                continue
+        together = tuple(f"{each.name} {each.version}" for each in found)
+        known: dict[tuple[str, str, tuple[str, ...]], tuple[str, bool]] = {}
+        summaries = []
+        for saved in found:
+            others = any(each in saved.source for each in _USES_OTHERS)
+            key = (saved.name, saved.version, together if others else ())
+            known[key] = self._known.get(key) or self._look(saved)
+            summaries.append(Summary(saved, *known[key]))
+        self._known = known
+        return summaries
+
+    def _look(self, saved: Saved) -> tuple[str, bool]:
+        draft = Draft(saved.path, saved.source)
+        try:
+            processes = self._control.outline(draft).processes
+        except MissionError:
+            return "", False
+        main = next((each for each in processes if each.starts), None)
+        findings = self._control.check(draft)
+        runnable = not any(each.severity is Severity.ERROR for each in findings)
+        return (main.name or main.id) if main is not None else "", runnable

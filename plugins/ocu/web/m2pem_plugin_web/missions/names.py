@@ -1,7 +1,12 @@
-"""What missions may be called: names that are a file's on any system, and never a path."""
+"""Names of missions: a file's name on any system, never a path; and names in place of paths."""
 
 import re
 import unicodedata
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from m2pem.api import Finding
 
 SUFFIX = ".bpmn"
 LONGEST = 100
@@ -20,7 +25,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
 def why_not(name: str) -> str:
-    """What is wrong with a name; "" if it will do."""
+    """Return what is wrong with a name; "" if it is allowed."""
     if not name or len(name) > LONGEST or len(name.encode("utf-8", "replace")) > LONGEST_BYTES:
         return f"a name has 1 to {LONGEST} letters"
     if _NAME.fullmatch(name) is None:
@@ -32,3 +37,34 @@ def why_not(name: str) -> str:
     if _DEVICES.fullmatch(name):
         return "some systems have a device of that name"
     return ""
+
+
+_FOLDERS = re.compile(r"""(?<![\w:/.])/(?:[^/\s:'",;()]+/)+(?=[^/\s:'",;()])""")
+"""Matches the folders of absolute paths, but not of URLs."""
+
+
+class PathNames:
+    """Replaces paths in texts for browsers by file names. `folder`: of the missions."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folders = sorted({f"{folder.resolve()}/", f"{folder}/"}, key=len, reverse=True)
+
+    def text(self, text: str) -> str:
+        """Return a text with file names instead of paths."""
+        for folder in self._folders:
+            if folder not in ("/", "./"):
+                text = text.replace(folder, "")
+        return _FOLDERS.sub("", text)
+
+    def findings(self, findings: Iterable[object]) -> tuple[Finding, ...]:
+        """Return findings with file names instead of paths."""
+        return tuple(
+            replace(
+                each,
+                file=self.text(each.file),
+                message=self.text(each.message),
+                remedy=self.text(each.remedy),
+            )
+            for each in findings
+            if isinstance(each, Finding)
+        )

@@ -1,6 +1,11 @@
-"""All versions of a mission that were saved or found, in a hidden folder beside the missions."""
+"""All versions of a mission that were saved or found, in a hidden folder beside the missions.
 
+Files are written whole or not at all, and durably, also if the power fails in between.
+"""
+
+import os
 import re
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -8,20 +13,64 @@ from pathlib import Path
 
 import msgspec
 
-from m2pem_plugin_web.missions.writing import write
+_NEW_FILES_MODE = 0o666
+
+
+def write(path: Path, content: bytes, *, new: bool = False) -> None:
+    """Replace a file. `new`: fail if there is one.
+
+    Raises:
+        FileExistsError: there is one.
+        OSError: it cannot be written.
+    """
+    handle, name = tempfile.mkstemp(prefix=".m2pem-", suffix=".part", dir=path.parent)
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fchmod(file.fileno(), _mode_of(path))
+            os.fsync(file.fileno())
+        if new:
+            os.link(part, path)
+        else:
+            part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Sync a folder, so that its names are durable."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _mode_of(path: Path) -> int:
+    """Return the mode of the file that is replaced, else that of new files of the process."""
+    try:
+        return path.stat().st_mode & 0o777
+    except FileNotFoundError:
+        mask = os.umask(0)
+        os.umask(mask)
+        return _NEW_FILES_MODE & ~mask
+
 
 FOLDER = ".versions"
 _FILE = re.compile(r"(\d{6,})\.json")
 
 
 def version_of(source: bytes) -> str:
-    """What tells one content from another."""
+    """Return a hash of the content."""
     return sha256(source).hexdigest()[:16]
 
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """One of them. `by`: who saved it, "" for what was found on the disk; `deleted`: it was the
+    """A version. `by`: the user who saved it, "" for one found on the disk; `deleted`: it was the
     last one before the mission was deleted. Times are microseconds since the Unix epoch."""
 
     number: int
@@ -32,13 +81,13 @@ class Version:
 
 
 class Versions:
-    """Those of one mission, the oldest first. Numbers count from 1."""
+    """The versions of one mission, the oldest first. Numbers count from 1."""
 
     def __init__(self, missions: Path, name: str) -> None:
         self._folder = missions / FOLDER / name
 
     def all(self) -> Sequence[Version]:
-        """Every one."""
+        """Return all versions."""
         found = []
         try:
             names = sorted(each.name for each in self._folder.iterdir())
@@ -55,14 +104,14 @@ class Versions:
         return sorted(found, key=lambda each: each.number)
 
     def source(self, number: int) -> bytes | None:
-        """The content of one; None: there is none of that number."""
+        """Return the content of a version; None if there is no such number."""
         try:
             return self._path(number, "bpmn").read_bytes()
         except FileNotFoundError:
             return None
 
     def add(self, source: bytes, at_us: int, by: str, *, deleted: bool = False) -> Version:
-        """Keep a content; nothing is new if it is that of the newest one."""
+        """Add a content as a version, unless the newest one has the same."""
         known = self.all()
         version = version_of(source)
         newest = known[-1] if known else None

@@ -1,4 +1,4 @@
-"""/api/fleet, /api/behaviors, /api/services: who is there, and what they can do."""
+"""/api/fleet, /api/behaviors, /api/services: vehicles, payloads and teams, and what they can do."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -17,7 +17,7 @@ from m2pem.api import (
     ResourceId,
     as_geojson,
 )
-from m2pem_plugin_web.access.people import Viewer
+from m2pem_plugin_web.access.roles import Viewer
 from m2pem_plugin_web.problems import RESPONSES
 
 _UNITS = {
@@ -92,7 +92,7 @@ class ParameterModel(BaseModel):
 
 
 class BehaviorModel(BaseModel):
-    """A behavior with its parameters, and who takes it so: vehicles and payloads, or teams."""
+    """A behavior with its parameters, and the vehicles, payloads or teams that can do it."""
 
     name: str
     type: BehaviorType
@@ -123,7 +123,7 @@ def router(control: MissionControl) -> APIRouter:
 
     @routes.get("/behaviors")
     async def behaviors(_: Viewer) -> list[BehaviorModel]:
-        """What this fleet can do, by name; one that some take otherwise is there again."""
+        """Return the behaviors of this fleet by name; variants of one are separate entries."""
         return behaviors_of(control.fleet(), control.catalogue())
 
     @routes.get("/services")
@@ -170,7 +170,7 @@ def _fleet(fleet: Fleet) -> FleetModel:
 def behaviors_of(
     fleet: Fleet, catalogue: Mapping[ResourceId, Sequence[BehaviorSpec]]
 ) -> list[BehaviorModel]:
-    """Every behavior with who can do it: of a team, all members can, and its lead says how."""
+    """Return every behavior with what can do it; a team can do what all its members can."""
     found: dict[str, tuple[BehaviorSpec, list[str], list[str]]] = {}
     for resource, specs in catalogue.items():
         for spec in specs:

@@ -7,20 +7,19 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from m2pem.api import Draft, MissionControl, Outline
 from m2pem.errors import MissionError
-from m2pem_plugin_web.access.people import Viewer
-from m2pem_plugin_web.missions.calling import Called
+from m2pem_plugin_web.access.roles import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
+from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of, source_of
-from m2pem_plugin_web.rest.findings import FindingModel, finding_models
-from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.rest.models import Body, FindingModel, finding_models
 
 AT_ONCE = 2
-"""Files that are read at the same time, in threads beside the executive's."""
+"""Files that are checked at the same time, in threads."""
 
 
 class ProcessModel(BaseModel):
-    """A process; `starts`: a run begins with it, unless it is told otherwise."""
+    """A process; `starts`: a run begins with it, unless another is named."""
 
     id: str
     name: str
@@ -90,7 +89,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
     """The routes of checks."""
     routes = APIRouter(prefix="/api", tags=["checks"], responses=RESPONSES)
     turn = asyncio.Semaphore(AT_ONCE)
-    called = Called(folder.path)
+    called = PathNames(folder.path)
 
     @routes.post("/checks")
     async def check(_: Viewer, wanted: DraftModel) -> CheckModel:

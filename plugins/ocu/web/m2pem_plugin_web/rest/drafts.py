@@ -1,4 +1,4 @@
-"""The mission that a request is about: what was sent, or one of the folder."""
+"""The mission of a request: its own XML, or a mission of the folder."""
 
 import asyncio
 from collections.abc import Callable
@@ -24,13 +24,13 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 UNNAMED = "draft"
-"""What a mission is called that has no name yet."""
+"""The name of a mission that has none yet."""
 
 MissionName = Annotated[str, InPath(min_length=1, max_length=LONGEST, pattern=PATTERN)]
-"""In an address."""
+"""A name in an address."""
 
 WrittenName = Annotated[str, Field(min_length=1, max_length=LONGEST, pattern=PATTERN)]
-"""In what is sent."""
+"""A name in a body."""
 
 
 class DraftModel(Body):
@@ -52,7 +52,7 @@ class DraftModel(Body):
 
 
 async def draft_of(wanted: DraftModel, folder: MissionFolder) -> Draft:
-    """What is meant.
+    """Return the draft of a request.
 
     Raises:
         ProblemError: there is no such mission.
@@ -65,7 +65,7 @@ async def draft_of(wanted: DraftModel, folder: MissionFolder) -> Draft:
 
 
 def source_of(xml: str) -> bytes:
-    """A text as a file's bytes.
+    """Return a text as the bytes of a file.
 
     Raises:
         ProblemError: it has what no XML can have.
@@ -78,7 +78,7 @@ def source_of(xml: str) -> bytes:
 
 
 async def of_folder(call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """Ask the folder in a thread.
+    """Call the folder in a thread.
 
     Raises:
         ProblemError: it refused.

@@ -8,11 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from m2pem.api import Area, MissionControl, Point, Route, as_geojson, parse_geojson
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.people import Operator, Viewer
+from m2pem_plugin_web.access.roles import Operator, Viewer
 from m2pem_plugin_web.missions.names import LONGEST, PATTERN
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.lookup import find_run
-from m2pem_plugin_web.rest.models import Body, Name
+from m2pem_plugin_web.rest.models import Body, Name, find_run
 
 Kind = Literal["route", "area", "point"]
 GeometryName = Annotated[str, InPath(min_length=1, max_length=LONGEST, pattern=PATTERN)]

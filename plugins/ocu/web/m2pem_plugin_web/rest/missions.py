@@ -1,4 +1,4 @@
-"""/api/missions: the folder of missions, with all that was ever saved there."""
+"""/api/missions, /api/templates: the folder of missions with all that was ever saved there."""
 
 import asyncio
 from typing import Annotated
@@ -8,12 +8,12 @@ from fastapi import Path as InPath
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem_plugin_web.access.people import Commander, Viewer
-from m2pem_plugin_web.missions.folder import MissionFolder, Saved
-from m2pem_plugin_web.missions.summaries import Summaries
-from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.access.roles import Commander, Viewer
+from m2pem_plugin_web.missions.folder import MissionFolder, Saved, Summaries
+from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder, source_of
 from m2pem_plugin_web.rest.models import Body
+from m2pem_plugin_web.templates import find, templates
 
 BPMN = "application/xml"
 
@@ -35,7 +35,7 @@ class MissionLineModel(BaseModel):
 
 
 class SavedModel(BaseModel):
-    """What was saved. `version`: what tells one content from another."""
+    """What was saved. `version`: a hash of its content."""
 
     name: str
     version: str
@@ -162,3 +162,41 @@ def _saved(saved: Saved) -> SavedModel:
     return SavedModel(
         name=saved.name, version=saved.version, saved_at_us=saved.saved_at_us, by=saved.by
     )
+
+
+class TemplateLineModel(BaseModel):
+    """A mission to begin with; `doc` says what it does."""
+
+    name: str
+    title: str
+    doc: str
+
+
+class TemplateModel(BaseModel):
+    """A mission to begin with, for the editor."""
+
+    name: str
+    xml: str
+
+
+def template_router() -> APIRouter:
+    """The routes of templates."""
+    routes = APIRouter(prefix="/api/templates", tags=["templates"], responses=RESPONSES)
+
+    @routes.get("")
+    async def listed(_: Viewer) -> list[TemplateLineModel]:
+        """What there is."""
+        return [
+            TemplateLineModel(name=each.name, title=each.title, doc=each.doc)
+            for each in templates()
+        ]
+
+    @routes.get("/{name}")
+    async def template(_: Viewer, name: str) -> TemplateModel:
+        """One of them."""
+        found = find(name)
+        if found is None:
+            raise ProblemError(404, f"there is no template {name}")
+        return TemplateModel(name=found.name, xml=found.xml)
+
+    return routes

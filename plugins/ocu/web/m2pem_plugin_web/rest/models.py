@@ -1,10 +1,12 @@
-"""What runs and prompts look like as JSON."""
+"""Runs, prompts and findings as JSON, and the run that an address names."""
 
+from collections.abc import Iterable
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from m2pem.api import RunStatus, RunSummary
+from m2pem.api import Finding, MissionControl, RunStatus, RunSummary, Severity
+from m2pem_plugin_web.problems import ProblemError
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Reason = Annotated[str, Field(max_length=1000)]
@@ -23,7 +25,7 @@ class RunModel(BaseModel):
 
     `began_us` is by the clock on the wall, `started_us` and `ended_us` by the executive's, which
     may run faster. `took_s`: seconds of that clock until the end, of mission time until now; null
-    when nobody drives the run.
+    when no executive drives the run.
     """
 
     run: str
@@ -82,7 +84,7 @@ class DecisionModel(BaseModel):
 
 
 class PromptModel(BaseModel):
-    """A question that stands."""
+    """An open prompt."""
 
     run: str
     prompt: str
@@ -91,3 +93,46 @@ class PromptModel(BaseModel):
     text: str
     decisions: list[DecisionModel]
     role: str
+
+
+class FindingModel(BaseModel):
+    """What is wrong, or doubtful: where, and what would be right. `line` 0: none applies."""
+
+    severity: Severity
+    rule: str
+    number: str
+    file: str
+    line: int
+    element: str
+    message: str
+    remedy: str
+
+
+def finding_models(findings: Iterable[object]) -> list[FindingModel]:
+    """Findings as JSON."""
+    return [
+        FindingModel(
+            severity=each.severity,
+            rule=each.rule,
+            number=each.number,
+            file=each.file,
+            line=each.line,
+            element=each.element,
+            message=each.message,
+            remedy=each.remedy,
+        )
+        for each in findings
+        if isinstance(each, Finding)
+    ]
+
+
+async def find_run(control: MissionControl, run: str) -> RunSummary:
+    """The run of that id.
+
+    Raises:
+        ProblemError: 404, there is none.
+    """
+    for summary in await control.runs():
+        if summary.run == run:
+            return summary
+    raise ProblemError(404, f"there is no run {run}")

@@ -10,13 +10,18 @@ from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, BaseModel, Field
 
 from m2pem.api import MissionControl, MissionFile, SimulationResult
-from m2pem_plugin_web.access.people import Operator, Viewer
+from m2pem_plugin_web.access.roles import Operator, Viewer
 from m2pem_plugin_web.jobs import Job, Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
-from m2pem_plugin_web.rest.findings import FindingModel, finding_models
-from m2pem_plugin_web.rest.models import RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.models import (
+    FindingModel,
+    RecordPage,
+    RunModel,
+    finding_models,
+    run_model,
+)
 from m2pem_plugin_web.rest.record_pages import new_view, page_of
 from m2pem_plugin_web.rest.runs import LARGEST, MOST_RECORDS, RunMissionModel, file_models
 from m2pem_plugin_web.rest.verifications import JobModel
@@ -84,7 +89,7 @@ def router(
 
     @routes.get("/{identifier}")
     async def rehearsal(_: Viewer, identifier: str) -> RehearsalModel:
-        """How it stands."""
+        """Return its state."""
         job = jobs.get(identifier)
         return RehearsalModel(
             id=job.id,

@@ -1,5 +1,6 @@
 """/api/runs: start them, list them, and read what happened in them."""
 
+import asyncio
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import Annotated
@@ -8,15 +9,23 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
 from m2pem.api import Draft, MissionControl, MissionFile, RunStatus, RunSummary
-from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.people import Commander, Viewer
+from m2pem.errors import M2pemError, MissionError
+from m2pem_plugin_web.access.roles import Commander, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder
-from m2pem_plugin_web.rest.lookup import find_run
-from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, run_model
+from m2pem_plugin_web.rest.models import Body, Data, Name, RecordPage, RunModel, find_run, run_model
 from m2pem_plugin_web.rest.record_pages import RecordPages
-from m2pem_plugin_web.rest.shown import shown
+
+
+async def shown(control: MissionControl, source: bytes) -> str:
+    """A file in the form that the editor takes; as it is, if it has none."""
+    try:
+        found = await asyncio.to_thread(control.editable, source)
+    except MissionError:
+        return source.decode(errors="replace")
+    return found.source.decode()
+
 
 MOST_RUNS = 1000
 MOST_RECORDS = 5000
@@ -96,7 +105,7 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
 
     @routes.get("/{run}")
     async def run(_: Viewer, run: str) -> RunModel:
-        """How a run stands."""
+        """Return the summary of a run."""
         return await now(await find_run(control, run))
 
     @routes.get("/{run}/records", response_model=RecordPage)

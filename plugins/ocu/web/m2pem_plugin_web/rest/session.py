@@ -1,4 +1,4 @@
-"""/api/session: who one is here, and what this executive moves; signing in and out."""
+"""/api/session: the user, and what this executive moves; signing in and out."""
 
 import math
 from importlib.metadata import version
@@ -8,10 +8,10 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 
 from m2pem.api import MissionControl
-from m2pem_plugin_web.access.entry import Entry, ThrottledError
 from m2pem_plugin_web.access.passwords import LONGEST
-from m2pem_plugin_web.access.people import Person, Role, Viewer
+from m2pem_plugin_web.access.roles import Person, Role, Viewer
 from m2pem_plugin_web.access.sessions import Secrets
+from m2pem_plugin_web.access.sign_in import Entry, ThrottledError
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import Body, Name
 from m2pem_plugin_web.settings import Settings
@@ -19,14 +19,14 @@ from m2pem_plugin_web.tiles import Pictured
 
 
 class TilesModel(BaseModel):
-    """Pictures for the map; `attribution`: whom to name, a plain text."""
+    """Image tiles for the map. `attribution`: a plain text to show with them."""
 
     max_zoom: int
     attribution: str
 
 
 class SessionModel(BaseModel):
-    """Who asks, and where they are. `tiles` null: the map has no pictures."""
+    """The user of this session, and the executive. `tiles` null: the map has no images."""
 
     user: str
     role: Role
@@ -79,7 +79,7 @@ def router(
 
     @routes.get("")
     async def session(person: Viewer) -> SessionModel:
-        """Who one is, and what this executive moves."""
+        """Return the user, and what this executive moves."""
         return session_of(person)
 
     @routes.post("")
@@ -99,7 +99,7 @@ def router(
 
     @routes.delete("", status_code=204)
     async def sign_out(request: Request, response: Response, _: Viewer) -> None:
-        """Sign out: the cookie is worth nothing any more."""
+        """Sign out; the cookie is no longer valid."""
         entry.leave(request.cookies)
         response.delete_cookie(entry.cookie, path="/")
 
@@ -126,7 +126,7 @@ async def _signed_in(
 
 
 def _set_cookie(response: Response, entry: Entry, secrets: Secrets) -> None:
-    """Have a browser keep one secret of a session where no script can read it."""
+    """Set a cookie with one secret of a session, which no script can read."""
     response.set_cookie(
         entry.cookie,
         secrets.cookie,

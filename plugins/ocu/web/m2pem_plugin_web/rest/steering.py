@@ -1,16 +1,16 @@
-"""/api/runs/{run}/...: what operators do with a run that goes on; and with all of them at once."""
+"""/api/runs/{run}/..., /api/prompts, /api/resources: what operators do with runs and vehicles."""
 
 from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
 from m2pem.errors import NotDrivenError
-from m2pem_plugin_web.access.lateness import LONGEST_S, age_s
-from m2pem_plugin_web.access.people import Operator, Person, Stopper
+from m2pem_plugin_web.access.requests import LATEST_S, age_s
+from m2pem_plugin_web.access.roles import Operator, Person, Stopper, Viewer
 from m2pem_plugin_web.live.hub import Hub
+from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.lookup import find_run
-from m2pem_plugin_web.rest.models import Body, Data, Name, Reason
+from m2pem_plugin_web.rest.models import Body, Data, Name, PromptModel, Reason, find_run
 
 
 class StopModel(Body):
@@ -48,7 +48,7 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
             age = age_s(request)
         except ProblemError:  # whatever its clock says, a STOP is a STOP
             age = 0.0
-        if age <= LONGEST_S:
+        if age <= LATEST_S:
             return wanted.reason
         late = f"given {age:.0f} s before it arrived"
         hub.announce(f"{what} by {person.name} was {late}; it is carried out")
@@ -103,5 +103,67 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
         """Send a message to a run."""
         await find_run(control, run)
         await control.message(wanted.message, run=run, data=wanted.data, by=person.name)
+
+    return routes
+
+
+class AnswerModel(Body):
+    """The `value` of one of the decisions."""
+
+    decision: Name
+
+
+def prompt_router(control: MissionControl, hub: Hub) -> APIRouter:
+    """The routes of prompts."""
+    routes = APIRouter(prefix="/api", tags=["prompts"], responses=RESPONSES)
+
+    @routes.get("/prompts")
+    async def prompts(_: Viewer) -> list[PromptModel]:
+        """The questions that stand."""
+        return [
+            PromptModel.model_validate(prompt_of(each, hub.place(each)))
+            for each in control.prompts()
+        ]
+
+    @routes.post("/runs/{run}/prompts/{prompt}", status_code=204)
+    async def answer(person: Operator, run: str, prompt: str, wanted: AnswerModel) -> None:
+        """Answer a question. The first answer to it wins."""
+        await find_run(control, run)
+        await control.answer(run, prompt, wanted.decision, by=person.name)
+
+    return routes
+
+
+class HoldersModel(BaseModel):
+    """Who has each resource: an operator, a behavior ("r1.b3"), or "" when it is free."""
+
+    holders: dict[str, str]
+
+
+def resource_router(control: MissionControl) -> APIRouter:
+    """The routes of resources."""
+    routes = APIRouter(prefix="/api/resources", tags=["resources"], responses=RESPONSES)
+
+    async def known(resource: str) -> None:
+        if resource not in await control.holders():
+            raise ProblemError(404, f"the fleet has no {resource}")
+
+    @routes.get("")
+    async def holders(_: Viewer) -> HoldersModel:
+        """Who has what."""
+        found = await control.holders()
+        return HoldersModel(holders={str(each): who for each, who in found.items()})
+
+    @routes.post("/{resource:path}/take", status_code=204)
+    async def take(person: Operator, resource: str) -> None:
+        """Take it from the missions, to steer it by hand."""
+        await known(resource)
+        await control.take(resource, by=person.name)
+
+    @routes.post("/{resource:path}/give-back", status_code=204)
+    async def give_back(person: Operator, resource: str) -> None:
+        """Give it back to the missions."""
+        await known(resource)
+        await control.give_back(resource, by=person.name)
 
     return routes

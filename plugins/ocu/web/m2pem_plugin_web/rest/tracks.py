@@ -8,12 +8,12 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem_plugin_web.access.people import Viewer
+from m2pem_plugin_web.access.roles import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.lookup import find_run
+from m2pem_plugin_web.rest.models import find_run
 from m2pem_plugin_web.rest.rehearsals import SampleModel
-from m2pem_plugin_web.tracks.reading import page_of
 from m2pem_plugin_web.tracks.recorder import Recorder
+from m2pem_plugin_web.tracks.track import page_of
 
 LATEST_S = 1e12
 MOST_SAMPLES = 5000
@@ -49,7 +49,7 @@ def router(control: MissionControl, recorder: Recorder) -> APIRouter:
         await recorder.flush(run)
         try:
             page = await asyncio.to_thread(
-                page_of, recorder.place, run, summary.started_us, after, limit
+                page_of, recorder.store, run, summary.started_us, after, limit
             )
         except OSError as error:
             raise ProblemError(503, f"where vehicles were in {run}: {error.strerror}") from error

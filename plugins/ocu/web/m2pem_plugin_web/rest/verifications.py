@@ -7,12 +7,12 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from m2pem.api import MissionControl, SearchLimits, SearchProgress
-from m2pem_plugin_web.access.people import Operator, Viewer
+from m2pem_plugin_web.access.roles import Operator, Viewer
 from m2pem_plugin_web.jobs import Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import DraftModel, draft_of
-from m2pem_plugin_web.rest.findings import FindingModel, finding_models
+from m2pem_plugin_web.rest.models import FindingModel, finding_models
 
 LONGEST_S = 3600.0
 MOST_STATES = 10_000_000
@@ -69,7 +69,7 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
         draft = await draft_of(wanted, folder)
 
         async def work(identifier: str) -> Report:
-            def told(searched: SearchProgress) -> None:
+            def progressed(searched: SearchProgress) -> None:
                 progress[identifier] = searched
 
             try:
@@ -81,7 +81,7 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
                     strict=wanted.strict,
                     timers_in_order=wanted.timers == "in-order",
                     limits=SearchLimits(wanted.states, wanted.seconds),
-                    on_progress=told,
+                    on_progress=progressed,
                 )
             finally:
                 progress.pop(identifier, None)
@@ -90,7 +90,7 @@ def router(control: MissionControl, folder: MissionFolder, jobs: Jobs[Report]) -
 
     @routes.get("/{identifier}")
     async def verification(_: Viewer, identifier: str) -> VerificationModel:
-        """How it stands."""
+        """Return its state."""
         job = jobs.get(identifier)
         report = dict(job.result) if job.result is not None else None
         found = progress.get(identifier, SearchProgress(0.0))

@@ -1,7 +1,7 @@
-"""Keeps tracks while the page is served: of every run that this executive drives.
+"""Records tracks of every run that this executive drives, while the page is served.
 
-Nobody waits for this. It looks at what the fleet said last, a few times in a second of mission
-time, and hands what is new to a thread, which writes it once a second.
+The executive does not wait for it. It reads the latest states of the fleet a few times in a second
+of mission time, and hands what is new to a thread, which writes it once a second.
 """
 
 import asyncio
@@ -14,20 +14,20 @@ import msgspec
 from m2pem.api import MissionControl, PayloadState, RunId, RunStatus, RunView, VehicleState
 from m2pem.errors import M2pemError
 from m2pem_plugin_web.live.latest_states import FleetStates
-from m2pem_plugin_web.tracks.stores import HeldError, Place
+from m2pem_plugin_web.tracks.stores import HeldError, TrackStore
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, State
 from m2pem_plugin_web.tracks.track import Head, Track, head_of
 
 LOOK_S = 0.25
-"""Of mission time, between two looks; not less than `QUICKEST_S` of the wall's."""
+"""Seconds of mission time between two samples, but at least `QUICKEST_S` of the wall clock."""
 QUICKEST_S = 0.05
 
 WRITE_S = 1.0
 AGAIN_S = 2.0
-"""After it could not be done."""
+"""Seconds until a retry."""
 
 MOST_WAITING = 2000
-"""Samples of a run that wait for the disk."""
+"""Samples of a run that may wait for the disk."""
 
 MOST_PROBLEMS = 100
 
@@ -41,7 +41,7 @@ log = logging.getLogger("m2pem.ocu.web")
 
 @dataclass(slots=True, eq=False)
 class _Writing:
-    """A track that is written, and what waits for that."""
+    """A track that is open for writing, and the samples that wait for it."""
 
     track: Track
     waiting: list[Sample] = field(default_factory=list)
@@ -56,22 +56,22 @@ class Recorder:
         control: MissionControl,
         views: Mapping[RunId, RunView],
         fleet: FleetStates,
-        place: Place,
+        store: TrackStore,
     ) -> None:
-        self.place = place
+        self.store = store
         self.problems: dict[RunId, str] = {}
         """Why tracks of runs have gaps, for people."""
         self._control = control
         self._views = views
         self._fleet = fleet
         self._before: list[State] = []
-        """As it was at the last look."""
+        """The states at the last sample."""
         self._soon_s = SPACING_S + control.speed()
         self._writing: dict[RunId, _Writing] = {}
         self._not_before: dict[RunId, float] = {}
 
     async def run(self) -> None:
-        """Go on until cancelled; what waits is written in the end."""
+        """Record until cancelled; at the end, write what waits."""
         try:
             await self._forget_runs_of_before()
             async with asyncio.TaskGroup() as tasks:
@@ -84,7 +84,7 @@ class Recorder:
                 await self._close(run)
 
     async def flush(self, run: RunId) -> None:
-        """Write what waits of a run."""
+        """Write the samples of a run that wait."""
         writing = self._writing.get(run)
         if writing is None:
             return
@@ -135,12 +135,12 @@ class Recorder:
             self._take(writing, t_s, self._states())
 
     def _states(self) -> list[State]:
-        """What is known of vehicles and payloads now."""
-        heard = (*self._fleet.vehicles.states.values(), *self._fleet.payloads.states.values())
-        return [each for each in heard if isinstance(each, VehicleState | PayloadState)]
+        """Return the latest states of vehicles and payloads."""
+        latest = (*self._fleet.vehicles.states.values(), *self._fleet.payloads.states.values())
+        return [each for each in latest if isinstance(each, VehicleState | PayloadState)]
 
     def _take(self, writing: _Writing, t_s: float, states: Iterable[State]) -> None:
-        """Have those kept that say something new."""
+        """Add the states that are new to the samples of a run."""
         thinner = writing.track.thinner
         fresh: dict[str, dict[str, msgspec.Raw]] = {"vehicles": {}, "payloads": {}}
         for state in states:
@@ -153,7 +153,7 @@ class Recorder:
 
     async def _open(self, run: RunId, started_us: int, t_s: float) -> _Writing | None:
         try:
-            track = await asyncio.to_thread(Track, self.place, Head(run, started_us), t_s)
+            track = await asyncio.to_thread(Track, self.store, Head(run, started_us), t_s)
         except HeldError:
             self._leave_alone(run)
             return None
@@ -183,7 +183,7 @@ class Recorder:
                 await asyncio.to_thread(writing.track.close)
 
     def _complain(self, run: RunId, error: OSError) -> None:
-        """Say it once; where the file is, is for the log alone."""
+        """Log an error once; the path of the file is in the log only."""
         text = f"where vehicles are in {run} cannot be kept: {error.strerror}"
         if self.problems.get(run) == text:
             return
@@ -193,24 +193,24 @@ class Recorder:
             del self.problems[next(iter(self.problems))]
 
     async def _forget_runs_of_before(self) -> None:
-        """Tracks go when their runs are in the journal no more."""
+        """Remove tracks of runs that the journal does not have."""
         try:
             kept = await asyncio.to_thread(self._heads)
             there = {each.run: each.started_us for each in await self._control.runs()}
             for run, started_us in kept.items():
                 if run not in there or (started_us and started_us != there[run]):
-                    await asyncio.to_thread(self.place.remove, run)
+                    await asyncio.to_thread(self.store.remove, run)
         except (OSError, M2pemError) as error:
             log.warning("tracks of runs that are gone cannot be removed: %s", error)
 
     def _heads(self) -> dict[RunId, int]:
-        """When each run began of which there is a track; 0: its head cannot be read."""
-        heads = {run: head_of(self.place.read(run, LONGEST_HEAD)) for run in self.place.runs()}
+        """Return when each run with a track began; 0 if the head of its track cannot be read."""
+        heads = {run: head_of(self.store.read(run, LONGEST_HEAD)) for run in self.store.runs()}
         return {run: head.started_us if head is not None else 0 for run, head in heads.items()}
 
 
 async def _to_the_end(work: Callable[[], None]) -> None:
-    """Do it in a thread; who is cancelled meanwhile goes when it is done."""
+    """Call it in a thread; a task that is cancelled meanwhile ends when the call is done."""
     doing = asyncio.ensure_future(asyncio.to_thread(work))
     try:
         await asyncio.shield(doing)

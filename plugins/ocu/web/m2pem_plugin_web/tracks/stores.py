@@ -1,4 +1,4 @@
-"""Where tracks are kept: in a folder beside the journal, or in memory if that is there as well.
+"""Stores of tracks: a folder beside the journal, or memory if the journal is in memory, too.
 
 All of this waits for a disk: it is called in threads.
 """
@@ -16,11 +16,11 @@ from typing import Protocol
 from m2pem.api import RunId
 
 MOST_IN_MEMORY = 20
-"""Runs; the oldest are forgotten."""
+"""Runs with a track; the oldest are removed."""
 
 FILE_BYTES = 20_000_000
 MEMORY_BYTES = 2_000_000
-"""Of a run at most."""
+"""The most bytes of the track of a run."""
 
 _RUN = re.compile(r"r[1-9][0-9]{0,17}")
 _SUFFIX = ".jsonl"
@@ -28,14 +28,14 @@ _CLOSED = -1
 
 
 class HeldError(Exception):
-    """Another page of the same executive keeps this track."""
+    """Another page of the same executive writes this track."""
 
 
-class Kept(Protocol):
-    """The text of a track that is written by this one alone. Raises OSError."""
+class TrackText(Protocol):
+    """The text of a track, locked for one writer. Methods raise OSError."""
 
     def read(self) -> bytes:
-        """All of it."""
+        """Return the whole text."""
         ...
 
     def append(self, text: bytes) -> None:
@@ -43,23 +43,23 @@ class Kept(Protocol):
         ...
 
     def replace(self, text: bytes) -> None:
-        """Have `text` instead, or what there was."""
+        """Replace it by `text`, or leave it unchanged."""
         ...
 
     def close(self) -> None:
-        """Write no more."""
+        """Close it; nothing can be written any more."""
         ...
 
 
-class Place(Protocol):
-    """Where there is a text for each run, of `most_bytes` at most. Raises OSError."""
+class TrackStore(Protocol):
+    """A text for each run, of `most_bytes` at most. Methods raise OSError."""
 
     @property
     def most_bytes(self) -> int:
-        """Beyond which a text is thinned."""
+        """The size beyond which a text is thinned."""
         ...
 
-    def open(self, run: RunId) -> Kept:
+    def open(self, run: RunId) -> TrackText:
         """For writing; made where it is missing.
 
         Raises:
@@ -68,40 +68,44 @@ class Place(Protocol):
         ...
 
     def read(self, run: RunId, size: int = -1) -> bytes:
-        """Its first `size` bytes, all of it with -1; b"": there is none."""
+        """Return the first `size` bytes of a text, all of it with -1; b"" if there is none."""
         ...
 
     def runs(self) -> Iterable[RunId]:
-        """Those that there are."""
+        """Return the runs that have a text."""
         ...
 
     def remove(self, run: RunId) -> None:
-        """Forget one."""
+        """Remove the text of a run."""
         ...
 
 
-def place_beside(journal: Path | None) -> Place:
-    """Where the tracks of a journal's runs are; None: it ends with its process."""
-    return Memory() if journal is None else Folder(journal.with_name(f"{journal.name}-tracks"))
+def store_beside(journal: Path | None) -> TrackStore:
+    """Return the store of a journal's tracks. `journal` None: a journal in memory."""
+    return (
+        MemoryStore()
+        if journal is None
+        else FolderStore(journal.with_name(f"{journal.name}-tracks"))
+    )
 
 
-class Folder:
-    """A file a run; its owner alone may read it, as the journal. `path` is made when needed."""
+class FolderStore:
+    """A file for each run, which only its owner may read. `path` is made when needed."""
 
     def __init__(self, path: Path, most_bytes: int = FILE_BYTES) -> None:
         self._path = path
         self.most_bytes = most_bytes
 
-    def open(self, run: RunId) -> "File":
-        """See `Place.open`."""
+    def open(self, run: RunId) -> "TextFile":
+        """See `TrackStore.open`."""
         file = self._file(run)
         self._path.mkdir(mode=0o700, exist_ok=True)
         if self._path.lstat().st_uid != os.geteuid():
             raise PermissionError(errno.EPERM, "the folder of tracks is another user's", self._path)
-        return File(file)
+        return TextFile(file)
 
     def read(self, run: RunId, size: int = -1) -> bytes:
-        """See `Place.read`."""
+        """See `TrackStore.read`."""
         try:
             with self._file(run).open("rb") as file:
                 return file.read(size)
@@ -109,11 +113,11 @@ class Folder:
             return b""
 
     def runs(self) -> Iterable[RunId]:
-        """See `Place.runs`: files of others are left alone."""
+        """See `TrackStore.runs`: files of others are left alone."""
         return [path.stem for path in self._path.glob(f"*{_SUFFIX}") if _RUN.fullmatch(path.stem)]
 
     def remove(self, run: RunId) -> None:
-        """See `Place.remove`."""
+        """See `TrackStore.remove`."""
         self._file(run).unlink(missing_ok=True)
 
     def _file(self, run: RunId) -> Path:
@@ -122,7 +126,7 @@ class Folder:
         return self._path / f"{run}{_SUFFIX}"
 
 
-class File:
+class TextFile:
     """A track's file, locked."""
 
     def __init__(self, path: Path) -> None:
@@ -136,11 +140,11 @@ class File:
             os.close(self._descriptor)
 
     def read(self) -> bytes:
-        """See `Kept.read`."""
+        """See `TrackText.read`."""
         return self._path.read_bytes()
 
     def append(self, text: bytes) -> None:
-        """See `Kept.append`: what a full disk took of it is taken back."""
+        """See `TrackText.append`: what a full disk took of it is taken back."""
         size = os.fstat(self._descriptor).st_size
         try:
             _write(self._descriptor, text)
@@ -150,7 +154,7 @@ class File:
             raise
 
     def replace(self, text: bytes) -> None:
-        """See `Kept.replace`."""
+        """See `TrackText.replace`."""
         new = self._path.with_name(f".{self._path.name}.new")
         new.unlink(missing_ok=True)
         descriptor = _locked(new, os.O_APPEND | os.O_EXCL)
@@ -167,7 +171,7 @@ class File:
         self._descriptor = descriptor
 
     def close(self) -> None:
-        """See `Kept.close`."""
+        """See `TrackText.close`."""
         if self._descriptor != _CLOSED:
             os.close(self._descriptor)
         self._descriptor = _CLOSED
@@ -193,53 +197,53 @@ def _write(descriptor: int, text: bytes) -> None:
         rest = rest[os.write(descriptor, rest) :]
 
 
-class Memory:
-    """Ends with its process, as the journal does."""
+class MemoryStore:
+    """Tracks in memory, as the journal is."""
 
     def __init__(self, most: int = MOST_IN_MEMORY, most_bytes: int = MEMORY_BYTES) -> None:
         self._most = most
         self.most_bytes = most_bytes
-        self._texts: OrderedDict[RunId, Text] = OrderedDict()
+        self._texts: OrderedDict[RunId, MemoryText] = OrderedDict()
 
-    def open(self, run: RunId) -> "Text":
-        """See `Place.open`."""
-        text = self._texts.setdefault(run, Text())
+    def open(self, run: RunId) -> "MemoryText":
+        """See `TrackStore.open`."""
+        text = self._texts.setdefault(run, MemoryText())
         while len(self._texts) > self._most:
             self._texts.popitem(last=False)
         return text
 
     def read(self, run: RunId, size: int = -1) -> bytes:
-        """See `Place.read`."""
+        """See `TrackStore.read`."""
         text = self._texts.get(run)
         whole = text.read() if text is not None else b""
         return whole if size < 0 else whole[:size]
 
     def runs(self) -> Iterable[RunId]:
-        """See `Place.runs`."""
+        """See `TrackStore.runs`."""
         return list(self._texts)
 
     def remove(self, run: RunId) -> None:
-        """See `Place.remove`."""
+        """See `TrackStore.remove`."""
         self._texts.pop(run, None)
 
 
-class Text:
+class MemoryText:
     """A track in memory."""
 
     def __init__(self) -> None:
         self._text = bytearray()
 
     def read(self) -> bytes:
-        """See `Kept.read`."""
+        """See `TrackText.read`."""
         return bytes(self._text)
 
     def append(self, text: bytes) -> None:
-        """See `Kept.append`."""
+        """See `TrackText.append`."""
         self._text += text
 
     def replace(self, text: bytes) -> None:
-        """See `Kept.replace`."""
+        """See `TrackText.replace`."""
         self._text = bytearray(text)
 
     def close(self) -> None:
-        """See `Kept.close`."""
+        """See `TrackText.close`."""

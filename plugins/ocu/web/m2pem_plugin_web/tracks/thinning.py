@@ -1,4 +1,4 @@
-"""Which states of vehicles and payloads say something new; and fewer of them, where many are."""
+"""Thinning of tracks: which states of vehicles and payloads are new enough to keep."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -9,7 +9,7 @@ import msgspec
 from m2pem.api import GeoPosition, PayloadState, VehicleState
 
 SPACING_S = 1.0
-"""Of mission time, at least, between two states of a resource; longer in long runs."""
+"""Least seconds of mission time between two states of a resource; more in long runs."""
 
 MOVED_M = 0.5
 TURNED_RAD = math.radians(5.0)
@@ -28,24 +28,24 @@ class Sample(msgspec.Struct, frozen=True):
     payloads: dict[str, msgspec.Raw]
 
     def kinds(self) -> Iterator[tuple[str, dict[str, msgspec.Raw]]]:
-        """Both kinds, by name."""
+        """All states by resource."""
         yield "vehicles", self.vehicles
         yield "payloads", self.payloads
 
 
 class Thinner:
-    """Says of each state whether it is worth keeping. `spacing_s`: of mission time."""
+    """Decides for each state whether to keep it. `spacing_s`: seconds of mission time."""
 
     def __init__(self, spacing_s: float = SPACING_S) -> None:
         self.spacing_s = spacing_s
         self._kept: dict[str, tuple[float, State]] = {}
 
     def keep(self, t_s: float, state: State) -> None:
-        """It was kept."""
+        """Note that a state was kept."""
         self._kept[state.resource] = (t_s, state)
 
     def wants(self, t_s: float, state: State) -> bool:
-        """Whether to keep it: the last one of its resource is old enough, and said otherwise."""
+        """Whether to keep a state: the last one of its resource is old enough, and differs."""
         kept = self._kept.get(state.resource)
         if kept is None:
             return True
@@ -54,7 +54,7 @@ class Thinner:
 
 
 def differs(before: State, now: State) -> bool:
-    """Whether a resource has moved, turned, or stands otherwise than before."""
+    """Whether a resource has moved, turned, or changed its state."""
     if before.link is not now.link:
         return True
     match before, now:
@@ -106,7 +106,7 @@ def _zoomed(before: float | None, now: float | None) -> bool:
 
 
 def _known(value: float | None) -> float | None:
-    """Devices say NaN, too, where they do not know."""
+    """Whether a value is known; devices also send NaN for an unknown one."""
     return value if value is not None and math.isfinite(value) else None
 
 
@@ -118,7 +118,7 @@ def _known_place(place: GeoPosition | None) -> GeoPosition | None:
 
 
 def thinned(samples: Iterable[Sample], spacing_s: float) -> list[Sample]:
-    """Fewer of them: of each resource the last state within each `spacing_s` after a kept one.
+    """Return fewer samples: of each resource the last state within each `spacing_s`.
 
     So a resource stays where it came to rest. There are at most two in any `spacing_s`.
     """

@@ -1,24 +1,21 @@
-"""The track of one run: a head, then a line of JSON for each moment at which there was news.
-
-A line that a crash has torn is not there. The text grows to what its place
-allows; then it is thinned.
-"""
+"""The track of one run: a head, then a line of JSON for each moment at which something was new."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
 from m2pem.api import PayloadState, RunId, VehicleState
-from m2pem_plugin_web.tracks.stores import Kept, Place
+from m2pem_plugin_web.tracks.stores import TrackStore, TrackText
 from m2pem_plugin_web.tracks.thinning import SPACING_S, Sample, Thinner, thinned
 
 _encode = msgspec.json.Encoder().encode
 
 
 class Head(msgspec.Struct, frozen=True):
-    """`started_us` tells the run from one of that name in another journal."""
+    """`started_us` distinguishes the run from one of that name in another journal."""
 
     run: RunId
     started_us: int
@@ -34,7 +31,7 @@ _STATES: dict[str, Any] = {
 
 
 def head_of(text: bytes) -> Head | None:
-    """What a text begins with; None: it is no track."""
+    """Return the head of a text; None if it is no track."""
     try:
         return _head.decode(text[: text.index(b"\n")])
     except (ValueError, msgspec.DecodeError):
@@ -42,7 +39,7 @@ def head_of(text: bytes) -> Head | None:
 
 
 def samples_of(text: bytes) -> Iterator[Sample]:
-    """All samples of a text, in order; lines that are torn or damaged are passed over."""
+    """Yield all samples of a text, in order; skip lines that are torn or damaged."""
     _, *lines = text.split(b"\n")[:-1] or [b""]
     for line in lines:
         try:
@@ -52,7 +49,9 @@ def samples_of(text: bytes) -> Iterator[Sample]:
 
 
 class Track:
-    """For writing: only samples later than those before them. `thinner` knows what was kept.
+    """A track open for writing; it takes only samples later than the last.
+
+    `thinner` knows what was kept.
 
     `t_s`: mission time of now; what is later in the text is of a past that did not come about, as
     the run was taken up again from before it.
@@ -62,10 +61,10 @@ class Track:
         HeldError: another writes it.
     """
 
-    def __init__(self, place: Place, head: Head, t_s: float) -> None:
-        self._most = place.most_bytes
+    def __init__(self, store: TrackStore, head: Head, t_s: float) -> None:
+        self._most = store.most_bytes
         self._head = head
-        self._kept: Kept = place.open(head.run)
+        self._kept: TrackText = store.open(head.run)
         try:
             self._begin(t_s)
         except BaseException:
@@ -88,11 +87,11 @@ class Track:
         self._size = len(whole)
         self.thinner = Thinner(self._head.spacing_s)
         self.is_new = not samples
-        """Whether nothing was kept before."""
+        """Whether nothing was written before."""
         self._remember(samples)
 
     def append(self, samples: Sequence[Sample]) -> None:
-        """Keep samples.
+        """Write samples.
 
         Raises:
             OSError: nothing was written.
@@ -105,7 +104,7 @@ class Track:
         self._size += len(text)
 
     def close(self) -> None:
-        """Write no more."""
+        """Close it; nothing can be written any more."""
         self._kept.close()
 
     def _thin(self, more: Sequence[Sample]) -> None:
@@ -133,3 +132,33 @@ class Track:
             # What a device does not know may be nothing that a state can have.
             with suppress(ValueError, msgspec.DecodeError):
                 self.thinner.keep(t_s, _STATES[kind].decode(raw))
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """Samples in order. `after`: the time after which the next page begins; None at the end."""
+
+    samples: tuple[Sample, ...]
+    after: float | None
+
+
+def page_of(
+    store: TrackStore, run: RunId, started_us: int, after_s: float | None, limit: int
+) -> Page:
+    """Return about `limit` samples later than `after_s`; all of one moment are in the same page.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    text = store.read(run)
+    head = head_of(text)
+    if head is None or (head.run, head.started_us) != (run, started_us):
+        return Page((), None)
+    found: list[Sample] = []
+    for sample in samples_of(text):
+        if after_s is not None and sample.t <= after_s:
+            continue
+        if len(found) >= limit and sample.t > found[-1].t:
+            return Page(tuple(found), found[-1].t)
+        found.append(sample)
+    return Page(tuple(found), None)

@@ -1,4 +1,4 @@
-"""Where a page that is served can be found by its user: its address, with the token that is valid.
+"""Addresses of served pages, each with its valid token, for `m2pem web url`.
 
 A file a page, in a folder of this user's own.
 """
@@ -28,12 +28,12 @@ class Page(msgspec.Struct, frozen=True):
 
     @property
     def url(self) -> str:
-        """What to open."""
+        """The address to open."""
         return f"{self.address}?token={self.token}" if self.token else self.address
 
 
 def folder(environment: Mapping[str, str] = os.environ) -> Path:
-    """Where they are: in the user's runtime directory, else in their directory of state.
+    """Return the folder of page files: the runtime directory of the user, else the state directory.
 
     Raises:
         NotPrivateError: it cannot be made, or is another's.
@@ -46,17 +46,17 @@ def folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def file_of(where: Path, port: int) -> Path:
-    """The file of the page at a port."""
+    """Return the file of the page at a port."""
     return where / f"page-{port}.json"
 
 
 def sessions_of(where: Path, port: int) -> Path:
-    """The file of who has signed in at a port."""
+    """Return the file of the sessions at a port."""
     return where / f"sessions-{port}.json"
 
 
 def announce(where: Path, page: Page) -> None:
-    """Make a page known.
+    """Write the file of a page.
 
     Raises:
         NotPrivateError: it cannot be written.
@@ -65,13 +65,13 @@ def announce(where: Path, page: Page) -> None:
 
 
 def withdraw(where: Path, port: int) -> None:
-    """The page is served no more."""
+    """Remove the file of a page that is served no more."""
     with suppress(OSError):
         file_of(where, port).unlink()
 
 
 def pages(where: Path) -> Iterator[Page]:
-    """The pages that are served; files of dead ones are removed on the way."""
+    """Yield the pages that are served; remove the files of dead ones."""
     for path in sorted(where.glob("page-*.json")):
         try:
             page = msgspec.json.decode(read_private(path), type=Page)

@@ -1,6 +1,10 @@
-"""How one gets in: a one-time token, or a name with its password; and whose a session is."""
+"""Signing in: by a one-time token, or by a name with its password; who guesses is slowed down."""
 
+import hmac
 import logging
+import secrets
+import time
+from collections import deque
 from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
 
@@ -10,9 +14,80 @@ from m2pem_plugin_web.access.passwords import BusyError, PasswordChecker
 from m2pem_plugin_web.access.private_files import NotPrivateError
 from m2pem_plugin_web.access.roles import Person, Role
 from m2pem_plugin_web.access.sessions import Secrets, Session, Sessions, hash_of
-from m2pem_plugin_web.access.throttle import Throttle
-from m2pem_plugin_web.access.tokens import OneTimeToken
 from m2pem_plugin_web.access.users import Users
+
+WITHIN_S = 300.0
+MOST_KEYS = 10_000
+
+
+class Throttle:
+    """Counts failures by key, such as a name at an address."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._failures: dict[Hashable, deque[float]] = {}
+
+    def wait_s(self, bounds: Mapping[Hashable, int]) -> float:
+        """Seconds until another attempt is looked at; 0: now. `bounds`: failures by key."""
+        now = self._clock()
+        waits = [0.0]
+        for key, bound in bounds.items():
+            times = self._recent(key, now)
+            if len(times) >= bound:
+                waits.append(times[-bound] + WITHIN_S - now)
+        return max(waits)
+
+    def failed(self, bounds: Mapping[Hashable, int]) -> None:
+        """An attempt under these keys has failed."""
+        now = self._clock()
+        for key, bound in bounds.items():
+            times = self._recent(key, now)
+            self._failures.pop(key, None)
+            self._failures[key] = deque([*times, now], maxlen=bound)
+        while len(self._failures) > MOST_KEYS:
+            del self._failures[next(iter(self._failures))]
+
+    def succeeded(self, bounds: Mapping[Hashable, int]) -> None:
+        """The attempt that was counted last has not failed after all."""
+        for key in bounds:
+            if times := self._failures.get(key):
+                times.pop()
+
+    def forget(self, key: Hashable) -> None:
+        """What failed under this key was forgetfulness."""
+        self._failures.pop(key, None)
+
+    def _recent(self, key: Hashable, now: float) -> list[float]:
+        return [each for each in self._failures.get(key, ()) if now - each < WITHIN_S]
+
+
+TOKEN_BYTES = 24
+
+
+class OneTimeToken:
+    """There is always one that was not used. `renewed` is called with each."""
+
+    def __init__(self, renewed: Callable[[str], None] = lambda _: None) -> None:
+        self._renewed = renewed
+        self._token = ""
+        self._renew()
+
+    @property
+    def value(self) -> str:
+        """The token that signs in the next one who has it."""
+        return self._token
+
+    def redeem(self, token: str) -> bool:
+        """Whether this was the token; if so, it is none any more."""
+        if not hmac.compare_digest(token.encode(), self._token.encode()):
+            return False
+        self._renew()
+        return True
+
+    def _renew(self) -> None:
+        self._token = secrets.token_urlsafe(TOKEN_BYTES)
+        self._renewed(self._token)
+
 
 OF_A_NAME_HERE = 5
 OF_AN_ADDRESS = 20
@@ -41,7 +116,7 @@ class Entry:
     """Either `users` sign in by name, or `owner`, who started the executive, by a token.
 
     `port` is part of the cookie's name: browsers do not tell the ports of a machine apart.
-    `renewed` is told of each token. `kept`: a file for sessions.
+    `renewed` is called with each token. `kept`: a file for sessions.
     """
 
     def __init__(
@@ -131,7 +206,7 @@ class Entry:
         try:
             user = self._users.all().get(session.name)
         except NotPrivateError as error:
-            log.error("nobody can be let in: %s", error)
+            log.error("no user can sign in: %s", error)
             return None
         if user is None or hash_of(user.password) != session.proof:
             return None
