@@ -26,7 +26,7 @@ async def saved_beside(desk: Desk) -> tuple[Page, Path]:
     await other.close()
     await renamed(page, "MINE")
     await page.get_by_role("button", name="Save", exact=True).click()
-    await expect(page.get_by_role("dialog")).to_contain_text("Somebody else changed")
+    await expect(page.get_by_role("dialog")).to_contain_text("Another user changed")
     desk.refusals.append(409)
     return page, desk.executive.missions
 

@@ -46,7 +46,7 @@ async def test_stop_is_whole_on_every_page_of_a_phone(desk: Desk, width: int) ->
     run = page.url.rpartition("/")[2]
     for others, at in (("home", desk.home), ("editor", desk.edit)):
         await at()
-        await expect(page.get_by_role("link", name="question stands")).to_be_visible()
+        await expect(page.get_by_role("link", name="question open")).to_be_visible()
         await assert_stop_is_whole(page, f"{others}, asked")
         await page.locator("header button.stop").click()
         await expect(page.locator("header button.stop-armed")).to_be_visible()

@@ -24,7 +24,7 @@ import "./forms.css";
 
 const words = strings.editor;
 
-/** Of a tablet held upright: blocks are then in the menus alone, until somebody asks for more. */
+/** Of a tablet held upright: blocks are then in the menus alone, until the user asks for more. */
 const NARROW = 1000;
 
 export default function Editor({ mission }: { mission: string }) {

@@ -111,7 +111,7 @@ export function NewMission({ beginning, taken, close }: NewMissionProps) {
     </Dialog>
   );
 
-  /** Whether nobody has written another name yet. */
+  /** Whether the user has written no other name yet. */
   function isSuggested(said: string): boolean {
     return choices.some((choice) => freeName(choice.name || "mission", taken) === said);
   }

@@ -12,7 +12,7 @@ export interface Version extends SavedVersion {
   number: number;
 }
 
-/** `current`: what somebody else saved meanwhile; null: somebody removed it. */
+/** `current`: what another user saved meanwhile; null: it was removed. */
 export type Outcome =
   { kind: "saved"; saved: SavedVersion } | { kind: "conflict"; current: SavedVersion | null };
 

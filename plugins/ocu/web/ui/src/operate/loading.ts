@@ -44,7 +44,7 @@ export async function loadStage(source: Source): Promise<Stage> {
   return { mission: missionModel(sources, answer.process), fleet, geometries: signal(geometries) };
 }
 
-/** All records, page by page; `progress` is told how many there are so far. */
+/** All records, page by page; `progress` is called with how many there are so far. */
 export async function loadRecords(
   source: Source,
   progress: (count: number) => void,

@@ -2,7 +2,7 @@
 import { sessionKey } from "./key";
 import type { Socket, Surroundings } from "./live";
 
-/** A page in the background does not paint; what it is told is applied all the same. */
+/** A page in the background does not paint; messages are applied all the same. */
 function paint(callback: () => void): void {
   if (document.hidden) queueMicrotask(callback);
   else {

@@ -1,4 +1,4 @@
-// What the executive tells the whole page: its runs, the questions that stand, and the fleet.
+// What every part of the page shows of the executive: runs, open prompts, and the fleet.
 // Who wants all of one run listens to the messages themselves.
 import { batch, computed, signal } from "@preact/signals";
 import { browser } from "./browser";
@@ -38,7 +38,7 @@ export const activeRuns = computed(() =>
 
 const heardAt = new Map<string, number>();
 
-/** Seconds since a vehicle or payload was heard, by this browser's clock; null: never. */
+/** Seconds since the last state of a vehicle or payload, by this browser's clock; null: never. */
 export function silentFor_s(resource: string): number | null {
   const at = heardAt.get(resource);
   return at === undefined ? null : (performance.now() - at) / 1000;
@@ -47,7 +47,7 @@ export function silentFor_s(resource: string): number | null {
 type Listener = (message: ServerMessage) => void;
 const listeners = new Set<Listener>();
 
-/** Be told every message; what is returned ends it. */
+/** Call `listener` with every message; the function that is returned ends it. */
 export function listen(listener: Listener): () => void {
   listeners.add(listener);
   return () => void listeners.delete(listener);

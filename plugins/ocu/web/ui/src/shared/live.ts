@@ -96,7 +96,7 @@ export class LiveClient {
     socket?.close();
   }
 
-  /** Which run is told in full; null: none. A snapshot of it comes. */
+  /** Watch a run; null: none. A snapshot of it comes. */
   watch(run: string | null): void {
     if (this.watched === run) return;
     this.watched = run;

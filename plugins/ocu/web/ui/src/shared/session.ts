@@ -5,7 +5,7 @@ import { keepKey } from "./key";
 import { go, replace, route } from "./router";
 import type { BegunSession, Role, Session } from "./types";
 
-/** undefined: not asked yet. null: nobody has signed in. */
+/** undefined: not asked yet. null: no user has signed in. */
 export const session = signal<Session | null | undefined>(undefined);
 
 const RANK: Record<Role, number> = { viewer: 0, operator: 1, commander: 2 };

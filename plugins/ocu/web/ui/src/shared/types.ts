@@ -144,7 +144,7 @@ export interface RunSummary {
   began_us: number;
 }
 
-/** As it stands now. `took_s`: null when nobody drives it. */
+/** As it stands now. `took_s`: null when no executive drives it. */
 export interface RunLine extends RunSummary {
   took_s: number | null;
 }

@@ -19,7 +19,7 @@ const MISSING = "#b3261e";
 
 interface Drawn {
   group: BlockGroup;
-  /** Who does it; undefined: nobody needs to. */
+  /** The resource that does it; undefined: none is needed. */
   who: string | undefined;
   missing: boolean;
 }
@@ -101,7 +101,7 @@ function svg(name: string, attributes: Record<string, string | number>): SVGElem
   return made;
 }
 
-/** A bar along the upper edge: white on the colour of the kind; hollow where nobody is chosen. */
+/** A bar along the upper edge: white on the colour of the kind; hollow where nothing is chosen. */
 function bar({ width }: Size, drawn: Drawn): SVGElement {
   const color = COLORS[drawn.group];
   const made = svg("g", {});

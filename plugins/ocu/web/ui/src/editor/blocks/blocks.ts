@@ -111,7 +111,7 @@ function firstValue(catalogue: Catalogue, parameter: Parameter): string {
   return fitting.length === 1 ? (fitting[0]?.name ?? "") : "";
 }
 
-/** The one who can do it; nobody where several can: people choose. */
+/** The resource that can do it; none where several can: the user chooses. */
 export function firstRole(
   catalogue: Catalogue,
   fitting: readonly Candidate[],

@@ -11,7 +11,7 @@ export type ResourceKind = "vehicle" | "payload" | "team";
 
 export const RESOURCE_KINDS: readonly ResourceKind[] = ["vehicle", "payload", "team"];
 
-/** A role; `resource` is "" while nobody is chosen. */
+/** A role; `resource` is "" while nothing is chosen. */
 export interface Role {
   name: string;
   kind: ResourceKind;

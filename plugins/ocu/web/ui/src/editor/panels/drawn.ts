@@ -1,4 +1,4 @@
-// What stands in the mission as it is drawn now, in all of its diagrams.
+// What the mission has as it is drawn now, in all of its diagrams.
 import { child, isA, list, text, type ModdleElement } from "../moddle/moddle";
 import { behaviorOf, serviceOf } from "../moddle/behavior";
 import { promptOf } from "../moddle/prompts";

@@ -1,4 +1,4 @@
-// Where in a formula something is wrong: the server tells the column, counted from 1.
+// Where in a formula something is wrong: the server sends the column, counted from 1.
 export interface Pointed {
   line: string;
   /** From 0, in that line. */
@@ -7,7 +7,7 @@ export interface Pointed {
 
 const AT = /at column (\d+)(?: of line (\d+) of the formula)?(?:$|\s)/;
 
-/** The line of a formula with the character that a message means; undefined: it tells none. */
+/** The line of a formula with the character that a message means; undefined: it has none. */
 export function pointedAt(message: string, formula: string): Pointed | undefined {
   const match = AT.exec(message);
   if (!match) return undefined;
@@ -20,7 +20,7 @@ export function pointedAt(message: string, formula: string): Pointed | undefined
 const PLAIN = /^\s*(?:-\s+)?[\w-]+:\s*(.*)$/;
 const QUOTED = /^"((?:[^"\\]|\\.)*)"|^'((?:[^']|'')*)'/;
 
-/** The text of a key in a line of YAML, where it stands in that line as a whole. */
+/** The text of a key in a line of YAML, where it is in that line as a whole. */
 export function scalarIn(line: string, key: string): string | undefined {
   const at = new RegExp(`(?:^|[{,\\s-])${key}:\\s*`).exec(line);
   if (!at) return undefined;

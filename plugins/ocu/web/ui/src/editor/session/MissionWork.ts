@@ -86,7 +86,7 @@ export class MissionWork {
     return this.put(this.mission, this.saved.peek()?.version ?? null);
   }
 
-  /** Over a version that somebody else saved: theirs is kept as an older one. */
+  /** Over a version that another user saved: theirs is kept as an older one. */
   async overwrite(current: SavedVersion | null): Promise<boolean> {
     return this.put(this.mission, current?.version ?? null);
   }
@@ -113,7 +113,7 @@ export class MissionWork {
     toast(fill(words.versions.opened, { number }));
   }
 
-  /** Another file in place of this mission; it is saved only when somebody says so. */
+  /** Another file in place of this mission; it is saved only when the user says so. */
   async replaceBy(name: string, content: string): Promise<void> {
     try {
       const { xml, notes } = await makeEditable(content);

@@ -51,7 +51,7 @@ export class Catalogue {
     return this.fleet.vehicles.find(({ id }) => id === vehicle)?.domain;
   }
 
-  /** Who can do a behavior; nobody commands a manned vehicle. */
+  /** The resources that can do a behavior; a manned vehicle is never commanded. */
   candidates(behavior: Behavior): Candidate[] {
     const manned = new Set(this.fleet.vehicles.filter((each) => each.manned).map(({ id }) => id));
     const kind = behavior.type === "payload" ? "payload" : "vehicle";

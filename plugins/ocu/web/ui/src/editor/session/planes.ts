@@ -17,7 +17,7 @@ export function draws(diagram: ModdleElement, element: string): boolean {
   return drawnBy(diagram).has(element);
 }
 
-/** The id of the process or collaboration that something stands in. */
+/** The id of the process or collaboration that something is in. */
 export function outermostOf(element: ModdleElement | undefined): string {
   let at = element;
   while (at?.$parent && !isA(at.$parent, "bpmn:Definitions")) at = at.$parent;

@@ -1,5 +1,5 @@
 // Numbers at the corners of elements: how often a token came, how many are there now; and a sign
-// for what failed or asks. Renewed a few times a second: nobody reads faster.
+// for what failed or asks. Renewed a few times a second: people read no faster.
 import type { ElementState } from "../../shared/types";
 import type { Outline } from "./painter";
 

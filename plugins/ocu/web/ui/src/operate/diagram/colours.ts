@@ -8,7 +8,7 @@ export type Look = "active" | "asking" | "failed" | "done" | "idle";
 
 export interface Colour {
   fill: [red: number, green: number, blue: number];
-  /** Around the shape, so that nobody needs to tell colours apart; dashed where `dash` is set. */
+  /** Around the shape, so that colours need not be distinguished; dashed where `dash` is set. */
   ring: string;
   dash: number[];
   width: number;
@@ -32,7 +32,7 @@ export const PALETTES: Record<PaletteName, Palette> = {
     failed: solid([247, 138, 134], "#a3121a", 4),
     done: solid([218, 222, 225], "", 0),
   },
-  // Of Okabe and Ito: told apart by everybody.
+  // Of Okabe and Ito: everybody can distinguish them.
   colourBlind: {
     active: solid([105, 190, 240], "#00496b"),
     asking: { ...solid([240, 228, 66], "#5a5200"), dash: [8, 4] },

@@ -127,7 +127,7 @@ export class Drawing {
     this.canvas.zoom(this.canvas.zoom() * factor, MIDDLE);
   }
 
-  /** `age_ms`: how long ago an element was left, for one that is told of late. */
+  /** `age_ms`: how long ago an element was left, for one that is shown late. */
   set(
     process: string,
     element: string,

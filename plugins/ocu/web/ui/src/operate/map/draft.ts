@@ -3,7 +3,7 @@ import type { AltitudeFrame, Geometry } from "../../shared/types";
 
 export type Kind = Geometry["kind"];
 
-/** WGS-84 degrees, and metres in the draft's frame where somebody gave them. */
+/** WGS-84 degrees, and metres in the draft's frame where they were given. */
 export interface Vertex {
   latitude: number;
   longitude: number;

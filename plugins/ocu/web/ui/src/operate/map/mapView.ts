@@ -14,7 +14,7 @@ export interface MapListener {
   chosen(resource: string): void;
   clicked(vertex: Vertex): void;
   dragged(index: number, to: Vertex): void;
-  /** A hand moved the map: it follows nobody any more. */
+  /** A hand moved the map: it follows no vehicle any more. */
   moved(): void;
 }
 

@@ -91,7 +91,7 @@ export class VehicleLayer {
     }
   }
 
-  /** Gray where nothing was heard for a while. */
+  /** Gray where no state came for a while. */
   ages(isStale: (resource: string) => boolean): void {
     for (const [resource, { marker, state }] of this.shown) {
       const element = marker.getElement();
@@ -111,7 +111,7 @@ export class VehicleLayer {
     }
     for (const [resource, { polygon }] of this.seen) {
       if (resource in states) continue;
-      polygon.remove(); // a replay has gone back to before it was heard
+      polygon.remove(); // a replay has gone back to before its first state
       this.seen.delete(resource);
     }
   }

@@ -1,5 +1,5 @@
 // The elements of the mission as a tree, with how they stand: for the keyboard, for screen readers,
-// and for whoever looks for one.
+// and for users who look for one.
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { fill, strings } from "../../strings";

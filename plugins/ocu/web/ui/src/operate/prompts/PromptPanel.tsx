@@ -145,11 +145,11 @@ const decisionsOf = ({ decisions }: Prompt): string =>
 
 const idOf = ({ run, prompt }: Prompt): string => `${run}/${prompt}`;
 
-/** Whoever was about to answer is told that somebody else was first. */
+/** Shows an operator who was about to answer that another one was first. */
 function useTellWhoWasFirst(): void {
   const { scene } = useOperating();
   const standing = useRef<Prompt[]>([]);
-  // While a message is told, this is still the list of before it.
+  // While listeners are called, this is still the list of before it.
   useEffect(() => scene.prompts.subscribe((now) => void (standing.current = now)), [scene]);
   useEffect(() => {
     return listen((message) => {

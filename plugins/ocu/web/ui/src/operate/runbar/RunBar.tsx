@@ -1,4 +1,4 @@
-// Which run is shown, how it stands, and what may be done with all of it.
+// Which run is shown, its status, and what may be done with it as a whole.
 import { useSignal } from "@preact/signals";
 import { command } from "../../shared/command";
 import { activeRuns } from "../../shared/executive";

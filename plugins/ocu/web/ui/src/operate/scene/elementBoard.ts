@@ -1,4 +1,4 @@
-// The states of a run's elements. Who draws is told what changed at once; lists that people read
+// The states of a run's elements. Listeners get what changed at once; lists that people read
 // are renewed a few times a second (`slow`).
 import { signal, type ReadonlySignal } from "@preact/signals";
 import { keyOf } from "../mission/names";
@@ -61,7 +61,7 @@ export class ElementBoard {
     this.tell(changes);
   }
 
-  /** Take all; what is not told of is as at the start of the run. */
+  /** Take all; an element that is missing is as at the start of the run. */
   replace(elements: Elements): void {
     const changes: ElementChange[] = [];
     for (const [process, element] of [...this.all()]) {

@@ -1,4 +1,4 @@
-// A run that goes on, as the executive tells of it.
+// A run that goes on, from the messages of the executive.
 import { batch, computed, signal } from "@preact/signals";
 import { get } from "../../shared/api";
 import * as executive from "../../shared/executive";

@@ -56,7 +56,7 @@ export interface Scene {
   trail(resource: string): GeoPosition[][];
   /** Rises when trails are to be drawn anew: time has jumped, or more is known of before. */
   readonly jumps: ReadonlySignal<number>;
-  /** Seconds since a resource was heard; null: never. */
+  /** Seconds since the last state of a resource; null: there was none. */
   silentFor_s(resource: string): number | null;
   /** Its `spans` change in place; the signal tells that they did. */
   readonly timeline: ReadonlySignal<{ spans: Spans }>;

@@ -24,7 +24,7 @@ export function VehiclesPane() {
   const { scene, fleet } = useOperating();
   const states = usePaced(scene.vehicles, PACE_MS);
   const payloads = usePaced(scene.payloads, PACE_MS);
-  // Ages grow without anything being told.
+  // Ages grow without any message.
   usePaced(scene.time, 1000);
   return (
     <Pane title={strings.operate.panes.vehicles} class="vehicles-pane" scrolls>

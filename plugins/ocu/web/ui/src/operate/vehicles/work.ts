@@ -17,7 +17,7 @@ export function workOf(resource: string, commands: Record<string, Command>): Wor
     .sort((one, other) => one.command.since - other.command.since);
 }
 
-/** Holders are operators, behaviors ("r1.b3"), or "" for nobody. */
+/** Holders are operators, behaviors ("r1.b3"), or "" for none. */
 export const isOperator = (holder: string): boolean =>
   holder !== "" && !/^r\d+\.b\d+$/.test(holder);
 

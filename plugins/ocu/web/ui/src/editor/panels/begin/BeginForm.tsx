@@ -9,7 +9,7 @@ const words = strings.begin;
 
 export interface BeginFormProps {
   editor: EditorContext;
-  /** In front of the ids of its fields: the form stands in several panels. */
+  /** In front of the ids of its fields: the form is in several panels. */
   prefix: string;
 }
 

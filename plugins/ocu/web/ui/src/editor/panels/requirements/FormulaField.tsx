@@ -12,7 +12,7 @@ export interface FormulaFieldProps {
   value: string;
   write(value: string): void;
   vocabulary: Vocabulary;
-  /** An element alone stands for its completion. */
+  /** An element alone means its completion. */
   isCondition: boolean;
   required?: boolean;
   hint?: string | undefined;

@@ -37,7 +37,7 @@ const AFTER_OPERAND = /(?:[\p{L}\p{N}_)]|['"])\s+$/u;
 const AFTER_WORD = /\b(?:U|W|since|once|historically|and|or|not)\s+$/;
 const WORD = /[\p{L}_][\p{L}\p{N}_.-]*$/u;
 
-/** `isCondition`: an element alone stands for its completion. */
+/** `isCondition`: an element alone means its completion. */
 export function completeFormula(
   text: string,
   cursor: number,

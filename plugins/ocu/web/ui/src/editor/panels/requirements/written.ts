@@ -14,7 +14,7 @@ import type { EditorContext } from "../panel";
 import type { Vocabulary } from "./completion";
 import { isList, patternNamed } from "./patterns";
 
-/** A requirement with the process in whose extension elements it stands, and its place there. */
+/** A requirement with the process in whose extension elements it is, and its place there. */
 export interface Placed {
   process: ModdleElement;
   index: number;

@@ -27,7 +27,7 @@ export class Rehearsal {
   readonly script = signal<Script>(EMPTY);
   /** The text of an answers file in place of the form; null: what the form says. */
   readonly raw = signal<string | null>(null);
-  /** Why the form cannot show that text; null: nobody has asked, or it can. */
+  /** Why the form cannot show that text; null: it was not asked for, or it can. */
   readonly unread = signal<string | null>(null);
   readonly job = new Job<RehearsalTold>("/rehearsals");
   readonly spans = signal<readonly Span[]>([]);

@@ -98,7 +98,7 @@ interface DecisionFieldsProps {
 
 function DecisionFields({ decision, index, all, write }: DecisionFieldsProps) {
   const isTwice = all.some((other, at) => at !== index && other.value === decision.value);
-  // The value follows the label until somebody writes another one.
+  // The value follows the label until the user writes another one.
   const follows = decision.value === valueFrom(decision.label);
   return (
     <>
