@@ -268,9 +268,9 @@ def make_executive(
 
 
 async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
-    from m2pem.rehearsal.worker import rehearse_apart
+    from m2pem.rehearsal.worker import rehearse_in_subprocess
 
-    return await rehearse_apart(*arguments, **options)
+    return await rehearse_in_subprocess(*arguments, **options)
 
 
 STATE = "state"

@@ -1,1 +1,1 @@
-"""Which room aircraft take up by what they do, so that two never plan into the same."""
+"""Deconfliction: each behavior of an aircraft reserves an operational volume of its own."""

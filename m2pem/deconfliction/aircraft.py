@@ -18,7 +18,7 @@ GROUNDED_BELOW_M = 1.0
 STANDS_BELOW_M_S = 0.5
 REACTION_S = 1.0
 BRAKING_M_S2 = 2.0
-"""What is told to stop begins to within so long, and brakes with so much at least."""
+"""An aircraft begins to stop within this time, and brakes with at least this deceleration."""
 
 SNAP_M = 2.0
 """Nearer than this to the height that it was sent to, an aircraft is taken to be there: none
@@ -47,9 +47,12 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
-class Craft:
-    """`stop`: where it may be by the time at which it has stopped, at `span`. `home_m`: the height
-    of its home; None: not known. `homes`: where a return may lead to."""
+class Aircraft:
+    """The last state of an aircraft, in the local frame.
+
+    `stop`: where it may be by the time at which it has stopped, at the heights `span`. `home_m`:
+    the height of its home; None: not known. `homes`: where a return may lead to.
+    """
 
     vehicle: ResourceId
     place: EastNorth
@@ -68,9 +71,9 @@ def flies(state: VehicleState) -> bool:
     return not (low and not state.armed and _speed_m_s(state) < STANDS_BELOW_M_S)
 
 
-def craft_of(
+def aircraft_of(
     state: VehicleState, frame: LocalFrame, nominal_m: float | None, homes: tuple[EastNorth, ...]
-) -> Craft | None:
+) -> Aircraft | None:
     """None: its position is not known. `nominal_m`: the height that it was sent to last."""
     if state.position is None:
         return None
@@ -84,7 +87,7 @@ def craft_of(
         height_m, up = nominal_m, 0.0
     then_m = height_m + up * ahead_s
     above_m = state.altitude_above_home_m
-    return Craft(
+    return Aircraft(
         state.resource,
         place,
         convex_hull([place, (place[0] + east * ahead_s, place[1] + north * ahead_s)]),
@@ -106,19 +109,19 @@ ANY_HEIGHT = Span(-math.inf, math.inf)
 class FlightParameters(BehaviorParameters):
     """The parameters of a behavior of one aircraft.
 
-    `height_of`: the height of another vehicle now. `unknown`: is set to why something that was
-    asked for is boundless.
+    `height_of`: the height of another vehicle now. `unknown`: why a volume has no bounds, set when
+    one is made.
     """
 
     def __init__(
         self,
         values: Mapping[str, ResolvedValue],
-        craft: Craft,
+        aircraft: Aircraft,
         frame: LocalFrame,
         height_of: Callable[[str], float | None],
     ) -> None:
         super().__init__(values)
-        self.craft = craft
+        self.aircraft = aircraft
         self.frame = frame
         self.unknown = ""
         self._height_of = height_of
@@ -157,13 +160,13 @@ class FlightParameters(BehaviorParameters):
             return self._lifted(altitude_m, self.altitude_frame)
         if own_m is not None:
             return self._lifted(own_m, own_frame)
-        if self.craft.flies:
-            return self.craft.span
-        self.unknown = "nobody says how high it is to fly: give it an altitude"
-        return Span(self.craft.span.low_m, math.inf)
+        if self.aircraft.flies:
+            return self.aircraft.span
+        self.unknown = "how high it is to fly is not known: give it an altitude"
+        return Span(self.aircraft.span.low_m, math.inf)
 
     def _lifted(self, altitude_m: float, frame: str) -> Span:
-        home_m = self.craft.home_m
+        home_m = self.aircraft.home_m
         if frame == "terrain":
             self.unknown = "its altitude is above the terrain, whose height is not known here"
             return ANY_HEIGHT

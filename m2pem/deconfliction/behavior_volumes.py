@@ -1,7 +1,8 @@
-"""From a behavior of one aircraft to the room that it takes up, by the shared catalogue's meaning.
+"""The operational volume of a behavior of one aircraft, by its meaning in the shared catalogue.
 
-Whoever does it, it is somewhere in there: each way is as wide as its bends may be, and as high as
-from its beginning to its end. An aircraft on the ground is taken to rise straight up first.
+Whichever arbiter executes the behavior, the aircraft stays in the volume. Each way is as wide as
+its bends may be, and as high as from its beginning to its end. An aircraft on the ground is assumed
+to climb vertically first.
 """
 
 import math
@@ -18,7 +19,7 @@ BEND_M = 4.0
 
 RADIUS_M = 30.0
 SURVEY_SPACING_M = 20.0
-"""What circles and surveys have when nobody says."""
+"""Of circles and surveys that give no radius or spacing."""
 
 RETURN_HEIGHT_M = 30.0
 """Above home: as high as an autopilot rises, if it is lower, before it returns by itself."""
@@ -29,8 +30,10 @@ AT_HOME_M = 5.0
 def volume_of(
     behavior: str, parameters: FlightParameters, start_s: float, *, timed: bool = False
 ) -> Volume:
-    """The room that a behavior takes up which starts at `start_s`. `timed`: say, where it can be
-    said, when the vehicle is where."""
+    """Return the volume of a behavior that starts at `start_s`.
+
+    `timed`: the volume also says when the vehicle is where, if that can be known.
+    """
     if timed and (scheduled := _scheduled(behavior, parameters, start_s)) is not None:
         return scheduled
     return PLANS.get(behavior, _anything)(parameters)
@@ -39,16 +42,16 @@ def volume_of(
 def ascent(parameters: FlightParameters, span: Span) -> tuple[list[Piece], Span]:
     """How it comes from where it is to its way at some height: the column in which it takes off, if
     it must, and at which heights the way to the first place is flown."""
-    craft = parameters.craft
-    column = craft.span.to(span) if not craft.flies else craft.span
-    pieces = [Piece(craft.stop, column.low_m, column.high_m)]
-    return pieces, span if not craft.flies else craft.span.to(span)
+    aircraft = parameters.aircraft
+    column = aircraft.span.to(span) if not aircraft.flies else aircraft.span
+    pieces = [Piece(aircraft.stop, column.low_m, column.high_m)]
+    return pieces, span if not aircraft.flies else aircraft.span.to(span)
 
 
 def way_to(parameters: FlightParameters, area: Hull | None, span: Span) -> Volume:
     """From where it is into an area, and anywhere in it."""
     pieces, flown = ascent(parameters, span)
-    there = None if area is None else convex_hull([*parameters.craft.stop, *area])
+    there = None if area is None else convex_hull([*parameters.aircraft.stop, *area])
     pieces.append(Piece(there, flown.low_m, flown.high_m))
     return Volume(tuple(pieces), _end(span), parameters.unknown)
 
@@ -59,7 +62,9 @@ def along(
     """From where it is to the first of some places, and on from each to the next."""
     pieces, flown = ascent(parameters, spans[0])
     pieces.append(
-        Piece(buffered_hull([*parameters.craft.stop, places[0]], wide_m), flown.low_m, flown.high_m)
+        Piece(
+            buffered_hull([*parameters.aircraft.stop, places[0]], wide_m), flown.low_m, flown.high_m
+        )
     )
     legs = zip(pairwise(places), pairwise(spans), strict=True)
     for (begin, end), (first, second) in legs:
@@ -74,7 +79,7 @@ def _end(span: Span) -> float | None:
 
 def _scheduled(behavior: str, parameters: FlightParameters, start_s: float) -> Volume | None:
     """A route or a way at one height, at a speed that is given; None: it is not one."""
-    craft, speed_m_s = parameters.craft, parameters.speed_m_s
+    aircraft, speed_m_s = parameters.aircraft, parameters.speed_m_s
     if behavior == "single_vehicle_routing" and parameters.route is not None:
         places = [parameters.to_local(each) for each in parameters.route.waypoints]
         spans = parameters.waypoint_spans(parameters.route)
@@ -84,16 +89,16 @@ def _scheduled(behavior: str, parameters: FlightParameters, start_s: float) -> V
     else:
         return None
     level = all(
-        span.exact and craft.span.exact and abs(span.low_m - craft.span.low_m) <= NOTHING_M
+        span.exact and aircraft.span.exact and abs(span.low_m - aircraft.span.low_m) <= NOTHING_M
         for span in spans
     )
-    ready = craft.flies and craft.stands and not parameters.loop
+    ready = aircraft.flies and aircraft.stands and not parameters.loop
     if not (places and level and ready and speed_m_s and not parameters.unknown):
         return None
     height_m, now_s = spans[0].low_m, start_s
     wide_m = BEND_M if len(places) > 1 else 0.0
-    pieces = [Piece((craft.place,), height_m, height_m, to_s=start_s)]
-    for begin, end in pairwise([craft.place, *places]):
+    pieces = [Piece((aircraft.place,), height_m, height_m, to_s=start_s)]
+    for begin, end in pairwise([aircraft.place, *places]):
         then_s = now_s + math.dist(begin, end) / speed_m_s
         area = buffered_hull([begin, end], wide_m)
         pieces.append(Piece(area, height_m, height_m, now_s, then_s, (begin, end), wide_m))
@@ -106,15 +111,15 @@ def _scheduled(behavior: str, parameters: FlightParameters, start_s: float) -> V
 
 
 def _anything(parameters: FlightParameters) -> Volume:
-    parameters.unknown = "nobody can say where it flies"
+    parameters.unknown = "where it flies is not known"
     return Volume((Piece(None, -math.inf, math.inf),), unknown=parameters.unknown)
 
 
 def _stay(parameters: FlightParameters) -> Volume:
-    if not parameters.craft.flies:
+    if not parameters.aircraft.flies:
         return Volume()
-    span = parameters.craft.span
-    return Volume((Piece(parameters.craft.stop, span.low_m, span.high_m),), _end(span))
+    span = parameters.aircraft.span
+    return Volume((Piece(parameters.aircraft.stop, span.low_m, span.high_m),), _end(span))
 
 
 def _route(parameters: FlightParameters) -> Volume:
@@ -142,33 +147,33 @@ def _around(parameters: FlightParameters) -> Volume:
 
 
 def _climb(parameters: FlightParameters) -> Volume:
-    return way_to(parameters, parameters.craft.stop, parameters.span())
+    return way_to(parameters, parameters.aircraft.stop, parameters.span())
 
 
 def _land(parameters: FlightParameters) -> Volume:
-    if not parameters.craft.flies:
+    if not parameters.aircraft.flies:
         return Volume()
-    return Volume((Piece(parameters.craft.stop, -math.inf, parameters.craft.span.high_m),))
+    return Volume((Piece(parameters.aircraft.stop, -math.inf, parameters.aircraft.span.high_m),))
 
 
 def _return(parameters: FlightParameters) -> Volume:
-    craft = parameters.craft
-    away_m = [math.dist(craft.place, home) for home in craft.homes]
+    aircraft = parameters.aircraft
+    away_m = [math.dist(aircraft.place, home) for home in aircraft.homes]
     at_home = max(away_m, default=math.inf) <= AT_HOME_M
-    if at_home and not craft.flies:
+    if at_home and not aircraft.flies:
         return Volume()
-    top_m = craft.span.high_m
-    if craft.home_m is None:
+    top_m = aircraft.span.high_m
+    if aircraft.home_m is None:
         parameters.unknown, top_m = "the height of its home is not known", math.inf
     elif not at_home:
-        top_m = max(top_m, craft.home_m + RETURN_HEIGHT_M)
-    if not craft.homes:
+        top_m = max(top_m, aircraft.home_m + RETURN_HEIGHT_M)
+    if not aircraft.homes:
         parameters.unknown = "where its home is is not known"
         return Volume((Piece(None, -math.inf, top_m),), unknown=parameters.unknown)
-    low_m = craft.span.low_m if craft.flies else top_m
-    pieces = [Piece(craft.stop, craft.span.low_m, top_m)]
-    for home in craft.homes:
-        pieces.append(Piece(convex_hull([*craft.stop, home]), low_m, top_m))
+    low_m = aircraft.span.low_m if aircraft.flies else top_m
+    pieces = [Piece(aircraft.stop, aircraft.span.low_m, top_m)]
+    for home in aircraft.homes:
+        pieces.append(Piece(convex_hull([*aircraft.stop, home]), low_m, top_m))
         pieces.append(Piece((home,), -math.inf, top_m))
     return Volume(tuple(pieces), unknown=parameters.unknown)
 

@@ -1,4 +1,4 @@
-"""Why a behavior cannot have its room, and what would be right, for people."""
+"""Conflicts between operational volumes: why a behavior is refused, and what would be right."""
 
 import math
 from collections.abc import Callable
@@ -17,8 +17,11 @@ _TRIES = 8
 
 @dataclass(frozen=True, slots=True)
 class Occupant:
-    """Who takes up room. `behavior`: the id of what it does, `name` what that is; "" when it just
-    hovers. `lost`: that has ended, and the vehicle was not heard since."""
+    """A vehicle that occupies a volume.
+
+    `behavior`, `name`: the id and the name of its behavior; "" when it has none. `lost`: the
+    behavior has ended, and nothing was received from the vehicle since.
+    """
 
     vehicle: ResourceId
     volume: Volume
@@ -29,8 +32,11 @@ class Occupant:
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """`piece`: of the other's volume, that one would come too near to. `home_m`: the height of the
-    one's home; None: not known."""
+    """A vehicle would come too near to another one.
+
+    `piece`: the part of the other's volume to which it comes too near. `home_m`: the height of the
+    home of `vehicle`; None: not known.
+    """
 
     vehicle: ResourceId
     volume: Volume
@@ -40,11 +46,11 @@ class Conflict:
 
 
 Again: TypeAlias = Callable[[float, bool], Conflict | None]
-"""What is met at another altitude above home, in metres; True: it changes to that first."""
+"""Return the conflict at another altitude above home in metres; True: it goes there first."""
 
 
 def refusal(conflict: Conflict, policy: Separation, again: Again | None) -> str:
-    """`again` None: it cannot be told an altitude."""
+    """Return why the behavior is refused. `again` None: it takes no altitude."""
     other, piece = conflict.other, conflict.piece
     heights = _heights(piece, conflict.home_m)
     does = f"does {other.behavior} ({other.name}){heights}" if other.behavior else f"flies{heights}"
@@ -99,7 +105,7 @@ def _altitudes(conflict: Conflict, policy: Separation, again: Again) -> list[str
 
 
 def _said(altitude_m: float, change: str, beyond: str, farthest_m: float, again: Again) -> str:
-    """`change`: in which direction it changes its height; on its way it may meet somebody."""
+    """`change`: whether it climbs or descends; it may then conflict with a third one."""
     at = f"{altitude_m:.0f} m"
     if again(farthest_m, True) is None:
         at += f" or {beyond}"
@@ -121,7 +127,7 @@ def _search(
     beside: Callable[[Piece], tuple[float, Callable[[float], int]]],
     again: Again,
 ) -> float | None:
-    """The nearest altitude above home at which nobody else is met either; None: there is none."""
+    """Return the nearest altitude above home without any conflict; None: there is none."""
     met: Conflict | None = conflict
     tried: set[float] = set()
     while met is not None and len(tried) < _TRIES:

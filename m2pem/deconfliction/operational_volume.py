@@ -1,4 +1,4 @@
-"""The room that an aircraft takes up: polygons with a height from and to, perhaps for a time.
+"""The operational volume of an aircraft: polygons with heights from and to, perhaps for a time.
 
 Heights are metres above mean sea level, times seconds since the Unix epoch.
 """
@@ -11,10 +11,10 @@ from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Hull, hull_distance_m
 
 NOTHING_M = 0.01
-"""What two ways to reckon one place may differ by."""
+"""Two computations of one place may differ by this."""
 
 OFF_M = 3.0
-"""How far from its way an aircraft may be seen that keeps to it."""
+"""An aircraft that is nearer to its way than this keeps to it."""
 
 _HALVINGS = 40
 

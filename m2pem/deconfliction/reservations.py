@@ -1,6 +1,6 @@
-"""Who takes up which room: asked before a behavior starts, told when it has ended.
+"""Reservations of operational volumes: made before a behavior starts, released when it has ended.
 
-Pure: it is told what is seen and what time it is.
+Pure: states of vehicles and the time are arguments.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest
 from m2pem.api.telemetry import LinkState, VehicleState
-from m2pem.deconfliction.aircraft import Craft, FlightParameters, Span, craft_of, flies
+from m2pem.deconfliction.aircraft import Aircraft, FlightParameters, Span, aircraft_of, flies
 from m2pem.deconfliction.behavior_volumes import volume_of
 from m2pem.deconfliction.conflicts import Conflict, Occupant, refusal
 from m2pem.deconfliction.operational_volume import Piece, Separation, Volume, too_near
@@ -26,16 +26,19 @@ BY_HAND = frozenset({"teleop"})
 """Flown by a person, who sees to it: it counts where it is seen."""
 
 DISCERNIBLE_M = 1.0
-"""Nearer than this, nobody can say in which direction two that are too near may part."""
+"""Nearer than this, the direction in which two vehicles may part is not known."""
 
 US_PER_S = 1_000_000
 
 
 @dataclass(slots=True)
-class _Claim:
-    """A behavior that goes on. `volumes`: of its aircraft; None: not reckoned yet. `late`: those
-    that are not where their volume says, if it says when. `over`: it has ended, but a vehicle of it
-    has not been heard since."""
+class _Reservation:
+    """The volumes of a behavior in execution.
+
+    `volumes`: of its aircraft; None: not computed yet. `late`: aircraft that are not where their
+    volume says, if it says when. `over`: the behavior has ended, but nothing was received from one
+    of its vehicles since.
+    """
 
     request: BehaviorRequest
     kind: BehaviorType
@@ -45,7 +48,7 @@ class _Claim:
 
 
 class Airspace:
-    """Of the aircraft of a fleet that says how far they are to be apart."""
+    """The reservations of all aircraft of a fleet with a separation."""
 
     def __init__(self, fleet: Fleet, policy: Separation) -> None:
         self.aircraft = tuple(v.id for v in fleet.vehicles.values() if v.domain is Domain.AIR)
@@ -55,12 +58,12 @@ class Airspace:
         self._nominal_m: dict[ResourceId, float] = {}
         self._homes: dict[ResourceId, list[EastNorth]] = {}
         self._lost: set[ResourceId] = set()
-        self._claims: dict[BehaviorId, _Claim] = {}
+        self._reservations: dict[BehaviorId, _Reservation] = {}
 
     # --- what is seen ---------------------------------------------------------------------------
 
-    def heard(self, state: VehicleState) -> None:
-        """A vehicle, of any domain, has said where it is."""
+    def received(self, state: VehicleState) -> None:
+        """Take the state of a vehicle of any domain."""
         if state.position is None:
             return
         if self._frame is None:
@@ -75,16 +78,16 @@ class Airspace:
             self._forget()
 
     def lost(self, vehicle: ResourceId) -> None:
-        """A vehicle is not heard any more: it keeps its room until it is."""
+        """The link to a vehicle is lost: it keeps its volume until something is received again."""
         self._lost.add(vehicle)
 
     def unseen(self, vehicles: Iterable[ResourceId]) -> list[ResourceId]:
-        """Which of some aircraft have not said where they are."""
+        """Return those aircraft whose position was never received."""
         return [each for each in vehicles if each in self.aircraft and each not in self._states]
 
     # --- what is done ---------------------------------------------------------------------------
 
-    def claim(
+    def reserve(
         self,
         request: BehaviorRequest,
         kind: BehaviorType,
@@ -92,8 +95,11 @@ class Airspace:
         *,
         takes_altitude: bool = False,
     ) -> str:
-        """Take up the room of a behavior that starts now; or why it cannot be had, and what would
-        be right. `takes_altitude`: it has a parameter for that."""
+        """Reserve the volume of a behavior that starts now.
+
+        Return "", or why it is refused and what would be right. `takes_altitude`: the behavior
+        has a parameter for that.
+        """
         flown = [each for each in request.resources if each in self.aircraft]
         if not flown or request.behavior in BY_HAND:
             return ""
@@ -105,7 +111,7 @@ class Airspace:
         if request.behavior not in STOPS:
             conflict = self._conflict(request, kind, volumes, now_us)
         if conflict is None:
-            self._claims[request.id] = _Claim(request, kind, volumes)
+            self._reservations[request.id] = _Reservation(request, kind, volumes)
             self._note_ends(volumes)
             return ""
 
@@ -115,27 +121,27 @@ class Airspace:
         return refusal(conflict, self._policy, again if takes_altitude else None)
 
     def adopt(self, request: BehaviorRequest, kind: BehaviorType) -> None:
-        """A behavior goes on already; nobody asks whether it may."""
+        """Reserve the volume of a behavior that goes on already, without a check."""
         if request.behavior not in BY_HAND:
-            self._claims[request.id] = _Claim(request, kind)
+            self._reservations[request.id] = _Reservation(request, kind)
 
     def delay(self, vehicle: ResourceId) -> None:
-        """A vehicle is held: it is not any more where it was to be when."""
-        for claim in self._claims.values():
-            claim.late.add(vehicle)
+        """A vehicle is held: the times of its volumes do not hold any more."""
+        for reservation in self._reservations.values():
+            reservation.late.add(vehicle)
 
     def release(self, behavior: BehaviorId) -> None:
-        """A behavior has ended. Its room is free, but for where its vehicles are seen."""
-        if behavior in self._claims:
-            self._claims[behavior].over = True
+        """A behavior has ended: free its volume, except where its vehicles are."""
+        if behavior in self._reservations:
+            self._reservations[behavior].over = True
             self._forget()
 
     # --- inside ---------------------------------------------------------------------------------
 
     def _forget(self) -> None:
-        for name, claim in list(self._claims.items()):
-            if claim.over and not self._lost.intersection(claim.request.resources):
-                del self._claims[name]
+        for name, reservation in list(self._reservations.items()):
+            if reservation.over and not self._lost.intersection(reservation.request.resources):
+                del self._reservations[name]
 
     def _note_home(self, vehicle: ResourceId, state: VehicleState) -> None:
         """Where it stood at first, and where it stood last: autopilots mean one or the other."""
@@ -150,13 +156,13 @@ class Airspace:
             if volume.end_m is not None:
                 self._nominal_m[vehicle] = volume.end_m
 
-    def _craft(self, vehicle: str) -> Craft | None:
+    def _aircraft(self, vehicle: str) -> Aircraft | None:
         name = ResourceId(vehicle)
         state = self._states.get(name)
         if state is None or self._frame is None:
             return None
         homes = tuple(dict.fromkeys(self._homes.get(name, ())))
-        return craft_of(state, self._frame, self._nominal_m.get(name), homes)
+        return aircraft_of(state, self._frame, self._nominal_m.get(name), homes)
 
     def _conflict_at(
         self,
@@ -187,16 +193,16 @@ class Airspace:
     ) -> dict[ResourceId, Volume]:
         """`from_m`: the altitude above home that its aircraft have by then; None: the present."""
         volumes = {}
-        lead = self._craft(request.resources[0])
+        lead = self._aircraft(request.resources[0])
         vehicles = [each for each in request.resources if "/" not in each]
         for index, vehicle in enumerate(vehicles):
-            craft = self._craft(vehicle) if vehicle in self.aircraft else None
-            if craft is None or self._frame is None:
+            aircraft = self._aircraft(vehicle) if vehicle in self.aircraft else None
+            if aircraft is None or self._frame is None:
                 continue
-            if from_m is not None and craft.home_m is not None:
-                there_m = craft.home_m + from_m
-                craft = replace(craft, span=Span(there_m, there_m), flies=True)
-            parameters = FlightParameters(request.parameters, craft, self._frame, self._height_m)
+            if from_m is not None and aircraft.home_m is not None:
+                there_m = aircraft.home_m + from_m
+                aircraft = replace(aircraft, span=Span(there_m, there_m), flies=True)
+            parameters = FlightParameters(request.parameters, aircraft, self._frame, self._height_m)
             start_s, timed = now_us / US_PER_S, self._policy.time_s is not None
             if kind is BehaviorType.TEAM:
                 volume = member_volume(request.behavior, parameters, lead, index, start_s)
@@ -206,8 +212,8 @@ class Airspace:
         return volumes
 
     def _height_m(self, vehicle: str) -> float | None:
-        craft = self._craft(vehicle)
-        return None if craft is None else craft.span.high_m
+        aircraft = self._aircraft(vehicle)
+        return None if aircraft is None else aircraft.span.high_m
 
     def _conflict(
         self,
@@ -228,26 +234,26 @@ class Airspace:
                 together = kind is BehaviorType.TEAM and occupant.vehicle in request.resources
                 if occupant.vehicle == vehicle or together:
                     continue
-                craft, other = self._craft(vehicle), self._craft(occupant.vehicle)
-                if craft is None:
+                aircraft, other = self._aircraft(vehicle), self._aircraft(occupant.vehicle)
+                if aircraft is None:
                     continue
                 met = None
-                for policy in self._policies(craft, other):
+                for policy in self._policies(aircraft, other):
                     met = too_near(volume, occupant.volume, policy)
                     if met is None:
                         break
                 if met is not None:
-                    return Conflict(vehicle, volume, craft.home_m, occupant, met[1])
+                    return Conflict(vehicle, volume, aircraft.home_m, occupant, met[1])
         return None
 
-    def _policies(self, craft: Craft, other: Craft | None) -> list[Separation]:
+    def _policies(self, aircraft: Aircraft, other: Aircraft | None) -> list[Separation]:
         """Of which one must be kept. Two that are too near already, after a march for example, must
         be able to part: they must not come nearer still."""
         policy = self._policy
-        if other is None or not (craft.flies and other.flies):
+        if other is None or not (aircraft.flies and other.flies):
             return [policy]
-        far_m = hull_distance_m(craft.stop, other.stop)
-        high_m = craft.span.apart_m(other.span)
+        far_m = hull_distance_m(aircraft.stop, other.stop)
+        high_m = aircraft.span.apart_m(other.span)
         if far_m >= policy.horizontal_m or high_m >= policy.vertical_m:
             return [policy]
         kept = []
@@ -258,43 +264,45 @@ class Airspace:
         return kept or [policy]
 
     def _occupants(self, apart_from: BehaviorId, now_us: int) -> Iterator[Occupant]:
-        """Everybody in the air, but for what a behavior itself claims."""
+        """Everybody in the air, but for what a behavior itself reservations."""
         busy = set()
-        for name, claim in self._claims.items():
+        for name, reservation in self._reservations.items():
             if name == apart_from:
                 continue
-            if claim.volumes is None:
-                claim.volumes = self._volumes(claim.request, claim.kind, now_us)
-            for vehicle, volume in claim.volumes.items():
+            if reservation.volumes is None:
+                reservation.volumes = self._volumes(reservation.request, reservation.kind, now_us)
+            for vehicle, volume in reservation.volumes.items():
                 busy.add(vehicle)
-                seen = self._as_flown(claim, vehicle, volume, now_us)
-                lost = claim.over
-                yield Occupant(vehicle, seen, name, claim.request.behavior, lost=lost)
+                seen = self._as_flown(reservation, vehicle, volume, now_us)
+                lost = reservation.over
+                yield Occupant(vehicle, seen, name, reservation.request.behavior, lost=lost)
         for vehicle in self.aircraft:
-            craft = self._craft(vehicle)
-            if vehicle not in busy and craft is not None and craft.flies:
-                place = Piece(craft.stop, craft.span.low_m, craft.span.high_m)
+            aircraft = self._aircraft(vehicle)
+            if vehicle not in busy and aircraft is not None and aircraft.flies:
+                place = Piece(aircraft.stop, aircraft.span.low_m, aircraft.span.high_m)
                 yield Occupant(vehicle, Volume((place,)))
 
-    def _as_flown(self, claim: _Claim, vehicle: ResourceId, volume: Volume, now_us: int) -> Volume:
+    def _as_flown(
+        self, reservation: _Reservation, vehicle: ResourceId, volume: Volume, now_us: int
+    ) -> Volume:
         """A volume that says when, as long as the vehicle keeps to it."""
         limit_s = self._policy.time_s
         if not volume.timed or limit_s is None:
             return volume
-        if vehicle not in claim.late:
+        if vehicle not in reservation.late:
             ends_s = max(piece.to_s for piece in volume.pieces if piece.way is not None)
             late = now_us / US_PER_S > ends_s + limit_s
             if late or self._strays(vehicle, volume, limit_s):
-                claim.late.add(vehicle)
-        return volume.at_any_time() if vehicle in claim.late else volume
+                reservation.late.add(vehicle)
+        return volume.at_any_time() if vehicle in reservation.late else volume
 
     def _strays(self, vehicle: ResourceId, volume: Volume, limit_s: float) -> bool:
         """Whether it was seen where it should be at no time near to that."""
-        state, craft = self._states[vehicle], self._craft(vehicle)
+        state, aircraft = self._states[vehicle], self._aircraft(vehicle)
         seen_s = state.time_us / US_PER_S
-        if craft is None:
+        if aircraft is None:
             return False
-        return not volume.passes(craft.place, seen_s - limit_s / 2, seen_s + limit_s / 2)
+        return not volume.passes(aircraft.place, seen_s - limit_s / 2, seen_s + limit_s / 2)
 
 
 def airspace_of(fleet: Fleet) -> Airspace | None:

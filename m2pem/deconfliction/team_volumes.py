@@ -1,10 +1,10 @@
-"""From a team behavior to the room that each of its members takes up, whoever makes it."""
+"""The operational volume of each member of a team behavior."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
-from m2pem.deconfliction.aircraft import Craft, FlightParameters
+from m2pem.deconfliction.aircraft import Aircraft, FlightParameters
 from m2pem.deconfliction.behavior_volumes import (
     BEND_M,
     RADIUS_M,
@@ -29,16 +29,18 @@ _SHAPES = {
 
 
 def member_volume(
-    behavior: str, parameters: FlightParameters, lead: Craft | None, index: int, start_s: float
+    behavior: str, parameters: FlightParameters, lead: Aircraft | None, index: int, start_s: float
 ) -> Volume:
-    """The room of member `index` of a team (0 leads); its lead may be no aircraft, and unseen."""
+    """Return the volume of member `index` of a team (0 leads); the lead need not be an aircraft."""
     if behavior in _SHAPES:
         return _march(behavior, parameters, lead, index)
     plan = _PLANS.get(behavior)
     return volume_of(behavior, parameters, start_s) if plan is None else plan(parameters)
 
 
-def _march(behavior: str, parameters: FlightParameters, lead: Craft | None, index: int) -> Volume:
+def _march(
+    behavior: str, parameters: FlightParameters, lead: Aircraft | None, index: int
+) -> Volume:
     spacing_m = parameters.spacing_m or SPACING_M
     back, left = slot(parameters.text("shape") or _SHAPES[behavior], index)
     back_m, left_m = back * spacing_m, left * spacing_m
@@ -49,10 +51,10 @@ def _march(behavior: str, parameters: FlightParameters, lead: Craft | None, inde
     if route is None or not route.waypoints:
         # To a place beside the lead, whichever way that looks.
         if lead is None:
-            parameters.unknown = "where its lead stands is not known"
+            parameters.unknown = "the position of its lead is not known"
             return way_to(parameters, None, parameters.span())
         around = buffered_hull(lead.stop, math.hypot(back_m, left_m))
-        return way_to(parameters, around if index else parameters.craft.stop, parameters.span())
+        return way_to(parameters, around if index else parameters.aircraft.stop, parameters.span())
     places: list[Vector] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
     spans = parameters.waypoint_spans(route)
     if len({place[:2] for place in places}) == 1:
@@ -65,15 +67,15 @@ def _march(behavior: str, parameters: FlightParameters, lead: Craft | None, inde
     # Its place is before the route's beginning: it goes there at once, or by way of the route.
     end = trimmed([(*place, 0.0) for place in moved], back_m)[-1][:2]
     over = spans[0]
-    for span in (*spans, parameters.craft.span):
+    for span in (*spans, parameters.aircraft.span):
         over = over.to(span)
-    detour = convex_hull([*parameters.craft.stop, *moved, end])
-    low_m = over.low_m if parameters.craft.flies else min(span.low_m for span in spans)
+    detour = convex_hull([*parameters.aircraft.stop, *moved, end])
+    low_m = over.low_m if parameters.aircraft.flies else min(span.low_m for span in spans)
     extra = Piece(detour, low_m, over.high_m)
     return Volume((*volume.pieces, extra), volume.end_m, volume.unknown)
 
 
-def _stop(lead: Craft | None) -> Sequence[EastNorth]:
+def _stop(lead: Aircraft | None) -> Sequence[EastNorth]:
     return () if lead is None else lead.stop
 
 

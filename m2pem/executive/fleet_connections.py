@@ -22,7 +22,7 @@ from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.geometry import Area
-from m2pem.teams.capabilities import Offers
+from m2pem.teams.capabilities import Capabilities
 
 if TYPE_CHECKING:
     from m2pem.teams.arbiter import Teams
@@ -120,7 +120,7 @@ class FleetArbiters:
         }
         self._context = context
         self._connections = connections
-        self._offers = Offers(fleet, self.of)
+        self._capabilities = Capabilities(fleet, self.of)
         self.graph = ResourceGraph(fleet, self.offered)
 
     @cached_property
@@ -128,7 +128,7 @@ class FleetArbiters:
         """The arbiter of team behaviors that are made of behaviors of the members."""
         from m2pem.teams.arbiter import Teams  # noqa: PLC0415  # a check asks for offers alone
 
-        return Teams(self.fleet, self.of, self._context, self._offers)
+        return Teams(self.fleet, self.of, self._context, self._capabilities)
 
     @property
     def all(self) -> Mapping[str, Arbiter]:
@@ -177,7 +177,7 @@ class FleetArbiters:
         """What can be had of a resource, before the fleet's `behaviors` list: what its arbiter
         offers, and what teams can make of that."""
         own = tuple(self._of[resource].catalogue(resource))
-        made = self._offers.together(resource)
+        made = self._capabilities.together(resource)
         return (*own, *(spec for spec in made if not _has(own, spec.name)))
 
     @property

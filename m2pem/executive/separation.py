@@ -29,7 +29,7 @@ class AircraftSeparation:
     def on_telemetry(self, state: object) -> None:
         """A vehicle published its state."""
         if isinstance(state, VehicleState):
-            self.airspace.heard(state)
+            self.airspace.received(state)
 
     async def refusal(self, request: BehaviorRequest, spec: BehaviorSpec) -> str:
         """Why the behavior cannot have its room; "": it has it from now on."""
@@ -45,7 +45,7 @@ class AircraftSeparation:
             waited_s += LOOK_EVERY_S
         takes_altitude = "altitude" in spec.by_name
         now_us = self._clock.now_us()
-        return airspace.claim(request, spec.type, now_us, takes_altitude=takes_altitude)
+        return airspace.reserve(request, spec.type, now_us, takes_altitude=takes_altitude)
 
 
 def separation_for(fleet: Fleet, clock: Clock) -> AircraftSeparation | None:

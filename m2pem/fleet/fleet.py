@@ -46,7 +46,7 @@ class Payload:
 @dataclass(frozen=True, slots=True)
 class Vehicle:
     """A vehicle. `payloads`: the ids of what is mounted on it. `cruise_speed_m_s`: how fast it goes
-    when nobody says; `endurance_s`: how long it can, with a full battery. None: not said."""
+    if no behavior says; `endurance_s`: how long it can, with a full battery. None: not said."""
 
     id: ResourceId
     domain: Domain
@@ -80,7 +80,7 @@ class Fleet:
 
     `origin`: of the local ENU frame, (latitude deg, longitude deg, altitude m above mean sea
     level). `fence`: name of an area that no vehicle may leave, or "". `vertical_separation_m`: of
-    aircraft that are nearer than `horizontal_separation_m`; None: nobody keeps them apart.
+    aircraft that are nearer than `horizontal_separation_m`; None: they are not kept apart.
     `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
     `handed_over`: names of geometries that missions may use and operators hand over.
     """

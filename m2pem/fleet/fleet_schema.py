@@ -113,7 +113,7 @@ class VehicleModel(_Model):
     ] = None
     cruise_speed: Annotated[
         Annotated[Speed, Field(gt=0)] | None,
-        Field(description="How fast it goes when nobody says."),
+        Field(description="How fast it goes if no behavior says."),
     ] = None
     endurance: Annotated[
         Annotated[Duration, Field(gt=0)] | None,

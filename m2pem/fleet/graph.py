@@ -1,8 +1,8 @@
-"""The resource graph: who carries what, who belongs to which team, and who can do what.
+"""The resource graph: payloads on vehicles, vehicles in teams, and what each can do.
 
-Nodes are vehicles, payloads, teams and capabilities; a capability is one behavior that somebody
+Nodes are vehicles, payloads, teams and capabilities; a capability is one behavior that a resource
 offers. Edges: a payload is MOUNTED_ON a vehicle, a vehicle is a MEMBER_OF a team, a vehicle or
-payload OFFERS a capability. The graph never changes; who is free now is in `availability`.
+payload OFFERS a capability. The graph never changes; `allocation` says which resources are free.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,7 +39,7 @@ class ResourceNode:
 
 @dataclass(frozen=True, slots=True)
 class Capability:
-    """A behavior that somebody offers."""
+    """A behavior that a resource offers."""
 
     name: str
     type: BehaviorType

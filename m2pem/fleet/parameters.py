@@ -1,6 +1,6 @@
 """Reads a behavior's parameters: units to SI, names to geometries, everything checked.
 
-The check does it with what stands in the mission, the executive with what the data store holds
+The check does it with what is written in the mission, the executive with what the data store holds
 when the task starts.
 """
 

@@ -1,6 +1,6 @@
-"""The fleet's fence: whether a way stays within it, and if not, where and by how far it does not.
+"""The fleet's fence: whether a way stays within it, and if not, where and how far it leaves it.
 
-The fence is a polygon; its holes are places where nobody may go. It has no ceiling.
+The fence is a polygon; its holes are keep-out areas. It has no ceiling.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -4,7 +4,7 @@ One accuracy holds for all of m2pem. East, north and up are exact to 1 micrometr
 ground that goes from metres to degrees and back moves by less than 1 mm within 50 km of the origin,
 1 cm within 100 km and 1 m within 500 km. A distance is that of the geodesic to 1 mm within 10 km,
 1 cm within 50 km and 2 m within 500 km. Heights above mean sea level and above the ellipsoid are
-not told apart.
+treated as the same.
 
 This is plain arithmetic: a simulation converts single places many thousand times, for which an
 array library takes some twenty times as long, and the command line need not load NumPy.

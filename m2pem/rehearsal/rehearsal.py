@@ -72,7 +72,7 @@ def refuse_commands(mission: Mission) -> None:
 def _commands(mission: Mission) -> Iterator[tuple[Activity, Behavior | ServiceCall, str]]:
     for task in mission.activities():
         if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
-            # A hold of nobody is a wait.
+            # A hold without a resource is a wait.
             if task.behavior.roles or task.behavior.name != "hold":
                 yield task, task.behavior, f"behavior {task.behavior.name}"
         elif isinstance(task, ServiceTask) and task.call and task.call.roles:
@@ -148,7 +148,7 @@ OnRecord = Callable[[StampedRecord], None]
 
 @dataclass(frozen=True, slots=True)
 class RehearsalResult(SimulationResult):
-    """`records` is empty when they were told to `on_record` instead."""
+    """`records` is empty when they were given to `on_record` instead."""
 
     @property
     def exit_status(self) -> int:

@@ -39,7 +39,7 @@ class Done(msgspec.Struct):
     files: list[MissionFile]
 
 
-async def rehearse_apart(
+async def rehearse_in_subprocess(
     mission: MissionSource,
     fleet: Fleet,
     *,

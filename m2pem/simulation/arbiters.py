@@ -21,34 +21,34 @@ from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.simulation.broadcast import DEFAULT_HZ, Broadcast
 from m2pem.simulation.detectors import Detectors
-from m2pem.simulation.event_queue import Agenda
+from m2pem.simulation.event_queue import EventQueue
 from m2pem.simulation.executions import Body, Effect, Execution, Strike
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.links import Links
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.planning import Launcher
+from m2pem.simulation.planning import Planner
 from m2pem.simulation.settings import Fault, FaultList, own_faults, read_settings
-from m2pem.simulation.simulation import Conductor
+from m2pem.simulation.simulation import Simulation
 from m2pem.simulation.state_file import Memory, StateFile
 from m2pem.simulation.trajectory import US_PER_S, Warp
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
 
 
-class Reach:
+class RadioRange:
     """Commands wait for a broken link; when it is broken for `lost_after_s`, all is lost."""
 
     def __init__(
         self,
         links: Links,
-        agenda: Agenda,
+        event_queue: EventQueue,
         memory: Memory,
-        conductor: Conductor,
+        simulation: Simulation,
         lost_after_s: Callable[[ResourceId], float],
     ) -> None:
         self._links = links
-        self._agenda = agenda
+        self._event_queue = event_queue
         self._memory = memory
-        self._conductor = conductor
+        self._simulation = simulation
         self._lost_after_s = lost_after_s
 
     def command(
@@ -59,7 +59,7 @@ class Reach:
         if vehicle is None:
             act(now_us)
         elif self._links.lost(vehicle):
-            self._conductor.abandon(execution, f"{vehicle} is not heard", now_us)
+            self._simulation.abandon(execution, f"{vehicle} is not heard", now_us)
         else:
             # Another of its links may be broken still when this one is mended.
             self._links.defer(
@@ -75,7 +75,7 @@ class Reach:
         self._links.cut(vehicle)
         cuts = self._links.cuts(vehicle)
         after_us = round(self._lost_after_s(vehicle) * US_PER_S)
-        self._agenda.at(now_us + after_us, lambda at_us: self._give_up(vehicle, cuts, at_us))
+        self._event_queue.at(now_us + after_us, lambda at_us: self._give_up(vehicle, cuts, at_us))
 
     def _give_up(self, vehicle: ResourceId, cuts: int, now_us: int) -> None:
         if self._links.up(vehicle) or self._links.cuts(vehicle) != cuts:
@@ -84,7 +84,7 @@ class Reach:
         reason = f"{vehicle} was not heard for {self._lost_after_s(vehicle):g} s"
         for execution in list(self._memory.executions.values()):
             if vehicle in execution.carriers and not execution.reported_end:
-                self._conductor.abandon(execution, reason, now_us)
+                self._simulation.abandon(execution, reason, now_us)
 
 
 LOST_AFTER_S = 3.0
@@ -129,26 +129,28 @@ class SimArbiter:
             resource: default_hz if settings.telemetry_hz is None else settings.telemetry_hz
             for resource, settings in self._settings.items()
         }
-        self._agenda = Agenda(context.clock, context.logger)
+        self._event_queue = EventQueue(context.clock, context.logger)
         self._links = Links()
         self._memory = Memory()
-        self.broadcast = Broadcast(self._bodies, self._rates_hz, frame, self._agenda, self._audible)
-        self._launcher = Launcher(self._connections, context, frame, self._bodies)
-        self._conductor = Conductor(
-            agenda=self._agenda,
+        self.broadcast = Broadcast(
+            self._bodies, self._rates_hz, frame, self._event_queue, self._audible
+        )
+        self._planner = Planner(self._connections, context, frame, self._bodies)
+        self._simulation = Simulation(
+            event_queue=self._event_queue,
             memory=self._memory,
             bodies=self._bodies,
-            launcher=self._launcher,
+            planner=self._planner,
             links=self._links,
             logger=context.logger,
             changed=self._moved,
             lose_link=self._lose_link,
         )
-        self._reach = Reach(
-            self._links, self._agenda, self._memory, self._conductor, self._lost_after_s
+        self._reach = RadioRange(
+            self._links, self._event_queue, self._memory, self._simulation, self._lost_after_s
         )
         self._detectors = Detectors(
-            self._bodies, frame, self._agenda, self._detected, self._keep_found
+            self._bodies, frame, self._event_queue, self._detected, self._keep_found
         )
         self._epochs = EpochFence()
         self._faults = {
@@ -163,7 +165,7 @@ class SimArbiter:
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What the resource can do."""
-        return self._launcher.catalogue(resource)
+        return self._planner.catalogue(resource)
 
     def limits(self, resource: ResourceId) -> Limits:
         """The bounds that hold for the resource: how long it takes to stop from full speed."""
@@ -192,14 +194,14 @@ class SimArbiter:
         began_us, known = self._open_files(now_us)
         self._detectors.begin(began_us, lambda payload: known.get(payload, ()))
         self._links.muted = True
-        self._agenda.run_due(now_us)
+        self._event_queue.run_due(now_us)
         self._links.muted = False
         self.broadcast.begin(now_us)
         for payload, detection in self._late:
             self.broadcast.tell(payload, now_us, (detection,))
         self._late.clear()
         self._connected = True
-        self._agenda.wake()
+        self._event_queue.wake()
         if self._detectors.strangers:
             self._listener = asyncio.get_running_loop().create_task(self._listen())
 
@@ -232,7 +234,7 @@ class SimArbiter:
         if execution is None or execution.ended:
             return
         self._reach.command(
-            execution, "cancel", lambda at_us: self._conductor.cancel(execution, at_us), now_us
+            execution, "cancel", lambda at_us: self._simulation.cancel(execution, at_us), now_us
         )
 
     async def adjust(
@@ -251,7 +253,7 @@ class SimArbiter:
             self._reach.command(
                 execution,
                 "adjust",
-                lambda at_us: self._conductor.adjust(execution, wished, at_us),
+                lambda at_us: self._simulation.adjust(execution, wished, at_us),
                 now_us,
             )
 
@@ -282,7 +284,7 @@ class SimArbiter:
 
     async def close(self) -> None:
         """Stop simulating. Without a state file the vehicles are gone."""
-        await self._agenda.close()
+        await self._event_queue.close()
         listener, self._listener = self._listener, None
         if listener is not None:
             listener.cancel()
@@ -313,7 +315,7 @@ class SimArbiter:
 
         Not what may go on for ever: motion without an end, batteries that drain, telemetry.
         """
-        return self._agenda.expected > 0
+        return self._event_queue.expected > 0
 
     @property
     def searching(self) -> bool:
@@ -350,7 +352,7 @@ class SimArbiter:
 
     def _catch_up(self) -> int:
         now_us = self._clock.now_us()
-        self._agenda.run_due(now_us)
+        self._event_queue.run_due(now_us)
         return now_us
 
     def _start(self, execution: Execution, request: BehaviorRequest, now_us: int) -> None:
@@ -359,12 +361,12 @@ class SimArbiter:
         fault = self._take_fault(request) if strike is None else None
         if fault is not None and fault.kind == "reject":
             reason = "as the simulation was told"
-            self._conductor.reject(execution, fault.error or "REJECTED", reason, now_us)
+            self._simulation.reject(execution, fault.error or "REJECTED", reason, now_us)
             return
         if fault is not None:
             end = {"fail": "failed", "stall": "stalled", "lose_link": "lose_link"}[fault.kind]
             strike = Strike(fault.after_s, end, fault.error)
-        self._conductor.start(execution, request, strike, now_us)
+        self._simulation.start(execution, request, strike, now_us)
 
     def _take_fault(self, request: BehaviorRequest) -> Fault | None:
         for resource in request.resources:
@@ -379,7 +381,7 @@ class SimArbiter:
         if resource not in self._bodies:
             self._logger.warning("%s of %s ignored: it is not simulated here", command, resource)
             return
-        act = self._conductor.hold if command == "hold" else self._conductor.resume
+        act = self._simulation.hold if command == "hold" else self._simulation.resume
         vehicle = carrier_of(resource)
         if self._links.up(vehicle):
             act(resource, now_us)
@@ -447,7 +449,7 @@ class SimArbiter:
         for execution in executions:
             self._epochs.admit(execution.id, execution.epoch)
         self._links.muted = True
-        self._conductor.restore(executions, now_us)
+        self._simulation.restore(executions, now_us)
         return began_us, found
 
     def _keep_found(self, payload: ResourceId, found: Iterable[int]) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
-from m2pem.simulation.event_queue import Agenda, Entry
+from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.executions import Body
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
@@ -28,7 +28,7 @@ class Broadcast:
         bodies: Mapping[ResourceId, Body],
         rates_hz: Mapping[ResourceId, float],
         frame: FlatFrame,
-        agenda: Agenda,
+        event_queue: EventQueue,
         audible: Callable[[ResourceId], bool],
     ) -> None:
         # A state that carries a detection must not be lost to a slow reader.
@@ -38,9 +38,9 @@ class Broadcast:
         self._bodies = bodies
         self._rates_hz = rates_hz
         self._frame = frame
-        self._agenda = agenda
+        self._event_queue = event_queue
         self._audible = audible
-        self._next: dict[ResourceId, Entry] = {}
+        self._next: dict[ResourceId, TimedCall] = {}
         self._begun = False
         self._seen_from: dict[ResourceId, tuple[Vector, float, Look]] = {}
         self._seen: dict[ResourceId, tuple[GeoPosition, ...]] = {}
@@ -69,7 +69,7 @@ class Broadcast:
                 isinstance(body, SimVehicle) and body.pose(now_us).speed > 0
             )
             rate = rate if busy else min(rate, SLOWEST_HZ)
-            self._next[body.id] = self._agenda.at(
+            self._next[body.id] = self._event_queue.at(
                 now_us + round(US_PER_S / rate),
                 lambda at_us: self.tell(body, at_us),
                 background=True,

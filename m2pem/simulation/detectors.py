@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from m2pem.api.telemetry import Detection, GeoPosition
 from m2pem.mission.catalogue import ResourceId
-from m2pem.simulation.event_queue import Agenda, Entry
+from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.settings import Coordinates
@@ -22,7 +22,7 @@ class _Detector:
     payload: SimPayload
     carrier: SimVehicle | None
     found: set[int] = field(default_factory=set)
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[TimedCall] = field(default_factory=list)
 
 
 class Detectors:
@@ -36,12 +36,12 @@ class Detectors:
         self,
         bodies: Mapping[ResourceId, SimVehicle | SimPayload],
         frame: FlatFrame,
-        agenda: Agenda,
+        event_queue: EventQueue,
         found: Callable[[SimPayload, Detection, int], None],
         keep: Callable[[ResourceId, Iterable[int]], None],
     ) -> None:
         self._frame = frame
-        self._agenda = agenda
+        self._event_queue = event_queue
         self._found = found
         self._keep = keep
         self._detectors: list[_Detector] = []
@@ -59,7 +59,7 @@ class Detectors:
             for number, planned in enumerate(settings.detections):
                 if number not in detector.found:
                     at_us = began_us + round(planned.at_s * US_PER_S)
-                    self._agenda.at(at_us, self._finder(detector, number))
+                    self._event_queue.at(at_us, self._finder(detector, number))
             if detector.carrier is not None:
                 self._look(detector, detector.carrier.track.started_us)
 
@@ -115,7 +115,7 @@ class Detectors:
             at_us, near = _approach(detector.carrier, target, reach, now_us)
             if at_us is not None:
                 call = self._finder(detector, number) if near else self._looker(detector)
-                detector.entries.append(self._agenda.at(at_us, call, background=not near))
+                detector.entries.append(self._event_queue.at(at_us, call, background=not near))
 
     def _finder(self, detector: _Detector, number: int) -> Callable[[int], None]:
         return lambda at_us: self._find(detector, number, at_us)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from m2pem.api.clock import Clock
 
 
-class Entry:
+class TimedCall:
     """One call to come; `cancel` makes it not come."""
 
     __slots__ = ("_over", "at_us", "call", "number")
@@ -33,11 +33,11 @@ class Entry:
             self._over()
         return call
 
-    def __lt__(self, other: "Entry") -> bool:
+    def __lt__(self, other: "TimedCall") -> bool:
         return (self.at_us, self.number) < (other.at_us, other.number)
 
 
-class Agenda:
+class EventQueue:
     """Calls get the time that they were scheduled for, however late they come. So what happened
     while nobody looked can be caught up with, and nothing drifts.
 
@@ -48,18 +48,20 @@ class Agenda:
     def __init__(self, clock: Clock, logger: logging.Logger) -> None:
         self._clock = clock
         self._logger = logger
-        self._entries: list[Entry] = []
+        self._entries: list[TimedCall] = []
         self._numbers = itertools.count()
         self._sleeper: asyncio.Task[None] | None = None
         self._sleeping_until = 0
         self._awake = False
         self.expected = 0
 
-    def at(self, time_us: int, call: Callable[[int], None], *, background: bool = False) -> Entry:
+    def at(
+        self, time_us: int, call: Callable[[int], None], *, background: bool = False
+    ) -> TimedCall:
         """Schedule `call(time_us)`. Calls for the same time come in the order of scheduling."""
         over = self._background_over if background else self._expected_over
         self.expected += not background
-        entry = Entry(time_us, next(self._numbers), call, over)
+        entry = TimedCall(time_us, next(self._numbers), call, over)
         heapq.heappush(self._entries, entry)
         self._arm()
         return entry

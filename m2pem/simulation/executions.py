@@ -10,7 +10,7 @@ import msgspec
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.values import Value
-from m2pem.simulation.event_queue import Entry
+from m2pem.simulation.event_queue import TimedCall
 from m2pem.simulation.gimbals import Shots
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.pursuit import Pursuit
@@ -89,7 +89,7 @@ class Part:
     idle: bool = False
     chasing: bool = False
     done: bool = False
-    timer: Entry | None = None
+    timer: TimedCall | None = None
 
 
 @dataclass(slots=True)
@@ -114,7 +114,7 @@ class Execution:
     outcome: Outcome | None = None
     deaf: bool = False
     cancelling: bool = False
-    timer: Entry | None = None
+    timer: TimedCall | None = None
     shots: Shots | None = None
 
     @property

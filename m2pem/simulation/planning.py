@@ -85,7 +85,7 @@ class Assignment:
     shots: Shots | None = None
 
 
-class Launcher:
+class Planner:
     """Knows the bodies and where everybody is."""
 
     def __init__(
@@ -118,7 +118,7 @@ class Launcher:
         velocity = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
         return Pose((*level, up), state.yaw_rad or 0.0, velocity)
 
-    def lens(self, payload: ResourceId, now_us: int) -> GeoPosition | None:
+    def payload_position(self, payload: ResourceId, now_us: int) -> GeoPosition | None:
         """Where a payload is; None: where its vehicle is, is not known."""
         pose = self.whereabouts(carrier_of(payload), now_us)
         if pose is None:

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.simulation.event_queue import Agenda, Entry
+from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.executions import (
     Aim,
     Body,
@@ -24,7 +24,7 @@ from m2pem.simulation.kinematics import STANDING_LOAD
 from m2pem.simulation.links import Links
 from m2pem.simulation.local_parameters import RefusedError
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.planning import Assignment, Launcher
+from m2pem.simulation.planning import Assignment, Planner
 from m2pem.simulation.pursuit import STEP_S, Pursuit, steer
 from m2pem.simulation.state_file import Memory
 from m2pem.simulation.trajectory import US_PER_S, Plan
@@ -37,10 +37,10 @@ STEP = 0.05
 class Batteries:
     """`drained` is called when a battery has lost a step, and when it is empty."""
 
-    def __init__(self, agenda: Agenda, drained: Callable[[SimVehicle, int], None]) -> None:
-        self._agenda = agenda
+    def __init__(self, event_queue: EventQueue, drained: Callable[[SimVehicle, int], None]) -> None:
+        self._event_queue = event_queue
         self._drained = drained
-        self._entries: dict[ResourceId, Entry] = {}
+        self._entries: dict[ResourceId, TimedCall] = {}
 
     def look(self, vehicle: SimVehicle, now_us: int) -> None:
         """The vehicle's motion has changed: work out when its next step is lost."""
@@ -53,7 +53,7 @@ class Batteries:
         level = max(0.0, (math.ceil(left / STEP - 1e-9) - 1) * STEP)
         due = vehicle.drained_us(level, now_us)
         if due is not None:
-            self._entries[vehicle.id] = self._agenda.at(
+            self._entries[vehicle.id] = self._event_queue.at(
                 due, lambda at_us: self._drained(vehicle, at_us), background=True
             )
 
@@ -61,14 +61,14 @@ class Batteries:
 STEP_US = round(STEP_S * US_PER_S)
 
 
-def next_step(part: Part, launcher: Launcher, now_us: int) -> None:
+def next_step(part: Part, planner: Planner, now_us: int) -> None:
     """Give the body its motion until it looks again; a target that is not heard is waited for."""
     body = part.body
     if isinstance(body, SimVehicle) and isinstance(part.chase, Pursuit):
         pose = body.pose(now_us)
         chase = part.chase
         station, velocity = pose.place, (0.0, 0.0, 0.0)
-        if (target := launcher.whereabouts(chase.target, now_us)) is not None:
+        if (target := planner.whereabouts(chase.target, now_us)) is not None:
             station, velocity = chase.station(target), target.velocity
         phase = steer(
             body.kinematics,
@@ -80,10 +80,10 @@ def next_step(part: Part, launcher: Launcher, now_us: int) -> None:
         )
         body.take(Plan([phase]), now_us)
     elif isinstance(body, SimPayload) and isinstance(part.chase, Aim):
-        carrier = launcher.whereabouts(body.carrier, now_us)
+        carrier = planner.whereabouts(body.carrier, now_us)
         place = part.chase.place
         if part.chase.vehicle:
-            target = launcher.whereabouts(part.chase.vehicle, now_us)
+            target = planner.whereabouts(part.chase.vehicle, now_us)
             place = target.place if target is not None else place
             carrier = carrier if target is not None else None
         if carrier is None:
@@ -100,7 +100,7 @@ ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "revers
 """Behaviors whose speed can be changed on the way: they are over at a place, not after a time."""
 
 
-class Conductor:
+class Simulation:
     """Knows every behavior, running or remembered. All calls are made at their time `now_us`.
 
     `changed` is told of every body whose motion changes. `lose_link` is called with the vehicle
@@ -110,24 +110,24 @@ class Conductor:
     def __init__(
         self,
         *,
-        agenda: Agenda,
+        event_queue: EventQueue,
         memory: Memory,
         bodies: Mapping[ResourceId, Body],
-        launcher: Launcher,
+        planner: Planner,
         links: Links,
         logger: logging.Logger,
         changed: Callable[[Body, int], None],
         lose_link: Callable[[ResourceId, int], None],
     ) -> None:
         self.memory = memory
-        self._agenda = agenda
+        self._event_queue = event_queue
         self._bodies = bodies
-        self._launcher = launcher
+        self._planner = planner
         self._links = links
         self._logger = logger
         self._tell_changed = changed
         self._lose_link = lose_link
-        self._batteries = Batteries(agenda, self._drained)
+        self._batteries = Batteries(event_queue, self._drained)
 
     # --- commands -------------------------------------------------------------------------------
 
@@ -136,7 +136,7 @@ class Conductor:
     ) -> None:
         """Start a behavior, or report why not. It must be registered."""
         try:
-            assignments = self._launcher.assign(request, now_us)
+            assignments = self._planner.assign(request, now_us)
             self._check_free(request)
         except RefusedError as refused:
             self.reject(execution, refused.code, refused.reason, now_us)
@@ -329,7 +329,7 @@ class Conductor:
             execution.id,
             execution.watch.at(now_us)[0],
             now_us,
-            self._launcher.lens(camera, now_us) if shots.count else None,
+            self._planner.payload_position(camera, now_us) if shots.count else None,
             done=outcome.state is BehaviorState.SUCCEEDED,
         )
         return replace(outcome, outputs=dict(outputs))
@@ -392,7 +392,7 @@ class Conductor:
         self._schedule(execution, part)
 
     def _step(self, execution: Execution, part: Part, now_us: int) -> None:
-        next_step(part, self._launcher, now_us)
+        next_step(part, self._planner, now_us)
         part.timer = self._next_step(execution, part, now_us)
 
     def _chase(self, execution: Execution, part: Part, now_us: int) -> None:
@@ -400,8 +400,8 @@ class Conductor:
         self._changed(part.body, now_us)
         self.memory.save(execution)
 
-    def _next_step(self, execution: Execution, part: Part, now_us: int) -> Entry:
-        return self._agenda.at(
+    def _next_step(self, execution: Execution, part: Part, now_us: int) -> TimedCall:
+        return self._event_queue.at(
             now_us + STEP_US, lambda at_us: self._chase(execution, part, at_us), background=True
         )
 
@@ -425,7 +425,7 @@ class Conductor:
         if execution.cancelling and track.warp.target == 0:
             due = track.warp.settled_us if due is None else min(due, track.warp.settled_us)
         if due is not None:
-            part.timer = self._agenda.at(
+            part.timer = self._event_queue.at(
                 due, lambda at_us: self._plan_ended(execution, part, at_us)
             )
 
@@ -445,7 +445,7 @@ class Conductor:
             return
         due = execution.watch.when(strike.after_s)
         if due is not None:
-            execution.timer = self._agenda.at(
+            execution.timer = self._event_queue.at(
                 due, lambda at_us: self._struck(execution, strike, at_us)
             )
 
@@ -459,7 +459,7 @@ class Conductor:
         self._changed(body, now_us)
         track, end_us = body.track, body.track.end_us
         if end_us is not None and end_us > now_us:
-            self._agenda.at(end_us, lambda at_us: self._settled(body, track, at_us))
+            self._event_queue.at(end_us, lambda at_us: self._settled(body, track, at_us))
 
     def _settled(self, body: Body, track: object, now_us: int) -> None:
         if body.track is track:

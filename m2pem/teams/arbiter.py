@@ -19,11 +19,11 @@ from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet, LostMemberPolicy
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.teams.behavior import TeamBehavior
-from m2pem.teams.capabilities import Offers
+from m2pem.teams.capabilities import Capabilities
 from m2pem.teams.member import Member
 from m2pem.teams.plan import TeamRefusedError
 from m2pem.teams.restart import FoundParts, Reference, look_for_parts, read_reference
-from m2pem.teams.team_state import Scene, Scheme
+from m2pem.teams.team_state import TeamPlan, TeamSituation
 
 REMEMBERED = 1_000
 STATES_WAITING = 1_000
@@ -38,7 +38,7 @@ class _Remains:
     """What was found after a restart of a team behavior that is not whole any more."""
 
     request: BehaviorRequest
-    scheme: Scheme
+    scheme: TeamPlan
     found: FoundParts
     kept: Reference
 
@@ -56,13 +56,13 @@ class Teams:
         fleet: Fleet,
         arbiter_of: Callable[[ResourceId], Arbiter],
         context: ArbiterContext,
-        offers: Offers,
+        capabilities: Capabilities,
     ) -> None:
         self._fleet = fleet
         self._arbiter_of = arbiter_of
         self._context = context
-        self._offers = offers
-        self._scene = Scene(fleet, offers, context.bus, arbiter_of)
+        self._capabilities = capabilities
+        self._situation = TeamSituation(fleet, capabilities, context.bus, arbiter_of)
         self._ledger = BehaviorTracker(self.catalogue, _log)
         self._behaviors: dict[BehaviorId, TeamBehavior] = {}
         self._requests: dict[BehaviorId, BehaviorRequest] = {}
@@ -75,8 +75,8 @@ class Teams:
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What a vehicle can do beside others: what it can do alone, and the team behaviors in
         which it can take part by that."""
-        alone = self._offers.alone(resource)
-        together = self._offers.together(resource)
+        alone = self._capabilities.alone(resource)
+        together = self._capabilities.together(resource)
         names = {spec.name for spec in together}
         return (*together, *(spec for spec in alone.values() if spec.name not in names))
 
@@ -111,12 +111,12 @@ class Teams:
 
     async def start(self, request: BehaviorRequest) -> None:
         """Start a team behavior."""
-        await self._scene.until_seen(request, self._context.clock)
-        made: list[Scheme] = []
+        await self._situation.until_seen(request, self._context.clock)
+        made: list[TeamPlan] = []
 
         def refusal(wished: BehaviorRequest) -> str:
             try:
-                made.append(self._scene.scheme(wished, begun=False))
+                made.append(self._situation.scheme(wished, begun=False))
             except TeamRefusedError as error:
                 return str(error)
             return ""
@@ -155,10 +155,10 @@ class Teams:
         known = self._ledger.last(behavior)
         if known.state is not BehaviorState.UNKNOWN or request is None:
             return known
-        await self._scene.until_seen(request, self._context.clock)
+        await self._situation.until_seen(request, self._context.clock)
         kept = read_reference(native_ref)
         try:
-            scheme = self._scene.scheme(request, begun=True, split=kept.split)
+            scheme = self._situation.scheme(request, begun=True, split=kept.split)
         except TeamRefusedError as error:
             return replace(known, reason=f"it cannot be gone on with: {error}")
         found = await look_for_parts(request, scheme.plan, kept, self._arbiter_of)
@@ -197,7 +197,7 @@ class Teams:
         return self._states.read()
 
     async def close(self) -> None:
-        """Marshal nobody any more. Vehicles keep doing what they do."""
+        """FormationController nobody any more. Vehicles keep doing what they do."""
         for behavior in self._behaviors.values():
             behavior.close()
         self._states.close()
@@ -247,7 +247,7 @@ class Teams:
                 return behavior
         return None
 
-    def _make(self, request: BehaviorRequest, scheme: Scheme) -> TeamBehavior:
+    def _make(self, request: BehaviorRequest, scheme: TeamPlan) -> TeamBehavior:
         def failed(member: ResourceId, reason: str) -> None:
             behavior.failed_to_start(member, reason)
 
@@ -268,7 +268,7 @@ class Teams:
             scheme.plan,
             members,
             self._context.clock,
-            lambda member: self._scene.look(member, scheme.frame),
+            lambda member: self._situation.look(member, scheme.frame),
             tell,
             lambda reference: self._ledger.refer(request.id, reference.text()),
             show,

@@ -9,7 +9,7 @@ from m2pem.fleet.parameters import accepted
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
 from m2pem.mission.geometry import Area, Route, VehiclePosition
 from m2pem.teams.paths import SPACING_M
-from m2pem.teams.plan import Leg, Plan, Setting, TeamRefusedError
+from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
 
 
 def split(whole: float, weights: Sequence[float], reaches: Sequence[float]) -> list[float] | None:
@@ -62,13 +62,13 @@ Pass: TypeAlias = Sequence[Place]
 """Its two ends; or the corners of a ring, the first of them again at the end."""
 
 
-def bands(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
+def lanes(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
     """The passes in their order, cut so that the ways over the area are as the shares."""
-    bands: list[list[Pass]] = [[] for _ in shares]
+    lanes: list[list[Pass]] = [[] for _ in shares]
     lengths = [math.dist(*each) for each in passes]
     for each, index in zip(passes, owners(lengths, shares), strict=True):
-        bands[index].append(each)
-    return bands
+        lanes[index].append(each)
+    return lanes
 
 
 def strips(
@@ -136,55 +136,55 @@ FLYING_STANDOFF_M = 30.0
 """When nobody says."""
 
 
-def survey(setting: Setting) -> Plan:
-    """The passes over the area in as many bands as there are members, the faster the wider, and
+def survey(context: PlanningContext) -> Plan:
+    """The passes over the area in as many lanes as there are members, the faster the wider, and
     none longer than its member lasts.
 
     Where all can survey an area themselves, with cameras that their arbiters trigger perhaps, each
     is given the area of its band; else each moves along the passes.
     """
-    area = setting.parameters.area
+    area = context.parameters.area
     if area is None:
         raise TeamRefusedError("parameter 'area': there is none")
-    rings = [[setting.level(corner) for corner in ring] for ring in area.rings]
-    heading = setting.parameters.heading_rad
+    rings = [[context.level(corner) for corner in ring] for ring in area.rings]
+    heading = context.parameters.heading_rad
     yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
-    spacing = setting.parameters.spacing_m or SURVEY_SPACING_M
+    spacing = context.parameters.spacing_m or SURVEY_SPACING_M
     try:
-        tracks = lawn_mower(rings, spacing, yaw, setting.parameters.overshoot_m)
+        tracks = lawn_mower(rings, spacing, yaw, context.parameters.overshoot_m)
     except ValueError as error:
         raise TeamRefusedError(f"parameter 'spacing': {error}") from None
-    wished = setting.parameters.speed_m_s
+    wished = context.parameters.speed_m_s
     passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
-    shares = setting.split or _shares(setting, rings[0], passes, wished)
-    themselves = all("area_survey" in setting.offered[member] for member in setting.members)
+    shares = context.split or _shares(context, rings[0], passes, wished)
+    themselves = all("area_survey" in context.offered[member] for member in context.members)
     behavior = "area_survey" if themselves else "single_vehicle_routing"
     legs: list[Leg] = []
     if themselves:
         parts = strips(rings, passes, yaw, shares)
-        for member, ring in zip(setting.members, parts, strict=True):
+        for member, ring in zip(context.members, parts, strict=True):
             if ring:
                 own = {
-                    **setting.parameters.only("speed", "overshoot"),
-                    "area": _band_area(setting, area, ring),
+                    **context.parameters.only("speed", "overshoot"),
+                    "area": _band_area(context, area, ring),
                     "heading": (math.pi / 2 - yaw) % math.tau,
                     "spacing": spacing,
                 }
-                legs.append(setting.leg(member, behavior, own))
+                legs.append(context.leg(member, behavior, own))
     else:
-        for member, band in zip(setting.members, bands(passes, shares), strict=True):
+        for member, band in zip(context.members, lanes(passes, shares), strict=True):
             if band:
-                places = (setting.coordinate(place, None) for each in band for place in each)
+                places = (context.coordinate(place, None) for each in band for place in each)
                 parameters = {"route": Route(tuple(places)), "speed": wished}
-                legs.append(setting.leg(member, behavior, parameters))
+                legs.append(context.leg(member, behavior, parameters))
     takes = {
-        member: frozenset(accepted(setting.offered[member][behavior])) for member in setting.members
+        member: frozenset(accepted(context.offered[member][behavior])) for member in context.members
     }
     return Plan(tuple(legs), shared=True, takes=takes, split=tuple(shares))
 
 
 def _shares(
-    setting: Setting, ring: Pass, passes: Sequence[Pass], wished_m_s: float | None
+    context: PlanningContext, ring: Pass, passes: Sequence[Pass], wished_m_s: float | None
 ) -> list[float]:
     """How many metres of the passes each member is to do: as its speed, within its endurance.
 
@@ -195,11 +195,11 @@ def _shares(
     corners = ring[:-1]
     middle = tuple(sum(axis) / len(corners) for axis in zip(*corners, strict=True))
     weights, reaches = [], []
-    for member in setting.members:
-        nominal_m_s = setting.motion(member).nominal_m_s
+    for member in context.members:
+        nominal_m_s = context.motion(member).nominal_m_s
         speed_m_s = nominal_m_s if wished_m_s is None else wished_m_s
-        way_s = 2 * math.dist(setting.stands[member].place, middle) / nominal_m_s
-        reach = reach_m(setting.lasts_s.get(member), way_s, speed_m_s)
+        way_s = 2 * math.dist(context.poses[member].place, middle) / nominal_m_s
+        reach = reach_m(context.lasts_s.get(member), way_s, speed_m_s)
         weights.append(speed_m_s)
         # A band ends with a pass: it may be longer than its share by the longest one.
         reaches.append(max(0.0, reach - max(lengths, default=0.0)))
@@ -207,7 +207,7 @@ def _shares(
     if shares is None:
         last = ", ".join(
             f"{member} {reach:.0f} m"
-            for member, reach in zip(setting.members, reaches, strict=True)
+            for member, reach in zip(context.members, reaches, strict=True)
         )
         raise TeamRefusedError(
             f"the area has {sum(lengths):.0f} m of passes, and its members last for less: {last}; "
@@ -216,27 +216,27 @@ def _shares(
     return shares
 
 
-def _band_area(setting: Setting, area: Area, rings: Sequence[Pass]) -> Area:
+def _band_area(context: PlanningContext, area: Area, rings: Sequence[Pass]) -> Area:
     """A part of the area, at the height that it says."""
     up_m = area.rings[0][0][2]
     return Area(
-        tuple(tuple(setting.coordinate(corner, up_m) for corner in ring) for ring in rings),
+        tuple(tuple(context.coordinate(corner, up_m) for corner in ring) for ring in rings),
         area.altitude_frame,
     )
 
 
-def observe(setting: Setting) -> Plan:
+def observe(context: PlanningContext) -> Plan:
     """Each goes to a place of its own around the area or target, looks at it, and stays."""
-    area = setting.parameters.area
+    area = context.parameters.area
     legs = []
-    for index, member in enumerate(setting.members):
-        angle = math.tau * index / len(setting.members)
-        flies = setting.domains[member] == "air"
+    for index, member in enumerate(context.members):
+        angle = math.tau * index / len(context.members)
+        flies = context.domains[member] == "air"
         if area is None:
-            centre = setting.target_place()
+            centre = context.target_place()
             reach = FLYING_STANDOFF_M if flies else STANDOFF_M
         else:
-            ring = [setting.level(corner) for corner in area.rings[0]]
+            ring = [context.level(corner) for corner in area.rings[0]]
             corners = ring[:-1]
             centre = (
                 sum(east for east, _ in corners) / len(corners),
@@ -245,8 +245,8 @@ def observe(setting: Setting) -> Plan:
             reach = _reach(ring, centre, angle)
         place = (centre[0] + reach * math.cos(angle), centre[1] + reach * math.sin(angle))
         heading = (math.pi / 2 - (angle + math.pi)) % math.tau
-        legs.append(setting.to_place(member, place, heading))
-    return Plan(tuple(legs), stays=True, duration_s=setting.parameters.duration_s)
+        legs.append(context.to_place(member, place, heading))
+    return Plan(tuple(legs), stays=True, duration_s=context.parameters.duration_s)
 
 
 def _reach(
@@ -261,22 +261,22 @@ def _reach(
     return found
 
 
-def escort(setting: Setting) -> Plan:
+def escort(context: PlanningContext) -> Plan:
     """Each keeps to a place of its own around the target, the first one ahead of it."""
-    spacing = setting.parameters.spacing_m or SPACING_M
-    target = setting.parameters.target
+    spacing = context.parameters.spacing_m or SPACING_M
+    target = context.parameters.target
     legs = []
-    for index, member in enumerate(setting.members):
-        angle = math.tau * index / len(setting.members)
+    for index, member in enumerate(context.members):
+        angle = math.tau * index / len(context.members)
         if not isinstance(target, VehiclePosition):
-            centre = setting.target_place()
+            centre = context.target_place()
             place = (centre[0] + spacing * math.cos(angle), centre[1] + spacing * math.sin(angle))
-            legs.append(setting.to_place(member, place))
+            legs.append(context.to_place(member, place))
             continue
         if target.vehicle == member:
             raise TeamRefusedError(f"parameter 'target': {member} cannot escort itself")
-        leg = setting.leg(member, "follow", {"target": target, "offset": spacing, "bearing": angle})
-        if len(setting.members) > 1 and "bearing" not in leg.parameters:
+        leg = context.leg(member, "follow", {"target": target, "offset": spacing, "bearing": angle})
+        if len(context.members) > 1 and "bearing" not in leg.parameters:
             raise TeamRefusedError(f"{member} follows without a bearing: all would be in one place")
         legs.append(leg)
     return Plan(tuple(legs), stays=True)

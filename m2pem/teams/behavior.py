@@ -9,10 +9,10 @@ from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import TeamMemberState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
-from m2pem.teams.formation_controller import Marshal
+from m2pem.teams.formation_controller import FormationController
 from m2pem.teams.member import Member
-from m2pem.teams.partition import Shares
-from m2pem.teams.plan import Plan, Stand
+from m2pem.teams.partition import Partition
+from m2pem.teams.plan import MemberPose, Plan
 from m2pem.teams.restart import Reference
 
 PERIOD_S = 0.25
@@ -49,7 +49,7 @@ class TeamBehavior:
         plan: Plan,
         members: Mapping[ResourceId, Member],
         clock: Clock,
-        look: Callable[[ResourceId], Stand | None],
+        look: Callable[[ResourceId], MemberPose | None],
         tell: Tell,
         refer: Callable[[Reference], None],
         show: Callable[[tuple[TeamMemberState, ...], float], None],
@@ -67,9 +67,9 @@ class TeamBehavior:
         self._refer = refer
         self._show = show
         self._goes_on = goes_on
-        self._shares = Shares(plan)
+        self._shares = Partition(plan)
         steady = [each.id for each in members.values() if not each.adjustable]
-        self._marshal = Marshal(plan.march, steady) if plan.march else None
+        self._controller = FormationController(plan.march, steady) if plan.march else None
         self._reference = Reference()
         self._told_running = False
         self._ended_meanwhile: list[BehaviorReport] = []
@@ -139,7 +139,7 @@ class TeamBehavior:
         """Whether anything may come of it by the passing of time alone."""
         if self._over or self._period_s() is None:
             return False
-        if self._ending is not None or self._marshal is None:
+        if self._ending is not None or self._controller is None:
             return True
         return self._clock.now_us() - self._stirred_us < STIRS_WITHIN_S * US_PER_S
 
@@ -183,7 +183,7 @@ class TeamBehavior:
     ) -> None:
         """After a restart, before `start`: what the arbiters know of the parts.
 
-        `halts`: the marshal has halted those that are held, and lets them go on.
+        `halts`: the controller has halted those that are held, and lets them go on.
         """
         self._told_running = True
         self._reference = kept
@@ -239,8 +239,8 @@ class TeamBehavior:
         self._note()
 
     def _drop(self, member: Member) -> None:
-        if self._marshal is not None:
-            self._marshal.drop(member.id)
+        if self._controller is not None:
+            self._controller.drop(member.id)
         self._shares.drop(member.id)
 
     # --- what is to be done now -----------------------------------------------------------------
@@ -342,7 +342,7 @@ class TeamBehavior:
         """Until the next look; None: nothing that takes time is under way."""
         if self._ending is not None:
             return PERIOD_S
-        if self._marshal is not None and any(member.goes for member in self.members.values()):
+        if self._controller is not None and any(member.goes for member in self.members.values()):
             return PERIOD_S
         if any(member.active and member.state is None for member in self.members.values()):
             return IDLE_PERIOD_S
@@ -365,23 +365,25 @@ class TeamBehavior:
                 return
         if self.paused:
             return
-        if self._marshal is not None:
-            self._march(self._marshal)
+        if self._controller is not None:
+            self._march(self._controller)
         if self._plan.duration_s is not None and self._shares.all_over:
             self._stayed_s += seconds
             if self._stayed_s >= self._plan.duration_s:
                 self._end_well()
 
-    def _march(self, marshal: Marshal) -> None:
+    def _march(self, controller: FormationController) -> None:
         seen = {}
         for member in self.members.values():
             stand = self._look(member.id) if member.in_sight and not member.lost else None
             if stand is not None:
                 seen[member.id] = stand
-        before = marshal.marks_m
-        for name, speed_m_s in marshal.step(seen, self._shares.arrived).items():
+        before = controller.marks_m
+        for name, speed_m_s in controller.step(seen, self._shares.arrived).items():
             self.members[name].go(speed_m_s, self.epoch)
-        if any(abs(now - then) > STIR_M for now, then in zip(marshal.marks_m, before, strict=True)):
+        if any(
+            abs(now - then) > STIR_M for now, then in zip(controller.marks_m, before, strict=True)
+        ):
             self._stirred_us = self._clock.now_us()
         if any(member.told_of for member in self.members.values()):
-            self._show(marshal.kept(), marshal.spacing_m)
+            self._show(controller.kept(), controller.spacing_m)

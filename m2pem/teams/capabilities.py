@@ -10,7 +10,7 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 
 
-class Offers:
+class Capabilities:
     """What the members of a fleet's teams offer alone and together, by their own arbiters."""
 
     def __init__(self, fleet: Fleet, arbiter_of: Callable[[ResourceId], Arbiter]) -> None:

@@ -8,7 +8,7 @@ from m2pem.fleet.parameters import read_offsets
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.teams.paths import SPACING_M, Path, Vector, beside, shifted, slot, trimmed
-from m2pem.teams.plan import Leg, March, Marcher, Plan, Setting, TeamRefusedError
+from m2pem.teams.plan import Leg, March, Marcher, Plan, PlanningContext, TeamRefusedError
 
 GAP_SHARE = 0.5
 """Of the spacing: what members in one lane keep at least, along the route."""
@@ -19,38 +19,38 @@ HEADROOM_SHARE = 0.4
 _SAME_PLACE_M = 0.01
 
 
-def march(setting: Setting, default_shape: str) -> Plan:
+def march(context: PlanningContext, default_shape: str) -> Plan:
     """All move together and keep their places; without a route they form up on the lead."""
-    shape, spacing = _shape(setting, default_shape)
-    route = setting.parameters.route
-    places = _places(setting, shape, spacing)
-    if setting.parameters.text("offsets"):
+    shape, spacing = _shape(context, default_shape)
+    route = context.parameters.route
+    places = _places(context, shape, spacing)
+    if context.parameters.text("offsets"):
         shape, spacing = "", min(math.dist(a, b) for a, b in combinations(places, 2))
     if route is None:
-        return Plan(_forming_up(setting, places, chained=False))
-    ways = _ways(setting, route, places)
+        return Plan(_forming_up(context, places, chained=False))
+    ways = _ways(context, route, places)
     marchers = tuple(
-        Marcher(way.member, way.path, way.back_m, way.left_m, setting.motion(way.member))
+        Marcher(way.member, way.path, way.back_m, way.left_m, context.motion(way.member))
         for way in ways
     )
     _refuse_wrong_order(marchers, spacing)
-    speed = _march_speed(setting, marchers, spacing)
-    legs = tuple(way.leg(setting, speed, None) for way in ways)
+    speed = _march_speed(context, marchers, spacing)
+    legs = tuple(way.leg(context, speed, None) for way in ways)
     return Plan(legs, March(marchers, spacing, speed, closes=shape == "column"))
 
 
-def one_by_one(setting: Setting) -> Plan:
+def one_by_one(context: PlanningContext) -> Plan:
     """Each sets off when the one before it has arrived, and stops behind it."""
-    shape, spacing = _shape(setting, "column")
-    route = setting.parameters.route
-    places = _places(setting, shape, spacing)
+    shape, spacing = _shape(context, "column")
+    route = context.parameters.route
+    places = _places(context, shape, spacing)
     if route is None:
-        return Plan(_forming_up(setting, places, chained=True))
-    ways = _ways(setting, route, places)
+        return Plan(_forming_up(context, places, chained=True))
+    ways = _ways(context, route, places)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
-    wished = setting.parameters.speed_m_s
+    wished = context.parameters.speed_m_s
     return Plan(
-        tuple(way.leg(setting, wished, after) for way, after in zip(ways, befores, strict=False))
+        tuple(way.leg(context, wished, after) for way, after in zip(ways, befores, strict=False))
     )
 
 
@@ -64,7 +64,7 @@ class _Way:
 
     def __init__(
         self,
-        setting: Setting,
+        context: PlanningContext,
         member: ResourceId,
         route: Sequence[Vector],
         place: tuple[float, float],
@@ -80,47 +80,49 @@ class _Way:
             kept = kept[-1:]
         self.places = kept
         marks = [*marks[: len(kept) - 1], end_mark]
-        begin = setting.stands[member].place
-        if not setting.begun:
+        begin = context.poses[member].place
+        if not context.begun:
             first = math.dist(begin, kept[0][:2])
             kept, marks = [(*begin, 0.0), *kept], [marks[0] - first, *marks]
         elif len(kept) == 1:
             kept, marks = [*kept, *kept], [*marks, *marks]
         self.path = Path(kept, marks)
 
-    def leg(self, setting: Setting, speed_m_s: float | None, after: ResourceId | None) -> Leg:
-        route = setting.parameters.route
+    def leg(
+        self, context: PlanningContext, speed_m_s: float | None, after: ResourceId | None
+    ) -> Leg:
+        route = context.parameters.route
         if len(self.places) < 2 or route is None:
-            return setting.to_place(self.member, self.places[0], after=after)
-        ups = [waypoint[2] for waypoint in _apart(setting, route)]
+            return context.to_place(self.member, self.places[0], after=after)
+        ups = [waypoint[2] for waypoint in _apart(context, route)]
         waypoints = tuple(
-            setting.coordinate(place, None if up is None else place[2])
+            context.coordinate(place, None if up is None else place[2])
             for place, up in zip(self.places, ups, strict=False)
         )
         wished = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
-        return setting.leg(self.member, "single_vehicle_routing", wished, after)
+        return context.leg(self.member, "single_vehicle_routing", wished, after)
 
 
-def _shape(setting: Setting, default: str) -> tuple[str, float]:
-    return setting.parameters.text("shape") or default, setting.parameters.spacing_m or SPACING_M
+def _shape(context: PlanningContext, default: str) -> tuple[str, float]:
+    return context.parameters.text("shape") or default, context.parameters.spacing_m or SPACING_M
 
 
-def _places(setting: Setting, shape: str, spacing_m: float) -> list[tuple[float, float]]:
+def _places(context: PlanningContext, shape: str, spacing_m: float) -> list[tuple[float, float]]:
     """Where each member is to be, in metres behind the lead and to its left."""
-    text = setting.parameters.text("offsets")
+    text = context.parameters.text("offsets")
     if not text:
-        slots = (slot(shape, index) for index in range(len(setting.members)))
+        slots = (slot(shape, index) for index in range(len(context.members)))
         return [(back * spacing_m, left * spacing_m) for back, left in slots]
-    doubled = [name for name in ("shape", "spacing") if name in setting.parameters]
+    doubled = [name for name in ("shape", "spacing") if name in context.parameters]
     if doubled:
         raise TeamRefusedError(f"parameter 'offsets': it says what '{doubled[0]}' says, too")
     places = [(0.0, 0.0), *read_offsets(text)]
-    if len(places) < len(setting.members) or len(places) < 2:
+    if len(places) < len(context.members) or len(places) < 2:
         raise TeamRefusedError(
-            f"parameter 'offsets': there are {len(places) - 1} for {len(setting.members) - 1} "
+            f"parameter 'offsets': there are {len(places) - 1} for {len(context.members) - 1} "
             "members after the lead"
         )
-    return places[: max(2, len(setting.members))]
+    return places[: max(2, len(context.members))]
 
 
 def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
@@ -134,32 +136,34 @@ def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
                 )
 
 
-def _ways(setting: Setting, route: Route, offsets: Sequence[tuple[float, float]]) -> list[_Way]:
-    places = [(*setting.level(each), each[2] or 0.0) for each in _apart(setting, route)]
+def _ways(
+    context: PlanningContext, route: Route, offsets: Sequence[tuple[float, float]]
+) -> list[_Way]:
+    places = [(*context.level(each), each[2] or 0.0) for each in _apart(context, route)]
     return [
-        _Way(setting, member, places, offset)
-        for member, offset in zip(setting.members, offsets, strict=False)
+        _Way(context, member, places, offset)
+        for member, offset in zip(context.members, offsets, strict=False)
     ]
 
 
-def _apart(setting: Setting, route: Route) -> list[tuple[float, float, float | None]]:
-    """The waypoints that differ; a route of one begins where the lead stands."""
+def _apart(context: PlanningContext, route: Route) -> list[tuple[float, float, float | None]]:
+    """The waypoints that differ; a route of one begins where the lead is."""
     kept = [route.waypoints[0]]
     for waypoint in route.waypoints[1:]:
-        if math.dist(setting.level(waypoint), setting.level(kept[-1])) > _SAME_PLACE_M:
+        if math.dist(context.level(waypoint), context.level(kept[-1])) > _SAME_PLACE_M:
             kept.append(waypoint)
     if len(kept) == 1:
-        lead = setting.members[0]
-        here = setting.stands[lead].place
-        if math.dist(here, setting.level(kept[0])) <= 1.0:
+        lead = context.members[0]
+        here = context.poses[lead].place
+        if math.dist(here, context.level(kept[0])) <= 1.0:
             raise TeamRefusedError("parameter 'route': it is one place, and the lead is there")
-        kept.insert(0, setting.coordinate(here, kept[0][2]))
+        kept.insert(0, context.coordinate(here, kept[0][2]))
     return kept
 
 
-def _march_speed(setting: Setting, marchers: Sequence[Marcher], spacing_m: float) -> float:
+def _march_speed(context: PlanningContext, marchers: Sequence[Marcher], spacing_m: float) -> float:
     """As wished, but so that each can stop before it comes too near to the one in its lane."""
-    speed = setting.speed()
+    speed = context.speed()
     for index, marcher in enumerate(marchers):
         for other in marchers[:index]:
             if lane_mates(marcher, other, spacing_m):
@@ -170,10 +174,10 @@ def _march_speed(setting: Setting, marchers: Sequence[Marcher], spacing_m: float
 
 
 def _forming_up(
-    setting: Setting, places: Sequence[tuple[float, float]], *, chained: bool
+    context: PlanningContext, places: Sequence[tuple[float, float]], *, chained: bool
 ) -> tuple[Leg, ...]:
-    lead, *others = setting.members
-    stand = setting.stands[lead]
+    lead, *others = context.members
+    stand = context.poses[lead]
     if stand.yaw_rad is None:
         raise TeamRefusedError(f"the heading of {lead} is not known, on which the others form up")
     legs: list[Leg] = []
@@ -181,5 +185,5 @@ def _forming_up(
         back, left = places[index]
         place = beside(stand.place, stand.yaw_rad, back, left)
         after = others[index - 2] if chained and index > 1 else None
-        legs.append(setting.to_place(member, place, after=after))
+        legs.append(context.to_place(member, place, after=after))
     return tuple(legs)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from m2pem.api.telemetry import TeamMemberState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.columns import GAP_SHARE, lane_mates
-from m2pem.teams.plan import March, Marcher, Stand
+from m2pem.teams.plan import March, Marcher, MemberPose
 
 _SLACK_S = 1.5
 _LOOK_AHEAD_M = 50.0
 _CRAWL_SHARE = 0.1
 _START_SHARE = 0.2
-"""Of the speed of the march: what is slower stands; what stands goes on at the second."""
+"""Of the speed of the march: what is slower stops; what stands goes on at the second."""
 
 _RESTART_SHARE = 0.1
 """Of the spacing: how much wider than needed a gap is when one who can but stop and go goes on."""
@@ -37,7 +37,7 @@ class _Track:
     arrived: bool = False
 
 
-class Marshal:
+class FormationController:
     """`steady`: members that can go or stop, but not slower; all others take any speed."""
 
     def __init__(self, march: March, steady: Collection[ResourceId] = ()) -> None:
@@ -71,7 +71,7 @@ class Marshal:
                 track.back_m = rank * self._march.spacing_m
 
     def step(
-        self, seen: Mapping[ResourceId, Stand], arrived: Collection[ResourceId] = ()
+        self, seen: Mapping[ResourceId, MemberPose], arrived: Collection[ResourceId] = ()
     ) -> dict[ResourceId, float]:
         """How fast each member may go now, in m/s; 0: it must stand.
 
@@ -113,7 +113,7 @@ class Marshal:
             )
         return tuple(states)
 
-    def _look(self, track: _Track, stand: Stand | None, arrived: bool) -> None:
+    def _look(self, track: _Track, stand: MemberPose | None, arrived: bool) -> None:
         path = track.marcher.path
         if arrived:
             track.arrived, track.mark_m = True, path.end_mark_m

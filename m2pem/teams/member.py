@@ -28,11 +28,11 @@ _log = logging.getLogger("m2pem.teams")
 
 
 class Member:
-    """The marshal's words go out one after the other. A hold and a resume by the run, and a cancel,
-    go at once, and what the marshal said last is then left unsaid if it has not gone out.
+    """Commands of the formation controller are sent one after the other. A hold and a resume by the
+    run, and a cancel, go at once; the controller's last command is dropped if it was not sent yet.
 
     `part`: the id of its part, "" before and between them. `state`: where that is; None: no word of
-    it yet. `paused`: a run holds it. `halted`: the marshal does. `lost`: why the team goes on
+    it yet. `paused`: a run holds it. `halted`: the controller does. `lost`: why the team goes on
     without it. `failed`: is told what an arbiter's `start` raised.
     """
 
@@ -161,7 +161,7 @@ class Member:
         return await self._turn(f"hold {self.id}", self._arbiter.hold(self.id))
 
     async def resume(self) -> str:
-        """The run lets it go; it stands on if the marshal wants it to. Returns as `hold`."""
+        """The run lets it go; it stays held if the controller wants that. Returns as `hold`."""
         self.paused = False
         if self.halted:
             return ""
@@ -190,7 +190,7 @@ class Member:
 
     @property
     def _obeys(self) -> bool:
-        """Whether the marshal may still tell it something."""
+        """Whether the controller may still tell it something."""
         return self.active and not self.paused and self._cancelled != self.part
 
     async def _halt(self) -> None:

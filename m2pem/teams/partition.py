@@ -34,7 +34,7 @@ class Errand:
     own: bool
 
 
-class Shares:
+class Partition:
     """The shares of a plan, by the member whose own each is.
 
     `again`: parts get new names, as arbiters may know the old ones, and that they have ended.

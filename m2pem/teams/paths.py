@@ -13,7 +13,7 @@ SPACING_M = 15.0
 
 
 def slot(shape: str, index: int) -> tuple[float, float]:
-    """Where member `index` (0 leads) stands: behind the lead and to its left, in spacings."""
+    """Return the place of member `index` (0 leads): behind the lead and left of it, in spacings."""
     rank, side = (index + 1) // 2, 1 if index % 2 else -1
     match shape:
         case "line":

@@ -105,7 +105,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class MemberPose:
     """Where a vehicle is on the plane; `yaw_rad` from east, counter-clockwise; None: not known."""
 
     place: tuple[float, float]
@@ -113,10 +113,10 @@ class Stand:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class PlanningContext:
     """What a plan is made from. `offered`: each member's own vehicle behaviors, by name.
 
-    `stands`: where each member is. `target`: where the vehicle is that `target` names. `begun`: the
+    `poses`: where each member is. `target`: where the vehicle is that `target` names. `begun`: the
     members are under way already (after a restart), not on their way to the route's start; what
     was split among them then was as `split` says. `cruises_m_s`: how fast members go that the fleet
     says it of. `lasts_s`: how long those can go on that it says that of.
@@ -127,8 +127,8 @@ class Setting:
     offered: Mapping[ResourceId, Mapping[str, BehaviorSpec]]
     parameters: BehaviorParameters
     frame: LocalFrame
-    stands: Mapping[ResourceId, Stand] = field(default_factory=dict)
-    target: Stand | None = None
+    poses: Mapping[ResourceId, MemberPose] = field(default_factory=dict)
+    target: MemberPose | None = None
     begun: bool = False
     cruises_m_s: Mapping[ResourceId, float] = field(default_factory=dict)
     lasts_s: Mapping[ResourceId, float] = field(default_factory=dict)
@@ -218,6 +218,6 @@ class Setting:
         if "goto" in self.offered[member]:
             wished = {"target": Point(there), "speed": speed, "heading": heading_rad}
             return self.leg(member, "goto", wished, after)
-        here = self.coordinate(self.stands[member].place, None)
+        here = self.coordinate(self.poses[member].place, None)
         wished_route = {"route": Route((here, there)), "speed": speed}
         return self.leg(member, "single_vehicle_routing", wished_route, after)

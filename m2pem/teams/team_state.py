@@ -13,11 +13,11 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.areas import escort, observe, survey
-from m2pem.teams.capabilities import Offers
+from m2pem.teams.capabilities import Capabilities
 from m2pem.teams.columns import march, one_by_one
-from m2pem.teams.plan import Leg, Plan, Setting, Stand, TeamRefusedError
+from m2pem.teams.plan import Leg, MemberPose, Plan, PlanningContext, TeamRefusedError
 
-PLANS: Mapping[str, Callable[[Setting], Plan]] = {
+PLANS: Mapping[str, Callable[[PlanningContext], Plan]] = {
     "formation": partial(march, default_shape="wedge"),
     "road_following_formation": partial(march, default_shape="column"),
     "road_sweep": partial(march, default_shape="line"),
@@ -43,25 +43,25 @@ LEFT_OVER = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Scheme:
+class TeamPlan:
     """A plan, and the plane that its places are in."""
 
     plan: Plan
     frame: LocalFrame
 
 
-class Scene:
+class TeamSituation:
     """Looks through the fleet's bus, and through arbiters that need not wait for telemetry."""
 
     def __init__(
         self,
         fleet: Fleet,
-        offers: Offers,
+        capabilities: Capabilities,
         bus: FleetBus,
         arbiter_of: Callable[[ResourceId], Arbiter],
     ) -> None:
         self._fleet = fleet
-        self._offers = offers
+        self._capabilities = capabilities
         self._bus = bus
         arbiters = {vehicle: arbiter_of(vehicle) for vehicle in fleet.vehicles}
         self._sighted = {
@@ -72,7 +72,7 @@ class Scene:
 
     def scheme(
         self, request: BehaviorRequest, *, begun: bool, split: tuple[float, ...] = ()
-    ) -> Scheme:
+    ) -> TeamPlan:
         """What each member of a request does. `split`: the shares that they have, if they have.
 
         Raises:
@@ -81,7 +81,7 @@ class Scene:
         if not request.resources:
             raise TeamRefusedError(f"{request.behavior} has no members")
         if request.behavior not in PLANS:
-            return Scheme(alike(request), LocalFrame((0.0, 0.0)))
+            return TeamPlan(alike(request), LocalFrame((0.0, 0.0)))
         states = {member: self._state(member) for member in request.resources}
         for member, state in states.items():
             if state is None:
@@ -95,13 +95,13 @@ class Scene:
         if parameters.target_vehicle is not None:
             seen = self.look(ResourceId(parameters.target_vehicle), frame)
         vehicles = {each: self._fleet.vehicles[each] for each in request.resources}
-        setting = Setting(
+        context = PlanningContext(
             request.resources,
             {each: vehicle.domain.value for each, vehicle in vehicles.items()},
-            {each: self._offers.alone(each) for each in request.resources},
+            {each: self._capabilities.alone(each) for each in request.resources},
             parameters,
             frame,
-            {each: stand_of(frame, state) for each, state in states.items() if state is not None},
+            {each: pose_of(frame, state) for each, state in states.items() if state is not None},
             seen,
             begun,
             {each: v.cruise_speed_m_s for each, v in vehicles.items() if v.cruise_speed_m_s},
@@ -112,7 +112,7 @@ class Scene:
             },
             split,
         )
-        return Scheme(PLANS[request.behavior](setting), frame)
+        return TeamPlan(PLANS[request.behavior](context), frame)
 
     async def until_seen(self, request: BehaviorRequest, clock: Clock) -> None:
         """Wait a moment for members that have not been heard since the start of the executive."""
@@ -122,10 +122,10 @@ class Scene:
             await clock.sleep(LOOK_EVERY_S)
             waited_s += LOOK_EVERY_S
 
-    def look(self, vehicle: ResourceId, frame: LocalFrame) -> Stand | None:
+    def look(self, vehicle: ResourceId, frame: LocalFrame) -> MemberPose | None:
         """Where a vehicle is; None: nobody knows."""
         state = self._state(vehicle)
-        return None if state is None else stand_of(frame, state)
+        return None if state is None else pose_of(frame, state)
 
     def _state(self, vehicle: ResourceId) -> VehicleState | None:
         sighted = self._sighted.get(vehicle)
@@ -144,9 +144,9 @@ def lasts_s(endurance_s: float, state: VehicleState | None) -> float:
     return endurance_s * max(0.0, (1.0 if charged is None else charged) - LEFT_OVER)
 
 
-def stand_of(frame: LocalFrame, state: VehicleState) -> Stand:
+def pose_of(frame: LocalFrame, state: VehicleState) -> MemberPose:
     """A vehicle on the plane; its position must be known."""
     if state.position is None:
         raise ValueError(f"the position of {state.resource} is not known")
     place = frame.to_local(state.position.latlon)
-    return Stand(place, state.yaw_rad)
+    return MemberPose(place, state.yaw_rad)

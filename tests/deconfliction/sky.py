@@ -89,4 +89,4 @@ def claim(
     now_us: int = NOW_US,
 ) -> str:
     """As the executive asks."""
-    return sky.claim(wished, kind, now_us, takes_altitude=True)
+    return sky.reserve(wished, kind, now_us, takes_altitude=True)

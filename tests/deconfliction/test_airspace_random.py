@@ -130,8 +130,8 @@ def test_two_that_may_both_go_meet_at_no_speed_whatever(
     sky = airspace("one", "two", vertical=VERTICAL_M, horizontal=HORIZONTAL_M)
     homes = {"one": (-30.0, 0.0, 0.0), "two": (30.0, 0.0, 0.0)}
     for name, task in (("one", first), ("two", second)):
-        sky.heard(state(name, *homes[name]))
-        sky.heard(state(name, *task[2]))
+        sky.received(state(name, *homes[name]))
+        sky.received(state(name, *task[2]))
     if claim(sky, requests(first, "one")) or claim(sky, requests(second, "two")):
         return
     if min(first[2][2], second[2][2]) > 0 and nearer_than_both(first[2], second[2]):
@@ -163,7 +163,7 @@ def test_two_on_crossing_routes_keep_apart_at_the_speeds_that_were_planned(
 ) -> None:
     sky = airspace("one", "two", vertical=VERTICAL_M, horizontal=HORIZONTAL_M, time=apart_s)
     for name, (begin, *_) in (("one", one), ("two", two)):
-        sky.heard(state(name, *begin, 30.0))
+        sky.received(state(name, *begin, 30.0))
     if math.dist(one[0], two[0]) < HORIZONTAL_M:
         return  # they were too near before
     ways = {}
@@ -171,7 +171,7 @@ def test_two_on_crossing_routes_keep_apart_at_the_speeds_that_were_planned(
         wished = request("single_vehicle_routing", name, route=route(*places), speed=v)
         if name == "two":
             seen = along(one, speed[0] * later_s)
-            sky.heard(state("one", *seen, 30.0, NOW_US + later_s * 1_000_000))
+            sky.received(state("one", *seen, 30.0, NOW_US + later_s * 1_000_000))
         if claim(sky, wished, now_us=NOW_US + start_s * 1_000_000):
             return
         ways[name] = (places, start_s, v)
@@ -196,8 +196,8 @@ def along(places: list[tuple[float, float]], way_m: float) -> tuple[float, float
 @pytest.mark.parametrize("time", [None, 20.0])
 def test_with_a_time_routes_may_cross_at_one_height(time: float | None) -> None:
     sky = airspace("one", "two", time=time)
-    sky.heard(state("one", -100, 0, 30))
-    sky.heard(state("two", 0, -400, 30))
+    sky.received(state("one", -100, 0, 30))
+    sky.received(state("two", 0, -400, 30))
     east = route((-100, 0), (100, 0))
     north = route((0, -400), (0, 400))
     assert not claim(sky, request("single_vehicle_routing", "one", route=east, speed=5.0))

@@ -164,9 +164,7 @@ def test_a_token_that_can_also_reach_a_taken_flow_does_not_delay_the_join() -> N
     assert play.answer(prompt="b").at == "after after"
 
 
-def test_a_token_that_must_pass_the_join_to_reach_an_empty_flow_does_not_delay_it() -> (
-    None
-):
+def test_a_token_that_must_pass_the_join_to_reach_an_empty_flow_does_not_delay_it() -> None:
     play = Play(
         """
         <startEvent id="start"/> <inclusiveGateway id="join"/> <userTask id="work"/>

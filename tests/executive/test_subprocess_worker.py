@@ -23,7 +23,7 @@ from m2pem.executive.subprocess_worker import apart
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.rehearsal.worker import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.verify.requirements.requirement import RequirementsError
 
 T = TypeVar("T")
@@ -50,7 +50,7 @@ def with_control(story: Callable[[Control], Awaitable[T]]) -> T:
             PluginManager(),
             SystemClock(),
             simulated=True,
-            rehearse=rehearse_apart,
+            rehearse=rehearse_in_subprocess,
         )
         async with executive:
             return await story(executive.control)

@@ -38,7 +38,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal import rehearsal
 from m2pem.rehearsal.answers import load_answers
 from m2pem.rehearsal.rehearsal import START_US, RehearsalResult, Sampler, rehearse, rehearse_async
-from m2pem.rehearsal.worker import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_in_subprocess
 
 SAMPLED_FROM_US = 1_000_000_000
 
@@ -587,7 +587,7 @@ from pathlib import Path
 from m2pem.journal.codec import record_line
 from m2pem.plugins import PluginManager
 from m2pem.fleet.fleet_file import load_fleet
-from m2pem.rehearsal.worker import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.rehearsal.rehearsal import rehearse
 
 def show(stamped):
@@ -633,7 +633,12 @@ def test_an_executive_rehearses_a_mission_with_its_fleet(tmp_path: Path) -> None
 
     async def main(clock: Any) -> tuple[RehearsalResult, list[Any]]:
         executive = Executive(
-            fleet(), MemoryJournal(), plugins, clock, simulated=True, rehearse=rehearse_apart
+            fleet(),
+            MemoryJournal(),
+            plugins,
+            clock,
+            simulated=True,
+            rehearse=rehearse_in_subprocess,
         )
         async with executive:
             result: Any = await executive.control.simulate(mission, answers=answers)

@@ -135,7 +135,7 @@ def test_a_detector_on_a_vehicle_elsewhere_hears_of_it_on_the_bus(simulate: Simu
     async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
         for east in (0.0, 30.0, 48.0):
             await bench.clock.sleep(1)
-            position = arbiter._launcher._frame.to_position((east, 0.0, 0.0))
+            position = arbiter._planner._frame.to_position((east, 0.0, 0.0))
             arbiter._context.bus.publish(
                 VehicleState(ResourceId("stranger"), bench.clock.now_us(), position)
             )

@@ -320,7 +320,7 @@ def test_a_held_follower_stands_and_catches_up_when_resumed(simulate: Simulate) 
 
 def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simulate) -> None:
     async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
-        frame = arbiter._launcher._frame
+        frame = arbiter._planner._frame
         stranger = ResourceId("stranger")
         arbiter._context.bus.publish(
             VehicleState(stranger, START_US, frame.to_position((200.0, 0.0, 0.0)), yaw_rad=0.0)

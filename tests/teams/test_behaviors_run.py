@@ -131,7 +131,7 @@ def test_members_cover_an_area_together_each_its_own_band(play: Play, arbiter: s
             assert near, (east, north)
     for one, two in pairwise("abc"):
         low, high = (rows(trails[name]) for name in (one, two))
-        assert max(low) < min(high), "the bands lie beside each other"
+        assert max(low) < min(high), "the lanes lie beside each other"
 
 
 @ARBITERS

@@ -1,4 +1,4 @@
-"""The marshal keeps members in their places: on random routes, with random carts and delays."""
+"""The controller keeps members in their places: on random routes, with random carts and delays."""
 
 import math
 from collections import deque
@@ -14,8 +14,8 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.behavior import PERIOD_S
 from m2pem.teams.columns import lane_mates, march
-from m2pem.teams.formation_controller import Marshal
-from m2pem.teams.plan import MOTIONS, March, Plan, Setting, Stand
+from m2pem.teams.formation_controller import FormationController
+from m2pem.teams.plan import MOTIONS, March, MemberPose, Plan, PlanningContext
 
 from .carts import FRAME, Cart
 from .conftest import route
@@ -39,8 +39,8 @@ class Field:
         brakes: list[float],
     ) -> None:
         names = [ResourceId(f"v{index}") for index in range(len(starts))]
-        stands = {n: Stand(at) for n, at in zip(names, starts, strict=True)}
-        setting = Setting(
+        poses = {n: MemberPose(at) for n, at in zip(names, starts, strict=True)}
+        setting = PlanningContext(
             tuple(names),
             dict.fromkeys(names, "ground"),
             {name: {"single_vehicle_routing": ROUTING} for name in names},
@@ -48,7 +48,7 @@ class Field:
                 {"route": route(*places), "shape": shape, "spacing": spacing_m, "speed": speed_m_s}
             ),
             _FRAME,
-            stands,
+            poses,
         )
         self.plan: Plan = march(setting, shape)
         assert self.plan.march is not None
@@ -62,10 +62,10 @@ class Field:
                 brake_m_s2=brakes[index],
                 ahead=[FRAME.to_local(each[:2]) for each in waypoints],
             )
-        self.marshal = Marshal(self.march, [ResourceId(name) for name in steady])
+        self.controller = FormationController(self.march, [ResourceId(name) for name in steady])
         self._steady = steady
         self._late = round(late_s / STEP_S)
-        self._seen: deque[dict[ResourceId, Stand]] = deque()
+        self._seen: deque[dict[ResourceId, MemberPose]] = deque()
         self._said: deque[dict[ResourceId, float]] = deque()
         self.stopped: set[ResourceId] = set()
         self.least_m: dict[tuple[ResourceId, ResourceId], float] = {}
@@ -75,11 +75,11 @@ class Field:
         """Until all have arrived; False if they have not in time."""
         each_steps = round(PERIOD_S / STEP_S)
         for tick in range(round(limit_s / STEP_S)):
-            self._seen.append({n: Stand(c.place, c.yaw_rad) for n, c in self.carts.items()})
+            self._seen.append({n: MemberPose(c.place, c.yaw_rad) for n, c in self.carts.items()})
             if len(self._seen) > self._late:
                 seen = self._seen.popleft()
                 if tick % each_steps == 0:
-                    self._said.append(self.marshal.step(seen, self.arrived()))
+                    self._said.append(self.controller.step(seen, self.arrived()))
                 else:
                     self._said.append({})
             if len(self._said) > self._late:
@@ -106,7 +106,7 @@ class Field:
     def mark(self, index: int) -> float:
         marcher = self.march.marchers[index]
         cart = self.carts[marcher.member]
-        track = self.marshal._tracks[marcher.member]
+        track = self.controller._tracks[marcher.member]
         return marcher.path.mark_m(marcher.path.find(cart.place, track.along_m, 50.0))
 
     def _measure(self) -> None:
@@ -118,7 +118,7 @@ class Field:
                     continue
                 pair = marchers[before].member, marcher.member
                 gap = marks[before] - marks[index]
-                if gap >= self.marshal.floor_m or pair in self.least_m:
+                if gap >= self.controller.floor_m or pair in self.least_m:
                     self.least_m[pair] = min(self.least_m.get(pair, gap), gap)
                 elif gap < self.nearest_m.get(pair, math.inf) and gap > 0:
                     self.nearest_m.setdefault(pair, gap)
@@ -230,13 +230,13 @@ def test_it_tells_how_well_each_keeps_its_place() -> None:
     field = Field([(0, 0), (500, 0)], starts, "column", 20.0, 4.0, frozenset(), 0.0, [2.0] * 4)
     names = list(field.carts)
     seen = {
-        names[0]: Stand((100.0, 0.0)),
-        names[1]: Stand((85.0, 0.0)),
-        names[2]: Stand((50.0, 3.0)),
+        names[0]: MemberPose((100.0, 0.0)),
+        names[1]: MemberPose((85.0, 0.0)),
+        names[2]: MemberPose((50.0, 3.0)),
     }
-    assert all(each.along_m is None for each in field.marshal.kept())
-    field.marshal.step(seen)
-    first, second, third, unseen = field.marshal.kept()
+    assert all(each.along_m is None for each in field.controller.kept())
+    field.controller.step(seen)
+    first, second, third, unseen = field.controller.kept()
     assert (first.along_m, first.gap_m) == (pytest.approx(0.0, abs=0.01), None)
     assert second.along_m == pytest.approx(5.0, abs=0.01)
     assert second.gap_m == pytest.approx(15.0, abs=0.01)
@@ -244,8 +244,8 @@ def test_it_tells_how_well_each_keeps_its_place() -> None:
     assert third.aside_m == pytest.approx(3.0, abs=0.01)
     assert third.gap_m == pytest.approx(35.0, abs=0.01)
     assert (unseen.along_m, unseen.aside_m, unseen.gap_m) == (None, None, None)
-    field.marshal.drop(names[1])
-    assert [each.resource for each in field.marshal.kept()] == [names[0], names[2], names[3]]
+    field.controller.drop(names[1])
+    assert [each.resource for each in field.controller.kept()] == [names[0], names[2], names[3]]
 
 
 def test_members_abreast_have_no_gap_and_are_off_their_own_lanes() -> None:
@@ -260,8 +260,8 @@ def test_members_abreast_have_no_gap_and_are_off_their_own_lanes() -> None:
         [2.0] * 2,
     )
     one, two = field.carts
-    field.marshal.step({one: Stand((100.0, 0.0)), two: Stand((98.0, 21.0))})
-    lead, other = field.marshal.kept()
+    field.controller.step({one: MemberPose((100.0, 0.0)), two: MemberPose((98.0, 21.0))})
+    lead, other = field.controller.kept()
     assert lead.gap_m is None
     assert other.gap_m is None
     assert other.along_m == pytest.approx(-2.0, abs=0.1)

@@ -19,7 +19,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point, Route, VehiclePosition
 from m2pem.teams.areas import strips
 from m2pem.teams.paths import Path, slot
-from m2pem.teams.plan import Plan, Setting, Stand, TeamRefusedError
+from m2pem.teams.plan import MemberPose, Plan, PlanningContext, TeamRefusedError
 from m2pem.teams.restart import Reference, read_reference
 from m2pem.teams.team_state import PLANS
 
@@ -32,16 +32,16 @@ FIELD = area((0, 0), (120, 0), (120, 60), (0, 60))
 
 def setting(
     *domains: str, offered: tuple[str, ...] = OFFERED, yaw: float | None = 0.0, **parameters: Any
-) -> Setting:
+) -> PlanningContext:
     names = [ResourceId(f"v{index}") for index in range(len(domains))]
     specs = {name: SHARED[name, BehaviorType.VEHICLE] for name in offered}
-    return Setting(
+    return PlanningContext(
         tuple(names),
         dict(zip(names, domains, strict=True)),
         {name: specs for name in names},  # noqa: C420
         BehaviorParameters(parameters),
         FRAME,
-        {name: Stand((-20.0 * index, 0.0), yaw) for index, name in enumerate(names)},
+        {name: MemberPose((-20.0 * index, 0.0), yaw) for index, name in enumerate(names)},
     )
 
 
@@ -134,7 +134,9 @@ def test_only_aircraft_are_told_an_altitude() -> None:
         ("road_sweep", setting("ground", route=route((0, 0), (0, 200_000))), "100 km away"),
     ],
 )
-def test_what_cannot_be_done_is_refused_by_name(behavior: str, wished: Setting, why: str) -> None:
+def test_what_cannot_be_done_is_refused_by_name(
+    behavior: str, wished: PlanningContext, why: str
+) -> None:
     with pytest.raises(TeamRefusedError, match=why):
         PLANS[behavior](wished)
 

@@ -11,7 +11,7 @@ from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.mission.catalogue import ResourceId
 from m2pem.teams.arbiter import Teams
-from m2pem.teams.capabilities import Offers
+from m2pem.teams.capabilities import Capabilities
 from m2pem.testing import ArbiterCase, ArbiterContract
 
 from .carts import ORIGIN, CartArbiter, WillingCartArbiter, Yard
@@ -35,7 +35,7 @@ class Crew(Teams):
         def arbiter_of(_: ResourceId) -> CartArbiter:
             return self.carts
 
-        super().__init__(fleet, arbiter_of, context, Offers(fleet, arbiter_of))
+        super().__init__(fleet, arbiter_of, context, Capabilities(fleet, arbiter_of))
 
     async def connect(self) -> None:
         await self.carts.connect()

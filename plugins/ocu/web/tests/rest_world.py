@@ -28,7 +28,7 @@ from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.rehearsal.worker import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_in_subprocess
 
 REPOSITORY = Path(__file__).parents[4]
 VIGNETTE = (REPOSITORY / "missions" / "vignette1.bpmn").read_text(encoding="utf-8")
@@ -115,7 +115,7 @@ async def rest_world(folder: Path) -> AsyncIterator[Rest]:
         SystemClock(20.0),
         simulated=True,
         speed=20.0,
-        rehearse=rehearse_apart,
+        rehearse=rehearse_in_subprocess,
     )
     async with executive:
         services = services_of(executive.control, folder)

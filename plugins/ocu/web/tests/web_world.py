@@ -23,7 +23,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import Journal, MemoryJournal
 from m2pem.plugins import PluginManager
-from m2pem.rehearsal.worker import rehearse_apart
+from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.testing import scenarios
 
 WITHIN_S = 10.0
@@ -278,7 +278,7 @@ def executive(journal: Journal, plugins: PluginManager | None = None) -> Executi
         SystemClock(SPEED),
         speed=SPEED,
         simulated=True,
-        rehearse=rehearse_apart,
+        rehearse=rehearse_in_subprocess,
     )
 
 
