@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from m2pem.bpmn import read_mission as load_mission
     from m2pem.fleet.fleet_file import load_fleet
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = ["__version__", "hookimpl", "load_fleet", "load_mission"]
 
