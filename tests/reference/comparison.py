@@ -14,7 +14,7 @@ signal, in any order. Between two inputs the model moves by itself until nothing
 that BPMN leaves the order of independent steps open. Mostly the order cannot be seen. Where it can
 (a branch ends the run while another goes on, a token comes to an inclusive join just before or just
 after it was activated), the reference has a trace for every order, and the engine, which has one
-queue and one order (docs/architecture.md, section 5, law 2), has one of them.
+queue and one order (docs/architecture.md, section 4, law 2), has one of them.
 
 So, for every reaction of the engine there must be the same one in the reference. And, as long as
 no order could be seen on the way, for each thing that the outside can do the engine must show a

@@ -2,7 +2,7 @@
 
 A task requests a behavior. A terminal report of its arbiter completes the task or throws its error.
 A fault of one of its resources throws that error. After a restart, an operator or the resume policy
-says what becomes of a behavior that is not as it was (docs/architecture.md, section 6).
+says what becomes of a behavior that is not as it was (docs/architecture.md, section 5).
 
 When an operator takes control of a vehicle, its behavior ends with error TAKEN_OVER, so that the
 mission can wait or go on another way, as its author drew it. Until the operator releases control,
