@@ -79,7 +79,7 @@ def parse_mission(
 
 
 def read_partly(data: bytes, file: str, library: Library | None = None) -> ReadingContext:
-    """What can be read of a mission's own file, whatever is wrong with it.
+    """Read as much of a mission's own file as can be read, whatever is wrong with it.
 
     Raises:
         MissionError: it is no BPMN 2.0 at all.
@@ -118,7 +118,7 @@ def _refusal(file: str, files: Files) -> MissionError:
 
 
 def _resolve(part: Part) -> None:
-    """Look up what is referred to within the file, and check what it is then."""
+    """Resolve references within the file, and check the elements that result."""
     context = part.context
     if not context.processes:
         root = part.document.root

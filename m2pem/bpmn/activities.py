@@ -60,7 +60,7 @@ def read_activity_attributes(
         return
     _note_default(context, element, node)
     if context.boolean(element, "isForCompensation", False, node.id):
-        context.undoing.add(node)
+        context.compensation_handlers.add(node)
     for attribute, (name, rule) in _QUANTITIES.items():
         text = element.get(name)
         if text is not None:
@@ -79,7 +79,7 @@ def read_activity_attributes(
 def _quantity(
     context: ReadingContext, element: etree._Element, name: str, text: str, rule: Rule
 ) -> int:
-    """How many tokens begin, or leave, an activity (table 10.3)."""
+    """Read the number of tokens that begin, or leave, an activity (table 10.3)."""
     if text.isascii() and text.isdecimal() and 1 <= int(text) <= MAX_QUANTITY:
         return int(text)
     context.findings.error(
@@ -99,7 +99,7 @@ def _note_default(context: ReadingContext, element: etree._Element, node: FlowNo
 
 
 def read_call_activity(context: ReadingContext, found: Children) -> CallActivity:
-    """A call activity; `resolve_calls` adds what data associations pass."""
+    """Read a call activity; `resolve_calls` adds what data associations pass."""
     inputs: list[Mapping] = []
     outputs: list[Mapping] = []
     called = found.element.get("calledElement", "")
@@ -283,7 +283,7 @@ GLOBAL_TASKS = frozenset(_GLOBAL_TASKS)
 
 
 def read_global_task(context: ReadingContext, element: etree._Element) -> Process:
-    """The process that calling a global task begins."""
+    """Read a global task as the process that calling it begins."""
     identifier = element.get("id", "")  # claimed with the root elements
     process = Process(
         identifier, element.get("name", ""), context.findings.line(element), global_task=True

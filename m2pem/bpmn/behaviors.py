@@ -42,7 +42,7 @@ class BehaviorReader:
         self._line = line
 
     def behavior(self, element: etree._Element) -> Behavior | None:
-        """A `<behavior>`; None when findings say why there is none."""
+        """Read a `<behavior>`; return None when it has errors, which are reported."""
         head: dict[str, str] = {}
         for name in ("type", "name"):
             text = _attribute(element, name)
@@ -110,7 +110,7 @@ class BehaviorReader:
         head[name] = text
 
     def service(self, element: etree._Element) -> ServiceCall | None:
-        """An `<m2pem:service class="...">`; None when it has no class."""
+        """Read an `<m2pem:service class="...">`; return None when it has no class."""
         parameters: list[Parameter] = []
         roles: list[Role] = []
         for child in self._children(element):
@@ -147,7 +147,7 @@ class BehaviorReader:
         return result
 
     def one_parameter(self, element: etree._Element) -> list[Parameter]:
-        """A `<property>`; nothing when a finding says why."""
+        """Read a `<property>`; return nothing when it has errors, which are reported."""
         name = _attribute(element, "name")
         text = _value_text(element)
         line = self._line(element)
@@ -168,7 +168,7 @@ class BehaviorReader:
         return self.roles([each for each in self._children(element) if local(each.tag) == "role"])
 
     def roles(self, elements: list[etree._Element]) -> list[Role]:
-        """The roles that some `<role>` elements say, without those that findings refuse."""
+        """Read `<role>` elements, without those that have errors, which are reported."""
         return [role for element in elements for role in self._role(element)]
 
     def _role(self, element: etree._Element) -> list[Role]:

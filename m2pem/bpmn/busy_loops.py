@@ -118,7 +118,7 @@ def _waiting(mission: Mission) -> set[FlowNode]:
 
 
 def _waits(node: FlowNode) -> bool:
-    """Whether a token waits on a node for the node's own sake."""
+    """Whether the node itself makes a token wait, whatever is in it."""
     match node:
         case UserTask() | AdHocSubProcess() | EventBasedGateway() | ComplexGateway():
             return True

@@ -18,7 +18,7 @@ _UNREAD = Shape(frozenset(), {})
 
 @dataclass(slots=True)
 class Children:
-    """One element's id and children; flow references are left out, since the flows say it all."""
+    """One element's id and children by tag, without `incoming` and `outgoing`."""
 
     element: etree._Element
     id: str
@@ -34,12 +34,12 @@ class Children:
         return text_of(found[0]) if found else ""
 
     def extensions(self) -> list[etree._Element]:
-        """What stands in its extension elements."""
+        """The children of its extension elements."""
         return [each for outer in self.children.get(EXTENSIONS, []) for each in outer]
 
 
 def read_children(context: ReadingContext, element: etree._Element, identifier: str) -> Children:
-    """Look at the attributes and children of an element, once."""
+    """Check an element's attributes and the order of its children; return the children."""
     shape = SHAPES.get(element.tag, _UNREAD)
     context.check_attributes(element, shape, identifier)
     result = Children(element, identifier)

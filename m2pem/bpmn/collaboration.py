@@ -29,7 +29,7 @@ from m2pem.suggestions import suggest_or
 
 
 def read_collaboration(context: ReadingContext, collaboration: etree._Element) -> None:
-    """Participants and message flows."""
+    """Read the participants and message flows of a collaboration."""
     context.optional_id(collaboration)
     for element in collaboration:
         name = local(element.tag) if element.tag.startswith(BPMN) else ""
@@ -100,7 +100,7 @@ def _warn(
 
 
 def read_lanes(context: ReadingContext, lane_set: etree._Element, process: Process) -> None:
-    """All lanes of a lane set, outer ones first."""
+    """Read all lanes of a lane set, outer ones first."""
     stack = [lane_set]
     while stack:
         outer = stack.pop()
@@ -121,7 +121,7 @@ def read_lanes(context: ReadingContext, lane_set: etree._Element, process: Proce
 
 
 def read_property(context: ReadingContext, element: etree._Element) -> None:
-    """A correlationProperty; what it refers to is looked up by `resolve_correlation`."""
+    """Keep a correlationProperty; `resolve_correlation` resolves its references."""
     identifier = context.claim(element)
     if identifier:
         context.correlation_properties[identifier] = element

@@ -1,7 +1,7 @@
-"""What undoes what (BPMN 2.0.2, clauses 10.7.1 and 13.5.5).
+"""Compensation: which activity compensates which (BPMN 2.0.2, clauses 10.7.1 and 13.5.5).
 
 A compensation boundary event and the activity that it leads to are joined by an association, not
-by a sequence flow. What is wrong with that is said by rules.
+by a sequence flow. `rules/compensation.py` checks them.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ ASSOCIATION = BPMN + "association"
 
 
 def read_association(context: ReadingContext, element: etree._Element) -> None:
-    """An association; only one of a compensation event has an effect."""
+    """Read an association; only one of a compensation event has an effect."""
     identifier = element.get("id", "")
     read_children(context, element, identifier)
     context.associations.append(
@@ -33,19 +33,19 @@ def read_association(context: ReadingContext, element: etree._Element) -> None:
 
 
 def note_compensation(context: ReadingContext) -> None:
-    """Note what is for compensation, before anything is linked: it does not begin by itself.
+    """Mark compensation handlers, before elements are linked: they do not begin by themselves.
 
-    That is what is marked so, and what a compensation event leads to all the same.
+    They are marked `isForCompensation`, or a compensation event leads to them.
     """
     for _, handler in _pairs(context):
-        context.undoing.add(handler)
-    for node in context.undoing:
+        context.compensation_handlers.add(handler)
+    for node in context.compensation_handlers:
         context.self_starting.add(node)
         _set(node, "for_compensation", True)
 
 
 def link_compensation(context: ReadingContext) -> None:
-    """Give each activity what undoes it: the first, when several were drawn."""
+    """Link each activity to its compensation handler: the first, when several were drawn."""
     for event, handler in _pairs(context):
         activity = getattr(event, "attached_to", None)  # a dangling one has none
         if isinstance(activity, Activity) and activity.compensation is None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
-from m2pem.bpmn.extensions import looks_like_own, stranger_attribute
+from m2pem.bpmn.extensions import looks_like_own, unknown_own_attribute
 from m2pem.bpmn.file_findings import FileFindings, Where
 from m2pem.bpmn.foreign_syntax import expression_remedy, value_remedy
 from m2pem.bpmn.rules.attributes import BAD_EXPRESSION, BAD_VALUE, unknown_attribute
@@ -117,7 +117,7 @@ class PendingLoop:
 
 @dataclass(slots=True)
 class MessageUse:
-    """A place that sends or receives a message, which message flows may have to name."""
+    """An event or task that sends or receives a message, which message flows may have to name."""
 
     holder: MessageEventDefinition | SendTask | ReceiveTask
     node_id: str
@@ -179,14 +179,14 @@ class ReadingContext:
     message_uses: list[MessageUse] = field(default_factory=list)
     self_starting: set[FlowNode] = field(default_factory=set)
     """Refused nodes that need no incoming flow (event subprocesses, link targets, ...)."""
-    undoing: set[FlowNode] = field(default_factory=set)
+    compensation_handlers: set[FlowNode] = field(default_factory=set)
     """Activities that are marked `isForCompensation`."""
     associations: list[Drawn] = field(default_factory=list)
     broken: set[Container] = field(default_factory=set)
-    """Containers whose graph is not what was drawn, because a finding says so."""
+    """Containers with an error in their graph; further checks of it would mislead."""
 
     def claim(self, element: etree._Element) -> str:
-        """The element's id; says when it is taken. One that has none gets one.
+        """Return the element's id, and report one that is taken. An element without one gets one.
 
         Where nothing refers to an element, its id may be left out (BPMN 2.0.2, table 8.5).
         """
@@ -205,7 +205,7 @@ class ReadingContext:
         return identifier
 
     def _make_up(self, element: etree._Element) -> str:
-        """An id that no valid file has: `~` may not stand in one."""
+        """Make up an id that no valid file has: `~` is not allowed in one."""
         what = local(element.tag)
         flow = what == "sequenceFlow"
         ends = (element.get("sourceRef", ""), element.get("targetRef", ""))
@@ -251,7 +251,7 @@ class ReadingContext:
                 )
 
     def _own_attribute(self, element: etree._Element, identifier: str, name: str) -> None:
-        wrong = stranger_attribute(element.tag, name)
+        wrong = unknown_own_attribute(element.tag, name)
         if wrong is None:
             return
         known, message, remedy = wrong
@@ -294,7 +294,7 @@ class ReadingContext:
     def expression(
         self, where: Where, identifier: str, text: str, language: str | None = None
     ) -> Expression | None:
-        """An expression of any dialect; says why when it is none."""
+        """Parse an expression of any dialect; report a syntax error, and return None."""
         try:
             return self._parse(text, language)
         except ExpressionSyntaxError as error:
@@ -317,7 +317,7 @@ class ReadingContext:
                 raise error from None
 
     def template(self, where: Where, identifier: str, text: str) -> Expression | None:
-        """A text that may be an expression; says why when it is a wrong one."""
+        """Parse a text with or without `${...}`; report a syntax error, and return None."""
         try:
             return template(text)
         except ExpressionSyntaxError as error:
@@ -327,7 +327,7 @@ class ReadingContext:
     def value(
         self, where: Where, identifier: str, text: str, language: str | None = None
     ) -> Expression | None:
-        """What is copied somewhere: an expression, or a text with `${...}` parts."""
+        """Parse a value: an expression, or a text with `${...}` parts."""
         try:
             if MARK.search(text) and not text.lstrip().startswith("="):
                 return template(text)

@@ -46,7 +46,7 @@ class _Store:
     reads: list[Read] = field(default_factory=list)
     written: set[str] = field(default_factory=set)
     anything: bool = False
-    """Whether something may write any name: a service that nobody described."""
+    """Whether something may write any name, such as a service that is not registered."""
 
     def has(self, name: str) -> bool:
         """Whether the name, or a map that holds it, is written."""

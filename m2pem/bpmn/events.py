@@ -75,7 +75,7 @@ Root = TypeVar("Root", bound=RootElement)
 def read_definition(
     context: ReadingContext, element: etree._Element, event: Children, *, catches: bool
 ) -> EventDefinition | None:
-    """One definition of an event; None when findings say why there is none."""
+    """Read one definition of an event; return None when it has errors, which are reported."""
     found = read_children(context, element, event.id)
     line = context.findings.line(element)
     label = event.element.get("name", "")
@@ -143,7 +143,7 @@ def look_up(
 
 
 def _own(context: ReadingContext, event: Children, table: dict[str, Root], root: Root) -> Root:
-    """The root element of an event that names none."""
+    """Return a root element made up for an event that names none, and warn of that."""
     what = type(root).__name__.lower()
     context.findings.warning(
         event.element,
@@ -239,22 +239,22 @@ def read_event(context: ReadingContext, element: etree._Element, container: Cont
     """A start, end, intermediate or boundary event."""
     identifier = context.claim(element)
     found = read_children(context, element, identifier)
-    place = local(element.tag)
-    definitions = _definitions(context, found, place, container)
+    tag_name = local(element.tag)
+    definitions = _definitions(context, found, tag_name, container)
     name = element.get("name", "")
     line = context.findings.line(element)
     parallel = context.boolean(element, "parallelMultiple", False, identifier)
     event: Event
-    if place == "startEvent":
+    if tag_name == "startEvent":
         interrupting = context.boolean(element, "isInterrupting", True, identifier)
         event = StartEvent(identifier, name, line, definitions, parallel, interrupting)
         if not interrupting:
             _no_error(context, element, event)
-    elif place == "endEvent":
+    elif tag_name == "endEvent":
         event = EndEvent(identifier, name, line, definitions)
-    elif place == "intermediateThrowEvent":
+    elif tag_name == "intermediateThrowEvent":
         event = IntermediateThrowEvent(identifier, name, line, definitions)
-    elif place == "intermediateCatchEvent":
+    elif tag_name == "intermediateCatchEvent":
         event = IntermediateCatchEvent(identifier, name, line, definitions, parallel)
     else:
         event = _boundary(context, element, identifier, definitions, parallel)
@@ -302,13 +302,13 @@ def _no_error(context: ReadingContext, element: etree._Element, event: Event) ->
 
 
 def _definitions(
-    context: ReadingContext, found: Children, place: str, container: Container
+    context: ReadingContext, found: Children, tag_name: str, container: Container
 ) -> tuple[EventDefinition, ...]:
     elements = definition_elements(context, found)
-    awaited = place in _NEEDS_TRIGGER or (place == "startEvent" and _is_handler(container))
+    awaited = tag_name in _NEEDS_TRIGGER or (tag_name == "startEvent" and _is_handler(container))
     if awaited and not elements and not found.of("eventDefinitionRef"):
-        _no_trigger(context, found, place)
-    read = [_definition(context, found, place, container, each) for each in elements]
+        _no_trigger(context, found, tag_name)
+    read = [_definition(context, found, tag_name, container, each) for each in elements]
     return tuple(definition for definition in read if definition is not None)
 
 
@@ -354,14 +354,14 @@ def _is_handler(container: Container) -> bool:
 def _definition(
     context: ReadingContext,
     found: Children,
-    place: str,
+    tag_name: str,
     container: Container,
     definition: etree._Element,
 ) -> EventDefinition | None:
     """One of its definitions; None when a finding says what is wrong with it."""
     name = local(definition.tag).removesuffix("EventDefinition")
     embedded = not _is_handler(container) and not isinstance(container, Process)
-    if place == "startEvent" and embedded:
+    if tag_name == "startEvent" and embedded:
         context.findings.error(
             found.element,
             found.id,
@@ -372,13 +372,13 @@ def _definition(
         return None
     if name not in allowed_triggers(found.element):
         return None  # which a rule says
-    return read_definition(context, definition, found, catches=place in _CATCHING)
+    return read_definition(context, definition, found, catches=tag_name in _CATCHING)
 
 
 def referred_definition(
     context: ReadingContext, referring: etree._Element, attribute: str, name: str, identifier: str
 ) -> etree._Element | None:
-    """The event definition of the file that has an id; says so when there is none."""
+    """Return the event definition with an id, and report that there is none."""
     target = context.event_definitions.get(name)
     if target is None:
         context.findings.error(
@@ -391,9 +391,9 @@ def referred_definition(
     return target
 
 
-def _no_trigger(context: ReadingContext, found: Children, place: str) -> None:
+def _no_trigger(context: ReadingContext, found: Children, tag_name: str) -> None:
     word = kind(found.element.tag)
-    also = ", or make it an intermediateThrowEvent" if place == "intermediateCatchEvent" else ""
+    also = ", or make it an intermediateThrowEvent" if tag_name == "intermediateCatchEvent" else ""
     context.findings.error(
         found.element,
         found.id,
@@ -412,7 +412,7 @@ def is_link_target(node: FlowNode) -> bool:
 
 
 def resolve_links(context: ReadingContext) -> None:
-    """Link sources and targets, both ways; says which have no counterpart, or too many."""
+    """Link throwing and catching link events both ways; report those without a counterpart."""
     targets: dict[tuple[Container, str], IntermediateCatchEvent] = {}
     sources: dict[IntermediateCatchEvent, list[IntermediateThrowEvent]] = {}
     for node in context.nodes:

@@ -236,7 +236,7 @@ _WRAPPED = {("behavior", "role")}
 """Children that a reader names as misplaced: their wrapper was left out."""
 
 
-def strangers(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
+def unknown_content(element: etree._Element) -> Iterator[tuple[etree._Element, str, str]]:
     """Attributes and children that m2pem does not know, in one of its elements, at any depth.
 
     Each with where it is, what is wrong and what would be right. The element may be one of a
@@ -286,7 +286,7 @@ def _one_of(what: str, names: list[str] | tuple[str, ...]) -> str:
     return f"its {what} are: {', '.join(names)}" if names else ""
 
 
-def stranger_attribute(tag: str, name: str) -> tuple[bool, str, str] | None:
+def unknown_own_attribute(tag: str, name: str) -> tuple[bool, str, str] | None:
     """What is wrong with an attribute `m2pem:name` of a BPMN element; None: it has an effect.
 
     The first value is whether m2pem knows the name for other elements.

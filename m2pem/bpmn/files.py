@@ -73,7 +73,7 @@ class Part:
 
     @property
     def namespace(self) -> str:
-        """Its targetNamespace."""
+        """The targetNamespace of the file."""
         return str(self.document.root.get("targetNamespace", ""))
 
     def read_roots(self) -> None:
@@ -90,7 +90,7 @@ class Part:
         return identifier in self._drawn_ids or identifier in self.context.global_tasks
 
     def read(self) -> tuple[Process, ...]:
-        """Read what is in the processes, once; gives them back."""
+        """Read the content of the processes, once; return the processes."""
         if not self.is_read:
             self.is_read = True
             for element in self._drawn:
@@ -101,7 +101,7 @@ class Part:
         return tuple(self.context.processes)
 
     def process(self, identifier: str) -> Process:
-        """What `has` found."""
+        """Return the process, or that of the global task, which `has` found."""
         self.read()
         found = self._processes.get(identifier)
         if found is None:
@@ -127,7 +127,7 @@ class Part:
 
 
 def open_part(data: bytes, name: str, qualifier: str = "") -> Part:
-    """Parse a file, no more.
+    """Parse the XML of a file; nothing is read of it yet.
 
     Raises:
         MissionError: it is no BPMN 2.0.
@@ -192,7 +192,7 @@ class Files:
         return part
 
     def sources(self) -> tuple[Source, ...]:
-        """What the library gave."""
+        """The files that came from the library."""
         return tuple(
             Source(part.name, part.data, tuple(dict.fromkeys(part.answers)))
             for part in self.parts
@@ -280,7 +280,7 @@ _MAX_LISTED = 10
 
 
 def find_called(files: Files) -> set[Process]:
-    """Tell each call activity what it calls; gives back the processes that take part.
+    """Link each call activity to its called process; return the processes that take part.
 
     All of the mission's own file do, and of others those that are called, by whatever way. What
     cannot be found is reported.
@@ -429,8 +429,7 @@ def _inside(reached: set[Process], parts: list[Part]) -> set[Container]:
 
 
 def _qualify(part: Part) -> None:
-    """Put the file's name in front of ids; also of events' own signals and the like, which have
-    the id of their event and are nobody else's."""
+    """Put the file's name in front of ids, also of root elements made up for one event or task."""
     context = part.context
     elements: list[Element] = [*context.processes, *context.nodes]
     elements += [ends.flow for ends in context.flows]

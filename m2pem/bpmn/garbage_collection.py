@@ -1,4 +1,4 @@
-"""Reading and checking without Python's cyclic garbage collector: it would look again and again."""
+"""Pauses Python's cyclic garbage collector while missions are read and checked."""
 
 import gc
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ _unsearched = 0
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """Keep the collector off: what is read all stays, so that it finds nothing however it looks.
+    """Pause the collector: all that is read stays in use, so there is no garbage to find.
 
     Of a large mission it does not look afterwards either. Missions that are read and dropped are
     garbage in time: it looks when many have been read so.

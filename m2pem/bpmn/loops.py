@@ -374,7 +374,7 @@ def _keys(context: ReadingContext, refs: list[str]) -> Iterator[str]:
 
 
 def _is_not_own(node: Activity, key: str) -> None:
-    """The whole has it, not each instance."""
+    """Take a key out of the data of each instance: the activity as a whole has it."""
     object.__setattr__(node, "own_data", node.own_data - {key})
 
 

@@ -52,7 +52,7 @@ _SHAPE = SHAPES[SEQUENCE_FLOW]
 
 
 def read_flow(context: ReadingContext, element: etree._Element, container: Container) -> None:
-    """A sequence flow; its ends are looked up when all nodes are known."""
+    """Read a sequence flow; its ends are linked when all nodes are known."""
     identifier = context.claim(element)
     context.check_attributes(element, _SHAPE, identifier)
     condition = None
@@ -99,7 +99,7 @@ _NO_TARGETS = (StartEvent, BoundaryEvent)
 
 
 def link(context: ReadingContext) -> None:
-    """Link all elements."""
+    """Link nodes, flows and containers to each other, and report references to nothing."""
     nodes: dict[str, FlowNode] = {}
     for index, (node, container) in enumerate(zip(context.nodes, context.containers, strict=True)):
         _set(node, "index", index)
@@ -308,7 +308,7 @@ def _link_boundary(context: ReadingContext, nodes: dict[str, FlowNode]) -> None:
 
 
 def check_graph(context: ReadingContext) -> None:
-    """Find what can never begin, and conditions that nothing decides."""
+    """Report elements that can never begin, and conditions that are not evaluated."""
     _check_processes(context)
     for container in _containers(context):
         if container in context.broken:
@@ -366,7 +366,7 @@ def _check_start(context: ReadingContext, container: Container) -> None:
 
 
 def add_unreachable(context: ReadingContext) -> None:
-    """Say, of a mission that is refused anyway, what `lint` says of others."""
+    """Report the unreachable elements of a mission that has errors, as `lint` does of others."""
     for container in _containers(context):
         if container in context.broken or not container.entries:
             continue
@@ -377,7 +377,7 @@ def add_unreachable(context: ReadingContext) -> None:
 
 
 def unreachable(file: str, node: FlowNode) -> Finding:
-    """The finding about one of them."""
+    """Return the finding about an unreachable node."""
     what = "no start event can reach it" if node.container.starts else "nothing can reach it"
     remedy = "draw a sequence flow to it, or delete it"
     if isinstance(node, IntermediateCatchEvent):

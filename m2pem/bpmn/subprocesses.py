@@ -114,7 +114,7 @@ def _subprocess(context: ReadingContext, element: etree._Element, identifier: st
 def not_executed(
     context: ReadingContext, element: etree._Element, identifier: str, what: str, instead: str
 ) -> None:
-    """Refuse what is BPMN but nothing that m2pem runs."""
+    """Report an element of BPMN that m2pem does not execute."""
     context.findings.error(
         element, identifier, NOT_EXECUTED, f"m2pem does not execute {a(what)} yet", instead
     )
@@ -145,7 +145,7 @@ class _Frame:
 
 
 def read_process(context: ReadingContext, element: etree._Element) -> None:
-    """A process and all that it contains."""
+    """Read a process and all that it contains."""
     identifier = context.claim(element)
     process = Process(
         identifier,

@@ -10,7 +10,7 @@ from m2pem.bpmn.behaviors import BehaviorReader, is_behavior
 from m2pem.bpmn.children import Children, own_extensions
 from m2pem.bpmn.context import KEY, MessageUse, PendingPrompt, ReadingContext, association, text_of
 from m2pem.bpmn.events import look_up
-from m2pem.bpmn.extensions import strangers
+from m2pem.bpmn.extensions import unknown_content
 from m2pem.bpmn.foreign_syntax import script_remedy, statement_remedy
 from m2pem.bpmn.rules.activities import BAD_SCRIPT, DECISION_VALUE, EMPTY_SCRIPT, SCRIPT_LANGUAGE
 from m2pem.bpmn.rules.behaviors import DUPLICATE_PROPERTY, NO_SERVICE, TWO_BEHAVIORS, TWO_SERVICES
@@ -73,7 +73,7 @@ def read_service_task(context: ReadingContext, found: Children) -> ServiceTask:
 
 
 def read_business_rule_task(context: ReadingContext, found: Children) -> BusinessRuleTask:
-    """A business rule task: likewise."""
+    """Read a business rule task: a registered service, or a behavior."""
     return _service_task(context, found, BusinessRuleTask)
 
 
@@ -138,7 +138,7 @@ def _service_call(
 
 
 def _bound_elsewhere(found: Children) -> str:
-    """What another engine would do here, for the message."""
+    """Return a note for the message on how another engine binds the task."""
     for key in attribute_names(found.element):
         if key.startswith(_ENGINES) and local(key) in ("expression", "delegateExpression", "type"):
             value = found.element.get(key) or ""
@@ -423,7 +423,7 @@ def _script(
 
 
 def _language(found: Children) -> str:
-    """The attribute that says it (BPMN 2.0.2, tables 10.17 and 10.18)."""
+    """Return the name of the attribute with the language (BPMN 2.0.2, tables 10.17, 10.18)."""
     return "scriptLanguage" if found.element.tag == GLOBAL_SCRIPT else "scriptFormat"
 
 
@@ -480,7 +480,7 @@ def _behavior(
     element: etree._Element,
     line: Callable[[etree._Element], int],
 ) -> Behavior | None:
-    for where, message, remedy in strangers(element):
+    for where, message, remedy in unknown_content(element):
         context.findings.error(line(where), found.id, UNKNOWN_EXTENSION, message, remedy)
     return BehaviorReader(context, found.id, line).behavior(element)
 

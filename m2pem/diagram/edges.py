@@ -238,7 +238,7 @@ def _label(text: str, top: Point, width: float) -> Label:
 
 
 def _put(to: Group, label: Label, style: Style) -> Bounds:
-    """With a rim of paper around the letters, so that lines below do not hide them."""
+    """Write a label with a background-coloured outline, so that lines below do not hide it."""
     to.text(
         label.lines, *label.top, SIZE, fill=style.text, stroke=BACKGROUND,
         stroke_width=3, stroke_linejoin="round", paint_order="stroke",

@@ -43,7 +43,7 @@ _ORDER = {"participant": 0, "lane": 1, "boundaryEvent": 3}
 
 
 def remove_diagrams(definitions: Element) -> None:
-    """Forget where everything is."""
+    """Remove all diagrams from the file."""
     for diagram in [*definitions.iterchildren(f"{_DI}BPMNDiagram")]:
         definitions.remove(diagram)
 
@@ -80,7 +80,7 @@ def add_diagrams(definitions: Element) -> list[str]:
 
 
 def undrawn(definitions: Element) -> list[str]:
-    """The ids of flow nodes that no diagram shows, though it shows others beside them."""
+    """Return ids of flow nodes that no diagram shows, though it shows others of their container."""
     drawn = {referred_id(each.get("bpmnElement")) for each in _drawn(definitions)}
     return [
         name_of(each)
@@ -168,7 +168,7 @@ class _Writer:
             self._edge(plane, name, block)
 
     def collapse(self, subprocess: str) -> None:
-        """Its symbol, wherever it is, shows no inside."""
+        """Mark the shapes of a subprocess as collapsed."""
         for shape in self._root.iter(f"{_DI}BPMNShape"):
             if referred_id(shape.get("bpmnElement")) == subprocess:
                 shape.set("isExpanded", "false")

@@ -69,7 +69,7 @@ class Overlays:
         return found
 
     def styles(self) -> dict[str, Style]:
-        """By element that is marked, how it is drawn."""
+        """Return the style of each element that is pointed out."""
         found: dict[str, Style] = {}
         groups: Iterable[tuple[Iterable[str], Style]] = (
             (self.unreached, UNREACHED),
@@ -83,7 +83,7 @@ class Overlays:
         return found
 
     def legend(self) -> list[tuple[Style, str]]:
-        """What the marks that there are mean."""
+        """Return the entries of the legend: styles and what they mean."""
         meant = (
             (any(self.steps), ON_PATH, "the run, step by step"),
             (bool(self.stuck), IS_STUCK, "what is wrong, and where"),
@@ -95,7 +95,7 @@ class Overlays:
 
 
 def ids_of(picture: Picture) -> frozenset[str]:
-    """What is drawn."""
+    """Return the ids of all shapes and lines of a picture."""
     shapes = {shape.id for shape in picture.shapes}
     return frozenset(shapes | {line.id for line in picture.lines})
 
@@ -118,7 +118,7 @@ _AT_SHAPES = ((0.0, 0.0), (0.0, 1.0), (0.25, 0.0), (0.0, 0.4))
 
 
 class Badges:
-    """Draws the signs. `names`: where texts are."""
+    """Draws numbers of steps, and tokens. `names`: where texts are, which they do not cover."""
 
     def __init__(self, to: Group, names: Iterable[Bounds]) -> None:
         self.to = to
@@ -127,7 +127,7 @@ class Badges:
     def paint(
         self, overlays: Overlays, shapes: Mapping[str, Shape], points: Mapping[str, Sequence[Point]]
     ) -> None:
-        """All of them."""
+        """Draw the tokens and the numbers of steps."""
         styles = overlays.styles()
         for name in sorted(overlays.tokens):
             style = styles.get(name, WAITS)

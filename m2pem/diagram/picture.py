@@ -110,7 +110,7 @@ class Picture:
     parents: Mapping[str, str] = field(default_factory=dict)
 
     def box(self) -> Bounds:
-        """What holds all of it."""
+        """Return the rectangle around all shapes, lines and labels."""
         boxes = [shape.bounds for shape in self.shapes]
         labels = [each.label for each in self.shapes] + [each.label for each in self.lines]
         boxes += [label for label in labels if label is not None]

@@ -218,7 +218,7 @@ def _behavior_of(script: Element) -> Element | None:
 
 
 def _ours(element: Element) -> Element:
-    """The same in m2pem's namespace, as far as it is ours."""
+    """Copy an element; those of BPMN's or no namespace get m2pem's."""
     name = element.tag
     if not name.startswith("{") or name.startswith(_OURS):
         name = f"{M2PEM}{local(name)}"

@@ -148,7 +148,7 @@ def _references(definitions: Element) -> Iterator[str]:
 
 
 def _refer(definitions: Element, names: dict[str, str]) -> None:
-    """Let references say the other name."""
+    """Rename an id in all references."""
     for element in _elements(definitions):
         for key, value in element.attrib.items():
             if _ATTRIBUTES.fullmatch(str(key)):

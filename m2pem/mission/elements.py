@@ -2,7 +2,7 @@
 
 A `Mission` holds processes; a process or subprocess (`Container`) holds flow nodes and sequence
 flows; a node knows its incoming and outgoing flows and its container. Elements are compared and
-hashed by identity. Links are set once, by `m2pem.bpmn`, before anybody sees the mission.
+hashed by identity. Links are set once, by `m2pem.bpmn`, before the mission is used.
 
 Names are those of BPMN 2.0.2, chapter 10.
 """

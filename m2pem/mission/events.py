@@ -105,7 +105,7 @@ class TimerKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TimerEventDefinition(EventDefinition):
-    """`expression` gives a text that `m2pem.mission.timers` or `m2pem.mission.timers` reads."""
+    """`expression` gives a text that `m2pem.mission.timers` reads."""
 
     kind: TimerKind
     expression: Expression

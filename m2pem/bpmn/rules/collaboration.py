@@ -319,7 +319,7 @@ def _flow(tree: Tree, element: etree._Element) -> None:
         if end is not None:
             _carries(tree, element, end)
     if source is None or target is None:
-        return  # which a reader has said
+        return  # a reader has reported it
     if source.tag in CATCHING:
         tree.report(MESSAGE_FLOW_FROM_CATCH, element, f"{what(source)} is one")
     elif source.tag in THROWING and not has_trigger(tree, source, "message"):

@@ -2,7 +2,7 @@
 
 from lxml import etree
 
-from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, strangers
+from m2pem.bpmn.extensions import ELEMENTS, PLACES, looks_like_own, unknown_content
 from m2pem.bpmn.rules.rule import E, Rule, W
 from m2pem.bpmn.rules.tree import Checks, Tree, parent
 from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, ZEEBE, a, kind, local
@@ -127,7 +127,7 @@ def _own(tree: Tree, element: etree._Element, owner: etree._Element) -> None:
         places = [kind(place) for place in schema.places]
         right = f"it is for: {', '.join(places)}" if places else f"put it into {_wrappers(name)}"
         tree.report(MISPLACED_EXTENSION, element, f"m2pem:{name} on {a(kind(owner.tag))}", right)
-    for where, message, right in strangers(element):
+    for where, message, right in unknown_content(element):
         tree.report(UNKNOWN_EXTENSION, where, message, right)
 
 

@@ -159,7 +159,7 @@ def _subprocess(tree: Tree, element: etree._Element) -> None:
 
 
 def _same_events(tree: Tree) -> None:
-    """Interrupting event subprocesses of one scope for one event; whose is said first stands."""
+    """Report interrupting event subprocesses of one scope for one event, but for the first."""
     seen: dict[tuple[etree._Element, str, str], etree._Element] = {}
     for element in tree.root.iter(*SUBPROCESSES):
         if not is_true(element, "triggeredByEvent"):

@@ -28,7 +28,7 @@ _LEAST_WIDTH = 300
 
 
 def lay_out_file(definitions: Element) -> Block:
-    """Everything, with the corner of the paper at 0, 0.
+    """Everything, with the upper left corner at 0, 0.
 
     Raises:
         ValueError: the file has no process, or dangling references.
@@ -165,7 +165,7 @@ def _edge(block: Block, name: str, towards: Point) -> Point:
 
 
 def keep_sound(definitions: Element) -> None:
-    """Remove flows between what is not beside each other, and what hangs on nothing."""
+    """Remove flows and boundary events whose ends are not in the same container."""
     for container in [*definitions.iter(etree.Element)]:
         if tag(container) == "collaboration":
             _keep_flows_between_pools(container, definitions)

@@ -32,12 +32,12 @@ class Grid:
 
     @property
     def columns(self) -> int:
-        """How many there are."""
+        """The number of them."""
         return max((column for column, _ in self.cells.values()), default=-1) + 1
 
     @property
     def rows(self) -> int:
-        """How many there are."""
+        """The number of them."""
         rows = [row for _, row in self.cells.values()]
         rows += [row for way in self.ways.values() for row in way]
         return max(rows, default=-1) + 1
@@ -157,11 +157,11 @@ def _place(
     inside = set(component)
     mine = [link for link in links if link.at in inside]
     for column in range(max(columns[node] for node in component) + 1):
-        wishes: list[tuple[float, int, str, int, int | None]] = []
+        wanted_rows: list[tuple[float, int, str, int, int | None]] = []
         for order, node in enumerate(n for n in component if columns[n] == column):
             lane = rows.lanes.get(node, 0)
-            wish = _wish(node, lane, mine, columns, rows)
-            wishes.append((wish if wish is not None else -1, order, node, lane, wish))
+            wanted = _wanted_row(node, lane, mine, columns, rows)
+            wanted_rows.append((wanted if wanted is not None else -1, order, node, lane, wanted))
         for order, link in enumerate(mine):
             if columns[link.at] < column < columns[link.target]:
                 before = f"{link.id}@{column - 1}"
@@ -169,21 +169,21 @@ def _place(
                 if row is None:
                     row = rows.of[link.at] + _fan(link, mine)
                 lane = rows.lanes.get(link.at, 0)
-                wishes.append((row, order + 1000, f"{link.id}@{column}", lane, row))
-        for _, _, item, lane, wish in sorted(wishes):
-            rows.put(item, column, lane, wish)
+                wanted_rows.append((row, order + 1000, f"{link.id}@{column}", lane, row))
+        for _, _, item, lane, wanted in sorted(wanted_rows):
+            rows.put(item, column, lane, wanted)
 
 
-def _wish(
+def _wanted_row(
     node: str, lane: int, links: Sequence[Link], columns: Mapping[str, int], rows: _Rows
 ) -> int | None:
     """The row of the first that leads here; a fork's branches spread downwards."""
-    wishes = [
+    wanted_rows = [
         rows.of.get(f"{link.id}@{columns[node] - 1}", rows.of[link.at] + _fan(link, links))
         for link in links
         if link.target == node and rows.lanes.get(link.at, 0) == lane
     ]
-    return min(wishes, default=None)
+    return min(wanted_rows, default=None)
 
 
 def _fan(link: Link, links: Sequence[Link]) -> int:

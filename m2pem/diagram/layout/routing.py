@@ -57,7 +57,7 @@ class Router:
         self._sizes = sizes
 
     def add(self, link: Link) -> None:
-        """A flow."""
+        """Add a flow to be routed."""
         self._links.append(link)
         column, row = self._grid.cells[link.at]
         if link.below:
@@ -85,11 +85,11 @@ class Router:
     # --- where things are -----------------------------------------------------------------------
 
     def size(self) -> tuple[float, float]:
-        """Of the whole."""
+        """Return width and height of the whole layout."""
         return self._left(self._grid.columns), self._top(self._grid.rows)
 
     def corner(self, name: str) -> Point:
-        """The upper left one of a symbol."""
+        """Return the upper left corner of a symbol."""
         column, row = self._grid.cells[name]
         width, height = self._sizes[name]
         return (

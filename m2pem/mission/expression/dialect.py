@@ -36,7 +36,7 @@ def locate(text: str, language: str | None) -> tuple[Dialect, Span]:
     """The dialect of a text that is one expression, by its marks, else by its `language`.
 
     Raises:
-        ExpressionSyntaxError: the language is none of ours; the text is too long, or goes on
+        ExpressionSyntaxError: the language is not supported; the text is too long, or goes on
             outside its `${...}`.
     """
     _limit(text)

@@ -96,7 +96,7 @@ def _compare(node: Compare, read: ReadValue) -> Value:
     value = _RULES[type(node.left)](node.left, read)
     if type(right) is Literal:
         other = right.value
-        # What conditions mostly are; for a text or null, Python's `==` is already ours.
+        # What conditions mostly are; for a text or null, Python's `==` is the same.
         if other is None or type(other) is str:
             if operator is Comparison.EQUAL:
                 return value == other

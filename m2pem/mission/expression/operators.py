@@ -46,7 +46,7 @@ def kind(value: Value) -> str:
 
 
 def truth(value: Value, what: str) -> bool:
-    """The boolean, null being false. `what` names whoever asks, for the message."""
+    """The boolean, null being false. `what` names the value in the message."""
     if value is True or value is False:
         return value
     if value is None:
