@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeAlias
 
-from m2pem.rehearsal.svg import Canvas, text_width
-
 from bench.engines import Figure
 from bench.targets import Work
+from m2pem.diagram.style import width_of
+from m2pem.diagram.svg import Drawing, Group
 
 COLOURS = ("#0b6e4f", "#c1440e", "#3066be", "#8e44ad", "#7f6a00", "#00838f", "#ad1457")
-INK, FAINT, PAPER = "#222222", "#dddddd", "#ffffff"
+TEXT, FAINT = "#222222", "#dddddd"
+SIZE = 11.0
 WIDTH, HEIGHT = 380.0, 260.0
 LEFT, TOP, BOTTOM, GAP, RIGHT = 62.0, 58.0, 44.0, 30.0, 16.0
 DOT = 3.0
@@ -64,11 +65,10 @@ def draw(
     engines: Sequence[str],
 ) -> str:
     """A drawing of panels side by side; an engine's line ends with the largest size it bears."""
-    canvas = Canvas()
+    canvas = Drawing()
     step = LEFT + WIDTH + RIGHT + GAP
     width, height = len(panels) * step - GAP, TOP + HEIGHT + BOTTOM
-    canvas.rectangle(0, 0, width, height, PAPER)
-    canvas.text(LEFT, 20, title, INK, size=14, bold=True)
+    canvas.text_line(title, LEFT, 20, 14, fill=TEXT, font_weight="600")
     _legend(canvas, engines, width)
     for number, panel in enumerate(panels):
         _panel(canvas, LEFT + number * step, panel, sizes, engines)
@@ -83,18 +83,18 @@ def _peak_mb(figure: Figure) -> float:
     return figure.values["peak_kb"] / 1024
 
 
-def _legend(canvas: Canvas, engines: Sequence[str], width: float) -> None:
+def _legend(canvas: Group, engines: Sequence[str], width: float) -> None:
     x, y = LEFT + 190.0, 12.0
     for name, colour in zip(engines, COLOURS, strict=False):
-        if x + 15 + text_width(name) > width:
+        if x + 15 + width_of(name, SIZE) > width:
             x, y = LEFT + 190.0, y + 16
-        canvas.rectangle(x, y, 10, 10, colour)
-        canvas.text(x + 15, y + 9, name, INK)
-        x += text_width(name) + 40
+        canvas.rectangle(x, y, 10, 10, fill=colour)
+        canvas.text_line(name, x + 15, y + 9, SIZE, fill=TEXT)
+        x += width_of(name, SIZE) + 40
 
 
 def _panel(
-    canvas: Canvas,
+    canvas: Group,
     left: float,
     panel: Panel,
     sizes: Mapping[int, Mapping[str, Figure]],
@@ -114,22 +114,24 @@ def _panel(
     across = Axis.over([x for x, _ in shown], WIDTH)
     up = Axis.over([y for _, y in shown], HEIGHT)
     bottom = TOP + HEIGHT
-    canvas.text(left, TOP - 12, panel.title, INK, bold=True)
+    canvas.text_line(panel.title, left, TOP - 12, SIZE, fill=TEXT, font_weight="600")
     for power in range(across.low, across.high + 1):
         x = left + across.place(10.0**power)
-        canvas.line((x, TOP), (x, bottom), FAINT)
-        canvas.text(x, bottom + 16, f"{10**power:,}", INK, anchor="middle")
+        canvas.line((x, TOP), (x, bottom), stroke=FAINT)
+        label = f"{10**power:,}"
+        canvas.text_line(label, x, bottom + 16, SIZE, fill=TEXT, text_anchor="middle")
     for power in range(up.low, up.high + 1):
         y = bottom - up.place(10.0**power)
-        canvas.line((left, y), (left + WIDTH, y), FAINT)
-        canvas.text(left - 6, y + 4, f"{10.0**power:,g} {panel.unit}".strip(), INK, anchor="end")
+        canvas.line((left, y), (left + WIDTH, y), stroke=FAINT)
+        label = f"{10.0**power:,g} {panel.unit}".strip()
+        canvas.text_line(label, left - 6, y + 4, SIZE, fill=TEXT, text_anchor="end")
     for (name, points), colour in zip(lines.items(), COLOURS, strict=False):
-        group = Canvas(canvas, title=name)
+        group = canvas.group(title=name)
         places = [(left + across.place(x), bottom - up.place(y)) for x, y in points]
         for start, end in pairwise(places):
-            group.line(start, end, colour)
+            group.line(start, end, stroke=colour)
         for x, y in places:
-            group.rectangle(x - DOT, y - DOT, 2 * DOT, 2 * DOT, colour)
+            group.rectangle(x - DOT, y - DOT, 2 * DOT, 2 * DOT, fill=colour)
 
 
 def _good(figure: Figure | None) -> bool:

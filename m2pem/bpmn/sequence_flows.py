@@ -1,4 +1,8 @@
-"""Sequence flows: read, linked to their nodes, checked as a graph (BPMN 2.0.2, 8.4.13 and 13.2)."""
+"""Sequence flows: read, linked to their nodes, checked as a graph (BPMN 2.0.2, 8.4.13 and 13.2).
+
+`link` also links the other elements. Readers set fields of elements after these are made; nothing
+does so once the mission is read.
+"""
 
 from lxml import etree
 

@@ -181,7 +181,11 @@ _HEAD = ("type", "name")
 
 
 def lift_behaviors(definitions: Element) -> None:
-    """Move the behavior of each script into its task's extension elements, in one form."""
+    """Move the behavior of each script into its task's extension elements, in one form.
+
+    The other forms (docs/missions.md) are XML in a script: as elements, which editors cannot read,
+    or as text.
+    """
     for task in definitions.iter(*(f"{{{BPMN}}}{name}" for name in _SCRIPTS)):
         scripts = [*children(task, "script")]
         behavior = _behavior_of(scripts[0]) if len(scripts) == 1 else None

@@ -173,6 +173,7 @@ VALUES = Checks(
 TRUTHS = Checks({name: _truth(each) for name, each in _TRUTHS.items()})
 
 
+# The table of `schema.py` for the elements of BPMN that no reader looks into.
 _BASE = "documentation extensionElements"
 _ROLE = f"{_BASE} resourceRef resourceParameterBinding resourceAssignmentExpression"
 _ASSOCIATION = f"{_BASE} sourceRef targetRef transformation assignment"

@@ -1,4 +1,8 @@
-"""Conditions on the items of a list, under a name of their own."""
+"""Evaluates a syntax tree over the data store: the tree is walked, nothing is compiled.
+
+Most expressions of a mission are evaluated once or never, so that preparing them costs more than it
+saves.
+"""
 
 from collections.abc import Callable
 from typing import Any
