@@ -20,9 +20,9 @@ from typing import Any, TypeVar
 
 from bench.measured import peak_kb
 from m2pem.bpmn import parse_mission
-from m2pem.cli.verify import asked_of, findings
+from m2pem.cli.verify import findings, search_request
 from m2pem.executive.loading import load_source
-from m2pem.executive.verification import Engine
+from m2pem.executive.verification import SearchEngine
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import search as search_as_it_does
@@ -119,7 +119,7 @@ def required(how: str, xml: str, formula: str, limits: Limits, steps: Steps) -> 
 
 def checked(how: str, file: str, fleet: str | None, steps: Steps) -> tuple[int, str]:
     """What `m2pem verify` does; its steps are taken once before, to see what each of them takes."""
-    asked = asked_of(load_source(file), fleet, None, {})
+    asked = search_request(load_source(file), fleet, None, {})
     net = steps.step(
         "derive_s", lambda: simplify(translate(asked.mission, asked.fleet, options=asked.options))
     )
@@ -130,8 +130,8 @@ def checked(how: str, file: str, fleet: str | None, steps: Steps) -> tuple[int, 
         states = len(steps.step("search_s", lambda: search_as_it_does(net, limits)).states)
 
     def everything() -> Sequence[Result]:
-        asked = asked_of(load_source(file), fleet, None, {})
-        found = findings(asked, Engine(how, "exact", limits), strict=False)
+        asked = search_request(load_source(file), fleet, None, {})
+        found = findings(asked, SearchEngine(how, "exact", limits), strict=False)
         return found.results
 
     return states, verdicts(steps.step("all_s", everything))

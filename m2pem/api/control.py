@@ -73,7 +73,7 @@ class RunSummary:
 
 
 class StampedRecord(NamedTuple):
-    """A record with where it stands: `seq` counts from 1 in its run; `t_s` is mission time."""
+    """A record with its position: `seq` counts from 1 in its run; `t_s` is mission time."""
 
     run: RunId
     seq: int
@@ -83,7 +83,7 @@ class StampedRecord(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class OpenPrompt:
-    """A question that stands. The first answer to it wins."""
+    """A question that is open. The first answer to it wins."""
 
     run: RunId
     prompt: str
@@ -95,7 +95,7 @@ class OpenPrompt:
 
 @dataclass(frozen=True, slots=True)
 class PromptClosed:
-    """A question no longer stands: `decision` and `by` are "" when it was withdrawn."""
+    """A question is closed: `decision` and `by` are "" when it was withdrawn."""
 
     run: RunId
     prompt: str
@@ -254,7 +254,7 @@ class MissionControl(Protocol):
     def subscribe(
         self, run: RunId | None = None, size: int = 10_000
     ) -> AsyncIterator[ControlEvent]:
-        """What is committed from this call on, and first the prompts that stand now."""
+        """What is committed from this call on, and first the prompts that are open."""
         ...
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
@@ -273,7 +273,7 @@ class MissionControl(Protocol):
         ...
 
     def prompts(self) -> Sequence[OpenPrompt]:
-        """The prompts that stand now."""
+        """The prompts that are open."""
         ...
 
     async def mission(self, run: RunId) -> "Mission":

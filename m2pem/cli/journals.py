@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from m2pem.cli.options import UnusableError
-from m2pem.cli.status import Standing
+from m2pem.cli.status import RunStatusView
 from m2pem.errors import JournalError
 from m2pem.executive.runtime_directory import runtime_directory
 from m2pem.journal import Journal, MemoryJournal, RunInfo, default_url, file_of, open_journal
@@ -173,7 +173,7 @@ async def interrupted_runs(url: str | None) -> list[Interrupted]:
 
 
 async def _interrupted(journal: Journal, line: RunInfo) -> Interrupted:
-    standing = Standing(line)
+    standing = RunStatusView(line)
     async for entry in journal.read(line.run):
         for record in entry.records:
             standing.take(record)

@@ -107,10 +107,10 @@ async def _print(
     from m2pem.api.control import StampedRecord
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import US_PER_S, wants_colour
-    from m2pem.cli.status import Standing
+    from m2pem.cli.status import RunStatusView
     from m2pem.journal.codec import record_line
 
-    standing = Standing(line)
+    standing = RunStatusView(line)
     lines = LineFormatter(lambda _: standing.mission, colour=wants_colour(sys.stdout))
     async for entry in journal.read(line.run):
         for seq, record in enumerate(entry.records, entry.seq):

@@ -1,4 +1,4 @@
-"""Prints lines from a thread, so that a reader who stands still never holds up a mission."""
+"""Standard output and input for asyncio: a slow terminal or pipe never delays a mission."""
 
 import asyncio
 import codecs

@@ -1,4 +1,4 @@
-"""How a run stands by its journal: tokens, behaviors, prompts, data."""
+"""The status of a run by its journal: tokens, behaviors, prompts, data."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def run_of(line: RunInfo) -> MissionRun:
     return MissionRun(mission_of(header), restore(header.fleet) if header.fleet else None, line.run)
 
 
-class Standing:
+class RunStatusView:
     """The state of a run, rebuilt by applying its records."""
 
     def __init__(self, line: RunInfo) -> None:

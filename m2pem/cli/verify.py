@@ -23,7 +23,7 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from m2pem.executive.verification import Asked, Engine
+    from m2pem.executive.verification import SearchEngine, SearchRequest
     from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
     from m2pem.verify.report.findings import DescribedViolation, Findings
@@ -125,11 +125,11 @@ def verify(
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
     from m2pem.executive.loading import load_source
-    from m2pem.executive.verification import Engine
+    from m2pem.executive.verification import SearchEngine
     from m2pem.verify.report.data import as_data
     from m2pem.verify.search.explore import Limits
 
-    asked = asked_of(
+    asked = search_request(
         load_source(mission, search_path),
         fleet_file,
         process,
@@ -141,7 +141,7 @@ def verify(
         _emit(promela(asked), emit.partition("=")[2])
         return 0
     limits = Limits(states=max_states, seconds=max_seconds, tokens=3)
-    found = findings(asked, Engine(engine, storage, limits), strict=strict)
+    found = findings(asked, SearchEngine(engine, storage, limits), strict=strict)
     for file in reports:
         write(file, found)
     if output == "json":
@@ -189,7 +189,7 @@ _QUIET_S = 1.0
 _BETWEEN_LINES_S = 0.2
 
 
-def asked_of(
+def search_request(
     mission: "Mission",
     fleet_file: str | None,
     process: str | None,
@@ -197,7 +197,7 @@ def asked_of(
     spec: Path | None = None,
     *,
     timers_in_order: bool = False,
-) -> "Asked":
+) -> "SearchRequest":
     """What is to be searched, if `m2pem check` finds no errors in it. `spec`: more requirements.
 
     Raises:
@@ -212,20 +212,20 @@ def asked_of(
     plugins = PluginManager()
     fleet = get_fleet(fleet_file, mission) if fleet_file is not None else None
     arbiters = arbiters_of(fleet, plugins) if fleet is not None else None
-    return proving.asked_of(
+    return proving.search_request(
         mission, arbiters, plugins, process, data, spec, timers_in_order=timers_in_order
     )
 
 
-def findings(asked: "Asked", engine: "Engine", *, strict: bool) -> "Findings":
+def findings(asked: "SearchRequest", engine: "SearchEngine", *, strict: bool) -> "Findings":
     """Search, and tell what was found."""
-    from m2pem.executive.verification import prove
+    from m2pem.executive.verification import search
 
     with _ended_as_by_hand(), progress() as show:
-        return prove(asked, engine, strict=strict, progress=show)
+        return search(asked, engine, strict=strict, progress=show)
 
 
-def promela(asked: "Asked") -> str:
+def promela(asked: "SearchRequest") -> str:
     """The model that Spin would be given."""
     from m2pem.verify.net.simplify import simplify
     from m2pem.verify.spin.promela import text_of

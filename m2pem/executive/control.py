@@ -36,7 +36,7 @@ from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
 from m2pem.executive.supervisor import Supervisor
-from m2pem.executive.verification_worker import verify_apart
+from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import RunInfo
@@ -196,7 +196,7 @@ class Control:
     def subscribe(
         self, run: RunId | None = None, size: int = 10_000
     ) -> AsyncIterator[ControlEvent]:
-        """What is committed from now on, and first the prompts that stand now."""
+        """What is committed from now on, and first the prompts that are open."""
         subscription = self._supervisor.events.subscribe(run, size)
         subscription.put(self.prompts())
         return subscription
@@ -225,7 +225,7 @@ class Control:
         return [summary(line) for line in lines if not line.gone]
 
     def prompts(self) -> Sequence[OpenPrompt]:
-        """The prompts that stand now."""
+        """The prompts that are open."""
         return [
             prompt
             for runner in self._supervisor.runners.values()
@@ -332,7 +332,7 @@ class Control:
     ) -> Mapping[str, Any]:
         """Verify a mission with this fleet, in a process of its own."""
         supervisor = self._supervisor
-        return await verify_apart(
+        return await verify_in_subprocess(
             mission,
             supervisor.fleet_now,
             simulated=supervisor.settings.simulated,

@@ -1,4 +1,7 @@
-"""Tells subscribers what was committed, in order; nobody ever waits for a subscriber."""
+"""Events of an executive: records, prompts and alerts, for subscribers, observers and logs.
+
+Subscribers get them in the order of commits. No run ever waits for a subscriber.
+"""
 
 import asyncio
 import logging
@@ -28,7 +31,7 @@ class Subscription:
         self._ended = False
 
     def put(self, events: Sequence[ControlEvent]) -> None:
-        """Hand events over, but those of another run."""
+        """Add events, but those of another run."""
         if self._overrun:
             return
         if self._run is not None:
@@ -39,7 +42,7 @@ class Subscription:
         self._wake.set()
 
     def end(self) -> None:
-        """No more will come."""
+        """Let the reader end after the events that wait."""
         self._ended = True
         self._wake.set()
 
@@ -47,7 +50,7 @@ class Subscription:
         return self
 
     async def __anext__(self) -> ControlEvent:
-        """The next notice; ends with the executive.
+        """Return the next event; the iteration ends with the executive.
 
         Raises:
             OperatorError: this reader was too slow.
@@ -74,11 +77,11 @@ class ControlEvents:
 
     @property
     def has_subscribers(self) -> bool:
-        """Whether there is anyone to tell."""
+        """Whether there is a subscription."""
         return bool(self._subscriptions)
 
     def subscribe(self, run: RunId | None, size: int) -> Subscription:
-        """Everything from now on."""
+        """Subscribe to every event from now on, or to those of one run."""
         subscription = Subscription(run, size)
         if self._ended:
             subscription.end()
@@ -91,7 +94,7 @@ class ControlEvents:
         return subscription
 
     def publish(self, *events: ControlEvent) -> None:
-        """Tell all."""
+        """Send events to all subscriptions."""
         for reference in self._subscriptions:
             subscription = reference()
             if subscription is not None:
@@ -166,7 +169,7 @@ class RecordObservers:
             self._behind = True
 
     async def close(self) -> None:
-        """Let them observe what waits, within `DRAINED_WITHIN_S`."""
+        """Wait until observers have seen what waits, within `DRAINED_WITHIN_S`."""
         if self._ended is None:
             return
         with suppress(Full):
@@ -184,7 +187,7 @@ LOGGERS = ("m2pem.arbiter", "m2pem.dispatch", "m2pem.executive", "m2pem.teams")
 
 
 class LoggedAlerts(logging.Handler):
-    """Between `__enter__` and `__exit__`, in an event loop: each warning or error is an alert."""
+    """Publish each warning and error of `LOGGERS` as an alert, between enter and exit."""
 
     def __init__(self, events: ControlEvents) -> None:
         super().__init__(logging.WARNING)

@@ -55,8 +55,8 @@ class Order:
 
 
 class Dispatcher:
-    """`post` takes every report, those of arbiters and those made here. `clearance`: who keeps
-    aircraft apart; None: nobody."""
+    """`post` takes every report, those of arbiters and those made here. `clearance`:
+    reserves volumes for aircraft; None: the fleet has no separation."""
 
     def __init__(
         self,

@@ -20,7 +20,7 @@ from m2pem.suggestions import did_you_mean
 if TYPE_CHECKING:
     from m2pem.executive.fleet_connections import FleetArbiters
 
-SOMEBODY = "an operator"
+UNNAMED_OPERATOR = "an operator"
 
 
 class Handover:
@@ -45,11 +45,11 @@ class Handover:
         holder = self.taken.get(resource)
         if holder is not None:
             raise OperatorError(f"{resource} is with {holder}")
-        self.taken[resource] = by or SOMEBODY
+        self.taken[resource] = by or UNNAMED_OPERATOR
         self._withdraw(resource)
         for runner in list(runners):
             if not runner.done.is_set():
-                await runner.tell(ControlTaken(resource, by or SOMEBODY))
+                await runner.tell(ControlTaken(resource, by or UNNAMED_OPERATOR))
 
     def preview(self, name: str, runners: Iterable[Runner]) -> list[TakeEffect]:
         """What `take` of a resource would end now in each run.
@@ -86,7 +86,7 @@ class Handover:
             self._availability.withdraw(resource, why)
         for runner in list(runners):
             if not runner.done.is_set():
-                await runner.tell(ControlReturned(resource, by or SOMEBODY))
+                await runner.tell(ControlReturned(resource, by or UNNAMED_OPERATOR))
 
     def by_name(self) -> dict[str, str]:
         """What is taken, and by whom: for a run that begins."""

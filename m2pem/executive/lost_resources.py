@@ -1,4 +1,6 @@
-"""A lost vehicle that is heard again may still drive: it must stop before it counts as free.
+"""Lost vehicles whose link returns: each must stop before it counts as free.
+
+Such a vehicle may still drive.
 
 What it did when its link was lost has ended for its mission (LINK_LOST). The vehicle does not know
 that, and goes on with it. So it is told to stop, at once and until it has acknowledged; operators
@@ -31,7 +33,7 @@ SAY_EVERY = 10
 
 
 class LostResources:
-    """The resources that were lost, until they are free again.
+    """The resources whose link was lost, until they are free again.
 
     `epoch_of`: with which epoch the run of a behavior is driven here. `show`: to operators, how a
     resource is.
@@ -60,7 +62,7 @@ class LostResources:
         self._said: dict[ResourceId, VehicleState | PayloadState] = {}
 
     def lost(self, resource: ResourceId, reason: str) -> None:
-        """A resource is not heard any more: no behavior gets it until it has returned."""
+        """The link of a resource is lost: withdraw it until it has returned and stopped."""
         stopping = self._stopping.pop(resource, None)
         if stopping is not None:
             stopping.cancel()
@@ -74,7 +76,7 @@ class LostResources:
             self._availability.withdraw(resource, self._silent[resource])
 
     def on_telemetry(self, state: VehicleState | PayloadState) -> None:
-        """A resource has said something. If it was lost, it is told to stop from now on."""
+        """A resource published its state. If its link was lost, stop it from now on."""
         resource = state.resource
         if resource not in self._lost or state.link is LinkState.LOST:
             return
@@ -86,7 +88,7 @@ class LostResources:
         self._stopping[resource] = task
 
     def annotated(self, state: VehicleState | PayloadState) -> VehicleState | PayloadState:
-        """The state as operators see it: what is not free yet is not ready, and says why."""
+        """Return the state as operators see it: not ready, and why, until it is free."""
         why = self._why.get(state.resource)
         if why is None:
             return state

@@ -1,9 +1,10 @@
-"""Watches the event loop: a plugin that blocks it delays everything, STOP included.
+"""Monitors of the executive's own process: its event loop, and the disk of its journal.
 
     async with LoopMonitor(executive.events):
         ...
 
-A thread sees that the loop does not turn, and reads off its stack which module keeps it.
+A plugin that blocks the event loop delays everything, STOP included. A thread sees that the loop
+does not turn, and reads off its stack which module blocks it.
 """
 
 import asyncio
@@ -28,8 +29,10 @@ LATE_AFTER_S = 0.5
 
 
 class LoopMonitor:
-    """Of the loop in which its block runs. While the loop is blocked, the log says so; operators
-    get an alert as soon as it turns again."""
+    """Watch the event loop in which the block runs.
+
+    While the loop is blocked, the log says so; operators get an alert as soon as it turns again.
+    """
 
     def __init__(self, events: ControlEvents) -> None:
         self._events = events

@@ -50,7 +50,7 @@ STALLED_AFTER_S = 2.0
 
 @dataclass(slots=True)
 class RunContext:
-    """Where a run's commands go and its records are told."""
+    """What a run works with: where its commands go, and where its records are published."""
 
     journal: Journal
     clock: Clock
@@ -98,12 +98,12 @@ class Runner:
     # --- inputs ---------------------------------------------------------------------------------
 
     def post(self, item: Input) -> None:
-        """Hand in what happened; it is decided in its turn."""
+        """Add an input; the run decides it in the order of arrival."""
         self._inbox.append(item)
         self._wake.set()
 
     def tell(self, item: Input) -> "asyncio.Future[Step]":
-        """Hand in what an operator wants; the future is done when it is decided and committed.
+        """Add an operator's input; the future is done when it is decided and committed.
 
         Raises:
             OperatorError: the run has ended.
@@ -150,7 +150,7 @@ class Runner:
     # --- the loop -------------------------------------------------------------------------------
 
     async def drive(self) -> None:
-        """Go on until the run has ended and all that it commanded is released.
+        """Decide inputs until the run has ended and all that it commanded is released.
 
         A failure of the journal or of m2pem itself holds the run's vehicles and ends the task; the
         rest of the executive goes on.
@@ -180,7 +180,10 @@ class Runner:
         return state.status is RunStatus.ENDED and not state.behaviors and not self._inbox
 
     async def _next_inputs(self) -> list[Input]:
-        """What has happened, or what time or the engine itself wants; waits when nothing does."""
+        """Return the next inputs: those that were posted, a due timer, or the engine's own.
+
+        Waits when there is none.
+        """
         while True:
             if self._exhausted():
                 return [GiveUp(f"it has taken the {self._max_steps} steps that are allowed")]

@@ -1,4 +1,7 @@
-"""Asks for an aircraft's room before its behavior starts, as soon as it is known where all are."""
+"""Reserves the operational volume of an aircraft before its behavior starts.
+
+The reservation waits until the positions of the aircraft are known.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -19,7 +22,7 @@ LOOK_EVERY_S = 0.1
 
 
 class AircraftSeparation:
-    """`airspace` is told by the executive what is seen."""
+    """Reserves volumes in `airspace`, which it updates from telemetry."""
 
     def __init__(self, airspace: "Airspace", clock: Clock) -> None:
         self.airspace = airspace

@@ -1,9 +1,9 @@
-"""Work for minutes of a processor, in a process of its own: the executive must not feel it.
+"""Long computations in a subprocess, so that they do not delay the executive.
 
-    result = await apart("m2pem.executive.verification_worker", order, tell)      # in the executive
-    serve(work)                                                      # in the module that it names
+    result = await run_in_subprocess("m2pem.executive.verification_worker", order, on_progress)
+    serve(work)  # in the module that is named
 
-The process ends with the task that awaits it, and with the executive, however that ends.
+The subprocess ends with the task that awaits it, and with the executive, however that ends.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ from m2pem.errors import (
 from m2pem.findings import Finding
 from m2pem.verify.requirements.requirement import RequirementsError
 
-Tell: TypeAlias = Callable[[bytes], None]
+SendProgress: TypeAlias = Callable[[bytes], None]
 
 _HEAD = struct.Struct(">cQ")
 _RESULT, _TOLD, _REFUSED = b"r", b"t", b"e"
@@ -41,7 +41,7 @@ _LAST_WORDS = 2_000
 
 
 class Refusal(msgspec.Struct):
-    """An error, as it travels."""
+    """An error as it is sent."""
 
     kind: str
     text: str
@@ -56,15 +56,15 @@ _KINDS: dict[str, Callable[[str, Sequence[Finding]], M2pemError]] = {
 }
 
 
-class Given(msgspec.Struct):
-    """Where a mission is, as it travels. `kind`: of `MissionSource`; `source`: of the BPMN."""
+class EncodedSource(msgspec.Struct):
+    """A mission source as it is sent. `kind`: the type of `MissionSource`; `source`: the BPMN."""
 
     kind: str
     place: str = ""
     source: bytes = b""
 
     def source_of(self) -> MissionSource:
-        """What was given."""
+        """Return the mission source that was encoded."""
         if self.kind == "bytes":
             return self.source
         if self.kind == "str":
@@ -73,23 +73,23 @@ class Given(msgspec.Struct):
         return Draft(path, self.source) if self.kind == "Draft" else path
 
 
-def given(mission: MissionSource) -> Given:
-    """A mission, for its journey."""
+def encode_source(mission: MissionSource) -> EncodedSource:
+    """Encode a mission source for the subprocess."""
     match mission:
         case bytes():
-            return Given("bytes", source=mission)
+            return EncodedSource("bytes", source=mission)
         case Draft(path, source):
-            return Given("Draft", str(path), source)
+            return EncodedSource("Draft", str(path), source)
         case str():
-            return Given("str", mission)
+            return EncodedSource("str", mission)
         case _:
-            return Given("Path", str(mission))
+            return EncodedSource("Path", str(mission))
 
 
-async def apart(module: str, order: bytes, told: Tell | None = None) -> bytes:
-    """Run a module's `serve` in a process of its own; gives back what its work does.
+async def run_in_subprocess(module: str, order: bytes, told: SendProgress | None = None) -> bytes:
+    """Run a module's `serve` in a subprocess; returns the result of its work.
 
-    `told` gets what the work tells on the way. Cancelling ends the process.
+    `told` is called with each progress message. Cancelling ends the subprocess.
 
     Raises:
         FindingsError: the work refused what it was given, with all findings.
@@ -150,11 +150,11 @@ def _error(content: bytes) -> M2pemError:
     return make(refusal.text, refusal.findings) if make else OperatorError(refusal.text)
 
 
-# --- in the process of its own ------------------------------------------------------------------
+# --- in the subprocess -------------------------------------------------------------------------
 
 
-def serve(work: Callable[[bytes, Tell], bytes]) -> None:
-    """Do what was ordered, tell what comes of it, and end."""
+def serve(work: Callable[[bytes, SendProgress], bytes]) -> None:
+    """Read the order, do the work, write progress and the result or the error, and end."""
     answers = os.dup(1)
     os.dup2(2, 1)  # whatever prints does not print into the answer
     with suppress(OSError):
@@ -177,7 +177,7 @@ def serve(work: Callable[[bytes, Tell], bytes]) -> None:
 
 
 def _plain(finding: Finding) -> Finding:
-    """Without what only the command line shows."""
+    """Return the finding without what only the command line shows."""
     said: Any = {name: getattr(finding, name) for name in Finding.__dataclass_fields__}
     return Finding(**said)
 
@@ -197,6 +197,6 @@ def _write(to: int, content: bytes) -> None:
 
 
 def _end_with_the_executive() -> None:
-    """Nothing more is ever sent: when reading ends, nobody is there."""
+    """End this process when standard input closes: the executive has ended."""
     os.read(0, 1)
     os._exit(1)

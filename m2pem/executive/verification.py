@@ -1,4 +1,4 @@
-"""Verification of a mission against a fleet: what is searched, and what is told of it."""
+"""Verification of a mission against a fleet: the search request, the search and its findings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
 
 IN_ORDER = "timers that begin to run together come in the order of their times (--timers in-order)"
-"""What is told of answers to which that was assumed."""
+"""The note in reports whose answers assume that order."""
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What is to be searched. `process`: None for the main one; `data`: what a run begins with."""
+class SearchRequest:
+    """What is searched. `process`: None for the main one; `data`: what a run begins with."""
 
     mission: Mission
     fleet: Fleet
@@ -39,15 +39,15 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
-class Engine:
-    """Who searches (`builtin`, `spin`), how Spin remembers states, and where the search ends."""
+class SearchEngine:
+    """The search engine (`builtin`, `spin`), how Spin stores states, and where the search ends."""
 
     name: str
     storage: str
     limits: Limits
 
 
-def asked_of(
+def search_request(
     mission: Mission,
     arbiters: FleetArbiters | None,
     plugins: "PluginManager",
@@ -57,7 +57,7 @@ def asked_of(
     *,
     simulated: bool = False,
     timers_in_order: bool = False,
-) -> Asked:
+) -> SearchRequest:
     """What is to be searched, if `m2pem check` finds no errors in it.
 
     `arbiters` None: a fleet is made up, and the mission's roles are not checked. `spec`: more
@@ -73,51 +73,53 @@ def asked_of(
     options = Options(data=data, service_writes=writes, timers_in_order=timers_in_order)
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     requirements = collect(Names(mission, fleet, writes, data), spec)
-    return Asked(mission, fleet, process, data, options, requirements)
+    return SearchRequest(mission, fleet, process, data, options, requirements)
 
 
-def prove(
-    asked: Asked,
-    engine: Engine,
+def search(
+    request: SearchRequest,
+    engine: SearchEngine,
     *,
     strict: bool,
     progress: Callable[[Progress], None] | None = None,
 ) -> Findings:
-    """Search, and tell what was found."""
+    """Search, and return what was found."""
     report = with_requirements(
-        _report(asked, engine, progress),
-        asked.mission,
-        asked.fleet,
-        asked.requirements,
-        process=asked.process,
-        options=asked.options,
+        _report(request, engine, progress),
+        request.mission,
+        request.fleet,
+        request.requirements,
+        process=request.process,
+        options=request.options,
         limits=engine.limits,
         storage=Storage(engine.storage),
         progress=progress,
     )
-    if asked.options.timers_in_order:
+    if request.options.timers_in_order:
         report = replace(report, notes=(*report.notes, IN_ORDER))
-    return findings_of(asked.mission, report, strict=strict, given=asked.data)
+    return findings_of(request.mission, report, strict=strict, given=request.data)
 
 
-def _report(asked: Asked, engine: Engine, progress: Callable[[Progress], None] | None) -> Report:
+def _report(
+    request: SearchRequest, engine: SearchEngine, progress: Callable[[Progress], None] | None
+) -> Report:
     if engine.name == "spin":
         from m2pem.verify.spin.check import check_with_spin  # noqa: PLC0415  # seldom wanted
 
         return check_with_spin(
-            asked.mission,
-            asked.fleet,
-            process=asked.process,
-            options=asked.options,
+            request.mission,
+            request.fleet,
+            process=request.process,
+            options=request.options,
             limits=engine.limits,
             storage=Storage(engine.storage),
             progress=progress,
         )
     return check(
-        asked.mission,
-        asked.fleet,
-        process=asked.process,
-        options=asked.options,
+        request.mission,
+        request.fleet,
+        process=request.process,
+        options=request.options,
         limits=engine.limits,
         progress=progress,
     )

@@ -1,4 +1,4 @@
-"""The process of its own in which a mission is verified for an executive."""
+"""The subprocess that verifies a mission for an executive."""
 
 import logging
 import time
@@ -13,22 +13,28 @@ from m2pem.api.authoring import MissionSource, SearchLimits, SearchProgress
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import load_source
-from m2pem.executive.subprocess_worker import Given, Tell, apart, given, serve
+from m2pem.executive.subprocess_worker import (
+    EncodedSource,
+    SendProgress,
+    encode_source,
+    run_in_subprocess,
+    serve,
+)
 from m2pem.fleet.fleet import Fleet, dump, restore
 from m2pem.mission.values import Value
 from m2pem.telemetry.bus import Bus
 
 TOKENS = 3
-"""On one place, where one is meant: as `m2pem verify` has it."""
+"""The most tokens on one place that the search follows, as in `m2pem verify`."""
 
 _BETWEEN_S = 0.2
-"""Of two tellings how far it is."""
+"""Seconds between two progress messages."""
 
 
 class Order(msgspec.Struct):
-    """What is to be verified."""
+    """What the subprocess verifies."""
 
-    mission: Given
+    mission: EncodedSource
     fleet: bytes
     simulated: bool
     search_path: list[str]
@@ -40,7 +46,7 @@ class Order(msgspec.Struct):
     limits: SearchLimits
 
 
-async def verify_apart(
+async def verify_in_subprocess(
     mission: MissionSource,
     fleet: Fleet,
     *,
@@ -54,9 +60,9 @@ async def verify_apart(
     limits: SearchLimits,
     on_progress: Callable[[SearchProgress], None] | None,
 ) -> dict[str, Any]:
-    """The answers of `m2pem verify --format json`, from a process of its own."""
+    """Return the answers of `m2pem verify --format json`, computed in a subprocess."""
     order = Order(
-        given(mission),
+        encode_source(mission),
         dump(fleet),
         simulated,
         [str(each) for each in search_path],
@@ -72,14 +78,14 @@ async def verify_apart(
         if on_progress is not None:
             on_progress(msgspec.msgpack.decode(content, type=SearchProgress))
 
-    answer = await apart(__name__, msgspec.msgpack.encode(order), told)
+    answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order), told)
     found: dict[str, Any] = msgspec.json.decode(answer)
     return found
 
 
-def _work(content: bytes, tell: Tell) -> bytes:
+def _work(content: bytes, tell: SendProgress) -> bytes:
     # What searches is loaded here: the executive has no use for it.
-    from m2pem.executive.verification import Engine, asked_of, prove  # noqa: PLC0415
+    from m2pem.executive.verification import SearchEngine, search, search_request  # noqa: PLC0415
     from m2pem.plugins import PluginManager  # noqa: PLC0415
     from m2pem.verify.report.data import as_data  # noqa: PLC0415
     from m2pem.verify.search.explore import Limits, Progress  # noqa: PLC0415
@@ -98,7 +104,7 @@ def _work(content: bytes, tell: Tell) -> bytes:
     path = [Path(each) for each in order.search_path]
     loaded = load_source(order.mission.source_of(), path)
     plugins = PluginManager()
-    asked = asked_of(
+    asked = search_request(
         loaded,
         _arbiters(restore(order.fleet), plugins, simulated=order.simulated),
         plugins,
@@ -109,12 +115,14 @@ def _work(content: bytes, tell: Tell) -> bytes:
         timers_in_order=order.timers_in_order,
     )
     limits = Limits(states=order.limits.states, seconds=order.limits.seconds, tokens=TOKENS)
-    found = prove(asked, Engine("builtin", "exact", limits), strict=order.strict, progress=progress)
+    found = search(
+        asked, SearchEngine("builtin", "exact", limits), strict=order.strict, progress=progress
+    )
     return msgspec.json.encode(as_data(found))
 
 
 def _arbiters(fleet: Fleet, plugins: Any, *, simulated: bool) -> FleetArbiters:
-    """For questions alone."""
+    """Make the arbiters of a fleet to read their catalogues; they are not connected."""
     context = ArbiterContext(
         SystemClock(),
         Bus(),

@@ -9,7 +9,13 @@ import msgspec
 from m2pem.api.authoring import MissionSource
 from m2pem.api.control import RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.errors import OperatorError
-from m2pem.executive.subprocess_worker import Given, Tell, apart, given, serve
+from m2pem.executive.subprocess_worker import (
+    EncodedSource,
+    SendProgress,
+    encode_source,
+    run_in_subprocess,
+    serve,
+)
 from m2pem.fleet.fleet import Fleet, dump, restore
 from m2pem.mission.library import MissionFile
 from m2pem.mission.values import Value
@@ -18,7 +24,7 @@ from m2pem.mission.values import Value
 class Order(msgspec.Struct):
     """What is to be rehearsed."""
 
-    mission: Given
+    mission: EncodedSource
     fleet: bytes
     process: str | None
     data: dict[str, Any]
@@ -60,7 +66,7 @@ async def rehearse_in_subprocess(
     if max_steps < 1 or (telemetry_every_s is not None and not telemetry_every_s > 0):
         raise OperatorError("max_steps and telemetry_every_s are greater than 0")
     order = Order(
-        given(mission),
+        encode_source(mission),
         dump(fleet),
         process,
         dict(data or {}),
@@ -71,14 +77,14 @@ async def rehearse_in_subprocess(
         [str(each) for each in search_path],
         telemetry_every_s,
     )
-    answer = await apart(__name__, msgspec.msgpack.encode(order))
+    answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order))
     done = msgspec.msgpack.decode(answer, type=Done)
     return SimulationResult(
         done.summary, tuple(done.records), tuple(done.telemetry), tuple(done.files)
     )
 
 
-def _work(content: bytes, _: Tell) -> bytes:
+def _work(content: bytes, _: SendProgress) -> bytes:
     from m2pem.plugins import PluginManager  # noqa: PLC0415  # the executive has its own
     from m2pem.rehearsal.rehearsal import START_US, rehearse  # noqa: PLC0415
 

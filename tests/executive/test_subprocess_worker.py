@@ -19,7 +19,7 @@ from m2pem.errors import AnswersError, InternalError, MissionError, OperatorErro
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
-from m2pem.executive.subprocess_worker import apart
+from m2pem.executive.subprocess_worker import run_in_subprocess
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
@@ -179,7 +179,7 @@ def test_cancelling_ends_the_process(endless: str) -> None:
             pids.append(int(content))
             begun.set()
 
-        task = asyncio.ensure_future(apart(endless, b"", told))
+        task = asyncio.ensure_future(run_in_subprocess(endless, b"", told))
         await begun.wait()
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -192,11 +192,11 @@ def test_cancelling_ends_the_process(endless: str) -> None:
 def test_the_process_ends_with_an_executive_that_is_killed(endless: str) -> None:
     script = (
         "import asyncio, os\n"
-        "from m2pem.executive.subprocess_worker import apart\n"
+        "from m2pem.executive.subprocess_worker import run_in_subprocess\n"
         "def told(content):\n"
         "    print(content.decode(), flush=True)\n"
         "    os._exit(9)\n"
-        f"asyncio.run(apart({endless!r}, b'', told))\n"
+        f"asyncio.run(run_in_subprocess({endless!r}, b'', told))\n"
     )
 
     async def story() -> int:
@@ -223,4 +223,4 @@ def test_one_that_breaks_off_is_an_error_with_its_last_words(
     (tmp_path / "broken_work.py").write_text("raise SystemExit('no room')", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(InternalError, match="no room"):
-        asyncio.run(apart("broken_work", b""))
+        asyncio.run(run_in_subprocess("broken_work", b""))

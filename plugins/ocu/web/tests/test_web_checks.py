@@ -8,7 +8,7 @@ from rest_world import VIGNETTE, rest_world
 
 from m2pem.cli.arguments import arbiters_of
 from m2pem.executive.loading import findings_for, load_source
-from m2pem.executive.verification import Engine, asked_of, prove
+from m2pem.executive.verification import SearchEngine, search, search_request
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
@@ -94,8 +94,8 @@ def test_a_template_is_sound_and_runs_to_its_end(name: str) -> None:
     fleet = fleet_for(mission)
     arbiters = arbiters_of(fleet, plugins)
     assert findings_for(mission, arbiters, plugins) == []
-    asked = asked_of(mission, arbiters, plugins, None, {})
-    found = prove(asked, Engine("builtin", "exact", Limits(tokens=3)), strict=True)
+    asked = search_request(mission, arbiters, plugins, None, {})
+    found = search(asked, SearchEngine("builtin", "exact", Limits(tokens=3)), strict=True)
     assert found.verdict == "holds"
     assert rehearse(mission, fleet, plugins=plugins).exit_status == 0
 
