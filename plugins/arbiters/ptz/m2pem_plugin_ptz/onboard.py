@@ -3,13 +3,13 @@
 import logging
 from typing import TYPE_CHECKING
 
-from m2pem_plugin_ros import ArbiterDriver, Onboard, Targets
+from m2pem_plugin_ros import ArbiterDriver, OnboardNode, TargetBus
 
 from m2pem.api import ArbiterContext, Clock, Connection, PayloadState
 from m2pem_plugin_ptz.arbiter import PtzArbiter
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros import RosRuntime, Told
+    from m2pem_plugin_ros import DriverEvents, RosRuntime
 
 LOGGER = logging.getLogger("m2pem.onboard")
 
@@ -33,19 +33,19 @@ class CameraNode:
         clock: Clock,
         origin: tuple[float, float, float],
     ) -> None:
-        targets, camera = Targets(), connection.resource
+        targets, camera = TargetBus(), connection.resource
         context = ArbiterContext(clock, targets, LOGGER, origin)
         arbiter = PtzArbiter({camera: connection}, context)
         drivers: list[ArbiterDriver] = []
 
-        def make(told: "Told") -> ArbiterDriver:
-            drivers.append(ArbiterDriver(arbiter, camera, told, targets, LOGGER))
+        def make(events: "DriverEvents") -> ArbiterDriver:
+            drivers.append(ArbiterDriver(arbiter, camera, events, targets, LOGGER))
             return drivers[0]
 
-        def sight() -> PayloadState | None:
+        def payload_state() -> PayloadState | None:
             return drivers[0].state
 
-        self._node = Onboard(
+        self._node = OnboardNode(
             ros,
             camera,
             namespace,
@@ -53,7 +53,7 @@ class CameraNode:
             clock=clock,
             bus=targets,
             catalogue=arbiter.catalogue(camera),
-            sight=sight,
+            payload_state=payload_state,
             logger=LOGGER,
         )
 

@@ -10,27 +10,27 @@ from typing import TYPE_CHECKING, Any
 from m2pem_plugin_ros.hooks import m2pem_register_arbiters, m2pem_register_commands
 
 if TYPE_CHECKING:
-    from m2pem_plugin_ros.drivers.driver import Told
+    from m2pem_plugin_ros.drivers.driver import DriverEvents
     from m2pem_plugin_ros.frames import to_local
     from m2pem_plugin_ros.installation import RosError, require_interfaces
     from m2pem_plugin_ros.interfaces import set_stamp
     from m2pem_plugin_ros.interfaces.vehicle_status import write_payload_status
     from m2pem_plugin_ros.loopback import keep_on_loopback
     from m2pem_plugin_ros.onboard.arbiter_driver import ArbiterDriver
-    from m2pem_plugin_ros.onboard.node import Onboard
-    from m2pem_plugin_ros.onboard.target_bus import Targets
+    from m2pem_plugin_ros.onboard.node import OnboardNode
+    from m2pem_plugin_ros.onboard.target_bus import TargetBus
     from m2pem_plugin_ros.runtime import RosRuntime, qos
     from m2pem_plugin_ros.settings import read_payloads, read_settings
     from m2pem_plugin_ros.simulator.clock import SimulatedClock
 
 __all__ = [
     "ArbiterDriver",
-    "Onboard",
+    "OnboardNode",
     "RosError",
     "RosRuntime",
     "SimulatedClock",
-    "Targets",
-    "Told",
+    "TargetBus",
+    "DriverEvents",
     "keep_on_loopback",
     "m2pem_register_arbiters",
     "m2pem_register_commands",
@@ -44,15 +44,15 @@ __all__ = [
 ]
 
 _MODULES = {
-    "drivers.driver": "Told",
+    "drivers.driver": "DriverEvents",
     "frames": "to_local",
     "installation": "RosError require_interfaces",
     "interfaces": "set_stamp",
     "interfaces.vehicle_status": "write_payload_status",
     "loopback": "keep_on_loopback",
     "onboard.arbiter_driver": "ArbiterDriver",
-    "onboard.node": "Onboard",
-    "onboard.target_bus": "Targets",
+    "onboard.node": "OnboardNode",
+    "onboard.target_bus": "TargetBus",
     "runtime": "RosRuntime qos",
     "settings": "read_payloads read_settings",
     "simulator.clock": "SimulatedClock",

@@ -1,4 +1,4 @@
-"""The arbiter of ROS vehicles and payloads. Its catalogue needs no ROS, and no connection."""
+"""The arbiter of ROS vehicles and payloads. Its catalogue needs no ROS and no connection."""
 
 import asyncio
 import math
@@ -24,45 +24,46 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
-from m2pem_plugin_ros.checkpoint import Kept, native_ref, read_native_ref
-from m2pem_plugin_ros.connections import Installation, Station
-from m2pem_plugin_ros.drivers.driver import Driver, Seat
-from m2pem_plugin_ros.drivers.driver import make_driver as driver_of_the_fleet
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
+from m2pem_plugin_ros.connections import ConnectionsSetup, VehicleConnections
+from m2pem_plugin_ros.drivers.driver import Driver, DriverSetup
+from m2pem_plugin_ros.drivers.driver import make_driver as make_fleet_driver
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.settings import DriverName, read_detectors, read_payloads, read_settings
-from m2pem_plugin_ros.vehicle import Post, Vehicle
+from m2pem_plugin_ros.vehicle import Vehicle, VehicleSetup
 
 LOST_AFTER_S = 3.0
 HOLD_WITHIN_S = 6.0
 BRAKING_BEGINS_WITHIN_S = 2.0
 CANCEL_TIMEOUT_S = 10.0
 
-HEARD_WITHIN_S = 5.0
-"""In real time, as DDS takes it to find who is there; `connect` waits for vehicles no longer."""
+FIRST_CONTACT_WITHIN_S = 5.0
+"""`connect` waits no longer than this for vehicles, in real time. DDS needs some of it for
+discovery."""
 
 ATTEND_EVERY_S = 0.2
 PAYLOADS_EVERY = 5
-"""Times that vehicles are attended to for each time that their payloads are told of."""
+"""The state of payloads is published in every fifth round of `_attend`."""
 
-LATE = 2.0
-"""So many times as long as that since the last look: this process was held up."""
+LATE_FACTOR = 2.0
+"""A round that comes more than twice as late as planned means that this process was suspended."""
 
 STATES_WAITING = 1000
 
-MakeStation = Callable[[Installation], Station]
+MakeConnections = Callable[[ConnectionsSetup], VehicleConnections]
 
 
-def _station(installation: Installation) -> Station:
-    from m2pem_plugin_ros.connections import DdsStation  # noqa: PLC0415  # starting up must be fast
+def _vehicle_connections(installation: ConnectionsSetup) -> VehicleConnections:
+    from m2pem_plugin_ros.connections import DdsConnections  # noqa: PLC0415  # starting up must be fast
 
-    return DdsStation(installation)
+    return DdsConnections(installation)
 
 
 class RosArbiter:
-    """Implements `m2pem.api.AdjustingArbiter`, `ReclaimingArbiter` and `DetectingArbiter`. What a
-    fleet may say of it: docs/ros.md.
+    """The arbiter `ros` (docs/ros.md): an `AdjustingArbiter`, `ReclaimingArbiter` and
+    `DetectingArbiter` of `m2pem.api`.
 
-    `make_driver` and `make_station` are for tests without ROS.
+    `make_driver` and `make_connections` are replaced in tests without ROS.
 
     Raises:
         PluginError: a connection cannot be used; the text names the resource and the key.
@@ -74,8 +75,8 @@ class RosArbiter:
         self,
         connections: Mapping[ResourceId, Connection],
         context: ArbiterContext,
-        make_driver: Callable[[Seat], Driver] = driver_of_the_fleet,
-        make_station: MakeStation = _station,
+        make_driver: Callable[[DriverSetup], Driver] = make_fleet_driver,
+        make_connections: MakeConnections = _vehicle_connections,
     ) -> None:
         self._connections = connections
         self._context = context
@@ -83,21 +84,22 @@ class RosArbiter:
         self._settings = {**vehicles, **read_payloads(connections, vehicles)}
         self._detectors = read_detectors(connections, self._settings)
         self._make_driver = make_driver
-        self._make_station = make_station
-        self._station: Station | None = None
-        self._ledger = BehaviorTracker(self._taken, context.logger)
+        self._make_connections = make_connections
+        self._vehicle_connections: VehicleConnections | None = None
+        self._tracker = BehaviorTracker(self._taken, context.logger)
         self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(
             STATES_WAITING, _may_be_missed
         )
         self._vehicles: dict[ResourceId, Vehicle] = {}
-        self._asked: set[BehaviorId] = set()
-        self._unknown: dict[BehaviorId, tuple[Kept, str | None]] = {}
+        self._queried: set[BehaviorId] = set()
+        self._unknown: dict[BehaviorId, tuple[Checkpoint, str | None]] = {}
         self._attending: asyncio.Task[None] | None = None
 
     # --- what is offered ------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What a vehicle, or a payload with a node, can do; other payloads are carried, no more."""
+        """Return the behaviors of a vehicle, or of a payload with a node of its own. Other payloads
+        have none."""
         if resource not in self._settings:
             return ()
         own, usual = self._settings[resource].own_behaviors, PAYLOAD if "/" in resource else LEVEL
@@ -106,17 +108,18 @@ class RosArbiter:
 
     @property
     def detectors(self) -> Collection[ResourceId]:
-        """Payloads that are listened to: they have a `topic`, or are marked `detector: true`."""
+        """Payloads whose topic of detections is read: they have a `topic`, or `detector: true`."""
         return self._detectors.keys()
 
     def _taken(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """A payload may be held by what its vehicle does; what it does itself comes first."""
+        """Return the specifications for the tracker. A payload may be used by a behavior of its
+        vehicle, too."""
         vehicle = ResourceId(resource.partition("/")[0])
         of_vehicle = self.catalogue(vehicle) if vehicle != resource else ()
         return (*of_vehicle, *self.catalogue(resource))
 
     def limits(self, resource: ResourceId) -> Limits:
-        """The bounds that hold for a vehicle or a payload. Detectors may be silent for ever."""
+        """Return the limits of a vehicle or a payload. A detector may be silent for any time."""
         if resource not in self._settings:
             return Limits(math.inf, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
         own = self._connections[resource].lost_after_s
@@ -129,7 +132,7 @@ class RosArbiter:
         return Limits(LOST_AFTER_S if own is None else own, hold_within_s, cancel_timeout_s)
 
     def addresses(self, resource: ResourceId) -> Sequence[str]:
-        """The namespace in its ROS domain."""
+        """Return the ROS domain and the namespace, as text."""
         settings = self._settings.get(resource)
         if settings is None:
             return []
@@ -141,13 +144,14 @@ class RosArbiter:
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Listen to all vehicles; returns when all were heard, or soon.
+        """Subscribe to all vehicles. Return when each was received once, or after
+        `FIRST_CONTACT_WITHIN_S`.
 
         Raises:
             RosError: ROS, or a package of it that a driver needs, is not installed or not usable.
         """
-        self._station = self._make_station(
-            Installation(
+        self._vehicle_connections = self._make_connections(
+            ConnectionsSetup(
                 self._connections,
                 self._settings,
                 self._detectors,
@@ -156,11 +160,11 @@ class RosArbiter:
             )
         )
         try:
-            instruments = await self._station.open()
+            connected = await self._vehicle_connections.open()
             for resource, settings in self._settings.items():
                 connection, limits = self._connections[resource], self.limits(resource)
-                post = Post(connection, settings, self._context, self._ledger, limits)
-                self._vehicles[resource] = Vehicle(post, instruments[resource], self._make_driver)
+                setup = VehicleSetup(connection, settings, self._context, self._tracker, limits)
+                self._vehicles[resource] = Vehicle(setup, connected[resource], self._make_driver)
             opened = await asyncio.gather(
                 *(vehicle.open() for vehicle in self._vehicles.values()), return_exceptions=True
             )
@@ -170,97 +174,103 @@ class RosArbiter:
         except BaseException:
             await self._disconnect()
             raise
-        await self._until_heard()
+        await self._until_first_contact()
         for vehicle in self._vehicles.values():
             vehicle.listen_from_now()
         self._attending = asyncio.get_running_loop().create_task(self._attend())
 
     async def close(self) -> None:
-        """Listen no more. Vehicles keep doing what they do."""
+        """Close all subscriptions. The vehicles go on with what they do."""
         await self._disconnect()
         self._states.close()
-        self._ledger.close()
+        self._tracker.close()
 
     # --- behaviors ------------------------------------------------------------------------------
 
     async def start(self, request: BehaviorRequest) -> None:
-        """Start a behavior; see `BehaviorRequest`."""
-        asked = request.id in self._asked
-        self._asked.discard(request.id)
-        kept = Kept(request.resources, request.behavior, request.epoch, request.parameters)
-        if self._ledger.admit(request, lambda: native_ref(kept), self._refusal):
-            vehicle = self._vehicles[self._doers(request.resources)[0]]
-            await vehicle.take(request, look_first=asked)
+        asked = request.id in self._queried
+        self._queried.discard(request.id)
+        checkpoint = Checkpoint(
+            request.resources, request.behavior, request.epoch, request.parameters
+        )
+        if self._tracker.admit(request, lambda: encode_checkpoint(checkpoint), self._refusal):
+            vehicle = self._vehicles[self._commanded(request.resources)[0]]
+            await vehicle.take(request, query_first=asked)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Stop the vehicle that does it, or that may do it although it said that it does not."""
-        self._take_up(behavior)
-        if self._ledger.may_cancel(behavior, epoch):
-            for vehicle in self._doing(behavior):
+        """Cancel the behavior on its vehicle. After a restart, also if the vehicle reported
+        UNKNOWN."""
+        self._readopt(behavior)
+        if self._tracker.may_cancel(behavior, epoch):
+            for vehicle in self._running(behavior):
                 vehicle.cancel(behavior)
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
     ) -> None:
-        """Go on with these parameters; those that have no sense are left as they are."""
-        if self._ledger.may_adjust(behavior, epoch):
+        """Change parameters of a behavior that goes on. Values that are not finite are ignored."""
+        if self._tracker.may_adjust(behavior, epoch):
             sane = {name: value for name, value in parameters.items() if _is_sane(value)}
-            for vehicle in self._doing(behavior) if sane else ():
+            for vehicle in self._running(behavior) if sane else ():
                 vehicle.adjust(behavior, sane)
 
     async def hold(self, resource: ResourceId) -> None:
-        """Have a vehicle stand still at once."""
+        """Stop a vehicle at once. It keeps its behavior."""
         if resource in self._vehicles:
             self._vehicles[resource].hold()
 
     async def resume(self, resource: ResourceId) -> None:
-        """Have a vehicle go on."""
+        """Let a vehicle continue after `hold`."""
         if resource in self._vehicles:
             self._vehicles[resource].resume()
 
     async def reclaim(self, resource: ResourceId) -> str:
-        """A vehicle that was lost is heard again: have it end what it goes on with."""
+        """End what a vehicle still does that was lost and is received again; see
+        `Vehicle.reclaim`."""
         return await self._vehicles[resource].reclaim() if resource in self._vehicles else ""
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What is known; after a restart, what the vehicle itself says. Nothing is begun."""
-        known = self._ledger.last(behavior)
+        """Return the last report, or after a restart, what the vehicle answers. No behavior is
+        started."""
+        known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
-        kept = read_native_ref(native_ref) if native_ref else None
-        if kept is None:
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None:
             return await self._search(behavior, known)
-        resource = next(iter([*self._doers(kept.resources), *kept.resources]), ResourceId(""))
+        resource = next(
+            iter([*self._commanded(checkpoint.resources), *checkpoint.resources]), ResourceId("")
+        )
         if resource not in self._vehicles:
             kind = "payload with a node" if "/" in resource else "vehicle"
             return replace(known, reason=f"there is no {kind} '{resource}' any more")
-        return await self._look(self._vehicles[resource], behavior, kept, native_ref)
+        return await self._query_vehicle(self._vehicles[resource], behavior, checkpoint, native_ref)
 
     # --- streams --------------------------------------------------------------------------------
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Reports as they come, for one reader, until `close`."""
-        return self._ledger.reports()
+        """Yield reports until `close`, for one reader."""
+        return self._tracker.reports()
 
     def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """States as they come, for one reader, until `close`; a slow one misses old states, but no
+        """Yield states until `close`, for one reader. A slow reader misses old states, but no
         detection."""
         return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
 
-    async def _until_heard(self) -> None:
-        waits = [asyncio.ensure_future(v.heard_once.wait()) for v in self._vehicles.values()]
+    async def _until_first_contact(self) -> None:
+        waits = [asyncio.ensure_future(v.first_contact.wait()) for v in self._vehicles.values()]
         if not waits:
             return
         try:
-            await asyncio.wait(waits, timeout=HEARD_WITHIN_S)
+            await asyncio.wait(waits, timeout=FIRST_CONTACT_WITHIN_S)
         finally:
             for wait in waits:
                 wait.cancel()
             await asyncio.gather(*waits, return_exceptions=True)
         for resource, vehicle in self._vehicles.items():
-            if not vehicle.heard_once.is_set():
+            if not vehicle.first_contact.is_set():
                 where = vehicle.absence
                 self._context.logger.warning("%s: it was not heard yet: %s", resource, where)
 
@@ -271,12 +281,12 @@ class RosArbiter:
             await asyncio.gather(attending, return_exceptions=True)
         vehicles, self._vehicles = self._vehicles, {}
         await asyncio.gather(*(vehicle.close() for vehicle in vehicles.values()))
-        station, self._station = self._station, None
+        station, self._vehicle_connections = self._vehicle_connections, None
         if station is not None:
             await station.close()
 
     def _refusal(self, request: BehaviorRequest) -> str:
-        doers = self._doers(request.resources)
+        doers = self._commanded(request.resources)
         if len(doers) != 1:
             return f"{request.behavior} takes one vehicle or payload, and has {len(doers)}"
         resource = doers[0]
@@ -289,62 +299,68 @@ class RosArbiter:
             return "the arbiter is not connected"
         return self._vehicles[resource].refusal(request)
 
-    def _doers(self, resources: Sequence[ResourceId]) -> list[ResourceId]:
-        """Who is commanded: vehicles, or without any, payloads with a node of their own."""
+    def _commanded(self, resources: Sequence[ResourceId]) -> list[ResourceId]:
+        """Return the resources that are commanded: vehicles, or without any, payloads with a
+        node."""
         vehicles = [resource for resource in resources if "/" not in resource]
         return vehicles or [resource for resource in resources if resource in self._settings]
 
-    def _doing(self, behavior: BehaviorId) -> list[Vehicle]:
+    def _running(self, behavior: BehaviorId) -> list[Vehicle]:
         return [vehicle for vehicle in self._vehicles.values() if vehicle.doing == behavior]
 
     async def _search(self, behavior: BehaviorId, unknown: BehaviorReport) -> BehaviorReport:
-        """Nothing was kept of it: ask every vehicle that could do it without us."""
-        self._asked.add(behavior)
+        """Query all vehicles about a behavior of which there is no checkpoint."""
+        self._queried.add(behavior)
         candidates = [
             vehicle
             for resource, vehicle in self._vehicles.items()
             if vehicle.settings.driver is not DriverName.BASE
-            and self._ledger.holder(resource) is None
+            and self._tracker.holder(resource) is None
         ]
         looks = []
         for vehicle in candidates:
-            kept = Kept((vehicle.resource,), "", 0, {})
-            looks.append(self._look(vehicle, behavior, kept, None))
+            checkpoint = Checkpoint((vehicle.resource,), "", 0, {})
+            looks.append(self._query_vehicle(vehicle, behavior, checkpoint, None))
         for found in await asyncio.gather(*looks):
             if found.state is not BehaviorState.UNKNOWN:
-                self._asked.discard(behavior)
+                self._queried.discard(behavior)
                 return found
         return unknown
 
-    def _take_up(self, behavior: BehaviorId) -> None:
-        """To be ended, what a vehicle did not know after a restart is its behavior once more."""
-        kept, reference = self._unknown.pop(behavior, (None, None))
-        if kept is None or self._ledger.last(behavior).state is not BehaviorState.UNKNOWN:
+    def _readopt(self, behavior: BehaviorId) -> None:
+        """Adopt a behavior that its vehicle did not know after a restart, so that it can be
+        cancelled."""
+        checkpoint, reference = self._unknown.pop(behavior, (None, None))
+        if checkpoint is None or self._tracker.last(behavior).state is not BehaviorState.UNKNOWN:
             return
-        resource = next(iter([*self._doers(kept.resources), *kept.resources]))
+        resource = next(iter([*self._commanded(checkpoint.resources), *checkpoint.resources]))
         vehicle = self._vehicles.get(resource)
-        if vehicle is not None and self._ledger.holder(resource) is None:
-            order = vehicle.order_for(behavior, kept.epoch, kept.behavior, kept.parameters)
-            self._ledger.adopt(behavior, kept.resources, reference)
+        if vehicle is not None and self._tracker.holder(resource) is None:
+            order = vehicle.order_for(
+                behavior, checkpoint.epoch, checkpoint.behavior, checkpoint.parameters
+            )
+            self._tracker.adopt(behavior, checkpoint.resources, reference)
             vehicle.adopt(order)
 
-    async def _look(
-        self, vehicle: Vehicle, behavior: BehaviorId, kept: Kept, reference: str | None
+    async def _query_vehicle(
+        self, vehicle: Vehicle, behavior: BehaviorId, checkpoint: Checkpoint, reference: str | None
     ) -> BehaviorReport:
-        """Ask a vehicle. Nothing is awaited between its answer and what follows from it, so that
-        no end of the behavior is missed."""
-        order = vehicle.order_for(behavior, kept.epoch, kept.behavior, kept.parameters)
-        outcome = await vehicle.look(order)
-        if self._ledger.last(behavior).state is not BehaviorState.UNKNOWN:
-            return self._ledger.last(behavior)  # it was asked for twice at the same time
+        """Query a vehicle, and adopt the behavior if it goes on. There is no `await` between the
+        answer and `adopt`, so that no end of the behavior is missed."""
+        order = vehicle.order_for(
+            behavior, checkpoint.epoch, checkpoint.behavior, checkpoint.parameters
+        )
+        outcome = await vehicle.query(order)
+        if self._tracker.last(behavior).state is not BehaviorState.UNKNOWN:
+            return self._tracker.last(behavior)  # it was asked for twice at the same time
         if outcome.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
-            self._ledger.adopt(behavior, kept.resources, reference)
+            self._tracker.adopt(behavior, checkpoint.resources, reference)
             vehicle.adopt(order)
-            return replace(self._ledger.last(behavior), held=outcome.held)
+            return replace(self._tracker.last(behavior), held=outcome.held)
         if outcome.state is BehaviorState.UNKNOWN:
-            vehicle.leave(order)
-            if kept.behavior:
-                self._unknown[behavior] = (kept, reference)
+            vehicle.mark_unresolved(order)
+            if checkpoint.behavior:
+                self._unknown[behavior] = (checkpoint, reference)
         return BehaviorReport(
             behavior,
             3 if outcome.is_end else 0,
@@ -356,31 +372,31 @@ class RosArbiter:
         )
 
     async def _attend(self) -> None:
-        """Look after all vehicles, again and again."""
+        """Check all vehicles every 0.2 s, and put their states into the telemetry."""
         clock = self._context.clock
-        complaints = Complaints(self._context.logger, "the arbiter of ROS vehicles")
-        looked_us, was_late, turn = clock.now_us(), False, 0
+        log_throttle = LogThrottle(self._context.logger, "the arbiter of ROS vehicles")
+        last_us, was_late, round_number = clock.now_us(), False, 0
         while True:
             now_us = clock.now_us()
             # After a pause of our own, what vehicles said meanwhile is still to be read.
-            late = not was_late and now_us - looked_us > LATE * ATTEND_EVERY_S * 1e6
-            looked_us, was_late = now_us, late
+            late = not was_late and now_us - last_us > LATE_FACTOR * ATTEND_EVERY_S * 1e6
+            last_us, was_late = now_us, late
             for vehicle in self._vehicles.values():
                 try:
                     state = vehicle.attend(may_lose=not late)
                 except Exception as error:  # one vehicle's bug must not stop the others
-                    complaints.add(f"{vehicle.resource} cannot be attended to", repr(error))
+                    log_throttle.log(f"{vehicle.resource} cannot be attended to", repr(error))
                 else:
                     if state is not None:
                         self._states.put(state)
-            if self._station is not None:
-                self._station.retry()
-            if turn % PAYLOADS_EVERY == 0:
-                self._tell_of_payloads(now_us)
-            turn += 1
+            if self._vehicle_connections is not None:
+                self._vehicle_connections.retry()
+            if round_number % PAYLOADS_EVERY == 0:
+                self._publish_payload_states(now_us)
+            round_number += 1
             await clock.sleep(ATTEND_EVERY_S)
 
-    def _tell_of_payloads(self, now_us: int) -> None:
+    def _publish_payload_states(self, now_us: int) -> None:
         for resource in self._connections:
             if resource not in self._settings:
                 vehicle = self._vehicles.get(ResourceId(resource.partition("/")[0]))

@@ -1,4 +1,22 @@
-"""What ROS vehicles and payloads can be asked for, however they are reached; needs no ROS."""
+"""The behaviors of ROS vehicles and payloads: shared ones, those that the fleet declares, and
+defaults.
+
+`own_behaviors` of a connection declares the behaviors of an m2pem node beyond the shared ones. It
+is a map of names. A name alone is a shared behavior (docs/fleets.md). A new one lists its
+parameters:
+
+    own_behaviors:
+      area_survey:
+      sweep_street:
+        doc: Drive along a route with the brush down.
+        parameters:
+          route: {kind: route, required: true}
+          passes: {kind: count, minimum: 1, maximum: 5, default: 1}
+          speed: speed
+        writes: [sweep.swept]
+
+Bounds and defaults carry units, as everywhere in a fleet.
+"""
 
 import difflib
 import math
@@ -33,10 +51,10 @@ LEVEL = tuple(
         "teleop",
     )
 )
-"""What moves in the plane, on land or on water, can be asked for."""
+"""The behaviors of vehicles on land and on water."""
 
 PAYLOAD = tuple(spec for (_, type_), spec in SHARED.items() if type_ is BehaviorType.PAYLOAD)
-"""What a payload with a node of its own can be asked for."""
+"""The behaviors of payloads with a node of their own."""
 
 
 _BEHAVIOR_KEYS = ("parameters", "required_one_of", "resume", "ends", "writes", "doc")
@@ -56,8 +74,8 @@ _DIMENSIONS: Mapping[ParameterKind, Dimension] = {
 def read_declared_behaviors(
     resource: ResourceId, value: Any, type_: BehaviorType = BehaviorType.VEHICLE
 ) -> tuple[BehaviorSpec, ...]:
-    """What `own_behaviors` declares; `value` as it stands in the fleet, or None. `type_`: of what
-    the behaviors are.
+    """Read `own_behaviors`. `value` is what the fleet has there, or None. `type_` tells whether the
+    behaviors are of vehicles or of payloads.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
@@ -238,4 +256,4 @@ REVERSE_M = 5.0
 
 OFFSET_M = 15.0
 BEHIND_RAD = math.pi
-"""Where a vehicle follows another one, from its bow clockwise."""
+"""Bearing of a following vehicle from the heading of its target, clockwise."""

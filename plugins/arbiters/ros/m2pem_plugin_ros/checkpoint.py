@@ -1,8 +1,8 @@
-"""Checkpoints of behaviors: what is kept to find one on its vehicle after a restart.
+"""Checkpoints of behaviors: what is stored to find a behavior on its vehicle after a restart.
 
-The checkpoint is a short text of JSON, the `native_ref` of reports: the resources, the behavior and
-its parameters, without areas and without long routes. The ids of goals and runs are derived from
-the ids of behaviors, and are the same after a restart.
+A checkpoint is a short JSON text, the `native_ref` of reports. It has the resources, the behavior
+and its parameters, without areas and long routes. The ids of goals and runs are derived from the
+ids of behaviors, and are the same after a restart.
 """
 
 import json
@@ -14,48 +14,47 @@ from uuid import UUID, uuid5
 from m2pem.api import BehaviorId, Point, ResolvedValue, ResourceId, Route, VehiclePosition
 
 LONGEST_ROUTE = 300
-"""In waypoints. Every report carries the text."""
+"""In waypoints. Longer routes are left out, as every report carries the text."""
 
 _VERSION = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """What a reference says."""
-
+class Checkpoint:
     resources: tuple[ResourceId, ...]
     behavior: str
     epoch: int
     parameters: Mapping[str, ResolvedValue]
 
 
-def native_ref(kept: Kept) -> str:
-    """The text."""
-    encoded = {name: _encoded(value) for name, value in kept.parameters.items()}
+def encode_checkpoint(checkpoint: Checkpoint) -> str:
+    encoded = {name: _encode_value(value) for name, value in checkpoint.parameters.items()}
     whole = {
         "v": _VERSION,
-        "resources": list(kept.resources),
-        "behavior": kept.behavior,
-        "epoch": kept.epoch,
+        "resources": list(checkpoint.resources),
+        "behavior": checkpoint.behavior,
+        "epoch": checkpoint.epoch,
         "parameters": {name: value for name, value in encoded.items() if value is not None},
     }
     return json.dumps(whole, separators=(",", ":"))
 
 
-def read_native_ref(text: str) -> Kept | None:
-    """What a text says; None: it was not made by `native_ref`."""
+def decode_checkpoint(text: str) -> Checkpoint | None:
+    """Return the checkpoint; None if the text was not made by `encode_checkpoint`."""
     try:
         whole = json.loads(text)
         if whole["v"] != _VERSION:
             return None
         resources = tuple(ResourceId(str(resource)) for resource in whole["resources"])
-        parameters = {str(name): _decoded(value) for name, value in whole["parameters"].items()}
-        return Kept(resources, str(whole["behavior"]), int(whole["epoch"]), parameters)
+        parameters = {
+            str(name): _decode_value(value) for name, value in whole["parameters"].items()
+        }
+        return Checkpoint(resources, str(whole["behavior"]), int(whole["epoch"]), parameters)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
 
 
-def _encoded(value: ResolvedValue) -> Any:
+def _encode_value(value: ResolvedValue) -> Any:
     match value:
         case Point():
             return {"point": list(value.position), "frame": value.altitude_frame}
@@ -69,7 +68,7 @@ def _encoded(value: ResolvedValue) -> Any:
             return None
 
 
-def _decoded(value: Any) -> ResolvedValue:
+def _decode_value(value: Any) -> ResolvedValue:
     if not isinstance(value, dict):
         return value  # type: ignore[no-any-return]  # a number or text of JSON
     if "vehicle" in value:
@@ -85,10 +84,10 @@ def _coordinate(value: Any) -> tuple[float, float, float | None]:
 
 
 def goal_id(journal: UUID, behavior: BehaviorId) -> UUID:
-    """The goal of a behavior: the same after a restart, and unlike that of any other journal."""
+    """Return the goal of a behavior: the same after a restart, and different for each journal."""
     return uuid5(journal, behavior)
 
 
 def run_id(journal: UUID, behavior: BehaviorId) -> UUID:
-    """The run that a behavior belongs to: "r1.b3" is of run "r1"."""
+    """Return the run of a behavior: "r1.b3" belongs to run "r1"."""
     return uuid5(journal, behavior.partition(".")[0])

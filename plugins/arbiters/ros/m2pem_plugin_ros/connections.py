@@ -1,5 +1,5 @@
-"""What the arbiter has of ROS: for each vehicle, and each payload that is commanded itself, what is
-heard of it beside its driver."""
+"""The connections of the arbiter to ROS: one runtime for each ROS domain, and the topics of each
+vehicle."""
 
 import asyncio
 import math
@@ -18,75 +18,74 @@ from m2pem.api import (
 )
 from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.interfaces import set_stamp
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.sensors.detectors import DetectorTopic
 from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.sensors.health import Battery, Diagnostics
 from m2pem_plugin_ros.sensors.localization import Localization, TopicLocalization
-from m2pem_plugin_ros.sensors.payload import PayloadSenses, PayloadSight
+from m2pem_plugin_ros.sensors.payload import PayloadSensors, PayloadStatusTopic
 from m2pem_plugin_ros.settings import DetectorSettings, DriverName, Settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
-    from m2pem_plugin_ros.sensors.payload import PayloadSight
+    from m2pem_plugin_ros.sensors.payload import PayloadStatusTopic
 
 
-class Senses(Protocol):
-    """What a vehicle's sensors say."""
+class VehicleSensors(Protocol):
+    """The sensor data of a vehicle."""
 
     @property
-    def localization(self) -> Localization:
-        """Where it is."""
-        ...
+    def localization(self) -> Localization: ...
 
     @property
     def battery_fraction(self) -> float | None:
-        """Of a full one; None: not said."""
+        """0 to 1; None if it is not known."""
         ...
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """What is wrong with its parts, for people."""
+        """Errors of components of the vehicle, as text."""
         ...
 
     @property
     def refusal(self) -> str:
-        """Why nothing may be commanded, for people: it is not one vehicle, or where it is cannot be
-        known; "" if it may."""
+        """Why the vehicle must not be commanded: its endpoints are ambiguous, or its pose cannot be
+        known. "" if it may be commanded."""
         ...
 
     @property
     def absence(self) -> str:
-        """Where what says that it is there is awaited, and who is there, for people."""
+        """On which topic the vehicle is expected, and who publishes there, as text."""
         ...
 
     @property
-    def troubles(self) -> tuple[str, ...]:
-        """What is missing to know well how it is, for people."""
+    def problems(self) -> tuple[str, ...]:
+        """Data that is missing, as text."""
         ...
 
     @property
     def changes(self) -> int:
-        """Another number whenever something was heard."""
+        """A counter that changes with each message."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Instruments:
-    """Of one vehicle, or payload. `show_target` tells it where a vehicle is that it goes to,
-    follows or looks at, and a payload where it is carried. `sight`: where a payload looks."""
+class VehicleConnection:
+    """The ROS connection of one vehicle or payload. `publish_target` sends the state of a vehicle
+    that it goes to, follows or looks at; to a payload, also the state of its own vehicle. `sight`
+    is the status topic of a payload."""
 
     ros: "RosRuntime"
-    senses: Senses
-    show_target: Callable[[VehicleState], None]
-    sight: "PayloadSight | None" = None
+    sensors: VehicleSensors
+    publish_target: Callable[[VehicleState], None]
+    sight: "PayloadStatusTopic | None" = None
 
 
-class Station(Protocol):
-    """All connections to ROS of one arbiter."""
+class VehicleConnections(Protocol):
+    """All ROS connections of one arbiter."""
 
-    async def open(self) -> Mapping[ResourceId, Instruments]:
-        """Listen; returns at once, whoever is there.
+    async def open(self) -> Mapping[ResourceId, VehicleConnection]:
+        """Subscribe to all topics, and return at once. The vehicles need not be there.
 
         Raises:
             RosError: ROS cannot be used; the text says what would be right.
@@ -94,18 +93,19 @@ class Station(Protocol):
         ...
 
     def retry(self) -> None:
-        """Tell of detections whose place was not known before, if it is now."""
+        """Publish the detections that waited for a position of their vehicle, if it is known
+        now."""
         ...
 
     async def close(self) -> None:
-        """Let go of everything."""
+        """Close all connections."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Installation:
-    """What a station is made for. `hear` is given the states of payloads that detect. `vehicles`:
-    also payloads with a node of their own."""
+class ConnectionsSetup:
+    """The arguments of `VehicleConnections`. `hear` receives the states of payloads that detect.
+    `vehicles` contains payloads with a node of their own, too."""
 
     connections: Mapping[ResourceId, Connection]
     vehicles: Mapping[ResourceId, Settings]
@@ -114,8 +114,8 @@ class Installation:
     hear: Callable[[PayloadState], None]
 
 
-class TopicSenses:
-    """Implements `Senses`: what the usual topics of one vehicle say."""
+class TopicSensors:
+    """Implements `VehicleSensors` with the topics of one vehicle."""
 
     def __init__(
         self,
@@ -134,52 +134,42 @@ class TopicSenses:
 
     @property
     def battery_fraction(self) -> float | None:
-        """Of a full one; None: not said."""
         return self._battery.fraction
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """What is wrong with its parts, for people."""
         return self._diagnostics.errors(self._hardware_id)
 
     @property
     def refusal(self) -> str:
-        """Why nothing may be commanded, for people; "" if it may."""
-        return self._endpoints.trouble or self.localization.wrong_frame
+        return self._endpoints.problem or self.localization.wrong_frame
 
     @property
     def absence(self) -> str:
-        """Where the vehicle is awaited, and who is there, for people."""
         return self._endpoints.absence
 
     @property
-    def troubles(self) -> tuple[str, ...]:
-        """What is missing to know well how it is, for people."""
-        return self.localization.troubles
+    def problems(self) -> tuple[str, ...]:
+        return self.localization.problems
 
     @property
     def changes(self) -> int:
-        """Another number whenever something was heard."""
         return self.localization.changes
 
 
-class DdsStation:
-    """Implements `Station`. If all vehicles are software in the loop, DDS stays on 127.0.0.1."""
+class DdsConnections:
+    """Implements `VehicleConnections` over DDS. If all vehicles are simulated, DDS stays on
+    127.0.0.1."""
 
-    def __init__(self, installation: Installation) -> None:
-        self._installation = installation
+    def __init__(self, installation: ConnectionsSetup) -> None:
+        self._setup = installation
         self._runtimes: dict[int, RosRuntime] = {}
         self._diagnostics: dict[tuple[int, str], Diagnostics] = {}
         self._localizations: dict[ResourceId, TopicLocalization] = {}
         self._detectors: list[DetectorTopic] = []
 
-    async def open(self) -> Mapping[ResourceId, Instruments]:
-        """Listen; returns at once, whoever is there.
-
-        Raises:
-            RosError: ROS cannot be used; the text says what would be right.
-        """
-        known = self._installation
+    async def open(self) -> Mapping[ResourceId, VehicleConnection]:
+        known = self._setup
         if all(connection.sitl for connection in known.connections.values()):
             loopback.keep_on_loopback()
         try:
@@ -188,10 +178,12 @@ class DdsStation:
                 for resource, settings in known.vehicles.items()
             }
             for resource, settings in known.detectors.items():
-                whereabouts = self._whereabouts(resource)
+                vehicle_position = self._vehicle_position(resource)
                 ros = self._runtime(settings.domain_id)
                 self._detectors.append(
-                    DetectorTopic(ros, resource, settings, known.context, whereabouts, known.hear)
+                    DetectorTopic(
+                        ros, resource, settings, known.context, vehicle_position, known.hear
+                    )
                 )
         except BaseException:
             await self.close()
@@ -199,31 +191,31 @@ class DdsStation:
         return vehicles
 
     def retry(self) -> None:
-        """Tell of detections whose place was not known before, if it is now."""
         for detector in self._detectors:
             detector.retry()
 
     async def close(self) -> None:
-        """Let go of everything."""
         runtimes = list(self._runtimes.values())
         self._runtimes.clear()
         await asyncio.gather(*(runtime.close() for runtime in runtimes))
 
-    def _listen_to(self, resource: ResourceId, settings: Settings) -> Instruments:
-        context = self._installation.context
+    def _listen_to(self, resource: ResourceId, settings: Settings) -> VehicleConnection:
+        context = self._setup.context
         ros = self._runtime(settings.domain_id)
         if "/" in resource:
-            sight = PayloadSight(ros, resource, settings, Complaints(context.logger, resource))
+            sight = PayloadStatusTopic(
+                ros, resource, settings, LogThrottle(context.logger, resource)
+            )
             domain = _domain(settings.domain_id)
-            senses = PayloadSenses(sight, Endpoints(ros, settings, domain, is_payload=True))
-            return Instruments(ros, senses, TargetTopic(ros, settings).show, sight)
+            sensors = PayloadSensors(sight, Endpoints(ros, settings, domain, is_payload=True))
+            return VehicleConnection(ros, sensors, TargetPublisher(ros, settings).show, sight)
         localization = TopicLocalization(ros, resource, settings, context)
         self._localizations[resource] = localization
         topic = settings.topic(settings.topics.diagnostics)
         board = (_domain(settings.domain_id), topic)
         if board not in self._diagnostics:
             self._diagnostics[board] = Diagnostics(ros, topic, context.clock)
-        topics = TopicSenses(
+        topics = TopicSensors(
             localization,
             Battery(ros, resource, settings, context),
             self._diagnostics[board],
@@ -232,8 +224,8 @@ class DdsStation:
         )
         # Other drivers ask the fleet's bus themselves where a target is.
         is_node = settings.driver is DriverName.NODE
-        show_target = TargetTopic(ros, settings).show if is_node else _show_nothing
-        return Instruments(ros, topics, show_target)
+        publish_target = TargetPublisher(ros, settings).show if is_node else _publish_nothing
+        return VehicleConnection(ros, topics, publish_target)
 
     def _runtime(self, domain_id: int | None) -> "RosRuntime":
         from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # it needs rclpy
@@ -241,30 +233,30 @@ class DdsStation:
         domain = _domain(domain_id)
         if domain not in self._runtimes:
             # Two executives on one network have two journals, and so two names.
-            name = f"m2pem_{self._installation.context.journal.hex[:8]}"
+            name = f"m2pem_{self._setup.context.journal.hex[:8]}"
             self._runtimes[domain] = RosRuntime(name, domain_id=domain)
         return self._runtimes[domain]
 
-    def _whereabouts(self, payload: ResourceId) -> Callable[[], GeoPosition | None]:
+    def _vehicle_position(self, payload: ResourceId) -> Callable[[], GeoPosition | None]:
         vehicle = ResourceId(payload.partition("/")[0])
         localization = self._localizations.get(vehicle)
         if localization is not None:
             return lambda: localization.position
-        bus = self._installation.context.bus
+        bus = self._setup.context.bus
 
-        def whereabouts() -> GeoPosition | None:
+        def vehicle_position() -> GeoPosition | None:
             state = bus.latest(vehicle)
             return state.position if isinstance(state, VehicleState) else None
 
-        return whereabouts
+        return vehicle_position
 
 
-def _show_nothing(_: VehicleState) -> None:
+def _publish_nothing(_: VehicleState) -> None:
     return
 
 
 def _domain(domain_id: int | None) -> int:
-    """The domain of the environment is meant where the fleet says none."""
+    """Return the domain. Without one in the fleet, it is that of the environment."""
     if domain_id is not None:
         return domain_id
     try:
@@ -276,8 +268,9 @@ def _domain(domain_id: int | None) -> int:
 TOPIC = "target"
 
 
-class TargetTopic:
-    """Publishes m2pem_interfaces/TargetState in a vehicle's namespace."""
+class TargetPublisher:
+    """Publishes the state of other vehicles on `target` (m2pem_interfaces/TargetState), in the
+    namespace of a vehicle."""
 
     def __init__(self, ros: "RosRuntime", settings: Settings) -> None:
         from m2pem_plugin_ros.installation import require_interfaces  # noqa: PLC0415
@@ -289,7 +282,7 @@ class TargetTopic:
         )
 
     def show(self, state: VehicleState) -> None:
-        """Publish a vehicle's state; without a position there is nothing to say."""
+        """Publish a state. States without a position are skipped."""
         if state.position is None:
             return
         message = self._messages.TargetState(vehicle=state.resource)

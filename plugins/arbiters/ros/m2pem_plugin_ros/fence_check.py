@@ -1,4 +1,4 @@
-"""Whether what a vehicle is asked for would take it out of the fleet's fence."""
+"""Checks whether a behavior would leave the fence of the fleet."""
 
 import math
 from collections.abc import Callable
@@ -17,13 +17,13 @@ from m2pem.api import (
 )
 from m2pem_plugin_ros.catalogue import BEHIND_RAD, OFFSET_M, REVERSE_M
 from m2pem_plugin_ros.frames import to_geodetic
-from m2pem_plugin_ros.pose import bow_rad
+from m2pem_plugin_ros.pose import known_yaw_rad
 
 _LatLon = tuple[float, float]
 
 
-class Confines:
-    """The fence, for one vehicle. Of targets that move it is known where they are now, no more."""
+class FenceCheck:
+    """The fence of one vehicle. Of targets that move, only the current position is known."""
 
     def __init__(self, area: Area, bus: FleetBus) -> None:
         self._fence = Fence(area)
@@ -32,8 +32,8 @@ class Confines:
     def refusal(
         self, request: BehaviorRequest, position: GeoPosition | None, yaw_rad: float | None
     ) -> str:
-        """Where the way would leave the fence; "" if it does not. `position`, `yaw_rad`: the
-        vehicle's own; None: not known, so that the way from there is not looked at."""
+        """Return where the way would leave the fence; "" if it does not. `position` and `yaw_rad`
+        are those of the vehicle. Without them, the way from the vehicle is not checked."""
         start = None if position is None else _latlon(position)
         match request.behavior:
             case "single_vehicle_routing":
@@ -76,7 +76,7 @@ class Confines:
         state = self._vehicle(request)
         if state is None or state.position is None:
             return None
-        yaw_rad = bow_rad(state) - _number(request, "bearing", BEHIND_RAD)
+        yaw_rad = known_yaw_rad(state) - _number(request, "bearing", BEHIND_RAD)
         return _beside(state.position, yaw_rad, _number(request, "offset", OFFSET_M))
 
     def _vehicle(self, request: BehaviorRequest) -> VehicleState | None:

@@ -1,4 +1,4 @@
-"""Says what to install where ROS 2, or a package of interfaces, is not there or not usable."""
+"""Checks that ROS 2 and packages of interfaces are installed, and says what to install."""
 
 import importlib
 import importlib.metadata
@@ -15,13 +15,13 @@ SOURCED = "a machine with ROS 2: source /opt/ros/jazzy/setup.bash before m2pem s
 
 
 class RosError(PluginError):
-    """ROS 2 is not there, or cannot be used as it is; the message says what would be right."""
+    """ROS 2 is missing, or cannot be used; the message says how to fix it."""
 
     exit_status = 2
 
 
 def require_ros() -> None:
-    """Make sure that rclpy can be imported, and finds its own files.
+    """Import rclpy.
 
     Raises:
         RosError: it is missing, its libraries are, or there are two of it.
@@ -49,7 +49,7 @@ def require_ros() -> None:
 
 
 def require_interfaces(package: str) -> ModuleType:
-    """A package of interfaces, such as m2pem_interfaces or nav2_msgs, with its msg, srv and action.
+    """Import and return a package of interfaces, such as m2pem_interfaces or nav2_msgs.
 
     Raises:
         RosError: it is not installed.
@@ -80,7 +80,7 @@ def _has_wheels() -> bool:
 
 
 def _sourced_prefixes() -> list[str]:
-    """Where a ROS other than that of this environment is, as sourcing it has said."""
+    """Return the prefixes of another ROS than that of this environment, which was sourced."""
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     own = Path(sys.prefix).resolve()
     return [p for p in prefixes if Path(p).resolve() != own and Path(p, "share", "rclpy").is_dir()]

@@ -1,10 +1,10 @@
 """Keeps DDS on this machine: for simulated vehicles, demos and tests.
 
-`python -m m2pem_plugin_ros.loopback [DOMAIN]` prints it for a shell to evaluate.
+`python -m m2pem_plugin_ros.loopback [DOMAIN]` prints shell commands to evaluate.
 
-Of itself, DDS looks for peers on every network. The profile restricts it to the interface
-127.0.0.1, where peers find each other by multicast. The range LOCALHOST of ROS would not do: with
-it, DDS opens sockets of all interfaces.
+By default, DDS looks for peers on every network. The profile restricts it to the interface
+127.0.0.1, where peers find each other by multicast. The discovery range LOCALHOST of ROS is not
+enough: with it, DDS opens sockets on all interfaces.
 """
 
 import os
@@ -19,9 +19,9 @@ PROFILE = Path(__file__).with_name("loopback.xml")
 
 
 def environment(domain_id: int | None = None) -> Mapping[str, str]:
-    """The variables that keep a process of ROS on 127.0.0.1, whatever its own are.
+    """Return the environment variables that keep a ROS process on 127.0.0.1.
 
-    `domain_id`: the ROS domain, 0 to 101; None leaves it to the process.
+    `domain_id` is the ROS domain, 0 to 101; None leaves it to the process.
     """
     variables = {
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
@@ -37,7 +37,7 @@ def environment(domain_id: int | None = None) -> Mapping[str, str]:
 
 
 def keep_on_loopback() -> None:
-    """Keep this process, and those that it starts, on 127.0.0.1. May be called again.
+    """Keep this process, and those that it starts, on 127.0.0.1. It may be called again.
 
     Raises:
         RosError: rclpy was imported before, and may use other networks already.

@@ -1,6 +1,6 @@
-"""Where a vehicle is and how it moves, in the fleet's local frame: ENU at the fleet's origin.
+"""Poses and twists in the local frame of the fleet: ENU at the fleet's origin.
 
-That is the frame `map` of ROS (REP-105) for all vehicles of a fleet; x is east, y is north, yaw is
+That is the frame `map` of ROS (REP-105) for all vehicles of a fleet. x is east, y is north, yaw is
 from east, counter-clockwise (REP-103).
 """
 
@@ -22,7 +22,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """Of the vehicle's own frame (x forward, y left), in metres and radians a second."""
+    """In the frame of the vehicle (x forward, y left), in metres and radians a second."""
 
     forward_m_s: float = 0.0
     yaw_rad_s: float = 0.0
@@ -30,11 +30,11 @@ class Twist:
 
 
 COURSE_ABOVE_M_S = 0.3
-"""Of who does not say where its bow points, it is known from its course, at such a speed."""
+"""The course of a vehicle faster than this is used as its heading, if it reports none."""
 
 
-def bow_rad(state: VehicleState) -> float:
-    """From east, counter-clockwise; 0 if nothing is known."""
+def known_yaw_rad(state: VehicleState) -> float:
+    """Return the yaw of a vehicle, from east, counter-clockwise; 0 if it is not known."""
     if state.yaw_rad is not None:
         return state.yaw_rad
     east_m_s, north_m_s, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)

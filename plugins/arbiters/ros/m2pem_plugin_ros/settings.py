@@ -1,4 +1,10 @@
-"""Reads a map of a fleet file strictly: what is unknown, or has no sense, is refused by name."""
+"""What a fleet says of the connections to ROS vehicles, payloads with a node, and detectors
+(docs/ros.md).
+
+A payload has a node of its own if its `driver` is m2pem and its namespace is not that of its
+vehicle. A payload inherits the connection of its vehicle. So a detector has a node only if its own
+`driver`, `own_behaviors`, or allowed `behaviors` say so.
+"""
 
 import difflib
 import re
@@ -27,7 +33,8 @@ HIGHEST_DOMAIN = 232
 
 
 class ConnectionReader:
-    """The map at `connection`, or one inside of it, such as `connection.topics`.
+    """Reads the map at `connection`, or an inner map such as `connection.topics`. Unknown keys and
+    invalid values are errors.
 
     All methods raise PluginError; the text names the resource and the key.
     """
@@ -40,11 +47,11 @@ class ConnectionReader:
         self.path = path
 
     def error(self, key: str, problem: str) -> PluginError:
-        """What is wrong with the value of a key."""
+        """Return the error for the value of a key."""
         return PluginError(f"{self.resource}: {self.path}.{key}: {problem}")
 
     def refuse_others(self, known: Collection[str]) -> None:
-        """Nothing but these keys may be there."""
+        """Raise an error for keys other than these."""
         for key in self.values:
             if key not in known:
                 near = difflib.get_close_matches(str(key), known, n=1)
@@ -52,28 +59,27 @@ class ConnectionReader:
                 raise self.error(str(key), f"there is no such setting; {hint}")
 
     def inner(self, key: str, example: str) -> "ConnectionReader":
-        """The map of a key; empty if it is not there."""
+        """Return the reader of an inner map; it is empty if the key is missing."""
         value = self.values.get(key, {})
         if not isinstance(value, Mapping):
             raise self.error(key, f"{value!r} is no map, such as {example}")
         return ConnectionReader(self.resource, value, f"{self.path}.{key}")
 
     def text(self, key: str, default: str) -> str:
-        """A text that is not empty."""
+        """Return a text that is not empty."""
         value = self.values.get(key, default)
         if key in self.values and (not isinstance(value, str) or not value.strip()):
             raise self.error(key, f"{value!r} is no text")
         return str(value)
 
     def flag(self, key: str, default: bool) -> bool:
-        """True or false."""
         value = self.values.get(key, default)
         if not isinstance(value, bool):
             raise self.error(key, f"{value!r} is neither true nor false")
         return value
 
     def choice(self, key: str, choices: type[Choice], default: Choice) -> Choice:
-        """One of an enumeration."""
+        """Return a member of an enumeration."""
         value = self.values.get(key, default)
         try:
             return choices(value)
@@ -81,7 +87,7 @@ class ConnectionReader:
             raise self.error(key, f"{value!r} is none of {', '.join(choices)}") from None
 
     def domain_id(self) -> int | None:
-        """The ROS domain; None: that of the environment."""
+        """Return the ROS domain; None means that of the environment."""
         value = self.values.get("domain_id")
         if value is None:
             return None
@@ -93,7 +99,7 @@ class ConnectionReader:
         return int(value)
 
     def namespace(self, default: str | None = None) -> str:
-        """With its leading "/"; "" is the root."""
+        """Return the namespace with its leading "/"; "" is the root."""
         value = self.values.get("namespace", default)
         if value is None:
             raise self.error("namespace", "it is missing: that of the vehicle's nodes, as /evsg1")
@@ -104,7 +110,7 @@ class ConnectionReader:
         return f"/{value.removeprefix('/')}"
 
     def topic(self, key: str, default: str) -> str:
-        """The name of a topic."""
+        """Return the name of a topic."""
         value = self.values.get(key, default)
         if not isinstance(value, str) or not _NAME.fullmatch(value):
             raise self.error(key, f"{value!r} is no name of a ROS topic, such as {default}")
@@ -113,7 +119,7 @@ class ConnectionReader:
     def number(
         self, key: str, default: float, dimension: Dimension, *, zero: bool = False
     ) -> float:
-        """A quantity in SI, above 0 or, with `zero`, not below it."""
+        """Return a quantity in SI, above 0, or with `zero` not below it."""
         if key not in self.values:
             return default
         try:
@@ -129,11 +135,11 @@ class ConnectionReader:
 
 
 DOMAINS = ("ground", "surface")
-"""Of the vehicles that this arbiter commands."""
+"""Domains of the vehicles of this arbiter."""
 
 
 class DriverName(StrEnum):
-    """The ways to reach a vehicle."""
+    """The drivers of vehicles."""
 
     NODE = "m2pem"
     NAV2 = "nav2"
@@ -148,21 +154,21 @@ class Via(StrEnum):
 
 
 class RouteAction(StrEnum):
-    """By which action of Nav2 a route is driven."""
+    """The Nav2 action for routes."""
 
     THROUGH = "through"
     WAYPOINTS = "waypoints"
 
 
 class OdomFrame(StrEnum):
-    """What the odometry of a vehicle is relative to (REP-105)."""
+    """The frame of a vehicle's odometry (REP-105)."""
 
     MAP = "map"
     ODOM = "odom"
 
 
 class DetectorMessage(StrEnum):
-    """What a detector publishes: m2pem_interfaces/msg/Detection, or std_msgs/msg/String."""
+    """The type of a detector's messages: m2pem_interfaces/msg/Detection, or std_msgs/msg/String."""
 
     DETECTION = "detection"
     STRING = "string"
@@ -170,7 +176,7 @@ class DetectorMessage(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """Names of topics; those that do not begin with "/" are in the vehicle's namespace."""
+    """Names of topics. Names without a leading "/" are in the namespace of the vehicle."""
 
     odom: str = "odom"
     fix: str = "fix"
@@ -182,7 +188,7 @@ class Topics:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a plain base can do. `turn_radius_m` 0: it turns on the spot. SI units."""
+    """The limits of a plain base in SI units. With `turn_radius_m` 0, it turns on the spot."""
 
     speed_m_s: float = 2.0
     reverse_m_s: float = 1.0
@@ -194,11 +200,10 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Of a vehicle, or a payload with an m2pem node. `namespace`: with its leading "/", "" is the
-    root. `odom_frame`: "map": its odometry is in the fleet's local frame; "odom": it begins
-    anywhere, and NavSatFix says where (REP-105). `stamped`: cmd_vel is a TwistStamped.
-    `hardware_id`: the vehicle's in /diagnostics; its name in the fleet, if the fleet does not
-    say."""
+    """The connection of a vehicle, or of a payload with an m2pem node. `namespace` has its leading
+    "/"; "" is the root. `odom_frame`: with "map", odometry is in the local frame of the fleet; with
+    "odom", it begins anywhere, and NavSatFix gives the position (REP-105). `stamped`: cmd_vel is a
+    TwistStamped. `hardware_id`: in /diagnostics; by default the name in the fleet."""
 
     namespace: str
     domain_id: int | None = None
@@ -213,14 +218,14 @@ class Settings:
     own_behaviors: tuple[BehaviorSpec, ...] = ()
 
     def topic(self, name: str) -> str:
-        """The full name of a topic, action or service of the vehicle."""
+        """Return the full name of a topic, action or service of the vehicle."""
         return in_namespace(self.namespace, name)
 
 
 @dataclass(frozen=True, slots=True)
 class DetectorSettings:
-    """Of a payload: the full name of the topic with its detections, and their type where the
-    messages do not say one."""
+    """The connection of a detector: the full name of its topic, and the type of detections whose
+    messages have none."""
 
     namespace: str
     topic: str
@@ -230,16 +235,16 @@ class DetectorSettings:
 
 
 def in_namespace(namespace: str, name: str) -> str:
-    """The full name; one that begins with "/" is full already."""
+    """Return the full name. A name with a leading "/" is full already."""
     return name if name.startswith("/") else f"{namespace}/{name}"
 
 
 _KEYS = (*(each.name for each in fields(Settings)), "sim")
-"""`sim` is what a simulated vehicle is like; whoever simulates it reads that."""
+"""`sim` is for the simulator of the vehicle, and not read here."""
 
 DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim")
 NODE_KEYS = ("driver", "via", "own_behaviors")
-"""What a payload with an m2pem node may say beside."""
+"""Further keys of a payload with an m2pem node."""
 
 BOUNDS = {
     "speed": "speed_m_s",
@@ -249,11 +254,11 @@ BOUNDS = {
     "turn_radius": "turn_radius_m",
     "lateral_acceleration": "lateral_m_s2",
 }
-"""What fleets call the fields of `Bounds`."""
+"""Keys of the fleet for the fields of `Bounds`."""
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
-    """The settings of all vehicles.
+    """Read the settings of all vehicles.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
@@ -275,8 +280,8 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
 def read_detectors(
     connections: Mapping[ResourceId, Connection], with_node: Collection[ResourceId] = ()
 ) -> dict[ResourceId, DetectorSettings]:
-    """The settings of all payloads that detect: they have a `topic`, or `detector: true`.
-    `with_node`: those whose connection also tells of the node that they have.
+    """Read the settings of all detectors: payloads with a `topic`, or `detector: true`.
+    `with_node`: payloads that have a node, too.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
@@ -344,7 +349,8 @@ def _bounds(reader: ConnectionReader) -> Bounds:
 def inherited(
     connection: Connection, connections: Mapping[ResourceId, Connection]
 ) -> Mapping[str, Any] | None:
-    """What a payload's connection has of its vehicle's; None: that is another arbiter's."""
+    """Return the settings that a payload inherits from its vehicle; None if the vehicle has another
+    arbiter."""
     vehicle = connections.get(ResourceId(connection.resource.partition("/")[0]))
     return vehicle.settings if vehicle is not None else None
 
@@ -352,8 +358,8 @@ def inherited(
 def own_settings(
     connection: Connection, of_vehicle: Mapping[str, Any] | None, known: Collection[str] = ()
 ) -> dict[str, Any]:
-    """What a payload's connection says beyond its vehicle's, and of `known` what it has at all.
-    `of_vehicle` None: that is another arbiter's, and what is not `known` is its business."""
+    """Return the settings of a payload that differ from its vehicle's, and all that are `known`. If
+    `of_vehicle` is None, the vehicle has another arbiter, and only `known` keys are returned."""
     return {
         key: value
         for key, value in connection.settings.items()
@@ -384,7 +390,7 @@ _PAYLOAD_KEYS = (*DETECTOR_KEYS, *NODE_KEYS)
 def read_payloads(
     connections: Mapping[ResourceId, Connection], vehicles: Mapping[ResourceId, Settings]
 ) -> dict[ResourceId, Settings]:
-    """The settings of all payloads with a node. `vehicles`: those of the vehicles.
+    """Read the settings of all payloads with a node. `vehicles` are the settings of the vehicles.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.

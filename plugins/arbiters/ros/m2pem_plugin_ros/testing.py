@@ -1,7 +1,7 @@
-"""For tests over real DDS: a ROS domain that no other test has, and peers in other processes.
+"""For tests over real DDS: a ROS domain for each test, and peers in other processes.
 
-In a conftest: `keep_on_loopback()` of m2pem_plugin_ros.loopback first, then
-`from m2pem_plugin_ros.testing import ros_domain  # noqa: F401`.
+In a conftest: `keep_on_loopback()` of m2pem_plugin_ros.loopback first, then `from
+m2pem_plugin_ros.testing import ros_domain  # noqa: F401`.
 """
 
 import os
@@ -20,7 +20,7 @@ import pytest
 from m2pem_plugin_ros import loopback
 
 DOMAINS = range(1, 101)
-"""On Linux, the ports of higher ones are where the system picks free ports from."""
+"""On Linux, the ports of higher domains are in the ephemeral range."""
 
 FIRST_PORT = 18500
 STOP_WITHIN_S = 30
@@ -28,9 +28,9 @@ STOP_WITHIN_S = 30
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
-    """A ROS domain for the block, of nobody else on this machine who asks in this way.
+    """Reserve a ROS domain for the block, among processes of this machine that use this function.
 
-    A socket of 127.0.0.1 is the reservation, so that it ends with its process in any case.
+    A socket of 127.0.0.1 is the reservation, so that it ends with its process.
     """
     for domain in DOMAINS:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as reservation:
@@ -51,9 +51,10 @@ def ros_domain() -> Iterator[int]:
 
 
 class Peer:
-    """A Python program in a process of its own, kept on 127.0.0.1, in a ROS domain.
+    """A Python program in another process, on 127.0.0.1, in a ROS domain.
 
-    The block begins when it has printed a line that is "ready". It ends by SIGTERM, or `kill`.
+    The block begins when the program has printed the line "ready". It ends the program by SIGTERM,
+    or `kill`.
     """
 
     def __init__(self, program: Path | str, domain: int, arguments: Sequence[str] = ()) -> None:
@@ -83,7 +84,7 @@ class Peer:
             self.process.stdout.close()
 
     def wait_for(self, line: str) -> None:
-        """Read what it prints until that line.
+        """Read its output until that line.
 
         Raises:
             RuntimeError: it ended before.
@@ -95,6 +96,6 @@ class Peer:
         raise RuntimeError(f"the peer ended with {self.process.wait()} before it was '{line}'")
 
     def kill(self) -> None:
-        """End it as a power failure would."""
+        """Kill the process, as a power failure would."""
         self.process.kill()
         self.process.wait()

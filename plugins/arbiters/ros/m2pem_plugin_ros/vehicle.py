@@ -1,5 +1,5 @@
-"""One vehicle of the arbiter, or a payload with a node of its own: its driver, what it was given,
-and when it was heard."""
+"""One vehicle of the arbiter, or a payload with its own node: its driver, its order, and its
+link."""
 
 import asyncio
 import math
@@ -25,152 +25,161 @@ from m2pem.api import (
 )
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
-from m2pem_plugin_ros.connections import Instruments, Senses
-from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
-from m2pem_plugin_ros.fence_check import Confines
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.connections import VehicleConnection, VehicleSensors
+from m2pem_plugin_ros.drivers.driver import Driver, DriverSetup, Health, Order, Outcome
+from m2pem_plugin_ros.fence_check import FenceCheck
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.settings import DriverName, Settings
 
-LOOK_WITHIN_S = 3.0
-"""In real time: so long may a vehicle take to say how it stands to a goal."""
+QUERY_WITHIN_S = 3.0
+"""Timeout of a query to the vehicle, in real time."""
 
 CANCEL_SHARE = 0.8
-"""Of the time in which a cancelled vehicle must be free: one that takes longer has failed to."""
+"""A cancel that takes more than this part of the cancel timeout has failed."""
 
 RECLAIM_WITHIN_S = 5.0
-"""In real time: a vehicle that has not acknowledged a CANCEL by then is also told to HOLD."""
+"""In real time. A vehicle that has not acknowledged a CANCEL by then is also sent HOLD."""
 
 CLOSE_WITHIN_S = 5.0
 REMEMBERED = 1_000
 OTHERS_EVERY_S = 1.0
-"""In real time, however fast the clock is: so often it is looked who else is there."""
+"""Period of the check for other publishers, in real time."""
 
 _GOES_ON = (BehaviorState.ACCEPTED, BehaviorState.RUNNING)
 
 
 @dataclass(frozen=True, slots=True)
-class Post:
-    """What a vehicle is made with."""
+class VehicleSetup:
+    """The arguments of a vehicle."""
 
     connection: Connection
     settings: Settings
     context: ArbiterContext
-    ledger: BehaviorTracker
+    tracker: BehaviorTracker
     limits: Limits
 
 
 class Vehicle:
-    """Implements `Told`. Whatever its driver raises stays here, and is told as a failure."""
+    """Implements `DriverEvents`. Errors of the driver stay here, and are reported as failures."""
 
     def __init__(
-        self, post: Post, instruments: Instruments, make_driver: Callable[[Seat], Driver]
+        self,
+        setup: VehicleSetup,
+        ros_connection: VehicleConnection,
+        make_driver: Callable[[DriverSetup], Driver],
     ) -> None:
-        self.resource: ResourceId = post.connection.resource
-        self.settings = post.settings
+        self.resource: ResourceId = setup.connection.resource
+        self.settings = setup.settings
         self.link = LinkState.CONNECTED
-        self.heard_once = asyncio.Event()
-        self._context = post.context
-        self._ledger = post.ledger
-        self._limits = post.limits
-        self._instruments = instruments
-        fence = post.connection.fence
-        self._confines = None if fence is None else Confines(fence, post.context.bus)
-        self._complaints = Complaints(post.context.logger, self.resource)
+        self.first_contact = asyncio.Event()
+        self._context = setup.context
+        self._tracker = setup.tracker
+        self._limits = setup.limits
+        self._ros_connection = ros_connection
+        fence = setup.connection.fence
+        self._fence_check = None if fence is None else FenceCheck(fence, setup.context.bus)
+        self._log_throttle = LogThrottle(setup.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._order: Order | None = None
         self._cancelled: BehaviorId = ""
         self._broken = ""
-        self._looked_s = 0.0
-        self._wrong = ""
-        self._left: dict[UUID, BehaviorId] = {}
-        self._left_less = asyncio.Event()
-        self._heard_us = post.context.clock.now_us()
-        self._heard = 0
-        self._told: tuple[object, ...] = ()
+        self._checked_s = 0.0
+        self._refusal = ""
+        self._unresolved: dict[UUID, BehaviorId] = {}
+        self._resolved = asyncio.Event()
+        self._last_contact_us = setup.context.clock.now_us()
+        self._contacts = 0
+        self._reported: tuple[object, ...] = ()
         self._tasks: set[asyncio.Task[None]] = set()
-        localization = instruments.senses.localization
+        localization = ros_connection.sensors.localization
         self.driver = make_driver(
-            Seat(post.connection, post.settings, post.context, instruments.ros, localization, self)
+            DriverSetup(
+                setup.connection,
+                setup.settings,
+                setup.context,
+                ros_connection.ros,
+                localization,
+                self,
+            )
         )
 
     @property
     def doing(self) -> BehaviorId | None:
-        """The behavior that it was given and that goes on. What only holds a payload, while its
-        vehicle does it, is none of the payload's."""
-        holder = self._ledger.holder(self.resource)
+        """The behavior that the vehicle was given and that goes on. A behavior of the vehicle that
+        only uses a payload is not the payload's."""
+        holder = self._tracker.holder(self.resource)
         is_ours = self._order is not None and self._order.request.id == holder
         return holder if is_ours else None
 
     # --- what the arbiter asks ------------------------------------------------------------------
 
-    async def take(self, request: BehaviorRequest, *, look_first: bool = False) -> None:
-        """Do this, in place of what it does. `look_first`: it may have been begun already."""
+    async def take(self, request: BehaviorRequest, *, query_first: bool = False) -> None:
+        """Start a request in place of the current one. `query_first`: it may have been started
+        before."""
         order = self._order_for(request)
         self._keep(order)
-        self._show_targets()
+        self._publish_targets()
         # A plain base does nothing while nobody drives it.
-        if look_first and self.settings.driver is not DriverName.BASE:
-            outcome = await self.look(order)
-            if self._ledger.last(request.id).state.terminal:
+        if query_first and self.settings.driver is not DriverName.BASE:
+            outcome = await self.query(order)
+            if self._tracker.last(request.id).state.terminal:
                 return  # the vehicle was lost meanwhile, or it has ended
             if outcome.state in _GOES_ON:
                 self.progress(order.goal)
                 if self._cancelled == request.id:
-                    self._ask("end", lambda: self.driver.end(order.goal))
+                    self._call_driver("end", lambda: self.driver.end(order.goal))
                 return
             if outcome.is_end:
                 self.ended(order.goal, outcome)
                 return
             if self._cancelled == request.id:
-                self._ledger.end(request.id, BehaviorState.CANCELLED)
+                self._tracker.end(request.id, BehaviorState.CANCELLED)
                 return
-        self._left.clear()
-        if wrong := self._ask("begin", lambda: self.driver.begin(order)):
-            self._ledger.end(request.id, BehaviorState.FAILED, reason=wrong)
+        self._unresolved.clear()
+        if wrong := self._call_driver("begin", lambda: self.driver.begin(order)):
+            self._tracker.end(request.id, BehaviorState.FAILED, reason=wrong)
 
     def cancel(self, behavior: BehaviorId) -> None:
-        """Stop doing it, within the limit that was promised."""
+        """Cancel a behavior. It fails if the vehicle does not stop in time."""
         goal = goal_id(self._context.journal, behavior)
         self._cancelled = behavior
-        task = asyncio.get_running_loop().create_task(self._give_up(behavior))
+        task = asyncio.get_running_loop().create_task(self._fail_cancel_after_limit(behavior))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        if wrong := self._ask("end", lambda: self.driver.end(goal)):
-            self._leave(behavior)
-            self._ledger.end(behavior, BehaviorState.FAILED, reason=wrong)
+        if wrong := self._call_driver("end", lambda: self.driver.end(goal)):
+            self._mark_unresolved(behavior)
+            self._tracker.end(behavior, BehaviorState.FAILED, reason=wrong)
 
     def adjust(self, behavior: BehaviorId, parameters: Mapping[str, ResolvedValue]) -> None:
-        """Go on with these parameters."""
         order, goal = self._order, goal_id(self._context.journal, behavior)
         if order is not None and order.goal == goal:
             request = order.request
             merged = {**request.parameters, **parameters}
             self._order = replace(order, request=replace(request, parameters=merged))
-        self._ask("adjust", lambda: self.driver.adjust(goal, parameters))
+        self._call_driver("adjust", lambda: self.driver.adjust(goal, parameters))
 
     def hold(self) -> None:
-        """Stand still, and keep the behavior."""
-        self._ask("hold", self.driver.hold)
+        """Stop the vehicle, and keep the behavior."""
+        self._call_driver("hold", self.driver.hold)
 
     def resume(self) -> None:
-        """Go on."""
-        self._ask("resume", self.driver.resume)
+        self._call_driver("resume", self.driver.resume)
 
     async def reclaim(self) -> str:
-        """It is heard again: have it end what it was left with. Returns when it has acknowledged
-        all of that, and ""; else, after a while, what it may still do."""
+        """End all orders that a lost vehicle may still execute, now that it is received again.
+        Return "" when all are acknowledged; otherwise, after a timeout, what it may still do."""
         if (holder := self.doing) is not None:
-            self._lose(holder, (self._context.clock.now_us() - self._heard_us) / 1e6)
-        for goal in list(self._left):
-            self._ask("end", partial(self.driver.end, goal))
+            self._lose(holder, (self._context.clock.now_us() - self._last_contact_us) / 1e6)
+        for goal in list(self._unresolved):
+            self._call_driver("end", partial(self.driver.end, goal))
         try:
             async with asyncio.timeout(RECLAIM_WITHIN_S):
-                while self._left:
-                    self._left_less.clear()
-                    await self._left_less.wait()
+                while self._unresolved:
+                    self._resolved.clear()
+                    await self._resolved.wait()
         except TimeoutError:
             self.hold()
-            left = ", ".join(self._left.values())
+            left = ", ".join(self._unresolved.values())
             return (
                 f"it is heard again, was told to end {left} and then to hold, and has not"
                 " acknowledged: it may still do that"
@@ -179,35 +188,35 @@ class Vehicle:
 
     @property
     def absence(self) -> str:
-        """Where it is awaited, and who is there, for people."""
-        return self._instruments.senses.absence
+        """On which topic the vehicle is expected, and who publishes there."""
+        return self._ros_connection.sensors.absence
 
     def refusal(self, request: BehaviorRequest) -> str:
-        """Why it cannot be done now; "" if it can."""
+        """Return why a request cannot be done now; "" if it can."""
         if self._broken:
             return self._broken
         try:
-            if wrong := self._instruments.senses.refusal:
+            if wrong := self._ros_connection.sensors.refusal:
                 return wrong
             return self.driver.refusal(request) or self._breach(request)
         except Exception as error:
             self._context.logger.exception("%s: refusal", self.resource)
             return _bug(error)
 
-    async def look(self, order: Order) -> Outcome:
-        """How the vehicle stands to a goal; UNKNOWN also if it does not say soon."""
+    async def query(self, order: Order) -> Outcome:
+        """Return the state of a goal on the vehicle; UNKNOWN also if it does not answer in time."""
         try:
-            async with asyncio.timeout(LOOK_WITHIN_S):
-                return await self.driver.look(order)
+            async with asyncio.timeout(QUERY_WITHIN_S):
+                return await self.driver.query(order)
         except TimeoutError:
-            reason = f"{self.resource} did not say within {LOOK_WITHIN_S:g} s whether it does it"
+            reason = f"{self.resource} did not say within {QUERY_WITHIN_S:g} s whether it does it"
         except Exception as error:
             self._context.logger.exception("%s: look", self.resource)
             reason = f"{self.resource} could not be asked: {error}"
         return Outcome(BehaviorState.UNKNOWN, reason=reason)
 
     def adopt(self, order: Order) -> None:
-        """It was found doing this, and its driver has it."""
+        """Take over an order that was found on the vehicle."""
         self._keep(order)
 
     def order_for(
@@ -217,16 +226,18 @@ class Vehicle:
         name: str = "",
         parameters: Mapping[str, ResolvedValue] | None = None,
     ) -> Order:
-        """An order that may have been given before a restart; of an unknown name it is ""."""
+        """Return an order that may have been sent before a restart. Its name may be "", if it is
+        not known."""
         request = BehaviorRequest(behavior, epoch, name, parameters or {}, (self.resource,))
         return self._order_for(request)
 
-    def leave(self, order: Order) -> None:
-        """It may still do this, and is to stop doing it when it is given something else."""
-        self._left[order.goal] = order.request.id
+    def mark_unresolved(self, order: Order) -> None:
+        """Remember that the vehicle may still execute an order. It is preempted by the next one."""
+        self._unresolved[order.goal] = order.request.id
 
     async def open(self) -> None:
-        """Have the driver listen. One that breaks refuses every request, and stops nobody else.
+        """Open the driver. If that fails, every request is refused; other vehicles are not
+        affected.
 
         Raises:
             PluginError: something that it needs is not installed.
@@ -240,7 +251,7 @@ class Vehicle:
             self._broken = f"its driver did not open: {_bug(error)}"
 
     async def close(self) -> None:
-        """Let go; the vehicle keeps doing what it does."""
+        """Close the driver. The vehicle goes on with what it does."""
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
@@ -253,113 +264,118 @@ class Vehicle:
 
     # --- what the driver tells ------------------------------------------------------------------
 
-    def heard(self) -> None:
-        """The vehicle, or what steers it there, is alive."""
-        self._heard_us = self._context.clock.now_us()
-        self._heard += 1
-        self.heard_once.set()
+    def alive(self) -> None:
+        self._last_contact_us = self._context.clock.now_us()
+        self._contacts += 1
+        self.first_contact.set()
 
     def progress(self, goal: UUID) -> None:
-        """The vehicle does it."""
         if (behavior := self._behavior(goal)) is not None:
-            self._ledger.progress(behavior)
+            self._tracker.progress(behavior)
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
-        """It has ended, for good."""
-        was_left = self._left.pop(goal, None) is not None
-        self._left_less.set()
+        was_left = self._unresolved.pop(goal, None) is not None
+        self._resolved.set()
         behavior = self._behaviors.get(goal) if was_left else self._behavior(goal)
         if behavior is None:
             return
         if not outcome.is_end:
-            self._complaints.add("an end that is none", f"{behavior} is {outcome.state}")
+            self._log_throttle.log("an end that is none", f"{behavior} is {outcome.state}")
             return
         if self._order is not None and self._order.goal == goal:
             self._order = None
         if outcome.state is BehaviorState.SUCCEEDED:
-            self._ledger.progress(behavior)  # one that was done so soon ran all the same
-        self._ledger.end(behavior, outcome.state, outcome.code, outcome.reason, outcome.outputs)
+            self._tracker.progress(behavior)  # one that was done so soon ran all the same
+        self._tracker.end(behavior, outcome.state, outcome.code, outcome.reason, outcome.outputs)
 
     # --- time -----------------------------------------------------------------------------------
 
     def listen_from_now(self) -> None:
-        """Silence counts from now on."""
-        self._heard_us = self._context.clock.now_us()
+        """Count the silence of the vehicle from now on."""
+        self._last_contact_us = self._context.clock.now_us()
 
     def attend(self, *, may_lose: bool) -> VehicleState | PayloadState | None:
-        """Look after the vehicle; what the fleet is to be told, if there is news.
+        """Check the vehicle, and return its new state; None if nothing has changed.
 
-        `may_lose`: what it said until now has been heard, so that silence means something.
+        `may_lose`: all messages until now were processed, so that silence means a lost link.
         """
         now_us = self._context.clock.now_us()
-        silent_s = (now_us - self._heard_us) / 1e6
+        silent_s = (now_us - self._last_contact_us) / 1e6
         bound_s = self._limits.lost_after_s
         is_silent = silent_s >= bound_s
         holder = self.doing
-        if not self._heard:
+        if not self._contacts:
             self.link = LinkState.LOST
         elif may_lose or not is_silent:
             self.link = link_state(silent_s, bound_s)
         if is_silent and may_lose and holder is not None:
             self._lose(holder, silent_s)
             holder = None
-        self._show_targets()
-        self._look_for_others()
-        news = (self._heard, self._instruments.senses.changes, self.link, holder, self._wrong)
-        still_lost = self.link is LinkState.LOST and self._told[2:3] == (self.link,)
-        if still_lost or news == self._told:
+        self._publish_targets()
+        self._check_for_other_publishers()
+        news = (
+            self._contacts,
+            self._ros_connection.sensors.changes,
+            self.link,
+            holder,
+            self._refusal,
+        )
+        still_lost = self.link is LinkState.LOST and self._reported[2:3] == (self.link,)
+        if still_lost or news == self._reported:
             return None
-        self._told = news
+        self._reported = news
         behavior = self._order.request.behavior if self._order else ""
-        if self._instruments.sight is not None:
-            return self._instruments.sight.state(now_us, self.link, behavior)
-        health, senses = self._health(), self._instruments.senses
-        state = vehicle_state(self.resource, now_us, senses, health, self.link, behavior)
-        if not self._wrong:
+        if self._ros_connection.sight is not None:
+            return self._ros_connection.sight.state(now_us, self.link, behavior)
+        health, sensors = self._health(), self._ros_connection.sensors
+        state = vehicle_state(self.resource, now_us, sensors, health, self.link, behavior)
+        if not self._refusal:
             return state
-        reasons = (self._wrong, *state.not_ready_reasons)
+        reasons = (self._refusal, *state.not_ready_reasons)
         return replace(state, ready=False, not_ready_reasons=reasons)
 
     # --- inside ---------------------------------------------------------------------------------
 
-    def _look_for_others(self) -> None:
-        """Once in a while, so that operators know before something is commanded."""
+    def _check_for_other_publishers(self) -> None:
+        """Check the endpoints periodically, so that operators know of a conflict early."""
         now_s = asyncio.get_running_loop().time()
-        if now_s - self._looked_s < OTHERS_EVERY_S:
+        if now_s - self._checked_s < OTHERS_EVERY_S:
             return
-        self._looked_s = now_s
-        wrong = self._instruments.senses.refusal
-        if wrong and wrong != self._wrong:
+        self._checked_s = now_s
+        wrong = self._ros_connection.sensors.refusal
+        if wrong and wrong != self._refusal:
             self._context.logger.error("%s: nothing more is commanded: %s", self.resource, wrong)
-        elif self._wrong and not wrong:
+        elif self._refusal and not wrong:
             self._context.logger.warning("%s: can be commanded again", self.resource)
-        self._wrong = wrong
+        self._refusal = wrong
 
     def _lose(self, holder: BehaviorId, silent_s: float) -> None:
-        self._leave(holder)
-        self._ask("forget", self.driver.forget)
+        self._mark_unresolved(holder)
+        self._call_driver("forget", self.driver.abandon)
         reason = f"not heard for {silent_s:.1f} s"
-        if not self._heard:
+        if not self._contacts:
             reason = f"never heard: {self.absence}"
-        self._ledger.lose(self.resource, reason)
+        self._tracker.lose(self.resource, reason)
 
-    def _leave(self, behavior: BehaviorId) -> None:
-        self._left[goal_id(self._context.journal, behavior)] = behavior
+    def _mark_unresolved(self, behavior: BehaviorId) -> None:
+        self._unresolved[goal_id(self._context.journal, behavior)] = behavior
         self._order = None
 
-    async def _give_up(self, behavior: BehaviorId) -> None:
+    async def _fail_cancel_after_limit(self, behavior: BehaviorId) -> None:
         limit_s = CANCEL_SHARE * self._limits.cancel_timeout_s
         await self._context.clock.sleep(limit_s)
         if self.doing == behavior:
-            self._leave(behavior)
+            self._mark_unresolved(behavior)
             reason = f"it did not stop within {limit_s:g} s of the cancel"
-            self._ledger.end(behavior, BehaviorState.FAILED, "TIMEOUT", reason)
+            self._tracker.end(behavior, BehaviorState.FAILED, "TIMEOUT", reason)
 
     def _order_for(self, request: BehaviorRequest) -> Order:
         journal = self._context.journal
         goal = goal_id(journal, request.id)
         others = [goal_id(journal, preempted) for preempted in request.preempts]
-        preempts = tuple(each for each in dict.fromkeys([*others, *self._left]) if each != goal)
+        preempts = tuple(
+            each for each in dict.fromkeys([*others, *self._unresolved]) if each != goal
+        )
         return Order(request, goal, run_id(journal, request.id), preempts)
 
     def _keep(self, order: Order) -> None:
@@ -372,11 +388,11 @@ class Vehicle:
     def _behavior(self, goal: UUID) -> BehaviorId | None:
         behavior = self._behaviors.get(goal)
         if behavior is None:
-            self._complaints.add("what it says of a goal that it was not given", str(goal))
+            self._log_throttle.log("what it says of a goal that it was not given", str(goal))
         return behavior
 
-    def _ask(self, what: str, call: Callable[[], None]) -> str:
-        """Returns "", or what went wrong."""
+    def _call_driver(self, what: str, call: Callable[[], None]) -> str:
+        """Call the driver. Return "", or what went wrong."""
         try:
             call()
         except Exception as error:
@@ -385,22 +401,23 @@ class Vehicle:
         return ""
 
     def _breach(self, request: BehaviorRequest) -> str:
-        """Where it would leave the fleet's fence."""
-        if self._confines is None:
+        """Return where the request would leave the fence of the fleet; "" if it does not."""
+        if self._fence_check is None:
             return ""
-        where = self._instruments.senses.localization
+        where = self._ros_connection.sensors.localization
         yaw_rad = None if where.pose is None else where.pose.yaw_rad
-        return self._confines.refusal(request, where.position, yaw_rad)
+        return self._fence_check.refusal(request, where.position, yaw_rad)
 
     def _health(self) -> Health:
         try:
             return self.driver.health
         except Exception as error:
-            self._complaints.add("what its driver says of its health", repr(error))
+            self._log_throttle.log("what its driver says of its health", repr(error))
             return Health()
 
-    def _show_targets(self) -> None:
-        """A payload is told all the time where it is carried, for what it is asked next."""
+    def _publish_targets(self) -> None:
+        """Publish the states of target vehicles. A payload always gets the state of its own
+        vehicle."""
         carrier, of_a_vehicle, _ = self.resource.partition("/")
         names = {carrier: None} if of_a_vehicle else {}
         if self._order is not None and self.doing is not None:
@@ -409,7 +426,7 @@ class Vehicle:
         for name in names:
             state = self._context.bus.latest(ResourceId(name))
             if isinstance(state, VehicleState):
-                self._instruments.show_target(state)
+                self._ros_connection.publish_target(state)
 
 
 def _bug(error: Exception) -> str:
@@ -417,11 +434,11 @@ def _bug(error: Exception) -> str:
 
 
 DEGRADED_SHARE = 0.5
-"""Of `lost_after_s`: a vehicle that is silent for longer has a bad link."""
+"""A vehicle that is silent for this part of `lost_after_s` has a bad link."""
 
 
 def link_state(silent_s: float, lost_after_s: float) -> LinkState:
-    """How well a vehicle is heard that was heard so many seconds ago."""
+    """Return the state of a link whose last message is `silent_s` seconds old."""
     if silent_s >= lost_after_s:
         return LinkState.LOST
     if silent_s >= DEGRADED_SHARE * lost_after_s:
@@ -432,31 +449,31 @@ def link_state(silent_s: float, lost_after_s: float) -> LinkState:
 def vehicle_state(
     resource: ResourceId,
     time_us: int,
-    senses: Senses,
+    sensors: VehicleSensors,
     health: Health,
     link: LinkState,
     behavior: str,
 ) -> VehicleState:
-    """What the fleet is told. A part that reports an error makes the vehicle not ready."""
-    pose, errors = senses.localization.pose, senses.errors
+    """Return the state for the fleet. An error of a component makes the vehicle not ready."""
+    pose, errors = sensors.localization.pose, sensors.errors
     battery = health.battery_fraction
     return VehicleState(
         resource,
         time_us,
-        senses.localization.position,
-        velocity_enu_m_s=_velocity(senses),
+        sensors.localization.position,
+        velocity_enu_m_s=_velocity(sensors),
         yaw_rad=pose.yaw_rad if pose is not None else None,
-        battery_fraction=senses.battery_fraction if battery is None else battery,
+        battery_fraction=sensors.battery_fraction if battery is None else battery,
         mode=health.mode,
         ready=False if errors else health.ready,
-        not_ready_reasons=(*health.not_ready_reasons, *errors, *senses.troubles),
+        not_ready_reasons=(*health.not_ready_reasons, *errors, *sensors.problems),
         link=link,
         behavior=behavior,
     )
 
 
-def _velocity(senses: Senses) -> tuple[float, float, float] | None:
-    pose, twist = senses.localization.pose, senses.localization.twist
+def _velocity(sensors: VehicleSensors) -> tuple[float, float, float] | None:
+    pose, twist = sensors.localization.pose, sensors.localization.twist
     if pose is None or twist is None:
         return None
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)

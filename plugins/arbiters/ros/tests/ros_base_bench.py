@@ -10,7 +10,7 @@ from typing import Any
 from uuid import UUID, uuid4
 
 from m2pem_plugin_ros.drivers.base import BaseDriver
-from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.frames import to_geodetic, yaw_of_quaternion
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime, qos
@@ -37,7 +37,7 @@ RUN = UUID("7a4f3c52-6d0e-5c6d-9a3b-2d8a6d7e9f10")
 AMPLE_S = 40.0
 
 
-class Whereabouts:
+class PoseEstimator:
     """Implements `Localization`."""
 
     def __init__(self, ros: RosRuntime, namespace: str, clock: Clock) -> None:
@@ -46,7 +46,7 @@ class Whereabouts:
         self.pose: Pose | None = None
         self.twist: Twist | None = None
         self.position: GeoPosition | None = None
-        ros.subscribe(Odometry, f"{namespace}/odom", self._hear, qos.TELEMETRY)
+        ros.subscribe(Odometry, f"{namespace}/odom", self._on_message, qos.TELEMETRY)
 
     @property
     def age_s(self) -> float:
@@ -54,7 +54,7 @@ class Whereabouts:
             return math.inf
         return (self._clock.now_us() - self._heard_us) / 1e6
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         place = message.pose.pose.position
         self.pose = Pose(place.x, place.y, yaw_of_quaternion(message.pose.pose.orientation))
         self.twist = Twist(message.twist.twist.linear.x, message.twist.twist.angular.z)
@@ -62,7 +62,7 @@ class Whereabouts:
 
 
 class Bench:
-    """Implements `Told`, and gives orders. `said`: the commands that the base has got."""
+    """Implements `DriverEvents`, and gives orders. `said`: the commands that the base has got."""
 
     def __init__(self, ros: RosRuntime, namespace: str, clock: Clock, **options: Any) -> None:
         fence = options.pop("fence", None)
@@ -72,16 +72,16 @@ class Bench:
         self.goals: list[UUID] = []
         self.outcomes: list[tuple[UUID, Outcome]] = []
         self.said: list[tuple[float, float]] = []
-        self.where = Whereabouts(ros, namespace, clock)
+        self.where = PoseEstimator(ros, namespace, clock)
         self.ros = ros
         self._orders = ros.node.create_publisher(String, f"{namespace}/orders", 10)
         ros.subscribe(String, f"{namespace}/said", self._say, qos.EVENTS)
         settings = Settings(namespace, **{"bounds": Bounds(acceleration_m_s2=2.0), **options})
         context = ArbiterContext(clock, self.bus, logging.getLogger("m2pem.testing"), ORIGIN)
         connection = Connection(ResourceId("ugv1"), "ground", sitl=True, fence=fence)
-        self.driver = BaseDriver(Seat(connection, settings, context, ros, self.where, self))
+        self.driver = BaseDriver(DriverSetup(connection, settings, context, ros, self.where, self))
 
-    def heard(self) -> None:
+    def alive(self) -> None:
         self.heard_count += 1
 
     def progress(self, goal: UUID) -> None:

@@ -10,7 +10,7 @@ from m2pem_plugin_ros.behaviors import (
     Ending,
     LocalParameters,
     Pilot,
-    Seen,
+    Observation,
     Step,
     Target,
     make_motion,
@@ -39,7 +39,7 @@ def point(place: Place) -> Point:
 
 
 @dataclass
-class Body:
+class Dynamics:
     """Speed and yaw rate follow the command with a lag, as on a real base."""
 
     pose: Pose = field(default_factory=lambda: Pose(0.0, 0.0, 0.0))
@@ -68,19 +68,19 @@ class Road:
     def __init__(
         self,
         bounds: Bounds = TURNS_ON_THE_SPOT,
-        body: Body | None = None,
+        body: Dynamics | None = None,
         outside_m: Callable[[Place], float] | None = None,
     ) -> None:
         self.bounds = bounds
-        self.body = body or Body()
+        self.body = body or Dynamics()
         self.pilot = Pilot(bounds, outside_m)
         self.now_s = 100.0
         self.commands: list[Twist] = []
         self.driven: list[Pose] = [self.body.pose]
         self.ending: Ending | None = None
         self.target: Callable[[float], Target | None] = lambda _: None
-        self.stick: Twist | None = None
-        self.stick_age_s = 0.0
+        self.joystick: Twist | None = None
+        self.joystick_age_s = 0.0
         self.age_s = 0.0
         self.seen_pose: Callable[[Pose], Pose | None] = lambda pose: pose
         self._last = Twist()
@@ -94,14 +94,14 @@ class Road:
 
     def step(self) -> Step:
         self.now_s += DT_S
-        seen = Seen(
+        seen = Observation(
             self.now_s,
             self.seen_pose(self.body.pose),
             self.body.twist,
             self.age_s,
             self.target(self.now_s),
-            self.stick,
-            self.stick_age_s,
+            self.joystick,
+            self.joystick_age_s,
         )
         step = self.pilot.step(seen)
         command = step.twist or Twist()

@@ -58,7 +58,7 @@ class Witness:
         ros = RosRuntime("witness", domain_id=domain)
         for vehicle in (A, B):
             ros.subscribe(UInt32, f"/{vehicle}/motions", self._count(vehicle), qos.STATUS)
-            ros.subscribe(Odometry, f"/{vehicle}/odom", self._hear(vehicle), qos.TELEMETRY)
+            ros.subscribe(Odometry, f"/{vehicle}/odom", self._on_message(vehicle), qos.TELEMETRY)
         await until(lambda: len(self.motions) == 2)
         return ros
 
@@ -70,7 +70,7 @@ class Witness:
     def _count(self, vehicle: ResourceId) -> Callable[[UInt32], None]:
         return lambda message: self.motions.update({vehicle: message.data})
 
-    def _hear(self, vehicle: ResourceId) -> Callable[[Odometry], None]:
+    def _on_message(self, vehicle: ResourceId) -> Callable[[Odometry], None]:
         return lambda _: self._heard.add(vehicle)
 
 

@@ -1,6 +1,6 @@
-"""Vehicles without ROS: they move as they are told, in the time of the clock that is lent.
+"""Vehicles without ROS: they execute orders in the time of the clock that is lent.
 
-A `Body` outlives the arbiter and its driver, as a vehicle outlives a restart. What it is told is
+A `Dynamics` outlives the arbiter and its driver, as a vehicle outlives a restart. Its orders are
 kept in `calls`.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from uuid import UUID
 
 from m2pem_plugin_ros.arbiter import RosArbiter
-from m2pem_plugin_ros.connections import Installation, Instruments
-from m2pem_plugin_ros.drivers.driver import Driver, Health, Order, Outcome, Seat
+from m2pem_plugin_ros.connections import ConnectionsSetup, VehicleConnection
+from m2pem_plugin_ros.drivers.driver import Driver, DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.pose import Pose, Twist
 
@@ -39,7 +39,7 @@ def at(east_m: float, north_m: float) -> Point:
 
 
 @dataclass
-class Body:
+class Dynamics:
     """It drives straight to where it is to go, and can be made to misbehave."""
 
     east: float = 0.0
@@ -63,7 +63,7 @@ class Body:
     battery: float | None = None
     errors: tuple[str, ...] = ()
 
-    def told(self, what: str, *arguments: object) -> None:
+    def events(self, what: str, *arguments: object) -> None:
         self.calls.append((what, *arguments))
         if what in self.raises:
             raise RuntimeError(f"{what} is broken")
@@ -97,15 +97,15 @@ class Body:
 class DoubleDriver:
     """Implements `Driver`."""
 
-    def __init__(self, seat: Seat, body: Body) -> None:
-        self.seat = seat
+    def __init__(self, setup: DriverSetup, body: Dynamics) -> None:
+        self.setup = setup
         self.body = body
         self.known: set[UUID] = set()
         self._task: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
-        self.body.told("open")
-        self.body.driven_us = self.seat.context.clock.now_us()
+        self.body.events("open")
+        self.body.driven_us = self.setup.context.clock.now_us()
         self._task = asyncio.get_running_loop().create_task(self._run())
 
     @property
@@ -115,11 +115,11 @@ class DoubleDriver:
         return self.body.health
 
     def refusal(self, request: BehaviorRequest) -> str:
-        self.body.told("refusal")
+        self.body.events("refusal")
         return self.body.refuses
 
     def begin(self, order: Order) -> None:
-        self.body.told("begin", order)
+        self.body.events("begin", order)
         if order.goal in self.body.outcomes or order.goal == self.body.goal:
             return  # a vehicle does what it is given once
         target = order.request.parameters.get("target")
@@ -132,7 +132,7 @@ class DoubleDriver:
         self.known.add(order.goal)
 
     def end(self, goal: UUID) -> None:
-        self.body.told("end", goal)
+        self.body.events("end", goal)
         self.known.add(goal)
         if self.body.goal == goal and self.body.stops:
             self.body.finish(Outcome(BehaviorState.CANCELLED))
@@ -140,20 +140,20 @@ class DoubleDriver:
             self.body.outcomes.setdefault(goal, Outcome(BehaviorState.CANCELLED))
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
-        self.body.told("adjust", goal, dict(parameters))
+        self.body.events("adjust", goal, dict(parameters))
         if goal == self.body.goal and isinstance(parameters.get("speed"), float):
             self.body.wished = float(parameters["speed"])
 
     def hold(self) -> None:
-        self.body.told("hold")
+        self.body.events("hold")
         self.body.held = True
 
     def resume(self) -> None:
-        self.body.told("resume")
+        self.body.events("resume")
         self.body.held = False
 
-    async def look(self, order: Order) -> Outcome:
-        self.body.told("look", order)
+    async def query(self, order: Order) -> Outcome:
+        self.body.events("look", order)
         if not self.body.answers_looks:
             await asyncio.Event().wait()
         if order.goal == self.body.goal:
@@ -161,37 +161,37 @@ class DoubleDriver:
             return Outcome(BehaviorState.RUNNING, held=self.body.held)
         return self.body.outcomes.get(order.goal, Outcome(BehaviorState.UNKNOWN))
 
-    def forget(self) -> None:
-        self.body.told("forget")
+    def abandon(self) -> None:
+        self.body.events("forget")
         self.known.clear()
 
     async def close(self) -> None:
-        self.body.told("close")
+        self.body.events("close")
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
 
     async def _run(self) -> None:
-        clock, told = self.seat.context.clock, self.seat.told
+        clock, events = self.setup.context.clock, self.setup.events
         while True:
             self.body.drive(clock.now_us())
             if self.body.linked:
-                told.heard()
+                events.alive()
                 if self.body.goal in self.known:
-                    told.progress(self.body.goal)
+                    events.progress(self.body.goal)
                 for goal in self.known & set(self.body.outcomes):
-                    told.ended(goal, self.body.outcomes[goal])
+                    events.ended(goal, self.body.outcomes[goal])
             await clock.sleep(STEP_S)
 
 
 class DoubleSenses:
-    """Implements `Senses` and, for the same body, `Localization`."""
+    """Implements `VehicleSensors` and, for the same body, `Localization`."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: Dynamics) -> None:
         self.body = body
         self.localization = self
         self.age_s = 0.0
-        self.troubles = ()
+        self.problems = ()
         self.refusal = self.absence = ""
 
     @property
@@ -220,17 +220,19 @@ class DoubleSenses:
 
 
 class DoubleStation:
-    """Implements `Station`."""
+    """Implements `VehicleConnections`."""
 
-    def __init__(self, bodies: Mapping[ResourceId, Body], installation: Installation) -> None:
+    def __init__(
+        self, bodies: Mapping[ResourceId, Dynamics], installation: ConnectionsSetup
+    ) -> None:
         self.bodies = bodies
         self.installation = installation
         self.is_open = False
 
-    async def open(self) -> dict[ResourceId, Instruments]:
+    async def open(self) -> dict[ResourceId, VehicleConnection]:
         self.is_open = True
         return {
-            resource: Instruments(None, DoubleSenses(body), body.shown.append)
+            resource: VehicleConnection(None, DoubleSenses(body), body.shown.append)
             for resource, body in self.bodies.items()
         }
 
@@ -242,7 +244,7 @@ class DoubleStation:
 
 
 def connections(
-    bodies: Mapping[ResourceId, Body], fence: Area | None = None, **settings: object
+    bodies: Mapping[ResourceId, Dynamics], fence: Area | None = None, **settings: object
 ) -> dict:
     return {
         resource: Connection(
@@ -253,10 +255,10 @@ def connections(
 
 
 def arbiter(
-    bodies: Mapping[ResourceId, Body], context: ArbiterContext, **settings: object
+    bodies: Mapping[ResourceId, Dynamics], context: ArbiterContext, **settings: object
 ) -> RosArbiter:
-    def make_driver(seat: Seat) -> Driver:
-        return DoubleDriver(seat, bodies[seat.connection.resource])
+    def make_driver(setup: DriverSetup) -> Driver:
+        return DoubleDriver(setup, bodies[setup.connection.resource])
 
     return RosArbiter(
         connections(bodies, **settings),

@@ -87,7 +87,7 @@ class Watch:
         rclpy.init(context=self._context, domain_id=domain)
         self._node = rclpy.create_node("watch", context=self._context)
         for name, track in self.tracks.items():
-            self._hear(name, track)
+            self._on_message(name, track)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, daemon=True)
@@ -121,7 +121,7 @@ class Watch:
         except ExternalShutdownException:
             return
 
-    def _hear(self, name: str, track: Track) -> None:
+    def _on_message(self, name: str, track: Track) -> None:
         def odometry(message: Any) -> None:
             place = message.pose.pose.position
             track.odometry.append(Sample(message.twist.twist.linear.x, place.x, place.y))

@@ -73,7 +73,7 @@ class Story:
     answers: str
     status: str
     ends: tuple[str, ...]
-    troubles: tuple[Trouble, ...] = ()
+    problems: tuple[Trouble, ...] = ()
     given_up: tuple[str, ...] = ()
     live: tuple[str, ...] = ()
 
@@ -83,7 +83,7 @@ class Story:
 
 
 @dataclass(slots=True)
-class Told:
+class MissionLog:
     """What came of it. `entered`: the elements; `ended`: of each behavior, how it ended."""
 
     status: str = ""
@@ -131,16 +131,16 @@ class World:
     def _programs(self) -> tuple[Program, ...]:
         return self.ground, self.cameras, self.air
 
-    def trouble(self, trouble: Trouble) -> None:
+    def problem(self, problem: Trouble) -> None:
         """Let it happen."""
-        if trouble.ground:
-            self.ground.type(trouble.ground)
-        if trouble.air:
-            self.air.type(trouble.air)
-        if trouble.camera:
-            self._camera.publish(String(data=trouble.camera))
-        if trouble.found:
-            self._detections.publish(Detection(type=trouble.found))
+        if problem.ground:
+            self.ground.type(problem.ground)
+        if problem.air:
+            self.air.type(problem.air)
+        if problem.camera:
+            self._camera.publish(String(data=problem.camera))
+        if problem.found:
+            self._detections.publish(Detection(type=problem.found))
 
     def close(self) -> None:
         self._node.destroy_node()
@@ -173,7 +173,7 @@ class Play:
     """One run of a story: the operator, and what goes wrong."""
 
     def __init__(self, world: World, story: Story) -> None:
-        self.told = Told()
+        self.told = MissionLog()
         self._world = world
         self._story = story
         self._clock = SystemClock(SPEED)
@@ -182,7 +182,7 @@ class Play:
         script = load_answers(MISSIONS / "answers" / f"{story.answers}.yaml")
         self._decisions = {key: list(each) for key, each in script.model.answers.items()}
         services = {k: v for k, v in script.model.services.items() if k not in story.live}
-        signals = [] if any(each.signal for each in story.troubles) else script.model.signals
+        signals = [] if any(each.signal for each in story.problems) else script.model.signals
         self._script = Answers(
             script.model.model_copy(
                 update={
@@ -195,14 +195,14 @@ class Play:
             script.source,
         )
 
-    async def run(self, within_s: float) -> Told:
+    async def run(self, within_s: float) -> MissionLog:
         """To its end; `within_s` of real time."""
         try:
             return await self._run_to_its_end(within_s)
         except TimeoutError:
             raise AssertionError(f"not within {within_s:g} s: {self.told.where()}") from None
 
-    async def _run_to_its_end(self, within_s: float) -> Told:
+    async def _run_to_its_end(self, within_s: float) -> MissionLog:
         executive = Executive(
             load_fleet(self._world.fleet),
             MemoryJournal(),
@@ -273,17 +273,17 @@ class Play:
     def _see(self, element: str) -> None:
         self._visits[element] += 1
         log.info("visit %d of %s", self._visits[element], element)
-        for trouble in self._story.troubles:
-            if (trouble.element, trouble.visit) == (element, self._visits[element]):
-                self._begin(self._trouble(trouble))
+        for problem in self._story.problems:
+            if (problem.element, problem.visit) == (element, self._visits[element]):
+                self._begin(self._problem(problem))
 
-    async def _trouble(self, trouble: Trouble) -> None:
-        await self._clock.sleep(trouble.after_s)
-        log.info("%s", trouble)
-        if trouble.signal:
-            await self._executive.control.signal(trouble.signal, run=self._run, by="operator")
+    async def _problem(self, problem: Trouble) -> None:
+        await self._clock.sleep(problem.after_s)
+        log.info("%s", problem)
+        if problem.signal:
+            await self._executive.control.signal(problem.signal, run=self._run, by="operator")
         else:
-            self._world.trouble(trouble)
+            self._world.problem(problem)
 
     async def _answer(self, prompt: OpenPrompt) -> None:
         """As the answers file says, once all vehicles are heard that are to be."""

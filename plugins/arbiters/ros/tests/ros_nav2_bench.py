@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID, uuid4
 
-from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2 import Nav2Driver
 from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.runtime import RosRuntime, qos
@@ -92,7 +92,7 @@ class Diary:
         self.begun: list[UUID] = []
         self.heards = 0
 
-    def heard(self) -> None:
+    def alive(self) -> None:
         self.heards += 1
 
     def progress(self, goal: UUID) -> None:
@@ -108,7 +108,7 @@ class Bench:
     def __init__(self, ros: RosRuntime, route_action: RouteAction, name: ResourceId) -> None:
         self.ros = ros
         self.name = name
-        self.told = Diary()
+        self.events = Diary()
         self.bus = Bus()
         self.motions = -1
         self.track: list[tuple[float, float, float]] = []
@@ -116,8 +116,8 @@ class Bench:
         context = ArbiterContext(WallClock(), self.bus, logging.getLogger("bench"), ORIGIN)
         self.localization = TopicLocalization(ros, name, settings, context)
         connection = Connection(name, "ground", sitl=True)
-        self.seat = Seat(connection, settings, context, ros, self.localization, self.told)
-        self.driver = Nav2Driver(self.seat)
+        self.setup = DriverSetup(connection, settings, context, ros, self.localization, self.events)
+        self.driver = Nav2Driver(self.setup)
         self._obeyed: list[str] = []
         self._words = ros.node.create_publisher(String, f"/{name}/words", qos.EVENTS)
         self._obeyed_topic = f"/{name}/obeyed"
@@ -148,8 +148,8 @@ class Bench:
         return order.goal
 
     async def outcome(self, goal: UUID) -> Outcome:
-        await self.until(lambda: goal in self.told.outcomes)
-        return self.told.outcomes[goal]
+        await self.until(lambda: goal in self.events.outcomes)
+        return self.events.outcomes[goal]
 
     async def state(self, goal: UUID) -> BehaviorState:
         return (await self.outcome(goal)).state
@@ -178,7 +178,7 @@ class Bench:
 
     async def moving(self, goal: UUID | None = None) -> None:
         if goal is not None:
-            await self.until(lambda: goal in self.told.begun)
+            await self.until(lambda: goal in self.events.begun)
         await self.until(lambda: self.speed_m_s > 0.5)
 
     async def say(self, words: str) -> None:

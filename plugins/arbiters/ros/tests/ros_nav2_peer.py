@@ -17,7 +17,7 @@ from m2pem_plugin_ros.loopback import keep_on_loopback
 
 keep_on_loopback()
 
-from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Told  # noqa: E402
+from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome  # noqa: E402
 from m2pem_plugin_ros.frames import quaternion_of_yaw, to_local  # noqa: E402
 from m2pem_plugin_ros.pose import Pose, Twist  # noqa: E402
 from m2pem_plugin_ros.runtime import RosRuntime, qos  # noqa: E402
@@ -46,16 +46,16 @@ class Base:
     def __init__(self, east_m: float, north_m: float) -> None:
         self.pose = Pose(east_m, north_m, 0.0)
         self.motions = 0
-        self._told: Told | None = None
+        self._events: DriverEvents | None = None
         self._order: Order | None = None
-        self._left: list[Pose] = []
+        self._unresolved: list[Pose] = []
         self._backwards = False
         self._limit_m_s = SPEED_M_S
         self._speed_m_s = 0.0
         self._stopping = False
 
-    def make_driver(self, told: Told) -> "Base":
-        self._told = told
+    def make_driver(self, events: DriverEvents) -> "Base":
+        self._events = events
         return self
 
     # --- Localization ---------------------------------------------------------------------------
@@ -88,13 +88,13 @@ class Base:
         self._limit_m_s = min(SPEED_M_S, speed if isinstance(speed, float) else SPEED_M_S)
         match wishes.get("route") or wishes.get("target") or wishes["distance"]:
             case Route(waypoints=waypoints):
-                self._left = [place(*waypoint[:2]) for waypoint in waypoints]
+                self._unresolved = [place(*waypoint[:2]) for waypoint in waypoints]
             case Point(position=position):
-                self._left = [place(*position[:2])]
+                self._unresolved = [place(*position[:2])]
             case float(distance_m):
                 east_m = self.pose.east_m - distance_m * math.cos(self.pose.yaw_rad)
                 north_m = self.pose.north_m - distance_m * math.sin(self.pose.yaw_rad)
-                self._left = [Pose(east_m, north_m, self.pose.yaw_rad)]
+                self._unresolved = [Pose(east_m, north_m, self.pose.yaw_rad)]
 
     def end(self, goal: UUID) -> None:
         if self._order is not None and self._order.goal == goal:
@@ -111,10 +111,10 @@ class Base:
     def resume(self) -> None:
         raise NotImplementedError
 
-    async def look(self, order: Order) -> Outcome:
+    async def query(self, order: Order) -> Outcome:
         raise NotImplementedError
 
-    def forget(self) -> None:
+    def abandon(self) -> None:
         raise NotImplementedError
 
     async def close(self) -> None:
@@ -125,10 +125,10 @@ class Base:
     def step(self) -> None:
         if self._order is None:
             return
-        if not self._left:
+        if not self._unresolved:
             self._over(BehaviorState.SUCCEEDED)
             return
-        target = self._left[0]
+        target = self._unresolved[0]
         away_m = math.dist((target.east_m, target.north_m), (self.pose.east_m, self.pose.north_m))
         change = ACCELERATION_M_S2 * STEP_S
         before_m_s = self._speed_m_s
@@ -151,7 +151,7 @@ class Base:
                 self.pose.yaw_rad if self._backwards else course,
             )
         if way_m >= away_m:
-            del self._left[0]
+            del self._unresolved[0]
 
     def _over(self, state: BehaviorState) -> None:
         order, self._order, self._speed_m_s = self._order, None, 0.0
@@ -159,8 +159,8 @@ class Base:
             heading = order.request.parameters.get("heading")
             if isinstance(heading, float):
                 self.pose = replace(self.pose, yaw_rad=math.pi / 2 - heading)
-        if self._told is not None and order is not None:
-            self._told.ended(order.goal, Outcome(state))
+        if self._events is not None and order is not None:
+            self._events.ended(order.goal, Outcome(state))
 
 
 def place(latitude_deg: float, longitude_deg: float) -> Pose:
@@ -213,14 +213,14 @@ async def main(namespace: str, east_m: float, north_m: float) -> None:
         ros.subscribe(String, f"{namespace}/words", hear, qos.EVENTS)
         odom = ros.node.create_publisher(Odometry, f"{namespace}/odom", qos.TELEMETRY)
         motions = ros.node.create_publisher(UInt32, f"{namespace}/motions", qos.STATUS)
-        told = -1
+        events = -1
         print("ready", flush=True)
         while not stop.is_set():
             base.step()
             odom.publish(odometry(base))
-            if told != base.motions:
-                told = base.motions
-                motions.publish(UInt32(data=told))
+            if events != base.motions:
+                events = base.motions
+                motions.publish(UInt32(data=events))
             await asyncio.sleep(STEP_S)
 
 

@@ -8,7 +8,7 @@ from typing import Any, cast
 from uuid import UUID, uuid4, uuid5
 
 from m2pem_interfaces.msg import VehicleStatus
-from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.node import NodeDriver
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import Settings, Via
@@ -20,15 +20,15 @@ AMPLE_S = 40.0
 LOOK_S = 0.005
 
 
-class Told:
-    """Implements `Told`: writes down what a driver tells."""
+class RecordedEvents:
+    """Implements `DriverEvents`: writes down what a driver tells."""
 
     def __init__(self) -> None:
         self.times_heard = 0
         self.begun: list[UUID] = []
         self.ends: list[tuple[UUID, Outcome]] = []
 
-    def heard(self) -> None:
+    def alive(self) -> None:
         self.times_heard += 1
 
     def progress(self, goal: UUID) -> None:
@@ -43,7 +43,7 @@ class Bench:
     """The driver of one vehicle, and what it has told."""
 
     def __init__(self, ros: RosRuntime, vehicle: str, via: Via, speed: float = 1.0) -> None:
-        self.told = Told()
+        self.events = RecordedEvents()
         self.ros = ros
         self.clock = SystemClock(speed)
         logger = logging.getLogger("m2pem.test")
@@ -51,8 +51,8 @@ class Bench:
         self.vehicle = ResourceId(vehicle)
         settings = Settings(f"/{vehicle}", via=via)
         connection = Connection(self.vehicle, "ground")
-        seat = Seat(connection, settings, context, ros, cast("Any", None), self.told)
-        self.driver = NodeDriver(seat)
+        setup = DriverSetup(connection, settings, context, ros, cast("Any", None), self.events)
+        self.driver = NodeDriver(setup)
         self.statuses = 0
         ros.subscribe(VehicleStatus, f"/{vehicle}/vehicle_status", self._count, qos.STATUS)
 
@@ -84,9 +84,9 @@ class Bench:
             while not holds():  # noqa: ASYNC110  # what is waited for has no event
                 await asyncio.sleep(LOOK_S)
 
-    async def heard(self) -> None:
+    async def alive(self) -> None:
         """Wait until the vehicle was heard."""
-        await self.until(lambda: self.told.times_heard)
+        await self.until(lambda: self.events.times_heard)
 
     async def later(self) -> None:
         """Wait until the vehicle has said some more of how it is, which it does after all that was
@@ -96,12 +96,12 @@ class Bench:
 
     async def running(self, order: Order) -> None:
         """Wait until the vehicle does it."""
-        await self.until(lambda: order.goal in self.told.begun)
+        await self.until(lambda: order.goal in self.events.begun)
 
     async def end_of(self, order: Order) -> Outcome:
         """How it ended."""
-        await self.until(lambda: order.goal in [goal for goal, _ in self.told.ends])
-        return next(outcome for goal, outcome in self.told.ends if goal == order.goal)
+        await self.until(lambda: order.goal in [goal for goal, _ in self.events.ends])
+        return next(outcome for goal, outcome in self.events.ends if goal == order.goal)
 
     def _count(self, _: object) -> None:
         self.statuses += 1

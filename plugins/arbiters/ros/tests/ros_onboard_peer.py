@@ -7,9 +7,9 @@ import asyncio
 import signal
 import sys
 
-from m2pem_plugin_ros.drivers.driver import Told
-from m2pem_plugin_ros.onboard.node import Onboard
-from m2pem_plugin_ros.onboard.target_bus import Targets
+from m2pem_plugin_ros.drivers.driver import DriverEvents
+from m2pem_plugin_ros.onboard.node import OnboardNode
+from m2pem_plugin_ros.onboard.target_bus import TargetBus
 from m2pem_plugin_ros.runtime import RosRuntime
 from ros_scripted_driver import ScriptedDriver
 
@@ -20,9 +20,9 @@ async def main(speed: float, names: list[str]) -> None:
     drivers: list[ScriptedDriver] = []
 
     clock = SystemClock(speed)
-    targets = Targets()
+    targets = TargetBus()
 
-    def make_driver(told: Told) -> ScriptedDriver:
+    def make_driver(told: DriverEvents) -> ScriptedDriver:
         drivers.append(ScriptedDriver(told, targets, clock))
         return drivers[-1]
 
@@ -36,7 +36,8 @@ async def main(speed: float, names: list[str]) -> None:
     loop.add_signal_handler(signal.SIGUSR1, deafen)
     async with RosRuntime("peer") as ros:
         nodes = [
-            Onboard(ros, name, f"/{name}", make_driver, clock=clock, bus=targets) for name in names
+            OnboardNode(ros, name, f"/{name}", make_driver, clock=clock, bus=targets)
+            for name in names
         ]
         for node in nodes:
             await node.open()

@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 from uuid import UUID
 
-from ros_double import Body, arbiter, at
+from ros_double import Dynamics, arbiter, at
 
 from m2pem.api import ResourceId
 from m2pem.executive.clock import run_virtual
@@ -21,7 +21,7 @@ NEAR = at(10.0, 0.0)
 class Play:
     """`bodies` outlive the arbiters that `connected` makes, one after the other."""
 
-    def __init__(self, bodies: Mapping[ResourceId, Body], clock, settings) -> None:
+    def __init__(self, bodies: Mapping[ResourceId, Dynamics], clock, settings) -> None:
         self.bodies = bodies
         self.clock = clock
         self.context = replace(context(clock), journal=JOURNAL)
@@ -36,10 +36,10 @@ class Play:
 
 def play(
     main: Callable[[Play], Awaitable[None]],
-    bodies: Mapping[ResourceId, Body] | None = None,
+    bodies: Mapping[ResourceId, Dynamics] | None = None,
     **settings: object,
 ) -> None:
     async def run(clock) -> None:
-        await main(Play(bodies or {A: Body(), B: Body(east=10.0)}, clock, settings))
+        await main(Play(bodies or {A: Dynamics(), B: Dynamics(east=10.0)}, clock, settings))
 
     run_virtual(run, START_US)

@@ -8,7 +8,7 @@ adjusted to a speed above 5 m/s. Its mode is how often it has begun something.
 import asyncio
 from collections.abc import Mapping
 
-from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Told
+from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome
 
 from m2pem.api import (
     BehaviorRequest,
@@ -27,8 +27,8 @@ DONE = Outcome(BehaviorState.SUCCEEDED)
 class ScriptedDriver:
     """Implements `Driver`."""
 
-    def __init__(self, told: Told, bus: FleetBus, clock: Clock) -> None:
-        self.told = told
+    def __init__(self, events: DriverEvents, bus: FleetBus, clock: Clock) -> None:
+        self.events = events
         self.bus = bus
         self.clock = clock
         self.begun = 0
@@ -57,7 +57,7 @@ class ScriptedDriver:
         self.held = False
         self._order = order
         self._left_s = float(order.request.parameters.get("duration") or 0.0)  # type: ignore[arg-type]
-        self.told.progress(order.goal)
+        self.events.progress(order.goal)
         if order.request.behavior == "drive_stop":
             self._over(DONE)
         elif order.request.behavior == "reverse":
@@ -78,10 +78,10 @@ class ScriptedDriver:
     def resume(self) -> None:
         self.held = False
 
-    async def look(self, order: Order) -> Outcome:
+    async def query(self, order: Order) -> Outcome:
         return Outcome(BehaviorState.UNKNOWN)
 
-    def forget(self) -> None:
+    def abandon(self) -> None:
         self._order = None
 
     async def close(self) -> None:
@@ -92,7 +92,7 @@ class ScriptedDriver:
     async def _live(self) -> None:
         while True:
             if not self.deaf:
-                self.told.heard()
+                self.events.alive()
             order = self._order
             if order is not None and order.request.behavior == "hold" and not self.held:
                 self._left_s -= TICK_S
@@ -108,4 +108,4 @@ class ScriptedDriver:
     def _over(self, outcome: Outcome) -> None:
         order, self._order = self._order, None
         if order is not None:
-            self.told.ended(order.goal, outcome)
+            self.events.ended(order.goal, outcome)

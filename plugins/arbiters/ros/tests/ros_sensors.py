@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from m2pem_plugin_ros.arbiter import RosArbiter
 from m2pem_plugin_ros.runtime import RosRuntime, qos
-from ros_double import ORIGIN, Body, DoubleDriver
+from ros_double import ORIGIN, DoubleDriver, Dynamics
 from std_msgs.msg import String
 
 from m2pem.api import Connection, ResourceId
@@ -71,9 +71,9 @@ class Sensors:
 
     def __init__(self, ros: RosRuntime) -> None:
         self._ros = ros
-        self._said: asyncio.Queue[String] = asyncio.Queue()
+        self._recent: asyncio.Queue[String] = asyncio.Queue()
         self._say = ros.node.create_publisher(String, "/say", qos.EVENTS)
-        ros.subscribe(String, "/said", self._said.put_nowait, qos.EVENTS)
+        ros.subscribe(String, "/said", self._recent.put_nowait, qos.EVENTS)
 
     async def say(self, *messages: tuple[str, dict]) -> None:
         """All were published when this returns."""
@@ -81,7 +81,7 @@ class Sensors:
         await until(lambda: self._ros.node.count_publishers("/said"), "the peer answers")
         self._say.publish(String(data=json.dumps(messages)))
         async with asyncio.timeout(AMPLE_S):
-            await self._said.get()
+            await self._recent.get()
 
     async def repeat(
         self, until_true: Callable[[], object], what: str, *messages: tuple[str, dict]
@@ -115,7 +115,7 @@ async def connected(domain: int, payloads: dict | None = None, **settings):
         connections[name] = Connection(name, "ground", {**own, **said}, detector=True, sitl=True)
     clock = SystemClock()
     lent = replace(context(clock), origin=ORIGIN, journal=uuid4())
-    body = Body()
-    arbiter = RosArbiter(connections, lent, lambda seat: DoubleDriver(seat, body))
+    body = Dynamics()
+    arbiter = RosArbiter(connections, lent, lambda setup: DoubleDriver(setup, body))
     async with ArbiterHarness(arbiter, clock) as bench:
         yield bench

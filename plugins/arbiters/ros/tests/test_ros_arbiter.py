@@ -7,7 +7,7 @@ from uuid import uuid4
 import pytest
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
 from m2pem_plugin_ros.drivers.driver import Health, Outcome
-from ros_double import Body, DoubleDriver, at
+from ros_double import DoubleDriver, Dynamics, at
 from ros_play import FAR, JOURNAL, NEAR, A, B, play
 
 from m2pem.api import (
@@ -94,7 +94,7 @@ def test_a_vehicle_with_a_node_is_shown_its_target_while_it_goes_there() -> None
             await bench.clock.sleep(2)
             assert len(shown) == told
 
-    play(main, {A: Body(east=-900.0), B: Body()})
+    play(main, {A: Dynamics(east=-900.0), B: Dynamics()})
 
 
 def test_the_fleet_says_what_a_vehicle_may_do() -> None:
@@ -235,11 +235,11 @@ def test_goals_that_nobody_gave_are_ignored_and_logged_at_a_bounded_rate(caplog)
             await bench.start("r1.b2", "goto", B, target=FAR)
             await bench.running("r1.b1")
             await bench.running("r1.b2")
-            told = driver_of(bench, A).seat.told
+            events = driver_of(bench, A).setup.events
             for _ in range(5000):
-                told.progress(uuid4())
-                told.ended(uuid4(), Outcome(SUCCEEDED))
-            told.ended(goal_id(JOURNAL, "r1.b2"), Outcome(SUCCEEDED))
+                events.progress(uuid4())
+                events.ended(uuid4(), Outcome(SUCCEEDED))
+            events.ended(goal_id(JOURNAL, "r1.b2"), Outcome(SUCCEEDED))
             await bench.clock.sleep(2)
             assert bench.states_of("r1.b1")[-1] is RUNNING
             assert bench.states_of("r1.b2")[-1] is RUNNING, "it is not a's to end"
@@ -254,12 +254,12 @@ def test_an_end_that_is_none_is_ignored_and_a_second_one_changes_nothing() -> No
         async with world.connected() as bench:
             await bench.start("r1.b1", "goto", A, target=FAR)
             await bench.running("r1.b1")
-            told, goal = driver_of(bench, A).seat.told, goal_id(JOURNAL, "r1.b1")
-            told.ended(goal, Outcome(BehaviorState.ACCEPTED))
-            told.ended(goal, Outcome(BehaviorState.UNKNOWN))
-            told.ended(goal, Outcome(FAILED, "ROUTE_BLOCKED", "a wall"))
-            told.ended(goal, Outcome(SUCCEEDED))
-            told.progress(goal)
+            events, goal = driver_of(bench, A).setup.events, goal_id(JOURNAL, "r1.b1")
+            events.ended(goal, Outcome(BehaviorState.ACCEPTED))
+            events.ended(goal, Outcome(BehaviorState.UNKNOWN))
+            events.ended(goal, Outcome(FAILED, "ROUTE_BLOCKED", "a wall"))
+            events.ended(goal, Outcome(SUCCEEDED))
+            events.progress(goal)
             await bench.clock.sleep(1)
             assert [(r.state, r.code) for r in bench.of("r1.b1")[2:]] == [(FAILED, "ROUTE_BLOCKED")]
 
@@ -271,7 +271,7 @@ def test_a_vehicle_that_is_done_at_once_was_running_all_the_same() -> None:
         async with world.connected() as bench:
             await bench.start("r1.b1", "goto", A, target=FAR)
             goal = goal_id(JOURNAL, "r1.b1")
-            driver_of(bench, A).seat.told.ended(goal, Outcome(SUCCEEDED))
+            driver_of(bench, A).setup.events.ended(goal, Outcome(SUCCEEDED))
             await bench.ended("r1.b1", 1)
             assert bench.states_of("r1.b1") == [BehaviorState.ACCEPTED, RUNNING, SUCCEEDED]
 

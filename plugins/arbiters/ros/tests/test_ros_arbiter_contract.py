@@ -4,7 +4,7 @@ from dataclasses import replace
 from uuid import UUID
 
 import pytest
-from ros_double import Body, arbiter, at
+from ros_double import Dynamics, arbiter, at
 
 from m2pem.api import ResourceId
 from m2pem.testing import ArbiterCase, ArbiterContract
@@ -16,7 +16,7 @@ JOURNAL = UUID("5a0cf3a8-1f5c-4b53-8f67-7c26a7f3b1d4")
 class TestRosVehicles(ArbiterContract):
     @pytest.fixture
     def bodies(self):
-        return {A: Body(), B: Body(east=10.0)}
+        return {A: Dynamics(), B: Dynamics(east=10.0)}
 
     @pytest.fixture
     def make_arbiter(self, bodies):

@@ -2,7 +2,13 @@
 
 import asyncio
 
-from m2pem_plugin_ros.checkpoint import LONGEST_ROUTE, Kept, goal_id, native_ref, read_native_ref
+from m2pem_plugin_ros.checkpoint import (
+    LONGEST_ROUTE,
+    Checkpoint,
+    decode_checkpoint,
+    encode_checkpoint,
+    goal_id,
+)
 from ros_play import FAR, JOURNAL, NEAR, A, B, play
 
 from m2pem.api import BehaviorState, Route, VehiclePosition
@@ -134,7 +140,7 @@ def test_a_base_that_nobody_drove_is_not_asked_what_it_does() -> None:
 
 def test_a_vehicle_that_left_the_fleet_is_named() -> None:
     async def main(world) -> None:
-        reference = native_ref(Kept(("evsg9",), "goto", 1, {}))
+        reference = encode_checkpoint(Checkpoint(("evsg9",), "goto", 1, {}))
         async with world.connected() as bench:
             found = await bench.arbiter.query("r1.b1", reference)
             assert (found.state, found.reason) == (UNKNOWN, "there is no vehicle 'evsg9' any more")
@@ -153,13 +159,13 @@ def test_a_reference_says_all_but_long_routes() -> None:
         "count": 3,
         "word": "line",
     }
-    kept = Kept(("evsg1", "evsg1/gpr"), "single_vehicle_routing", 7, parameters)
-    assert read_native_ref(native_ref(kept)) == kept
+    kept = Checkpoint(("evsg1", "evsg1/gpr"), "single_vehicle_routing", 7, parameters)
+    assert decode_checkpoint(encode_checkpoint(kept)) == kept
     long = Route(((38.1, -77.3, None),) * (LONGEST_ROUTE + 1))
-    kept = Kept(("evsg1",), "single_vehicle_routing", 1, {"route": long, "speed": 1.0})
-    assert read_native_ref(native_ref(kept)).parameters == {"speed": 1.0}
+    kept = Checkpoint(("evsg1",), "single_vehicle_routing", 1, {"route": long, "speed": 1.0})
+    assert decode_checkpoint(encode_checkpoint(kept)).parameters == {"speed": 1.0}
 
 
 def test_a_reference_that_is_not_ours_says_nothing() -> None:
     foreign = ["", "{}", "[]", '{"v":1}', '{"v":1,"resources":3,"parameters":{}}', "x" * 100]
-    assert {read_native_ref(text) for text in foreign} == {None}
+    assert {decode_checkpoint(text) for text in foreign} == {None}

@@ -207,20 +207,20 @@ async def test_what_cannot_be_done_is_refused(base: Bench) -> None:
 async def test_after_a_restart_only_a_reached_place_is_told(base: Bench) -> None:
     done, far = base.order("goto", target=point(0, 0.2)), base.order("goto", target=point(9, 0))
     there_and_back = base.order("single_vehicle_routing", route=route((0, 0), (9, 0), (0, 0)))
-    assert (await base.driver.look(done)).state is BehaviorState.SUCCEEDED
-    assert (await base.driver.look(far)).state is BehaviorState.UNKNOWN
-    assert (await base.driver.look(there_and_back)).state is BehaviorState.UNKNOWN
+    assert (await base.driver.query(done)).state is BehaviorState.SUCCEEDED
+    assert (await base.driver.query(far)).state is BehaviorState.UNKNOWN
+    assert (await base.driver.query(there_and_back)).state is BehaviorState.UNKNOWN
     base.driver.begin(far)
-    assert (await base.driver.look(far)).state is BehaviorState.RUNNING
+    assert (await base.driver.query(far)).state is BehaviorState.RUNNING
     assert (await base.ending(far)).state is BehaviorState.SUCCEEDED
-    assert (await base.driver.look(far)).state is BehaviorState.SUCCEEDED
+    assert (await base.driver.query(far)).state is BehaviorState.SUCCEEDED
 
 
 async def test_nothing_is_sent_for_a_vehicle_that_is_forgotten(base: Bench) -> None:
     base.begin("goto", target=point(30, 0))
     await until(lambda: base.said and base.said[-1][0] > 0)
     await until(lambda: base.speed_m_s > 1.0 and base.where.age_s < 1.0)
-    base.driver.forget()
+    base.driver.abandon()
     await until(lambda: abs(base.speed_m_s) < 0.05)  # of itself: nobody commands it any more
     said = len(base.said)
     await base.clock.sleep(4.0)

@@ -13,7 +13,7 @@ from ros_behaviors_bench import (
     GOAL,
     LIKE_A_CAR,
     TURNS_ON_THE_SPOT,
-    Body,
+    Dynamics,
     Place,
     Road,
     point,
@@ -50,7 +50,7 @@ def moving(speed_m_s: float, start: Place = (10.0, 0.0), yaw_rad: float = 0.0) -
     bounds=st.sampled_from([TURNS_ON_THE_SPOT, LIKE_A_CAR]),
 )
 def test_goto_arrives_wherever_the_place_is(place: Place, yaw: float, bounds: Bounds) -> None:
-    road = Road(bounds, Body(Pose(0.0, 0.0, yaw)))
+    road = Road(bounds, Dynamics(Pose(0.0, 0.0, yaw)))
     road.begin("goto", target=point(place), tolerance=0.3)
     assert road.until_ended() == DONE
     assert road.away(place) <= 0.3 + 1e-6
@@ -187,7 +187,7 @@ def test_a_stop_slows_down_as_the_base_can() -> None:
 @both
 @pytest.mark.parametrize("yaw_rad", [0.0, 2.0])
 def test_reverse_goes_straight_back_and_no_farther(bounds: Bounds, yaw_rad: float) -> None:
-    road = Road(bounds, Body(Pose(3.0, 4.0, yaw_rad)))
+    road = Road(bounds, Dynamics(Pose(3.0, 4.0, yaw_rad)))
     road.begin("reverse", distance=6.0, speed=0.8)
     assert road.until_ended() == DONE
     place = (3.0 - 6.0 * math.cos(yaw_rad), 4.0 - 6.0 * math.sin(yaw_rad))
@@ -220,11 +220,11 @@ def test_reverse_of_no_distance_does_not_move() -> None:
 def test_teleop_does_what_the_stick_says_within_the_bounds() -> None:
     road = Road(LIKE_A_CAR)
     road.begin("teleop")
-    road.stick = Twist(9.0, 5.0)
+    road.joystick = Twist(9.0, 5.0)
     road.drive(6.0)
     assert road.commands[-1].forward_m_s == pytest.approx(3.0)
     assert road.commands[-1].yaw_rad_s == pytest.approx(0.5)  # by lateral acceleration
-    road.stick = Twist(-9.0, 0.0)
+    road.joystick = Twist(-9.0, 0.0)
     road.drive(8.0)
     assert road.commands[-1].forward_m_s == pytest.approx(-1.0)
 
@@ -232,7 +232,7 @@ def test_teleop_does_what_the_stick_says_within_the_bounds() -> None:
 def test_teleop_turns_on_the_spot_as_the_stick_says() -> None:
     road = Road()
     road.begin("teleop")
-    road.stick = Twist(0.0, 0.4)
+    road.joystick = Twist(0.0, 0.4)
     road.drive(1.0)
     assert road.commands[-1] == Twist(0.0, 0.4)
 
@@ -240,9 +240,9 @@ def test_teleop_turns_on_the_spot_as_the_stick_says() -> None:
 def test_teleop_without_the_stick_stands_and_does_not_end() -> None:
     road = Road()
     road.begin("teleop")
-    road.stick = Twist(1.0, 0.0)
+    road.joystick = Twist(1.0, 0.0)
     road.drive(3.0)
-    road.stick_age_s = 0.6
+    road.joystick_age_s = 0.6
     road.drive(2.0)
     assert road.commands[-1] == Twist()
     road.drive(60.0)
@@ -252,7 +252,7 @@ def test_teleop_without_the_stick_stands_and_does_not_end() -> None:
 def test_teleop_ends_after_its_timeout() -> None:
     road = Road()
     road.begin("teleop", timeout=5.0)
-    road.stick = Twist(1.0, 0.0)
+    road.joystick = Twist(1.0, 0.0)
     assert road.until_ended(10.0) == DONE
     assert abs(road.body.twist.forward_m_s) < 0.1
 

@@ -6,7 +6,7 @@ import pytest
 from m2pem_plugin_ros.behaviors import make_motion
 from m2pem_plugin_ros.behaviors.path import next_waypoint
 from m2pem_plugin_ros.pose import Pose
-from ros_behaviors_bench import GOAL, TURNS_ON_THE_SPOT, Body, Place, Road, route
+from ros_behaviors_bench import GOAL, TURNS_ON_THE_SPOT, Dynamics, Place, Road, route
 
 from m2pem.api import BehaviorState
 
@@ -39,7 +39,7 @@ def test_the_next_waypoint_is_told_where_it_can_be(
 
 def take_up(places: list[Place], here: Place, *, loop: bool = False) -> Road:
     """A base that stands there takes up a route."""
-    road = Road(body=Body(Pose(*here, math.pi / 2)))
+    road = Road(body=Dynamics(Pose(*here, math.pi / 2)))
     parameters = {"route": route(places), **({"loop": True} if loop else {})}
     motion = make_motion("single_vehicle_routing", road.local(parameters), TURNS_ON_THE_SPOT)
     motion.take_up()

@@ -15,7 +15,7 @@ from ros_behaviors_bench import (
     DT_S,
     LIKE_A_CAR,
     TURNS_ON_THE_SPOT,
-    Body,
+    Dynamics,
     Place,
     Road,
     off_path,
@@ -63,7 +63,7 @@ def test_who_turns_on_the_spot_keeps_within_a_third_of_its_lookahead_of_the_rout
     waypoints: list[Place], yaw: float
 ) -> None:
     waypoints = [place for place in waypoints if math.hypot(*place) > 0.1] or [(9.0, 9.0)]
-    road = Road(TURNS_ON_THE_SPOT, Body(Pose(0.0, 0.0, yaw)))
+    road = Road(TURNS_ON_THE_SPOT, Dynamics(Pose(0.0, 0.0, yaw)))
     driven = drive(road, waypoints)
     assert road.ending == Ending(BehaviorState.SUCCEEDED)
     assert road.away(waypoints[-1]) <= TOLERANCE_M
@@ -77,7 +77,7 @@ def test_who_has_a_turning_circle_keeps_within_two_circles_and_ends_where_it_sho
     waypoints: list[Place], yaw: float
 ) -> None:
     waypoints = [place for place in waypoints if math.hypot(*place) > 0.1] or [(9.0, 9.0)]
-    road = Road(LIKE_A_CAR, Body(Pose(0.0, 0.0, yaw)))
+    road = Road(LIKE_A_CAR, Dynamics(Pose(0.0, 0.0, yaw)))
     driven = drive(road, waypoints)
     assert road.ending == Ending(BehaviorState.SUCCEEDED)
     assert road.away(waypoints[-1]) <= TOLERANCE_M
@@ -147,13 +147,13 @@ def test_a_route_without_waypoints_is_refused() -> None:
 
 
 def test_who_stands_near_the_first_waypoint_does_not_drive_back_to_it() -> None:
-    road = Road(body=Body(Pose(1.0, 0.3, 0.0)))
+    road = Road(body=Dynamics(Pose(1.0, 0.3, 0.0)))
     drive(road, [(0.0, 0.0), (10.0, 0.0)])
     assert min(pose.east_m for pose in road.driven) > 0.9
 
 
 def test_who_stands_at_the_end_of_a_route_drives_it_from_its_beginning() -> None:
-    road = Road(body=Body(Pose(10.0, 0.0, 0.0)))
+    road = Road(body=Dynamics(Pose(10.0, 0.0, 0.0)))
     drive(road, [(0.0, 0.0), (10.0, 0.0)])
     assert min(pose.east_m for pose in road.driven) < 0.3
     assert road.away((10.0, 0.0)) <= TOLERANCE_M

@@ -5,9 +5,9 @@ import math
 import pytest
 from m2pem_plugin_ros.behaviors.monitors import STRAY_M
 from m2pem_plugin_ros.pose import Pose, Twist
-from ros_behaviors_bench import Body as BaseBody
+from ros_behaviors_bench import Dynamics as BaseBody
 from ros_behaviors_bench import Road, point
-from ros_double import Body, at
+from ros_double import Dynamics, at
 from ros_play import A, B, play
 
 from m2pem.api import Area, BehaviorState, Route, VehiclePosition, VehicleState
@@ -29,7 +29,10 @@ def route(*places: tuple[float, float]) -> Route:
 
 
 def bodies(**other: float) -> dict:
-    return {A: Body(east=10.0, north=50.0), B: Body(**{"east": 20.0, "north": 50.0, **other})}
+    return {
+        A: Dynamics(east=10.0, north=50.0),
+        B: Dynamics(**{"east": 20.0, "north": 50.0, **other}),
+    }
 
 
 @pytest.mark.parametrize(
@@ -107,7 +110,7 @@ def fenced(body: BaseBody | None = None) -> Road:
 
 
 def stick(forward_m_s: float, road: Road) -> Road:
-    road.stick = Twist(forward_m_s)
+    road.joystick = Twist(forward_m_s)
     road.begin("teleop")
     return road
 
@@ -126,7 +129,7 @@ def test_a_base_that_is_outside_may_come_back_but_not_leave_again() -> None:
     road = stick(1.0, fenced(BaseBody(Pose(15.0, 0.0, math.pi))))
     road.until(lambda: road.body.pose.east_m < 9.0)
     assert road.ending is None
-    road.stick = Twist(-1.0)
+    road.joystick = Twist(-1.0)
     assert road.until_ended().state is FAILED
     assert road.body.pose.east_m < 15.0
 

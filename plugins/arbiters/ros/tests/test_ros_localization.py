@@ -5,7 +5,7 @@ import math
 from collections.abc import AsyncIterator, Iterator
 
 import pytest
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.sensors.localization import TopicLocalization
@@ -46,14 +46,14 @@ def localization(ros: RosRuntime, frame: OdomFrame = OdomFrame.MAP) -> TopicLoca
 async def test_odometry_in_the_map_is_the_pose(ros: RosRuntime, teller: Sensors) -> None:
     where = localization(ros)
     assert (where.pose, where.twist, where.position, where.age_s) == (None, None, None, INF)
-    assert where.troubles == ("no odometry was heard yet on /evsg1/odom",)
+    assert where.problems == ("no odometry was heard yet on /evsg1/odom",)
     await teller.say(odometry(30.0, 40.0, yaw=1.0, forward=1.5))
     await until(lambda: where.pose, "odometry is heard")
     assert where.pose == Pose(30.0, 40.0, pytest.approx(1.0))
     assert where.twist == Twist(1.5)
     assert where.position.latitude_deg == pytest.approx(ORIGIN[0] + 40.0 / 110_990, abs=1e-6)
     assert where.age_s < 20.0
-    assert where.troubles == ()
+    assert where.problems == ()
 
 
 async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
@@ -78,7 +78,7 @@ async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
     for cause, messages in wrong.items():
         await teller.say(*messages)
         counted = len(messages)
-        await until(lambda c=cause, n=counted: where.complaints.counts[c] == n, cause)
+        await until(lambda c=cause, n=counted: where.log_throttle.counts[c] == n, cause)
     assert where.pose == Pose(1.0, 2.0, 0.0)
     lines = [record.message for record in caplog.records if record.levelname == "WARNING"]
     assert len(lines) == len(wrong), lines
@@ -88,9 +88,9 @@ async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
 def test_what_goes_on_being_wrong_is_counted_in_few_lines(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    complaints = Complaints(logging.getLogger("m2pem.testing"), "evsg1")
+    log_throttle = LogThrottle(logging.getLogger("m2pem.testing"), "evsg1")
     for _ in range(2500):
-        complaints.add("a fix that cannot be", "(91, 0)")
+        log_throttle.log("a fix that cannot be", "(91, 0)")
     assert [record.message for record in caplog.records] == [
         "evsg1: a fix that cannot be: (91, 0)" + so_far
         for so_far in ("", " (10 so far)", " (100 so far)", " (1000 so far)")
@@ -101,7 +101,7 @@ async def test_odometry_that_repeats_a_stamp_is_not_news(ros: RosRuntime, teller
     where = localization(ros)
     frozen = [odometry(5.0, 5.0, stamp=7)] * 3
     await teller.say(odometry(1.0, 1.0, stamp=7), *frozen)
-    await until(lambda: where.complaints.counts["odometry that was there already"] == 3)
+    await until(lambda: where.log_throttle.counts["odometry that was there already"] == 3)
     assert where.pose.east_m == 1.0
     await teller.say(odometry(2.0, 2.0, stamp=3))
     await until(lambda: where.pose.east_m == 2.0, "a robot that was restarted is believed")
@@ -115,9 +115,9 @@ async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller
         odometry(500.0, 500.0, frame="odom"),
     )
     await until(lambda: where.twist, "odometry is heard")
-    await until(lambda: where.complaints.counts["a fix that cannot be"] == 1)
+    await until(lambda: where.log_throttle.counts["a fix that cannot be"] == 1)
     assert (where.pose, where.age_s) == (None, INF)
-    assert where.troubles == ("no satellite fix was heard yet",)
+    assert where.problems == ("no satellite fix was heard yet",)
     await teller.say(fix(*ORIGIN[:2], altitude=NAN, status=-2))
     await until(lambda: where.pose, "the fix is heard")
     await teller.say(odometry(502.0, 501.0, frame="evsg1/odom"))
@@ -125,4 +125,4 @@ async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller
     assert where.pose.east_m == pytest.approx(2.0, abs=1e-3)
     assert where.pose.north_m == pytest.approx(1.0, abs=1e-3)
     assert where.position.altitude_m == pytest.approx(ORIGIN[2], abs=1e-3)
-    assert where.troubles == ()
+    assert where.problems == ()

@@ -7,7 +7,7 @@ that are stuck, silence, an empty battery, a camera that does not turn.
 from pathlib import Path
 
 import pytest
-from ros_mehds_world import MISSIONS, SILENT, STUCK, Play, Story, Told, Trouble, world
+from ros_mehds_world import MISSIONS, SILENT, STUCK, MissionLog, Play, Story, Trouble, world
 
 WITHIN_S = 420.0
 RECALL = "cd8a5ef4-152f-55c0-a1e6-173bf4bb093b"
@@ -149,7 +149,7 @@ def ends_of(story: Story) -> set[str]:
     return {end for each in STORIES if each.mission == story.mission for end in each.ends}
 
 
-def check(story: Story, told: Told) -> None:
+def check(story: Story, told: MissionLog) -> None:
     assert told.status == story.status, (told.detail, told.errors)
     assert told.entered & ends_of(story) == set(story.ends), told.errors
     assert set(told.ended) == set(told.requested)

@@ -51,7 +51,7 @@ async def test_goto_drives_there_and_turns_to_the_heading(ugv1: Bench) -> None:
     there = elsewhere(ugv1.place, 6.0, 2.0)
     goal = ugv1.begin("goto", target=at(*there), heading=NORTH_RAD)
     assert await ugv1.state(goal) is BehaviorState.SUCCEEDED
-    assert goal in ugv1.told.begun
+    assert goal in ugv1.events.begun
     await ugv1.until(lambda: near(ugv1.place, there))
 
     def looks_north() -> bool:
@@ -109,7 +109,7 @@ async def test_waypoints_are_followed_if_the_fleet_says_so(domain: int, nav2: Pe
         await ugv1.until(lambda: ugv1.place[1] > start[1] + 1.0)
         ugv1.driver.hold()
         await ugv1.until(lambda: ugv1.speed_m_s < 0.05)
-        assert goal not in ugv1.told.outcomes, "its own goals of navigation are no takeover"
+        assert goal not in ugv1.events.outcomes, "its own goals of navigation are no takeover"
         ugv1.driver.resume()
         assert await ugv1.state(goal) is BehaviorState.SUCCEEDED
         await ugv1.until(lambda: near(ugv1.place, places[-1]))
@@ -147,7 +147,7 @@ async def test_a_new_order_takes_over_without_a_stop(ugv1: Bench) -> None:
     motions = ugv1.motions
     second = ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 4.0, 2.0)))
     assert await ugv1.state(second) is BehaviorState.SUCCEEDED
-    assert first not in ugv1.told.outcomes, "what is replaced is not told of"
+    assert first not in ugv1.events.outcomes, "what is replaced is not told of"
     await ugv1.later()
     assert ugv1.motions == motions
 
@@ -197,7 +197,7 @@ async def test_teleop_leaves_the_vehicle_alone_until_it_is_ended(ugv1: Bench) ->
     ugv1.begin("goto", target=at(*elsewhere(ugv1.place, 40.0, 0.0)))
     await ugv1.moving()
     goal = ugv1.begin("teleop")
-    await ugv1.until(lambda: goal in ugv1.told.begun and ugv1.speed_m_s < 0.05)
+    await ugv1.until(lambda: goal in ugv1.events.begun and ugv1.speed_m_s < 0.05)
     ugv1.driver.end(goal)
     assert await ugv1.state(goal) is BehaviorState.CANCELLED
 
@@ -232,7 +232,7 @@ async def test_follow_keeps_its_station_behind_a_vehicle_that_moves(ugv1: Bench)
     goal = ugv1.begin("follow", target=VehiclePosition("lead"), offset=5.0, bearing=math.pi)
     try:
         await ugv1.until(lambda: near(ugv1.place, elsewhere(start, 1.0, 0.0), 1.5))
-        assert goal not in ugv1.told.outcomes
+        assert goal not in ugv1.events.outcomes
     finally:
         lead.cancel()
     outcome = await ugv1.outcome(goal)

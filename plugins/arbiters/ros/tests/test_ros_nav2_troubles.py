@@ -40,7 +40,7 @@ async def ugv1(domain: int, nav2: Peer) -> AsyncIterator[Bench]:
         await made.say("fine")
         await made.say("active")
         goal = made.begin_anyway("drive_stop")
-        await made.until(lambda: goal in made.told.outcomes)
+        await made.until(lambda: goal in made.events.outcomes)
         await made.ready()
 
 
@@ -103,7 +103,7 @@ async def test_an_order_that_is_ended_is_told_of_when_the_vehicle_stands(ugv1: B
     ugv1.driver.end(goal)
     assert await ugv1.state(goal) is BehaviorState.CANCELLED
     assert ugv1.speed_m_s < 0.05
-    del ugv1.told.outcomes[goal]
+    del ugv1.events.outcomes[goal]
     ugv1.driver.end(goal)
     assert await ugv1.state(goal) is BehaviorState.CANCELLED, "also if it had ended"
 
@@ -111,7 +111,7 @@ async def test_an_order_that_is_ended_is_told_of_when_the_vehicle_stands(ugv1: B
 async def test_a_nav2_that_does_not_cancel_is_told_of_in_time(ugv1: Bench) -> None:
     await ugv1.say("hang")
     goal = ugv1.begin("goto", target=away(ugv1))
-    await ugv1.until(lambda: goal in ugv1.told.begun)
+    await ugv1.until(lambda: goal in ugv1.events.begun)
     ugv1.driver.end(goal)
     outcome = await ugv1.outcome(goal)
     assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "TIMEOUT")
@@ -209,7 +209,7 @@ async def test_after_a_restart_the_vehicle_drives_on_and_its_end_is_told(
     motions = ugv1.motions
     await ugv1.driver.close()
     async with bench(domain) as after:
-        outcome = await after.driver.look(order)
+        outcome = await after.driver.query(order)
         assert outcome.state is BehaviorState.RUNNING
         assert await after.state(order.goal) is BehaviorState.SUCCEEDED
         await after.until(lambda: math.dist(after.place, places[-1]) < 0.5)
@@ -225,7 +225,7 @@ async def test_what_was_found_after_a_restart_can_be_held_and_ended(
     await ugv1.moving(order.goal)
     await ugv1.driver.close()
     async with bench(domain) as after:
-        assert (await after.driver.look(order)).state is BehaviorState.RUNNING
+        assert (await after.driver.query(order)).state is BehaviorState.RUNNING
         after.driver.hold()
         await after.until(lambda: after.speed_m_s < 0.05)
         after.driver.resume()
@@ -250,15 +250,15 @@ async def test_what_ended_while_nobody_looked_is_found(domain: int, ugv1: Bench)
     await ugv1.until(lambda: ugv1.speed_m_s < 0.05)
     await ugv1.driver.close()
     async with bench(domain) as after:
-        assert (await after.driver.look(done)).state is BehaviorState.SUCCEEDED
-        found = await after.driver.look(blocked)
+        assert (await after.driver.query(done)).state is BehaviorState.SUCCEEDED
+        found = await after.driver.query(blocked)
         assert (found.state, found.code) == (BehaviorState.FAILED, "ROUTE_BLOCKED")
-        found = await after.driver.look(held)
+        found = await after.driver.query(held)
         assert (found.state, found.reason) == (
             BehaviorState.UNKNOWN,
             "its goal was cancelled at Nav2",
         )
-        found = await after.driver.look(after.order("goto", target=at(1.0, 1.0)))
+        found = await after.driver.query(after.order("goto", target=at(1.0, 1.0)))
         assert (found.state, found.reason) == (
             BehaviorState.UNKNOWN,
             "Nav2 knows nothing of it",
@@ -270,11 +270,11 @@ async def test_a_vehicle_that_was_lost_drives_on_until_it_is_told_something_else
 ) -> None:
     goal = ugv1.begin("goto", target=away(ugv1))
     await ugv1.moving(goal)
-    ugv1.driver.forget()
-    heards = ugv1.told.heards
-    await ugv1.until(lambda: ugv1.told.heards > heards + 20)
+    ugv1.driver.abandon()
+    heards = ugv1.events.heards
+    await ugv1.until(lambda: ugv1.events.heards > heards + 20)
     assert ugv1.speed_m_s > 0.5
-    assert goal not in ugv1.told.outcomes
+    assert goal not in ugv1.events.outcomes
     assert await ugv1.state(ugv1.begin("drive_stop")) is BehaviorState.SUCCEEDED
     assert await ugv1.state(ugv1.begin("hold", duration=0.3)) is BehaviorState.SUCCEEDED
 
@@ -319,7 +319,7 @@ async def test_without_nav2_msgs_the_driver_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "nav2_msgs", None)
     with pytest.raises(RosError, match="apt-get install ros-jazzy-nav2-msgs"):
-        await type(ugv1.driver)(ugv1.seat).open()
+        await type(ugv1.driver)(ugv1.setup).open()
 
 
 def test_goals_of_an_order_are_known_by_their_ids() -> None:

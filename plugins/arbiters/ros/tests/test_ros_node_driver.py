@@ -99,8 +99,8 @@ async def test_a_cancel_of_what_has_ended_tells_again_how(one: Bench) -> None:
     order = one.begin("drive_stop")
     await one.end_of(order)
     one.driver.end(order.goal)
-    await one.until(lambda: len(one.told.ends) == 2)
-    assert [outcome.state for _, outcome in one.told.ends] == [SUCCEEDED, SUCCEEDED]
+    await one.until(lambda: len(one.events.ends) == 2)
+    assert [outcome.state for _, outcome in one.events.ends] == [SUCCEEDED, SUCCEEDED]
 
 
 async def test_a_cancel_of_what_the_vehicle_does_not_know_ends_it(one: Bench) -> None:
@@ -115,7 +115,7 @@ async def test_a_behavior_takes_over_and_the_old_one_is_not_told_of(one: Bench) 
     new = one.order("hold", duration=0.2, preempts=(old.goal,))
     one.driver.begin(new)
     assert (await one.end_of(new)).state is SUCCEEDED
-    assert [goal for goal, _ in one.told.ends] == [new.goal]
+    assert [goal for goal, _ in one.events.ends] == [new.goal]
 
 
 async def test_a_held_vehicle_goes_on_when_it_is_resumed(one: Bench) -> None:
@@ -174,10 +174,10 @@ async def test_another_driver_finds_what_runs_and_what_has_ended(
     await one.driver.close()
     async with bench(domain, "evsg1", via) as other:
         await other.later()
-        assert (await other.driver.look(order)).state is RUNNING
-        found = await other.driver.look(ended)
+        assert (await other.driver.query(order)).state is RUNNING
+        found = await other.driver.query(ended)
         assert (found.state, found.code) == (FAILED, "ROUTE_BLOCKED")
-        assert (await other.driver.look(other.order("drive_stop"))).state is UNKNOWN
+        assert (await other.driver.query(other.order("drive_stop"))).state is UNKNOWN
         other.driver.end(order.goal)
         assert (await other.end_of(order)).state is CANCELLED
         await other.later()
@@ -206,6 +206,6 @@ async def test_a_start_of_what_is_done_already_begins_nothing(
 async def test_a_driver_that_has_forgotten_sends_nothing_more(one: Bench) -> None:
     order = one.begin("hold", duration=0.3)
     await one.running(order)
-    one.driver.forget()
+    one.driver.abandon()
     assert (await one.end_of(one.begin("drive_stop"))).state is SUCCEEDED
-    assert order.goal not in [goal for goal, _ in one.told.ends]
+    assert order.goal not in [goal for goal, _ in one.events.ends]

@@ -37,7 +37,7 @@ async def test_statuses_of_other_behaviors_and_none_are_ignored(
         order = one.begin("goto")
         await one.running(order)
         await listen(one)
-        assert one.told.ends == []
+        assert one.events.ends == []
         assert "a status of what we have not given it: r1.b1" in caplog.text
         assert "a status without an id" in caplog.text
 
@@ -51,7 +51,7 @@ async def test_an_end_is_told_once_and_numbers_that_fall_are_ignored(
             order = one.begin("drive_stop")
             assert (await one.end_of(order)).state is SUCCEEDED
         await listen(one)
-        assert [outcome.state for _, outcome in one.told.ends] == [SUCCEEDED] * 3
+        assert [outcome.state for _, outcome in one.events.ends] == [SUCCEEDED] * 3
     assert len(caplog.records) < 20, "complaints are bounded"
 
 
@@ -86,11 +86,11 @@ async def test_holding_what_never_says_it_is_held_ends_some_time(domain: int) ->
         from m2pem_plugin_ros.runtime import qos
 
         one.ros.subscribe(BehaviorCommand, "/parrot/command", count, qos.COMMANDS)
-        await one.heard()
+        await one.alive()
         one.driver.hold()
         await one.until(lambda: commands >= 15)
-        told = 0
-        while told != commands:
-            told = commands
-            assert told <= 20
+        events = 0
+        while events != commands:
+            events = commands
+            assert events <= 20
             await one.clock.sleep(20.0)

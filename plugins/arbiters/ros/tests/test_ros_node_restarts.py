@@ -74,13 +74,13 @@ async def test_both_sides_are_restarted_and_nothing_is_known(ros_domain: int, vi
     again = await start_peer(ros_domain)
     async with bench(ros_domain, "evsg1", via, SPEED) as other:
         await other.later()
-        assert (await other.driver.look(order)).state is UNKNOWN
+        assert (await other.driver.query(order)).state is UNKNOWN
         await end_peer(again)
 
 
 async def test_nobody_is_there_to_be_looked_at(ros_domain: int) -> None:
     async with bench(ros_domain, "evsg1", speed=SPEED) as one:
-        found = await one.driver.look(one.order("drive_stop"))
+        found = await one.driver.query(one.order("drive_stop"))
         assert (found.state, found.reason) == (
             UNKNOWN,
             "the vehicle's node did not answer within 3 s",
@@ -94,7 +94,7 @@ async def test_what_ended_while_nobody_listened_is_found(ros_domain: int, via: V
         await one.running(order)
     async with bench(ros_domain, "evsg1", via, SPEED) as other:
         await other.later()
-        if (found := await other.driver.look(order)).state is RUNNING:
+        if (found := await other.driver.query(order)).state is RUNNING:
             found = await other.end_of(order)
         assert found.state is SUCCEEDED
     await end_peer(peer)

@@ -19,9 +19,9 @@ from m2pem_interfaces.msg import (
     TargetState,
     VehicleStatus,
 )
-from m2pem_plugin_ros.drivers.driver import Told
-from m2pem_plugin_ros.onboard.node import Onboard
-from m2pem_plugin_ros.onboard.target_bus import Targets
+from m2pem_plugin_ros.drivers.driver import DriverEvents
+from m2pem_plugin_ros.onboard.node import OnboardNode
+from m2pem_plugin_ros.onboard.target_bus import TargetBus
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from rclpy.action import ActionClient
@@ -47,9 +47,9 @@ class Console:
         self.commands = create(C, f"/{vehicle}/command", qos.COMMANDS)
         self.targets = create(TargetState, f"/{vehicle}/target", qos.TELEMETRY)
         ros.subscribe(S, f"/{vehicle}/behavior_status", self.statuses.append, qos.BEHAVIOR_STATUS)
-        ros.subscribe(VehicleStatus, f"/{vehicle}/vehicle_status", self._hear, qos.STATUS)
+        ros.subscribe(VehicleStatus, f"/{vehicle}/vehicle_status", self._on_message, qos.STATUS)
 
-    def _hear(self, message: VehicleStatus) -> None:
+    def _on_message(self, message: VehicleStatus) -> None:
         self.vehicle = message
         self.heard += 1
 
@@ -276,12 +276,12 @@ async def test_a_node_can_be_let_go_and_made_again_in_one_process(ros_domain: in
     clock, drivers = SystemClock(), []
     before = asyncio.all_tasks()
 
-    def make_driver(told: Told) -> ScriptedDriver:
-        drivers.append(ScriptedDriver(told, Targets(), clock))
+    def make_driver(events: DriverEvents) -> ScriptedDriver:
+        drivers.append(ScriptedDriver(events, TargetBus(), clock))
         return drivers[-1]
 
     async with RosRuntime("host", domain_id=ros_domain) as ros:
-        first = Onboard(ros, "evsg1", "/evsg1", make_driver, clock=clock)
+        first = OnboardNode(ros, "evsg1", "/evsg1", make_driver, clock=clock)
         await first.open()
         async with console(ros_domain) as one:
             id_ = one.start("single_vehicle_routing", parameters=[route()])
@@ -289,7 +289,7 @@ async def test_a_node_can_be_let_go_and_made_again_in_one_process(ros_domain: in
             await first.drop()
             await one.until(lambda: not one.commands.get_subscription_count())
             assert one.of(id_) == [(1, S.ACCEPTED), (2, S.RUNNING)], "it went without a word"
-            second = Onboard(ros, "evsg1", "/evsg1", make_driver, clock=clock)
+            second = OnboardNode(ros, "evsg1", "/evsg1", make_driver, clock=clock)
             await second.open()
             await one.ready()
             one.say(C.QUERY, id_)

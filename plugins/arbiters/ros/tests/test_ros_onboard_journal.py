@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from m2pem_plugin_ros.interfaces.behavior_status import ENDS, Status
 from m2pem_plugin_ros.onboard import journal as module
-from m2pem_plugin_ros.onboard.journal import Book
+from m2pem_plugin_ros.onboard.journal import BehaviorJournal
 
 from m2pem.api import BehaviorState
 
@@ -17,7 +17,7 @@ ENDINGS = sorted(ENDS - {BehaviorState.REJECTED})
 
 def test_a_behavior_is_accepted_runs_and_ends_with_numbers_that_rise() -> None:
     said: list[Status] = []
-    book = Book(said.append)
+    book = BehaviorJournal(said.append)
     book.accept("a")
     book.progress("a")
     book.progress("a")
@@ -33,7 +33,7 @@ def test_a_behavior_is_accepted_runs_and_ends_with_numbers_that_rise() -> None:
 
 def test_who_takes_over_ends_what_went_on() -> None:
     said: list[Status] = []
-    book = Book(said.append)
+    book = BehaviorJournal(said.append)
     book.accept("a")
     book.accept("b")
     assert [(status.id, status.state) for status in said] == [
@@ -46,12 +46,12 @@ def test_who_takes_over_ends_what_went_on() -> None:
 
 def test_what_was_never_heard_of_is_unknown_with_number_0() -> None:
     said: list[Status] = []
-    Book(said.append).again("a")
+    BehaviorJournal(said.append).repeat("a")
     assert (said[0].id, said[0].number, said[0].state) == ("a", 0, BehaviorState.UNKNOWN)
 
 
 def test_a_lower_epoch_of_the_same_run_is_past() -> None:
-    book = Book(lambda _: None)
+    book = BehaviorJournal(lambda _: None)
     assert [book.is_past(*seen) for seen in (("r", 2), ("r", 1), ("s", 1), ("r", 3), ("r", 2))] == [
         False,
         True,
@@ -65,7 +65,7 @@ def test_of_very_many_the_oldest_are_forgotten_but_not_what_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "REMEMBERED", 3)
-    book = Book(lambda _: None)
+    book = BehaviorJournal(lambda _: None)
     book.accept("goes on")
     for number in range(5):
         book.reject(f"{number}", "REJECTED", "no")
@@ -94,7 +94,7 @@ def test_whatever_happens_each_behavior_keeps_the_order_of_statuses(
     happening: list[tuple[object, ...]],
 ) -> None:
     said: list[Status] = []
-    book = Book(said.append)
+    book = BehaviorJournal(said.append)
     for action, id_, *rest in happening:
         assert isinstance(id_, str)
         if action == "progress":

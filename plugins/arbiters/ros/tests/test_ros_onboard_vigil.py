@@ -1,6 +1,6 @@
 """A node that was not running itself does not take its vehicle for silent."""
 
-from m2pem_plugin_ros.onboard.node import rounds
+from m2pem_plugin_ros.onboard.node import watchdog_rounds
 
 
 class Busy:
@@ -22,7 +22,7 @@ class Busy:
 
 async def judged_us(count: int, *sleeps_s: float) -> list[int]:
     clock, found = Busy(*sleeps_s), []
-    async for _ in rounds(clock, 1.0):
+    async for _ in watchdog_rounds(clock, 1.0):
         found.append(clock.now_us())
         if len(found) == count:
             break

@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
-from ros_double import Body, DoubleDriver, DoubleStation, at
+from ros_double import DoubleDriver, DoubleStation, Dynamics, at
 
 from m2pem.api import BehaviorState, Connection, GeoPosition, ResourceId, VehicleState
 from m2pem.executive.clock import run_virtual
@@ -14,7 +14,7 @@ V, PTZ, GPR = ResourceId("ugv1"), ResourceId("ugv1/ptz"), ResourceId("ugv1/gpr")
 START_US = 1_767_225_600_000_000
 FAR = {"target": at(600.0, 0.0), "speed": 5.0}
 
-Main = Callable[[ArbiterHarness, dict[ResourceId, Body]], Awaitable[None]]
+Main = Callable[[ArbiterHarness, dict[ResourceId, Dynamics]], Awaitable[None]]
 
 
 def play(main: Main) -> None:
@@ -28,11 +28,11 @@ def play(main: Main) -> None:
     }
 
     async def run(clock) -> None:
-        bodies = {V: Body(), PTZ: Body()}
+        bodies = {V: Dynamics(), PTZ: Dynamics()}
         arbiter = RosArbiter(
             connections,
             context(clock),
-            lambda seat: DoubleDriver(seat, bodies[seat.connection.resource]),
+            lambda setup: DoubleDriver(setup, bodies[setup.connection.resource]),
             lambda installation: DoubleStation(bodies, installation),
         )
         async with ArbiterHarness(arbiter, clock) as bench:
@@ -41,12 +41,12 @@ def play(main: Main) -> None:
     run_virtual(run, START_US)
 
 
-def begun(bodies: dict[ResourceId, Body]) -> tuple[int, int]:
+def begun(bodies: dict[ResourceId, Dynamics]) -> tuple[int, int]:
     return bodies[V].begun, bodies[PTZ].begun
 
 
 def test_a_payload_is_commanded_itself_while_its_vehicle_drives() -> None:
-    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Body]) -> None:
+    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Dynamics]) -> None:
         await bench.start("r1.b1", "goto", V, **FAR)
         await bench.start("r1.b2", "ptz_track", PTZ, target=at(10.0, 0.0))
         await bench.running("r1.b1")
@@ -61,7 +61,7 @@ def test_a_payload_is_commanded_itself_while_its_vehicle_drives() -> None:
 
 
 def test_a_behavior_of_a_vehicle_may_hold_its_payload_which_is_told_nothing() -> None:
-    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Body]) -> None:
+    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Dynamics]) -> None:
         await bench.start("r1.b1", "goto", V, PTZ, GPR, **FAR)
         await bench.running("r1.b1")
         assert begun(bodies) == (1, 0)
@@ -75,7 +75,7 @@ def test_a_behavior_of_a_vehicle_may_hold_its_payload_which_is_told_nothing() ->
 
 
 def test_a_vehicle_drives_on_when_a_payload_that_it_holds_is_not_heard() -> None:
-    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Body]) -> None:
+    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Dynamics]) -> None:
         await bench.start("r1.b1", "goto", V, PTZ, **FAR)
         await bench.running("r1.b1")
         bodies[PTZ].linked = False
@@ -97,7 +97,7 @@ def test_a_vehicle_drives_on_when_a_payload_that_it_holds_is_not_heard() -> None
 def test_what_cannot_do_it_is_not_commanded(
     behavior: str, resource: ResourceId, reason: str
 ) -> None:
-    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Body]) -> None:
+    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Dynamics]) -> None:
         parameters = FAR if behavior == "goto" else {"level": 2.0}
         await bench.start("r1.b1", behavior, resource, **parameters)
         report = await bench.ended("r1.b1", 5.0)
@@ -109,7 +109,7 @@ def test_what_cannot_do_it_is_not_commanded(
 
 
 def test_a_payload_is_told_where_its_vehicle_is_also_while_it_does_nothing() -> None:
-    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Body]) -> None:
+    async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Dynamics]) -> None:
         bus = bench.arbiter._context.bus
         state = VehicleState(V, bench.clock.now_us(), GeoPosition(38.0, -77.0, 5.0))
         bus.publish(state)

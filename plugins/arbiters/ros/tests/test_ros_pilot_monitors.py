@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from m2pem_plugin_ros.behaviors import LocalParameters, Pilot, Seen, make_motion
+from m2pem_plugin_ros.behaviors import LocalParameters, Pilot, Observation, make_motion
 from m2pem_plugin_ros.behaviors.monitors import IGNORED
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Bounds
@@ -56,13 +56,13 @@ def test_time_without_odometry_is_no_time_of_being_stuck() -> None:
 def test_an_age_that_is_no_number_counts_as_old(age_s: float) -> None:
     road = driving()
     road.age_s = age_s
-    seen = Seen(road.now_s + DT_S, road.body.pose, road.body.twist, age_s)
+    seen = Observation(road.now_s + DT_S, road.body.pose, road.body.twist, age_s)
     assert road.pilot.step(seen).twist == Twist()
 
 
 def test_no_pose_is_no_reason_to_drive() -> None:
     road = driving()
-    seen = Seen(road.now_s + DT_S, None, road.body.twist)
+    seen = Observation(road.now_s + DT_S, None, road.body.twist)
     assert road.pilot.step(seen).twist == Twist()
 
 
@@ -70,7 +70,7 @@ def test_no_pose_is_no_reason_to_drive() -> None:
 def test_a_pose_that_is_no_number_stops_the_base(field: str) -> None:
     road = driving()
     pose = replace(road.body.pose, **{field: math.nan})
-    assert road.pilot.step(Seen(road.now_s + DT_S, pose, road.body.twist)).twist == Twist()
+    assert road.pilot.step(Observation(road.now_s + DT_S, pose, road.body.twist)).twist == Twist()
 
 
 @settings(max_examples=100, deadline=None)
@@ -88,8 +88,8 @@ def test_whatever_is_seen_commands_are_numbers_within_the_bounds(
     local = LocalParameters(parameters, lambda east, north: (east, north), "self")
     pilot = Pilot(bounds)
     pilot.begin(GOAL, make_motion(behavior, local, bounds))
-    for number, (pose, twist, stick, age_s, stick_age_s) in enumerate(seen):
-        step = pilot.step(Seen(number * DT_S, pose, twist, age_s, None, stick, stick_age_s))
+    for number, (pose, twist, joystick, age_s, joystick_age_s) in enumerate(seen):
+        step = pilot.step(Observation(number * DT_S, pose, twist, age_s, None, joystick, joystick_age_s))
         command = step.twist or Twist()
         assert -bounds.reverse_m_s <= command.forward_m_s <= bounds.speed_m_s
         assert abs(command.yaw_rad_s) <= bounds.yaw_rate_rad_s
@@ -134,6 +134,6 @@ def test_a_pose_that_is_heard_once_is_one_pose_however_often_it_is_seen() -> Non
     heard_s = road.now_s
     for number in range(1, 9):  # one odd message, looked at eight times
         now_s = heard_s + number * DT_S
-        step = road.pilot.step(Seen(now_s, jumped, road.body.twist, now_s - heard_s - DT_S))
+        step = road.pilot.step(Observation(now_s, jumped, road.body.twist, now_s - heard_s - DT_S))
         assert step.twist is not None
         assert step.twist.forward_m_s > 1.0

@@ -46,26 +46,26 @@ class Truth:
 
     def __init__(self, ros: RosRuntime) -> None:
         self._ros = ros
-        self._said = {"/ugv1": ["/ugv1", "0", "0"]}
+        self._recent = {"/ugv1": ["/ugv1", "0", "0"]}
         self._links = ros.node.create_publisher(String, "/link", 10)
-        ros.subscribe(String, "/truth", self._hear, qos.EVENTS)
+        ros.subscribe(String, "/truth", self._on_message, qos.EVENTS)
 
     def speed(self, vehicle: str = "/ugv1") -> float:
-        return float(self._said[vehicle][1])
+        return float(self._recent[vehicle][1])
 
     def begun(self, vehicle: str = "/ugv1") -> int:
-        return int(self._said[vehicle][2])
+        return int(self._recent[vehicle][2])
 
     def cancels(self, vehicle: str = "/ugv1") -> list[str]:
-        return self._said[vehicle][3].split(",") if len(self._said[vehicle]) > 3 else []
+        return self._recent[vehicle][3].split(",") if len(self._recent[vehicle]) > 3 else []
 
     def cut(self, vehicle: str) -> None:
         """Make a vehicle deaf and dumb; "" mends it."""
         self._links.publish(String(data=vehicle))
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         words = message.data.split(" ")
-        self._said[words[0]] = words
+        self._recent[words[0]] = words
 
 
 def arbiter_for(domain: int, bus: Bus, epoch: int = 1, **settings: Any) -> RosArbiter:

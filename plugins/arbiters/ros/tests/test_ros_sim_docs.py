@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from m2pem_plugin_ros import settings
 from m2pem_plugin_ros.simulator.faults import KINDS, parse
-from m2pem_plugin_ros.simulator.specification import OF_DETECTORS, WORDS
+from m2pem_plugin_ros.simulator.specification import DETECTOR_SETTINGS, SETTINGS
 from m2pem_plugin_ros.testing import Peer
 from ros_sim_watch import COMMAND
 
@@ -27,7 +27,7 @@ def test_all_faults_are_told_and_can_be_written_so() -> None:
 
 def test_all_words_are_told() -> None:
     told = set(re.findall(r"`([a-z_]+)`", SECTION))
-    assert set(WORDS) | set(OF_DETECTORS) <= told
+    assert set(SETTINGS) | set(DETECTOR_SETTINGS) <= told
 
 
 @pytest.mark.parametrize("command", COMMANDS)

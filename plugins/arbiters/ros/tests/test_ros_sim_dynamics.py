@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from m2pem_plugin_ros.pose import Pose, Twist
-from m2pem_plugin_ros.simulator.dynamics import STANDS_M_S, Body, Chassis
+from m2pem_plugin_ros.simulator.dynamics import STANDS_M_S, Chassis, Dynamics
 
 STEP_S = 0.02
 EPSILON = 1e-9
@@ -25,7 +25,7 @@ chassis = st.builds(
 )
 
 
-def driven(body: Body, twist: Twist, seconds: float, now_s: float = 0.0) -> float:
+def driven(body: Dynamics, twist: Twist, seconds: float, now_s: float = 0.0) -> float:
     """Command it again and again; returns the time then."""
     for _ in range(round(seconds / STEP_S)):
         now_s += STEP_S
@@ -38,7 +38,7 @@ def driven(body: Body, twist: Twist, seconds: float, now_s: float = 0.0) -> floa
 def test_no_limit_is_ever_exceeded(
     chassis: Chassis, commands: list[tuple[float, float, int]]
 ) -> None:
-    body, now_s = Body(chassis, Pose(0, 0, 0)), 0.0
+    body, now_s = Dynamics(chassis, Pose(0, 0, 0)), 0.0
     for forward, yaw, steps in commands:
         for _ in range(steps):
             now_s += STEP_S
@@ -62,7 +62,7 @@ def test_no_limit_is_ever_exceeded(
 
 @given(chassis, speeds, speeds)
 def test_without_commands_it_comes_to_a_stand(chassis: Chassis, forward: float, yaw: float) -> None:
-    body = Body(chassis, Pose(0, 0, 0))
+    body = Dynamics(chassis, Pose(0, 0, 0))
     now_s = driven(body, Twist(forward, yaw), 2.0)
     slow_s = max(
         max(chassis.speed_m_s, chassis.reverse_m_s) / chassis.acceleration_m_s2,
@@ -76,7 +76,7 @@ def test_without_commands_it_comes_to_a_stand(chassis: Chassis, forward: float, 
 
 
 def test_it_drives_as_far_as_speed_and_acceleration_say() -> None:
-    body = Body(Chassis(lag_s=0.0), Pose(0, 0, 0))
+    body = Dynamics(Chassis(lag_s=0.0), Pose(0, 0, 0))
     driven(body, Twist(2.0), 6.0)
     assert body.twist.forward_m_s == pytest.approx(2.0)
     assert body.pose.east_m == pytest.approx(2 * 6 - 2.0, abs=0.05)  # 2 s from 0 to 2 m/s
@@ -85,7 +85,7 @@ def test_it_drives_as_far_as_speed_and_acceleration_say() -> None:
 
 
 def test_it_drives_a_circle() -> None:
-    body = Body(
+    body = Dynamics(
         Chassis(lag_s=0.0, acceleration_m_s2=100, yaw_acceleration_rad_s2=100), Pose(0, 0, 0)
     )
     driven(body, Twist(1.0, 0.5), 4 * math.pi)
@@ -94,7 +94,7 @@ def test_it_drives_a_circle() -> None:
 
 
 def test_steered_wheels_do_not_turn_on_the_spot() -> None:
-    body = Body(Chassis(turn_radius_m=3.0), Pose(0, 0, 0))
+    body = Dynamics(Chassis(turn_radius_m=3.0), Pose(0, 0, 0))
     driven(body, Twist(0.0, 1.0), 2.0)
     assert body.pose == Pose(0, 0, 0)
     assert body.motions == 0
@@ -102,7 +102,7 @@ def test_steered_wheels_do_not_turn_on_the_spot() -> None:
 
 def test_lag_delays_what_is_commanded() -> None:
     quick, slow = (
-        Body(Chassis(lag_s=lag_s, acceleration_m_s2=100), Pose(0, 0, 0)) for lag_s in (0.0, 1.0)
+        Dynamics(Chassis(lag_s=lag_s, acceleration_m_s2=100), Pose(0, 0, 0)) for lag_s in (0.0, 1.0)
     )
     driven(quick, Twist(1.0), 1.0)
     driven(slow, Twist(1.0), 1.0)
@@ -111,7 +111,7 @@ def test_lag_delays_what_is_commanded() -> None:
 
 
 def test_stuck_wheels_go_nowhere_until_they_are_free() -> None:
-    body = Body(Chassis(), Pose(0, 0, 0))
+    body = Dynamics(Chassis(), Pose(0, 0, 0))
     now_s = driven(body, Twist(1.0), 2.0)
     body.stuck = True
     now_s = driven(body, Twist(1.0), 3.0, now_s)
@@ -125,7 +125,7 @@ def test_stuck_wheels_go_nowhere_until_they_are_free() -> None:
 
 
 def test_a_motion_is_counted_from_stand_to_stand() -> None:
-    body = Body(Chassis(), Pose(0, 0, 0))
+    body = Dynamics(Chassis(), Pose(0, 0, 0))
     now_s = driven(body, Twist(1.0), 2.0)
     now_s = driven(body, Twist(-0.5, 0.3), 2.0, now_s)
     assert body.motions == 1
@@ -137,7 +137,7 @@ def test_a_motion_is_counted_from_stand_to_stand() -> None:
 
 @pytest.mark.parametrize("nonsense", [math.nan, math.inf, -math.inf])
 def test_commands_that_are_no_numbers_are_not_heard(nonsense: float) -> None:
-    body = Body(Chassis(), Pose(0, 0, 0))
+    body = Dynamics(Chassis(), Pose(0, 0, 0))
     driven(body, Twist(nonsense, 0.0), 1.0)
     driven(body, Twist(0.0, nonsense), 1.0)
     assert body.pose == Pose(0, 0, 0)

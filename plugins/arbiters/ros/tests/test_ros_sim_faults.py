@@ -16,14 +16,14 @@ from std_msgs.msg import UInt32
 FOR = "for 20 s"
 """Four real seconds. On a busy computer it takes one of them until that is seen."""
 
-WORDS = ["sim", "ros", "--driver", "base", "--ground", "2", "--speed", "5"]
+SETTINGS = ["sim", "ros", "--driver", "base", "--ground", "2", "--speed", "5"]
 QUIET_S = 0.3
 """At five times the speed, odometry comes every 0.02 s."""
 
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    with reserved_domain() as domain, Peer(COMMAND, domain, WORDS):
+    with reserved_domain() as domain, Peer(COMMAND, domain, SETTINGS):
         yield domain
 
 

@@ -36,18 +36,20 @@ async def test_a_node_that_failed_to_begin_can_be_begun_again(
     def make(_: Any) -> Stillborn:
         return Stillborn()
 
-    monkeypatch.setattr(hosts, "make_way", make)
+    monkeypatch.setattr(hosts, "make_onboard_control", make)
     async with RosRuntime("hosting", domain_id=ros_domain) as ros:
-        host = hosts.Host(ros, Vehicle(VehicleSpec("ugv1", Settings("/ugv1"))), SimulatedClock())
+        simulated = hosts.SimulatedVehicle(
+            ros, Vehicle(VehicleSpec("ugv1", Settings("/ugv1"))), SimulatedClock()
+        )
         nodes = lambda: {name for name, _ in ros.node.get_node_names_and_namespaces()}  # noqa: E731
         with pytest.raises(RuntimeError, match="not today"):
-            await host.open()
+            await simulated.open()
         assert nodes() == {"hosting", "base"}
-        host.start()
+        simulated.start()
         await until(lambda: nodes() == {"hosting", "base", "m2pem_node"})
-        host.kill()
+        simulated.kill()
         await until(lambda: nodes() == {"hosting"})
-        await host.close()
+        await simulated.close()
 
 
 async def test_for_a_process_that_was_not_run_no_time_has_passed(ros_domain: int) -> None:

@@ -16,12 +16,12 @@ nav2_actions = pytest.importorskip("nav2_msgs.action")
 pytest.importorskip("m2pem_plugin_ros.simulator.nav2")
 pytest.importorskip("m2pem_plugin_ros.drivers.base")
 
-WORDS = ["sim", "ros", "--driver", "nav2", "--ground", "1", "--speed", "5"]
+SETTINGS = ["sim", "ros", "--driver", "nav2", "--ground", "1", "--speed", "5"]
 
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    with reserved_domain() as domain, Peer(COMMAND, domain, WORDS):
+    with reserved_domain() as domain, Peer(COMMAND, domain, SETTINGS):
         yield domain
 
 

@@ -18,7 +18,7 @@ from nav_msgs.msg import Odometry
 from ros_sim_watch import AMPLE_S, COMMAND, Heard, switch, until
 from std_msgs.msg import UInt32
 
-WORDS = ["sim", "ros", "--ground", "2", "--speed", "5", "--set", "battery=70 %"]
+SETTINGS = ["sim", "ros", "--ground", "2", "--speed", "5", "--set", "battery=70 %"]
 AGAIN_S = 0.2
 QUIET_S = 1.0
 """Real time without a status after which no more lies are to be expected: ten would have come."""
@@ -28,7 +28,7 @@ ids = itertools.count(1)
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    with reserved_domain() as domain, Peer(COMMAND, domain, WORDS):
+    with reserved_domain() as domain, Peer(COMMAND, domain, SETTINGS):
         yield domain
 
 

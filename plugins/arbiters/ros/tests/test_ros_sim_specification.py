@@ -7,9 +7,14 @@ from typing import Any
 import pytest
 from m2pem_plugin_ros.settings import DriverName, Settings
 from m2pem_plugin_ros.simulator.dynamics import Chassis
-from m2pem_plugin_ros.simulator.faults import KINDS, FaultError, Troubles, parse
+from m2pem_plugin_ros.simulator.faults import KINDS, FaultError, TrafficFaults, parse
 from m2pem_plugin_ros.simulator.sensors import DetectorSpec, Target
-from m2pem_plugin_ros.simulator.specification import VehicleSpec, WordError, apply, detector
+from m2pem_plugin_ros.simulator.specification import (
+    SettingError,
+    VehicleSpec,
+    apply_settings,
+    detector,
+)
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 ORIGIN = (38.1075, -77.3192, 60.0)
@@ -35,7 +40,7 @@ def test_settings_are_read_with_their_units() -> None:
         "battery_life": "10 h",
         "heading": "60 deg",
     }
-    read = apply(said, spec())
+    read = apply_settings(said, spec())
     assert read.chassis == Chassis(5.0, 0.5, 1.5, math.radians(45), turn_radius_m=3.0, lag_s=0.2)
     assert (read.inaccuracy.drift, read.inaccuracy.noise_m) == (0.01, 0.05)
     assert (read.battery, read.capacity.range_m, read.capacity.standing_s) == (0.8, 20_000, 36_000)
@@ -43,7 +48,7 @@ def test_settings_are_read_with_their_units() -> None:
 
 
 def test_home_is_where_it_starts() -> None:
-    read = apply({"home": [38.1075, -77.3182, 62.0], "heading": "90 deg"}, spec())
+    read = apply_settings({"home": [38.1075, -77.3182, 62.0], "heading": "90 deg"}, spec())
     assert (read.start.east_m, read.start.north_m) == pytest.approx((87.7, 0.0), abs=0.1)
     assert (read.start.up_m, read.start.yaw_rad) == pytest.approx((2.0, 0.0))
 
@@ -69,13 +74,13 @@ def test_home_is_where_it_starts() -> None:
     ],
 )
 def test_settings_that_make_no_sense_are_refused(key: str, value: Any, said: str) -> None:
-    with pytest.raises(WordError) as caught:
-        apply({key: value}, spec())
+    with pytest.raises(SettingError) as caught:
+        apply_settings({key: value}, spec())
     assert said in str(caught.value)
 
 
 def test_words_for_rehearsals_are_left_alone() -> None:
-    assert apply({"cruise_speed": 3, "endurance": "8 h"}, spec()) == spec()
+    assert apply_settings({"cruise_speed": 3, "endurance": "8 h"}, spec()) == spec()
 
 
 def test_what_a_detector_finds_is_read() -> None:
@@ -94,7 +99,7 @@ def test_what_a_detector_finds_is_read() -> None:
     ],
 )
 def test_what_a_detector_cannot_find_is_refused(words: dict[str, Any], said: str) -> None:
-    with pytest.raises(WordError) as caught:
+    with pytest.raises(SettingError) as caught:
         detector(words, DetectorSpec(), ORIGIN)
     assert said in str(caught.value)
 
@@ -114,7 +119,7 @@ class Patient:
     """A vehicle that notes what faults do to its nodes."""
 
     def __init__(self) -> None:
-        self.vehicle, self.troubles = Vehicle(spec()), Troubles()
+        self.vehicle, self.traffic_faults = Vehicle(spec()), TrafficFaults()
         self.nodes: list[str] = []
         self.navigation: Any = Navigation()
 
@@ -138,7 +143,7 @@ class Patient:
         switches = (odometer.frozen, odometer.nonsense, vehicle.body.stuck, vehicle.gps_lost)
         navigation = (str(self.nav2.faults), self.nav2.state)
         return (
-            str(self.troubles),
+            str(self.traffic_faults),
             *navigation,
             *switches,
             vehicle.battery.fraction,
@@ -189,7 +194,7 @@ def test_numbers_in_faults_count() -> None:
     patient = Patient()
     for words in ('refuse "too wet"', "flood 100", "battery 30 %", "jump 7.5 m", "detect mine"):
         parse(words).begin(patient)
-    assert patient.troubles == Troubles(refusal="too wet", flood_per_s=100.0)
+    assert patient.traffic_faults == TrafficFaults(refusal="too wet", flood_per_s=100.0)
     assert patient.vehicle.battery.fraction == 0.3
     assert patient.vehicle.odometer.read(0).pose.north_m == pytest.approx(7.5)
     assert [found.type for _, found in patient.vehicle.detections()] == ["mine"]

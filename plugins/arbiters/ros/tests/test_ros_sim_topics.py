@@ -18,7 +18,7 @@ from std_msgs.msg import UInt32
 from m2pem.api import GeoPosition
 
 ORIGIN = (38.1075, -77.3192, 60.0)
-WORDS = [
+SETTINGS = [
     *("sim", "ros", "--driver", "base", "--ground", "2", "--surface", "1", "--speed", "2"),
     *("--home", "38.1075,-77.3192,60", "--target", "gpr@38.10755,-77.3192"),
     *("--set", "battery=50 %"),
@@ -27,7 +27,7 @@ WORDS = [
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    with reserved_domain() as domain, Peer(COMMAND, domain, WORDS):
+    with reserved_domain() as domain, Peer(COMMAND, domain, SETTINGS):
         yield domain
 
 

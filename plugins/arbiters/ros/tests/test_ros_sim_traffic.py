@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
-from m2pem_plugin_ros.simulator.faults import Troubles
-from m2pem_plugin_ros.simulator.traffic import NodeGate
+from m2pem_plugin_ros.simulator.faults import TrafficFaults
+from m2pem_plugin_ros.simulator.traffic import NodeTrafficFilter
 
 
 class Publisher:
@@ -19,17 +19,17 @@ class Publisher:
 
 
 @pytest.fixture
-def troubles() -> Troubles:
-    return Troubles()
+def problems() -> TrafficFaults:
+    return TrafficFaults()
 
 
 @pytest.fixture
-def gate(troubles: Troubles) -> NodeGate:
-    return NodeGate(troubles)
+def gate(problems: TrafficFaults) -> NodeTrafficFilter:
+    return NodeTrafficFilter(problems)
 
 
 @pytest.fixture
-def publisher(gate: NodeGate) -> Publisher:
+def publisher(gate: NodeTrafficFilter) -> Publisher:
     publisher = Publisher()
     gate.made(publisher, "behavior_status")
     gate.send(publisher, "behavior_status", status(BehaviorStatus.RUNNING))
@@ -40,16 +40,18 @@ def status(state: int) -> BehaviorStatus:
     return BehaviorStatus(id="b1", number=2, state=state)
 
 
-def test_without_troubles_everything_passes_as_it_is(gate: NodeGate, publisher: Publisher) -> None:
+def test_without_troubles_everything_passes_as_it_is(
+    gate: NodeTrafficFilter, publisher: Publisher
+) -> None:
     gate.step(10.0, 1.0)
     assert publisher.said == [status(BehaviorStatus.RUNNING)]
-    assert gate.hears("command", BehaviorCommand(verb=BehaviorCommand.START))
+    assert gate.accepts("command", BehaviorCommand(verb=BehaviorCommand.START))
 
 
 def test_a_liar_ends_twice_and_otherwise(
-    gate: NodeGate, publisher: Publisher, troubles: Troubles
+    gate: NodeTrafficFilter, publisher: Publisher, problems: TrafficFaults
 ) -> None:
-    troubles.lies = True
+    problems.lies = True
     gate.send(publisher, "behavior_status", status(BehaviorStatus.SUCCEEDED))
     *_, true, false = publisher.said
     assert (true.id, true.state) == ("b1", BehaviorStatus.SUCCEEDED)
@@ -57,9 +59,9 @@ def test_a_liar_ends_twice_and_otherwise(
 
 
 def test_a_liar_tells_of_behaviors_that_nobody_gave_it(
-    gate: NodeGate, publisher: Publisher, troubles: Troubles
+    gate: NodeTrafficFilter, publisher: Publisher, problems: TrafficFaults
 ) -> None:
-    troubles.lies = True
+    problems.lies = True
     for seconds in range(20):
         gate.step(float(seconds), 1.0)
     lies = publisher.said[1:]
@@ -70,33 +72,35 @@ def test_a_liar_tells_of_behaviors_that_nobody_gave_it(
 
 
 def test_a_flood_comes_at_its_rate(
-    gate: NodeGate, publisher: Publisher, troubles: Troubles
+    gate: NodeTrafficFilter, publisher: Publisher, problems: TrafficFaults
 ) -> None:
-    troubles.flood_per_s = 5000.0
+    problems.flood_per_s = 5000.0
     for _ in range(50):
         gate.step(0.0, 0.02)
     assert len(publisher.said) == pytest.approx(5001, abs=1)
     assert {"b1"} < {each.id for each in publisher.said}
 
 
-def test_a_flood_needs_nothing_that_was_said_before(gate: NodeGate, troubles: Troubles) -> None:
-    publisher, troubles.flood_per_s = Publisher(), 100.0
+def test_a_flood_needs_nothing_that_was_said_before(
+    gate: NodeTrafficFilter, problems: TrafficFaults
+) -> None:
+    publisher, problems.flood_per_s = Publisher(), 100.0
     gate.made(publisher, "behavior_status")
     gate.step(0.0, 0.1)
     assert len(publisher.said) == 10
 
 
-def test_a_deaf_node_hears_of_nothing_new(gate: NodeGate, troubles: Troubles) -> None:
-    troubles.deaf = True
-    assert not gate.hears("command", BehaviorCommand(verb=BehaviorCommand.START))
-    assert gate.hears("command", BehaviorCommand(verb=BehaviorCommand.CANCEL))
-    assert gate.hears("target", object())
+def test_a_deaf_node_hears_of_nothing_new(gate: NodeTrafficFilter, problems: TrafficFaults) -> None:
+    problems.deaf = True
+    assert not gate.accepts("command", BehaviorCommand(verb=BehaviorCommand.START))
+    assert gate.accepts("command", BehaviorCommand(verb=BehaviorCommand.CANCEL))
+    assert gate.accepts("target", object())
 
 
 def test_a_dead_or_silent_node_says_nothing_and_a_silent_one_drives_on(
-    gate: NodeGate, publisher: Publisher, troubles: Troubles
+    gate: NodeTrafficFilter, publisher: Publisher, problems: TrafficFaults
 ) -> None:
-    troubles.silent, troubles.flood_per_s = True, 100.0
+    problems.silent, problems.flood_per_s = True, 100.0
     gate.step(0.0, 1.0)
     gate.send(publisher, "vehicle_status", "word")
     assert len(publisher.said) == 1
@@ -105,4 +109,4 @@ def test_a_dead_or_silent_node_says_nothing_and_a_silent_one_drives_on(
     gate.closed = True
     gate.send(publisher, "cmd_vel", "drive")
     assert len(publisher.said) == 2
-    assert not gate.hears("command", BehaviorCommand(verb=BehaviorCommand.CANCEL))
+    assert not gate.accepts("command", BehaviorCommand(verb=BehaviorCommand.CANCEL))

@@ -144,5 +144,5 @@ def test_a_vehicle_without_detectors_detects_nothing() -> None:
 def test_troubles_are_named() -> None:
     tested = vehicle(battery=0.1)
     tested.gps_lost = tested.body.stuck = True
-    assert tested.troubles == ("no satellites", "battery low", "wheels stuck")
-    assert vehicle().troubles == ()
+    assert tested.problems == ("no satellites", "battery low", "wheels stuck")
+    assert vehicle().problems == ()

@@ -83,7 +83,7 @@ async def test_a_state_is_made_of_what_all_topics_say(domain: int) -> None:
 async def test_a_pose_that_is_no_number_never_reaches_the_fleet(domain: int) -> None:
     async with connected(domain) as bench, sensors(domain) as teller:
         await teller.repeat(lambda: positioned(bench), "odometry is heard", odometry(1.0, 1.0))
-        heard = bench.arbiter._vehicles[V]._instruments.senses.localization.complaints.counts
+        heard = bench.arbiter._vehicles[V]._ros_connection.sensors.localization.log_throttle.counts
         await teller.repeat(
             lambda: len(heard) == 2,
             "what is no number is heard",
@@ -187,7 +187,7 @@ async def test_a_vehicle_is_shown_its_target_over_its_topic(domain: int) -> None
         state = VehicleState(
             lead, 1_700_000_000_250_000, GeoPosition(38.2, -77.4, 5.0), None, (1.0, 2.0, 0.0)
         )
-        show = bench.arbiter._vehicles[V]._instruments.show_target
+        show = bench.arbiter._vehicles[V]._ros_connection.publish_target
         show(VehicleState(lead, 0))
         while not shown:
             show(state)

@@ -1,4 +1,5 @@
-"""The pilot of a plain base (docs/ros.md, "A plain base"): pure code, in the local frame."""
+"""Behaviors of a plain base (docs/ros.md, "A plain base"). They do no I/O, and use the local
+frame."""
 
 from collections.abc import Mapping
 
@@ -6,7 +7,7 @@ from m2pem_plugin_ros.behaviors.follow import Follow
 from m2pem_plugin_ros.behaviors.goto import Goto
 from m2pem_plugin_ros.behaviors.hold_and_teleop import DriveStop, Hold, Teleop
 from m2pem_plugin_ros.behaviors.motion import Motion
-from m2pem_plugin_ros.behaviors.motion_state import Ending, RefusedError, Seen, Step, Target
+from m2pem_plugin_ros.behaviors.motion_state import Ending, RefusedError, Observation, Step, Target
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.pilot import STALE_S, STANDING, Pilot
 from m2pem_plugin_ros.behaviors.reverse import Reverse
@@ -21,7 +22,7 @@ __all__ = [
     "Motion",
     "Pilot",
     "RefusedError",
-    "Seen",
+    "Observation",
     "Step",
     "Target",
     "Teleop",
@@ -37,7 +38,7 @@ MOTIONS: Mapping[str, type[Motion]] = {
 
 
 def make_motion(behavior: str, parameters: LocalParameters, bounds: Bounds) -> Motion:
-    """The motion for a behavior.
+    """Make the motion of a behavior.
 
     Raises:
         RefusedError: a plain base cannot do it, or not so.

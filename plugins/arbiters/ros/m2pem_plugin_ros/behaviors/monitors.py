@@ -1,23 +1,23 @@
-"""Which poses are believed: a vehicle does not jump, but what says where it is may."""
+"""Monitors of a base while it drives: implausible poses, leaving the fence, being stuck."""
 
 import math
 from collections.abc import Callable
 
-from m2pem_plugin_ros.behaviors.motion_state import Place, place_of, sane_pose, turned
+from m2pem_plugin_ros.behaviors.motion_state import Place, angle_between, position_of, sane_pose
 from m2pem_plugin_ros.pose import Pose, Twist
 
 IGNORED = 3
-"""So many poses in a row that cannot be are ignored; the next one is believed."""
+"""The filter drops at most this many implausible poses in a row, and accepts the next one."""
 
 JITTER_M = 0.5
 MARGIN = 1.5
-"""A pose may be so far from the one before, beside so many times what the top speed allows."""
+"""A pose may be this much farther from the last one than the top speed allows, besides JITTER_M."""
 
 SAME_S = 1e-4
 
 
-class PoseGate:
-    """Hands on the poses that can be."""
+class PoseFilter:
+    """Drops poses to which the vehicle cannot have moved since the last one."""
 
     def __init__(self, top_speed_m_s: float) -> None:
         self._top_speed_m_s = top_speed_m_s
@@ -28,13 +28,13 @@ class PoseGate:
 
     @property
     def doubts(self) -> bool:
-        """Whether the pose to go by is an old one, since the last cannot be."""
+        """Whether the last pose was dropped, so that `pose` returned an older one."""
         return self._ignored > 0
 
     def pose(self, pose: Pose | None, heard_s: float, *, strict: bool = True) -> Pose | None:
-        """The pose to go by, given the one that was heard at `heard_s`; None: there is none.
+        """Return the pose to use, given the one received at `heard_s`; None if there is none.
 
-        Not `strict`: nothing depends on it, and whatever is a pose is believed.
+        With `strict` False, no behavior depends on it, and any finite pose is accepted.
         """
         pose = sane_pose(pose)
         if pose is None:
@@ -51,31 +51,33 @@ class PoseGate:
     def _jumps(self, pose: Pose, heard_s: float) -> bool:
         if self._believed is None:
             return False
-        far = math.dist(place_of(self._believed), place_of(pose))
+        far = math.dist(position_of(self._believed), position_of(pose))
         passed_s = heard_s - self._believed_s
         return far > JITTER_M + MARGIN * self._top_speed_m_s * passed_s
 
 
 STRAY_M = 1.0
-"""So far outside is not left yet: a way may run along the fence, and a base swings out a little."""
+"""This far outside still counts as inside: routes may run along the fence, and a base swings
+out."""
 
 
-class FenceWatch:
-    """During one motion. Who was outside when that began may come back.
+class FenceMonitor:
+    """Detects that the base leaves the fence during a motion. A base that began outside may come
+    back.
 
-    `outside_m`: how far a place is from where one may be; 0 inside.
+    `outside_m` returns the distance of a position from the permitted area; 0 inside.
     """
 
     def __init__(self, outside_m: Callable[[Place], float]) -> None:
         self._outside_m = outside_m
         self._was_inside = False
 
-    def forget(self) -> None:
-        """Another motion begins."""
+    def reset(self) -> None:
+        """Start a new motion."""
         self._was_inside = False
 
     def left_by_m(self, place: Place) -> float:
-        """How far outside who is at a place has gone; 0 if it has not."""
+        """Return how far outside the base is, if it has left the fence; otherwise 0."""
         by_m = self._outside_m(place)
         if by_m <= STRAY_M:
             self._was_inside = True
@@ -87,11 +89,12 @@ STUCK_S = 15.0
 MOVED_M = 0.3
 TURNED_RAD = 0.3
 SHARE = 0.5
-"""Of what was commanded: who creeps by order need not have come as far as MOVED_M."""
+"""A base that is commanded slowly has moved if it covered this part of the commanded distance."""
 
 
-class StuckWatch:
-    """Looks at each step; counts only the time in which a motion is commanded."""
+class StuckMonitor:
+    """Detects a base that is commanded to move and does not. Time without a command does not
+    count."""
 
     def __init__(self) -> None:
         self._from: Pose | None = None
@@ -99,12 +102,12 @@ class StuckWatch:
         self._commanded_m = 0.0
         self._commanded_rad = 0.0
 
-    def forget(self) -> None:
-        """It begins anew."""
+    def reset(self) -> None:
+        """Start again."""
         self._from = None
 
     def stuck(self, pose: Pose, twist: Twist, dt_s: float) -> bool:
-        """Whether there was no movement for so long. `twist` is what was commanded."""
+        """Return whether the base has not moved for `STUCK_S`. `twist` is the last command."""
         if self._from is None or self._moved(self._from, pose):
             self._from = pose
             self._commanded_s = self._commanded_m = self._commanded_rad = 0.0
@@ -115,10 +118,11 @@ class StuckWatch:
         return self._commanded_s >= STUCK_S
 
     def _moved(self, before: Pose, pose: Pose) -> bool:
-        """As far as it was told, or as far as matters; turning counts if that is what it does."""
-        far = math.dist(place_of(before), place_of(pose))
+        """Whether the base moved as far as commanded, or by MOVED_M. Turning counts if it only
+        turns."""
+        far = math.dist(position_of(before), position_of(pose))
         if self._commanded_m > 0.0 and far >= min(MOVED_M, SHARE * self._commanded_m):
             return True
         turns = self._commanded_rad > 0.0 and self._commanded_m < MOVED_M
-        aside = abs(turned(before.yaw_rad, pose.yaw_rad))
+        aside = abs(angle_between(before.yaw_rad, pose.yaw_rad))
         return turns and aside >= min(TURNED_RAD, SHARE * self._commanded_rad)

@@ -1,19 +1,21 @@
-"""What a base does for one behavior, step by step."""
+"""The interface of a motion: what a base does for one behavior, in steps."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from m2pem_plugin_ros.behaviors.motion_state import Ending, Place, Scene, Wish
+from m2pem_plugin_ros.behaviors.motion_state import Ending, Place, MotionState, DesiredMotion
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds
 
 
 class Motion(ABC):
-    """Made of a request's parameters; raises RefusedError if they cannot be.
+    """One motion, made from the parameters of a request. Raises RefusedError if they cannot be
+    used.
 
-    `target`: the vehicle whose state it must be shown, or "". `places`: where it leads.
-    `steered`: whether it is we who steer, so that a base which does not move is stuck.
+    `target`: the vehicle whose state the motion needs, or "". `places`: where the motion leads to.
+
+    `steered`: m2pem steers, so that a base that does not move is stuck.
     """
 
     name: ClassVar[str]
@@ -27,21 +29,23 @@ class Motion(ABC):
         self._take_speed(parameters)
 
     @abstractmethod
-    def step(self, scene: Scene) -> Wish | Ending:
-        """One step. A success is told when the base stands; of anything else it is stopped."""
+    def step(self, state: MotionState) -> DesiredMotion | Ending:
+        """Return the desired motion, or how the motion ends. A success is reported when the base
+        stands."""
 
     def found_at(self, place: Place, moved_m: float) -> None:  # noqa: B027  # most keep no place
-        """The vehicle is at a place that it has not driven to, so far from where it was."""
+        """Continue from a position that the base did not drive to, `moved_m` from its last one."""
 
     def take_up(self) -> None:  # noqa: B027  # most begin anew
-        """A part of it was done before: go on from where the base stands, if that can be told."""
+        """Continue from where the base stands, as a part of the motion was done before a
+        restart."""
 
     def adjust(self, parameters: LocalParameters) -> None:
-        """Go on with these; what is not given, or cannot be changed, stays as it is."""
+        """Change parameters. Those that are missing, or cannot be changed, stay as they are."""
         self._take_speed(parameters)
 
     def ends_at(self, pose: Pose) -> bool:
-        """Whether who stands so has surely done it, or need not do it."""
+        """Whether a base that stands at `pose` has certainly completed the motion."""
         return False
 
     def _take_speed(self, parameters: LocalParameters) -> None:

@@ -1,4 +1,4 @@
-"""What the pilot is shown, what a motion wishes, and what the pilot says."""
+"""Data types of motions, and geometry in the local plane."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from m2pem_plugin_ros.settings import Bounds
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Another vehicle, in the local frame; `age_s`: how long ago it said so."""
+    """The state of another vehicle in the local frame, `age_s` seconds old."""
 
     pose: Pose
     east_m_s: float = 0.0
@@ -21,11 +21,11 @@ class Target:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """What is known at one moment. `now_s` never goes back. `age_s`: of `pose` and `twist`.
+class Observation:
+    """The input of `Pilot.step`. `now_s` never decreases. `age_s` is the age of `pose` and `twist`.
 
-    `target`: the vehicle that `Pilot.target` names; None: nothing is known of it. `stick`: what an
-    operator wants, `stick_age_s` seconds ago.
+    `target` is the vehicle that `Pilot.target` names, or None if it is not known. `joystick` is the
+    last command of the operator, `joystick_age_s` seconds old.
     """
 
     now_s: float
@@ -33,16 +33,16 @@ class Seen:
     twist: Twist | None = None
     age_s: float = 0.0
     target: Target | None = None
-    stick: Twist | None = None
-    stick_age_s: float = 0.0
+    joystick: Twist | None = None
+    joystick_age_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
-    """What a motion is shown: all of it is there, and can be trusted.
+class MotionState:
+    """The input of a motion, checked by the pilot.
 
-    `dt_s`: since the last step, not counting a hold. `speed_m_s`: forward, negative backwards.
-    `stands`: it is at a stand. `stick` None: the operator's stick is not heard.
+    `dt_s`: time since the last step, without holds. `speed_m_s`: forward; negative backwards.
+    `stands`: the base does not move. `joystick` None: there is no recent command of the operator.
     """
 
     dt_s: float
@@ -51,15 +51,15 @@ class Scene:
     stands: bool
     bounds: Bounds
     target: Target | None = None
-    stick: Twist | None = None
+    joystick: Twist | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """How a motion wants the base to move; the governor makes of it what the base can do.
+class DesiredMotion:
+    """The motion that a behavior asks for. `VelocityLimiter` makes a command of it.
 
-    The yaw rate is `curvature_1_m` (positive to the left) times the speed that comes of it, plus
-    `yaw_rate_rad_s`, which only a base that turns on the spot can have.
+    The yaw rate is `curvature_1_m` (positive to the left) times the resulting speed, plus
+    `yaw_rate_rad_s`, which applies only to a base that turns on the spot.
     """
 
     speed_m_s: float = 0.0
@@ -68,16 +68,15 @@ class Wish:
 
     @property
     def moves(self) -> bool:
-        """Whether it is one to move at all."""
         return self.speed_m_s != 0.0 or self.yaw_rate_rad_s != 0.0
 
 
-STAND = Wish()
+STANDSTILL = DesiredMotion()
 
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How a motion ends; `state` is terminal. The base is brought to a stand before it is told."""
+    """How a motion ends. The base stops before the ending is reported. `state` is terminal."""
 
     state: BehaviorState = BehaviorState.SUCCEEDED
     code: str = ""
@@ -86,10 +85,8 @@ class Ending:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What is to be done now. `twist` None: nothing is to be sent, others may use the base.
-
-    `goal` has ended so, if `ending` is given.
-    """
+    """The output of `Pilot.step`. With `twist` None, nothing is published, and others may command
+    the base. With `ending`, the goal has ended."""
 
     twist: Twist | None
     goal: UUID | None = None
@@ -97,50 +94,49 @@ class Step:
 
 
 class RefusedError(Exception):
-    """It cannot be done; the text says why."""
+    """The behavior cannot be done; the text says why."""
 
 
 Place: TypeAlias = tuple[float, float]
-"""East and north, in metres, of the fleet's local frame."""
+"""East and north in the local frame, in metres."""
 
 
-def turned(from_rad: float, to_rad: float) -> float:
-    """The short way from one direction to another: positive is counter-clockwise."""
+def angle_between(from_rad: float, to_rad: float) -> float:
+    """Return the shortest rotation from one direction to another; positive is counter-clockwise."""
     return math.remainder(to_rad - from_rad, math.tau)
 
 
-def place_of(pose: Pose) -> Place:
-    """Where a pose is."""
+def position_of(pose: Pose) -> Place:
     return pose.east_m, pose.north_m
 
 
-def beyond(place: Place, yaw_rad: float, distance_m: float) -> Place:
-    """The place so far away in a direction."""
+def point_beyond(place: Place, yaw_rad: float, distance_m: float) -> Place:
+    """Return the position at a distance in a direction."""
     return (
         place[0] + distance_m * math.cos(yaw_rad),
         place[1] + distance_m * math.sin(yaw_rad),
     )
 
 
-def yaw_towards(start: Place, end: Place) -> float:
-    """The direction in which `end` lies."""
+def direction_to(start: Place, end: Place) -> float:
+    """Return the direction from `start` to `end`."""
     return math.atan2(end[1] - start[1], end[0] - start[0])
 
 
 FARTHEST_M = 1e6
 FASTEST = 1e3
-"""What is farther from the origin, or faster in m/s or rad/s, is no pose or twist of a base."""
+"""Poses farther from the origin, and twists faster than this in m/s or rad/s, are invalid."""
 
 
 def sane_pose(pose: Pose | None) -> Pose | None:
-    """The pose, unless something in it is no number, or none that can be."""
+    """Return the pose, or None if it is missing or invalid."""
     if pose is None or not math.isfinite(pose.yaw_rad):
         return None
     return pose if _within(FARTHEST_M, pose.east_m, pose.north_m) else None
 
 
 def sane_twist(twist: Twist | None) -> Twist | None:
-    """The twist, unless something in it is no number, or none that can be."""
+    """Return the twist, or None if it is missing or invalid."""
     if twist is None or not _within(FASTEST, twist.forward_m_s, twist.yaw_rad_s):
         return None
     return twist

@@ -1,38 +1,39 @@
-"""A path of straight legs, which may repeat for ever."""
+"""A path of straight legs, and the progress of a vehicle along it. A path may repeat."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from m2pem_plugin_ros.behaviors.motion_state import Place, beyond, turned, yaw_towards
+from m2pem_plugin_ros.behaviors.motion_state import Place, angle_between, direction_to, point_beyond
 
 SHORTEST_M = 0.05
-"""Waypoints that are nearer to each other are one."""
+"""Waypoints closer to each other than this count as one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """From a place straight to the next."""
+    """A straight leg from one waypoint to the next."""
 
     start: Place
     yaw_rad: float
     length_m: float
 
     def at(self, along_m: float) -> Place:
-        """The place so far along, or before or beyond it."""
-        return beyond(self.start, self.yaw_rad, along_m)
+        """Return the position at a distance along the leg, which may be before its start or after
+        its end."""
+        return point_beyond(self.start, self.yaw_rad, along_m)
 
     def along(self, place: Place) -> float:
-        """How far along the leg a place is, if one looks from the side; it may be beyond."""
+        """Return the distance along the leg of the foot of the perpendicular from a position."""
         return (place[0] - self.start[0]) * math.cos(self.yaw_rad) + (
             place[1] - self.start[1]
         ) * math.sin(self.yaw_rad)
 
 
 class Path:
-    """Legs from the first place through all others; with `lap_from`, from the last one back to the
-    place of that number, and round again without an end."""
+    """Legs through all positions. With `lap_from`, the path returns from its end to the position of
+    that index, and repeats from there."""
 
     def __init__(self, places: Iterable[Place], lap_from: int | None = None) -> None:
         kept: list[Place] = []
@@ -53,11 +54,11 @@ class Path:
 
     @property
     def repeats(self) -> bool:
-        """Whether it has no end."""
         return self._lap is not None
 
     def leg(self, number: int) -> Leg | None:
-        """The leg of a number, counted on through all laps; None: the path has ended."""
+        """Return the leg with an index, counted through all laps; None after the end of the
+        path."""
         count = len(self._legs)
         if number < count:
             return self._legs[number]
@@ -66,22 +67,24 @@ class Path:
         return self._legs[self._lap + (number - self._lap) % (count - self._lap)]
 
     def turn(self, number: int) -> float:
-        """By how much one turns after a leg, 0 to pi; 0 at the end."""
+        """Return the angle between a leg and the next one, 0 to pi; 0 at the end."""
         leg, after = self.leg(number), self.leg(number + 1)
-        return 0.0 if leg is None or after is None else abs(turned(leg.yaw_rad, after.yaw_rad))
+        return (
+            0.0 if leg is None or after is None else abs(angle_between(leg.yaw_rad, after.yaw_rad))
+        )
 
 
 def _leg(start: Place, end: Place) -> Leg:
-    return Leg(start, yaw_towards(start, end), math.dist(start, end))
+    return Leg(start, direction_to(start, end), math.dist(start, end))
 
 
 PASSED_M = 0.15
-"""Who is so near before a sharp corner has reached it."""
+"""A vehicle this close to a sharp corner has reached it."""
 
 
 class Progress:
-    """Along a path, on which corners of more than `sharp_rad` are driven to before what is after
-    them is looked at."""
+    """The progress along a path. A corner of more than `sharp_rad` must be reached before later
+    legs are considered."""
 
     def __init__(self, path: Path, sharp_rad: float) -> None:
         self.path = path
@@ -92,21 +95,21 @@ class Progress:
 
     @property
     def driven_m(self) -> float:
-        """From the path's beginning, along it."""
+        """The distance from the start of the path, along it."""
         return self._before_m + self._along_m
 
     @property
     def leg(self) -> Leg | None:
-        """The one that it is on; None for a path without any."""
+        """The current leg; None if the path has none."""
         return self.path.leg(self._number)
 
     def is_sharp(self, number: int) -> bool:
-        """Whether the corner after a leg is."""
+        """Whether the corner after a leg is sharp."""
         return self.path.turn(number) > self._sharp_rad
 
     def ahead(self) -> Iterator[tuple[int, Leg, float, float]]:
-        """The legs from here on, without end if the path repeats: number, leg, how far along it one
-        begins, and how far away that is along the path."""
+        """Yield the legs from here on: index, leg, distance along it at which it begins, and
+        distance from here. A path that repeats has no end."""
         number, begin, away = self._number, self._along_m, 0.0
         while (leg := self.path.leg(number)) is not None:
             yield number, leg, begin, away
@@ -114,7 +117,7 @@ class Progress:
             number, begin = number + 1, 0.0
 
     def advance(self, place: Place, window_m: float) -> None:
-        """Go on to the point of the path, at most `window_m` ahead, that is nearest to a place."""
+        """Advance to the nearest point of the path to a position, at most `window_m` ahead."""
         self._go_to_nearest(place, window_m, over_corners=False)
         if self.is_sharp(self._number):
             leg = self.path.leg(self._number)
@@ -122,8 +125,8 @@ class Progress:
                 self._go_to(self._number + 1, 0.0)
 
     def find_again(self, place: Place, window_m: float) -> None:
-        """The vehicle is elsewhere than was thought: the nearest point within `window_m` of the
-        path, ahead or behind, is where it goes on."""
+        """Search the nearest point of the path within `window_m`, ahead or behind, after a jump of
+        the pose."""
         back = window_m
         while self._number > 0 and back > self._along_m:
             back -= self._along_m
@@ -137,7 +140,8 @@ class Progress:
         self._go_to_nearest(place, 2 * window_m, over_corners=True)
 
     def point_ahead(self, distance_m: float) -> Place:
-        """The point so far ahead; before a sharp corner and at the end, straight on."""
+        """Return the point at a distance ahead. It lies straight on before a sharp corner and at
+        the end."""
         left, point = distance_m, self.path.end
         for number, leg, begin, _ in self.ahead():
             point = leg.at(begin + left)
@@ -148,7 +152,7 @@ class Progress:
 
     @property
     def left_m(self) -> float:
-        """To the end, along the path; infinite if it repeats."""
+        """The distance to the end of the path; infinite if it repeats."""
         if self.path.repeats:
             return math.inf
         return self.path.length_m - self.driven_m
@@ -177,14 +181,14 @@ class Progress:
 
 
 NEARER_M = 0.5
-"""A later leg must be nearer by so much than one before it: nothing is left out by chance."""
+"""A later leg must be nearer by this distance, so that no leg is skipped by chance."""
 
 
 def next_waypoint(places: Sequence[Place], here: Place, within_m: float) -> int | None:
-    """The number of the waypoint that comes next.
+    """Return the index of the waypoint that comes next for a vehicle that stands at `here`.
 
-    None: nobody can tell, as the route does not come by within `within_m`, or comes by again
-    later on.
+    Return None if that is ambiguous: the route passes farther away than `within_m`, or more than
+    once.
     """
     away = [_distance(leg, here) for leg in pairwise(places)]
     near = [number for number, distance_m in enumerate(away) if distance_m <= within_m]

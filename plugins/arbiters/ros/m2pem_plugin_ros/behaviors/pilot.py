@@ -1,7 +1,7 @@
-"""Drives a base in the plane, one motion at a time: where it is comes in, a command goes out.
+"""The pilot of a plain base: runs one motion at a time; poses come in, commands go out.
 
-There is no clock here and nothing is waited for, so that a step can be tried for any moment. What
-is not known is not driven on: without a pose that is fresh the command is zero.
+It has no clock and never waits, so that a step can be tested for any time. Without a recent pose,
+the command is zero.
 """
 
 import math
@@ -9,60 +9,67 @@ from collections.abc import Callable
 from uuid import UUID
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_ros.behaviors.monitors import MARGIN, STUCK_S, FenceWatch, PoseGate, StuckWatch
+from m2pem_plugin_ros.behaviors.monitors import (
+    MARGIN,
+    STUCK_S,
+    FenceMonitor,
+    PoseFilter,
+    StuckMonitor,
+)
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import (
-    STAND,
+    STANDSTILL,
+    DesiredMotion,
     Ending,
+    MotionState,
+    Observation,
     Place,
-    Scene,
-    Seen,
     Step,
-    Wish,
-    place_of,
+    position_of,
     sane_twist,
 )
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
-from m2pem_plugin_ros.behaviors.steering import Governor
+from m2pem_plugin_ros.behaviors.steering import VelocityLimiter
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Bounds
 
 STALE_S = 0.5
-"""A pose, and what a stick says, is gone by when it is older."""
+"""Older poses and older messages of the joystick are not used."""
 
 STANDING = 0.08
-"""Who moves no faster than that, in m/s and rad/s, stands."""
+"""A base that moves more slowly than this, in m/s and rad/s, stands."""
 
 STOOD_S = 1.0
-"""Without a twist, a base is taken to stand so long after it was told to."""
+"""A base without odometry twist counts as standing this long after the command to stop."""
 
 QUIET_S = 2.0
-"""For so long a base that stands is told zero; then others may command it."""
+"""After this time of zero commands to a base that stands, nothing more is published."""
 
 STOP_WITHIN_S = 5.0
-"""A base that takes so much longer than it should to stop does not stop."""
+"""A base that needs this much longer to stop than its acceleration allows does not stop."""
 
 LONGEST_STEP_S = 0.5
 FOUND_M = 1.0
 
 
 class Pilot:
-    """One base. `step` it about 20 times a second, more rarely while it is not `busy`.
+    """The pilot of one base. Call `step` 20 times a second, or less often while it is not `busy`.
 
-    `outside_m`: how far a place is outside of where the base may be, 0 inside; everywhere if None.
+    `outside_m` returns the distance of a position from the permitted area, 0 inside. None: there is
+    no fence.
     """
 
     def __init__(self, bounds: Bounds, outside_m: Callable[[Place], float] | None = None) -> None:
         self._bounds = bounds
-        self._governor = Governor(bounds)
-        self._gate = PoseGate(max(bounds.speed_m_s, bounds.reverse_m_s))
-        self._stuck = StuckWatch()
-        self._fence = FenceWatch(outside_m or (lambda _: 0.0))
+        self._limiter = VelocityLimiter(bounds)
+        self._gate = PoseFilter(max(bounds.speed_m_s, bounds.reverse_m_s))
+        self._stuck = StuckMonitor()
+        self._fence = FenceMonitor(outside_m or (lambda _: 0.0))
         self._goal: UUID | None = None
         self._motion: Motion | None = None
         self._ending: Ending | None = None
         self._held = False
-        self._wished = STAND
+        self._desired = STANDSTILL
         self._stopping_s = 0.0
         self._still_s = 0.0
         self._quiet_s = QUIET_S
@@ -73,82 +80,81 @@ class Pilot:
 
     @property
     def goal(self) -> UUID | None:
-        """What it does, or is being stopped from."""
+        """The goal that the base is driven for, or is being stopped for."""
         return self._goal
 
     @property
     def motion(self) -> Motion | None:
-        """How it does that."""
         return self._motion
 
     @property
     def target(self) -> str:
-        """The vehicle that it must be shown, or ""."""
+        """The vehicle whose state the motion needs, or ""."""
         return self._motion.target if self._motion is not None else ""
 
     @property
     def held(self) -> bool:
-        """Whether it stands until `resume`."""
+        """Whether the base stands until `resume`."""
         return self._held
 
     @property
     def busy(self) -> bool:
-        """Whether it commands the base, if only to stand."""
+        """Whether the pilot publishes commands."""
         return self._goal is not None or self._quiet_s < QUIET_S
 
     # --- what may be told -----------------------------------------------------------------------
 
     def begin(self, goal: UUID, motion: Motion) -> None:
-        """Do this in place of what it does, without a stop between."""
+        """Start a motion in place of the current one, without a stop in between."""
         self._goal, self._motion, self._ending = goal, motion, None
         self._held = False
-        self._wished = STAND
+        self._desired = STANDSTILL
         self._driven_from = None
-        self._fence.forget()
-        self._speak()
+        self._fence.reset()
+        self._resume_publishing()
 
     def end(self, goal: UUID) -> None:
-        """Stop, if this is what it does; the ending comes when it stands."""
+        """Stop the motion of a goal. The ending is reported when the base stands."""
         if goal == self._goal and self._ending is None:
             self._end_with(Ending(BehaviorState.CANCELLED))
 
     def stop_for(self, goal: UUID) -> None:
-        """Stop the base, which may still move for a goal that was dropped; the ending comes when it
-        stands."""
+        """Stop a base that may still move for a goal that was dropped. The ending is reported when
+        it stands."""
         self._goal, self._motion, self._held = goal, None, False
         self._end_with(Ending(BehaviorState.CANCELLED))
 
     def fail(self, reason: str) -> None:
-        """Stop, and let what it does fail."""
+        """Stop the base, and let its goal fail."""
         if self._goal is not None and self._ending is None:
             self._end_with(Ending(BehaviorState.FAILED, "", reason))
 
     def hold(self) -> None:
-        """Stand, and keep the motion with its progress."""
+        """Stop the base. The motion keeps its progress."""
         self._held = True
-        self._speak()
+        self._resume_publishing()
 
     def resume(self) -> None:
-        """Go on."""
+        """Continue the motion."""
         self._held = False
-        self._speak()
+        self._resume_publishing()
 
     def adjust(self, parameters: LocalParameters) -> None:
-        """Go on with other parameters."""
+        """Change parameters of the motion."""
         if self._motion is not None:
             self._motion.adjust(parameters)
 
     def drop(self) -> None:
-        """Nothing is sent any more, and nothing told."""
+        """Publish and report nothing more."""
         self._goal = self._motion = self._ending = None
         self._held = False
-        self._governor.halt()
+        self._limiter.halt()
         self._quiet_s = QUIET_S
 
     # --- what it does ---------------------------------------------------------------------------
 
-    def step(self, seen: Seen) -> Step:
-        """The command for now, and how the motion has ended if it has."""
+    def step(self, seen: Observation) -> Step:
+        """Return the command, and how the motion has ended, if it has."""
         dt_s = self._passed(seen.now_s)
         idle = self._goal is None or self._held
         pose = None
@@ -158,65 +164,67 @@ class Pilot:
             return self._blind(dt_s)
         twist = sane_twist(seen.twist)
         if not self.busy:
-            self._governor.moved_by_others(twist.forward_m_s if twist is not None else 0.0)
+            self._limiter.moved_by_others(twist.forward_m_s if twist is not None else 0.0)
             return Step(None)
         stands = self._stands(twist)
-        wish = self._wish(seen, pose, twist, stands, dt_s)
-        command = self._governor.command(wish, dt_s)
-        self._watch(pose, command, wish, dt_s)
-        return self._told(command, stands, dt_s)
+        desired = self._desired_motion(seen, pose, twist, stands, dt_s)
+        command = self._limiter.command(desired, dt_s)
+        self._check_stuck(pose, command, desired, dt_s)
+        return self._step_result(command, stands, dt_s)
 
     def _blind(self, dt_s: float) -> Step:
         busy = self.busy
-        command = self._governor.halt()
-        self._stuck.forget()
-        return self._told(command, False, dt_s) if busy else Step(None)
+        command = self._limiter.halt()
+        self._stuck.reset()
+        return self._step_result(command, False, dt_s) if busy else Step(None)
 
-    def _wish(self, seen: Seen, pose: Pose, twist: Twist | None, stands: bool, dt_s: float) -> Wish:
+    def _desired_motion(
+        self, seen: Observation, pose: Pose, twist: Twist | None, stands: bool, dt_s: float
+    ) -> DesiredMotion:
         motion = self._motion
         if motion is None or self._held or self._ending is not None:
-            return STAND
+            return STANDSTILL
         if self._gate.doubts:  # nothing ends, nor begins, where it may not be
-            return self._wished
-        if (left_by_m := self._fence.left_by_m(place_of(pose))) > 0:
+            return self._desired
+        if (left_by_m := self._fence.left_by_m(position_of(pose))) > 0:
             reason = f"it is {left_by_m:.1f} m outside the fleet's fence"
             self._end_with(Ending(BehaviorState.FAILED, "", reason))
-            return STAND
-        self._find(motion, pose, dt_s)
-        scene = Scene(
+            return STANDSTILL
+        self._check_jump(motion, pose, dt_s)
+        state = MotionState(
             dt_s=dt_s,
             pose=pose,
-            speed_m_s=self._governor.speed_m_s if twist is None else twist.forward_m_s,
+            speed_m_s=self._limiter.speed_m_s if twist is None else twist.forward_m_s,
             stands=stands,
             bounds=self._bounds,
             target=seen.target,
-            stick=sane_twist(seen.stick) if seen.stick_age_s <= STALE_S else None,
+            joystick=sane_twist(seen.joystick) if seen.joystick_age_s <= STALE_S else None,
         )
-        result = motion.step(scene)
+        result = motion.step(state)
         if isinstance(result, Ending):
             self._end_with(result)
-            result = STAND
-        self._wished = result
+            result = STANDSTILL
+        self._desired = result
         return result
 
-    def _find(self, motion: Motion, pose: Pose, dt_s: float) -> None:
-        """Tell the motion if it did not drive here itself."""
+    def _check_jump(self, motion: Motion, pose: Pose, dt_s: float) -> None:
+        """Tell the motion about a position that the base did not drive to."""
         before, self._driven_from = self._driven_from, pose
         if before is None:
             return
-        moved = math.dist(place_of(before), place_of(pose))
+        moved = math.dist(position_of(before), position_of(pose))
         if moved > FOUND_M + MARGIN * self._bounds.speed_m_s * dt_s:
-            motion.found_at(place_of(pose), moved)
+            motion.found_at(position_of(pose), moved)
 
-    def _watch(self, pose: Pose, command: Twist, wish: Wish, dt_s: float) -> None:
+    def _check_stuck(self, pose: Pose, command: Twist, desired: DesiredMotion, dt_s: float) -> None:
         steered = self._motion is not None and self._motion.steered
-        if not steered or self._held or self._ending is not None or not wish.moves:
-            self._stuck.forget()
+        if not steered or self._held or self._ending is not None or not desired.moves:
+            self._stuck.reset()
         elif self._stuck.stuck(pose, command, dt_s):
             reason = f"it was told to move for {STUCK_S:g} s, and has not moved"
             self._end_with(Ending(BehaviorState.FAILED, "ROUTE_BLOCKED", reason))
 
-    def _told(self, command: Twist, stands: bool, dt_s: float) -> Step:
+    def _step_result(self, command: Twist, stands: bool, dt_s: float) -> Step:
         zero = command.forward_m_s == 0.0 and command.yaw_rad_s == 0.0
         self._still_s = self._still_s + dt_s if zero else 0.0
         silent = self._quiet_s >= QUIET_S
@@ -244,13 +252,14 @@ class Pilot:
     def _end_with(self, ending: Ending) -> None:
         self._ending = ending
         self._stopping_s = 0.0
-        self._speak()
+        self._resume_publishing()
 
-    def _speak(self) -> None:
+    def _resume_publishing(self) -> None:
         self._quiet_s = 0.0
-        self._stuck.forget()
+        self._stuck.reset()
 
     def _passed(self, now_s: float) -> float:
-        """Since the last step; a pause of the program is not a long step."""
+        """Return the time since the last step. A pause of the program does not count as a long
+        step."""
         before, self._last_s = self._last_s, now_s
         return 0.0 if before is None else max(0.0, min(LONGEST_STEP_S, now_s - before))

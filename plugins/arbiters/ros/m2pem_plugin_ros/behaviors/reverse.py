@@ -1,9 +1,9 @@
-"""Straight backwards."""
+"""The behavior `reverse`: drive straight backwards."""
 
 import math
 
 from m2pem_plugin_ros.behaviors.motion import Motion
-from m2pem_plugin_ros.behaviors.motion_state import STAND, Ending, Scene, Wish, place_of
+from m2pem_plugin_ros.behaviors.motion_state import STANDSTILL, Ending, MotionState, DesiredMotion, position_of
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path import Leg
 from m2pem_plugin_ros.behaviors.steering import (
@@ -21,7 +21,7 @@ BACK_AGAIN_M = 0.3
 
 
 class Reverse(Motion):
-    """Over `distance`, along the line that it stands on when it begins."""
+    """Drive backwards over `distance`, along the line through the pose at the start."""
 
     name = "reverse"
 
@@ -31,19 +31,19 @@ class Reverse(Motion):
         self._line: Leg | None = None
         self._over = False
 
-    def step(self, scene: Scene) -> Wish | Ending:
-        """Backwards as one drives forwards along a path: by a point that is some way ahead."""
-        backwards = scene.pose.yaw_rad + math.pi
+    def step(self, state: MotionState) -> DesiredMotion | Ending:
+        """Steer backwards to a point that is a lookahead behind the base."""
+        backwards = state.pose.yaw_rad + math.pi
         if self._line is None:
-            end = place_of(scene.pose)
+            end = position_of(state.pose)
             self._line = Leg(end, math.remainder(backwards, math.tau), self._distance_m)
-        along = self._line.along(place_of(scene.pose))
+        along = self._line.along(position_of(state.pose))
         left = self._distance_m - along
         self._over = left <= (BACK_AGAIN_M if self._over else ENDED_M)
         if self._over:
-            return Ending() if scene.stands else STAND
-        point = self._line.at(along + lookahead(self.bounds, scene.speed_m_s))
-        seen_from_behind = Pose(scene.pose.east_m, scene.pose.north_m, backwards)
+            return Ending() if state.stands else STANDSTILL
+        point = self._line.at(along + lookahead(self.bounds, state.speed_m_s))
+        seen_from_behind = Pose(state.pose.east_m, state.pose.north_m, backwards)
         bound = sharpest(self.bounds)
         bend = max(-bound, min(bound, curvature_to(seen_from_behind, point)))
         speed = min(
@@ -52,4 +52,4 @@ class Reverse(Motion):
             curve_speed(self.bounds, bend),
             braking_speed(self.bounds, left),
         )
-        return Wish(-speed, -bend)
+        return DesiredMotion(-speed, -bend)

@@ -1,1 +1,1 @@
-"""The ways to reach a vehicle: an m2pem node on it, Nav2, or a plain base that is driven by us."""
+"""The drivers of vehicles: an m2pem node on the vehicle, Nav2, or a plain base."""

@@ -1,7 +1,8 @@
-"""What the arbiter asks of a way to reach one vehicle, and what it is told.
+"""The interface of drivers. A driver is one way to reach one vehicle.
 
-A driver needs rclpy; the arbiter makes it when it connects. All calls come on the event loop and
-return at once or soon: what becomes of an order is told later, and as often as the vehicle says so.
+A driver needs rclpy; the arbiter makes it in `connect`. All calls are made on the event loop and
+return quickly. The driver reports the progress of an order by `DriverEvents`, and may report it
+again.
 """
 
 from collections.abc import Mapping
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """A behavior for the vehicle. `goal` and `run` are unique for ever, and the same after a
-    restart. `preempts`: goals that it takes over from."""
+    """A behavior for the vehicle. `goal` and `run` are unique, and the same after a restart.
+    `preempts` lists the goals that this one replaces."""
 
     request: BehaviorRequest
     goal: UUID
@@ -38,8 +39,9 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a goal stands on the vehicle. UNKNOWN: the vehicle knows nothing of it. `outputs`: of one
-    that has ended; what the mission's data store gets. `held`: the vehicle says that it is held."""
+    """The state of a goal on the vehicle. UNKNOWN: the vehicle does not know the goal. `outputs` of
+    a goal that has ended go to the mission's data store. `held`: the vehicle reports that it is
+    held."""
 
     state: BehaviorState
     code: str = ""
@@ -49,13 +51,13 @@ class Outcome:
 
     @property
     def is_end(self) -> bool:
-        """Whether the goal was known, and has ended."""
+        """Whether the goal was known and has ended."""
         return self.state.terminal and self.state is not BehaviorState.UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What a vehicle says of itself, beside where it is. None: it does not say."""
+    """What a vehicle reports of itself besides its pose. None: not reported."""
 
     mode: str = ""
     ready: bool | None = None
@@ -63,81 +65,84 @@ class Health:
     battery_fraction: float | None = None
 
 
-class Told(Protocol):
-    """What a driver tells the arbiter. Said twice, or of a goal that nobody knows, does no harm."""
+class DriverEvents(Protocol):
+    """What a driver reports to the arbiter. Repeated reports, and reports of unknown goals, are
+    ignored."""
 
-    def heard(self) -> None:
-        """The vehicle, or what steers it there, is alive."""
+    def alive(self) -> None:
+        """A message of the vehicle, or of its software, was received."""
         ...
 
     def progress(self, goal: UUID) -> None:
-        """The vehicle does it."""
+        """The vehicle executes the goal."""
         ...
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
-        """It has ended, for good; the state is terminal."""
+        """The goal has ended. The state of `outcome` is terminal."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Seat:
-    """What a driver is given. All time goes through `context.clock`, except what bounds a call."""
+class DriverSetup:
+    """The arguments of a driver. `context.clock` is used for all times, except timeouts of
+    calls."""
 
     connection: Connection
     settings: Settings
     context: ArbiterContext
     ros: "RosRuntime"
     localization: Localization
-    told: Told
+    events: DriverEvents
 
 
 class Driver(Protocol):
-    """One way to reach one vehicle. Constructed as `Driver(seat)`."""
+    """One way to reach one vehicle. It is made as `Driver(setup)`."""
 
     async def open(self) -> None:
-        """Listen; the vehicle need not be there yet."""
+        """Connect. The vehicle need not be there yet."""
         ...
 
     @property
     def health(self) -> Health:
-        """What is known by now."""
+        """The last known health."""
         ...
 
     def refusal(self, request: BehaviorRequest) -> str:
-        """Why a request that fits the catalogue cannot be done now; "" if it can."""
+        """Return why a valid request cannot be done now; "" if it can."""
         ...
 
     def begin(self, order: Order) -> None:
-        """Have the vehicle do this, in place of what it does, which is not told of any more."""
+        """Start an order in place of the current one. The replaced order is not reported any
+        more."""
         ...
 
     def end(self, goal: UUID) -> None:
-        """Have it stop, if it still does this; `told.ended` follows, also if it had ended."""
+        """Stop a goal. `events.ended` follows, also if it had ended already."""
         ...
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
-        """Go on with these parameters in place of those of the same names, as far as possible."""
+        """Change parameters of a goal as far as the vehicle can."""
         ...
 
     def hold(self) -> None:
-        """Bring the vehicle to a stand, whatever it does, and keep the order."""
+        """Stop the vehicle, and keep the order."""
         ...
 
     def resume(self) -> None:
-        """Go on with the order that `hold` interrupted."""
+        """Continue the order after `hold`."""
         ...
 
-    async def look(self, order: Order) -> Outcome:
-        """After a restart: how the vehicle stands to a goal that was given it before. Nothing is
-        begun. If it is RUNNING, the driver has it from now on, and tells of it as of its own."""
+    async def query(self, order: Order) -> Outcome:
+        """After a restart, return the state of a goal that was sent before. Nothing is started. If
+        the goal is RUNNING, the driver adopts it and reports its progress."""
         ...
 
-    def forget(self) -> None:
-        """The vehicle is lost: its order is nobody's any more, and nothing is sent for it."""
+    def abandon(self) -> None:
+        """Drop the order of a vehicle that is lost. Nothing more is sent for it."""
         ...
 
     async def close(self) -> None:
-        """Let go. The vehicle keeps doing what it does, if it can without us."""
+        """Disconnect. The vehicle goes on with what it does, if it can without a connection."""
         ...
 
 
@@ -148,11 +153,11 @@ _DRIVERS = {
 }
 
 
-def make_driver(seat: Seat) -> Driver:
-    """The driver for a seat; not open yet.
+def make_driver(setup: DriverSetup) -> Driver:
+    """Make the driver that the fleet names. It is not open yet.
 
     Raises:
         RosError: it needs a package of ROS that is not installed.
     """
-    module, name = _DRIVERS[seat.settings.driver]
-    return cast("Driver", getattr(import_module(module), name)(seat))
+    module, name = _DRIVERS[setup.settings.driver]
+    return cast("Driver", getattr(import_module(module), name)(setup))

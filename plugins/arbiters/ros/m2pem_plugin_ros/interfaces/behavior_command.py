@@ -1,4 +1,5 @@
-"""What a command asks for, as m2pem_interfaces/msg/BehaviorCommand carries it. Needs no ROS."""
+"""m2pem_interfaces/msg/BehaviorCommand, read by the node on a vehicle and written by the
+executive."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from m2pem_plugin_ros.interfaces.key_values import WireError, decode_parameters,
 
 
 class Verb(IntEnum):
-    """The constants of the message."""
+    """The constants of BehaviorCommand.msg."""
 
     START = 1
     CANCEL = 2
@@ -25,8 +26,8 @@ class Verb(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A command that is one. `of_vehicle`: it is about whatever the vehicle does."""
+class Command:
+    """A valid command."""
 
     verb: Verb
     id: str
@@ -35,12 +36,12 @@ class Asked:
 
     @property
     def of_vehicle(self) -> bool:
-        """Whether it names no behavior."""
+        """Whether the command names no behavior."""
         return self.verb in (Verb.HOLD, Verb.RESUME)
 
 
-def read_command(message: Any) -> Asked:
-    """What a message asks for.
+def read_command(message: Any) -> Command:
+    """Read a command.
 
     Raises:
         WireError: an unknown verb, or no id where one is needed.
@@ -49,14 +50,14 @@ def read_command(message: Any) -> Asked:
         verb = Verb(message.verb)
     except ValueError:
         raise WireError(f"a command with a verb of {message.verb}") from None
-    asked = Asked(verb, message.id, message.run, message.epoch)
+    asked = Command(verb, message.id, message.run, message.epoch)
     if not asked.id and not asked.of_vehicle:
         raise WireError(f"a command to {verb.name} without an id")
     return asked
 
 
 def read_parameters(message: Any) -> dict[str, ResolvedValue]:
-    """The parameters of a START or an ADJUST.
+    """Read the parameters of a START or an ADJUST.
 
     Raises:
         WireError: one cannot be understood.
@@ -65,7 +66,7 @@ def read_parameters(message: Any) -> dict[str, ResolvedValue]:
 
 
 def read_request(message: Any, vehicle: str) -> BehaviorRequest:
-    """What a START asks for. `vehicle`: or the payload, such as evsg2/ptz, whose node this is.
+    """Read the request of a START. `vehicle`: the vehicle, or the payload, whose node this is.
 
     Raises:
         WireError: a parameter cannot be understood, or it is for another vehicle.
@@ -89,13 +90,14 @@ def read_request(message: Any, vehicle: str) -> BehaviorRequest:
     )
 
 
-def misfit(
+def mismatch(
     catalogue: Sequence[BehaviorSpec],
     vehicle: str,
     behavior: str,
     parameters: Mapping[str, ResolvedValue],
 ) -> str:
-    """Why a behavior is not one of the catalogue; "" if it is."""
+    """Return why a behavior is not in the catalogue, or its parameters do not fit; "" if they
+    do."""
     for spec in catalogue:
         if spec.name == behavior:
             return refusal(spec, parameters)
@@ -104,7 +106,7 @@ def misfit(
 
 
 def start_command(order: Order, now_us: int) -> Any:
-    """START, also the goal of the action.
+    """Return a START. It is the goal of the action, too.
 
     Raises:
         WireError: a parameter is none that the wire can carry.
@@ -121,7 +123,7 @@ def start_command(order: Order, now_us: int) -> Any:
 
 
 def adjust_command(order: Order, parameters: Mapping[str, ResolvedValue], now_us: int) -> Any:
-    """ADJUST.
+    """Return an ADJUST.
 
     Raises:
         WireError: a parameter is none that the wire can carry.
@@ -132,8 +134,8 @@ def adjust_command(order: Order, parameters: Mapping[str, ResolvedValue], now_us
 
 
 def behavior_command(verb: int, order: Order, now_us: int, epoch: int = 0) -> Any:
-    """CANCEL or QUERY. `epoch`: that of the executive that sends it, if it is known; an order that
-    was given before a restart has the one of its START."""
+    """Return a CANCEL or QUERY. `epoch` is that of the sending executive, if known. An order from
+    before a restart has the epoch of its START."""
     return _message(
         verb,
         now_us,
@@ -144,17 +146,17 @@ def behavior_command(verb: int, order: Order, now_us: int, epoch: int = 0) -> An
 
 
 def goal_command(verb: int, goal: UUID, now_us: int) -> Any:
-    """CANCEL or QUERY of a behavior of which nothing else is known."""
+    """Return a CANCEL or QUERY of a goal whose order is not known."""
     return _message(verb, now_us, id=str(goal))
 
 
 def vehicle_command(verb: int, now_us: int) -> Any:
-    """HOLD or RESUME: whatever it does."""
+    """Return a HOLD or RESUME."""
     return _message(verb, now_us)
 
 
 def _roles(request: BehaviorRequest) -> Mapping[str, tuple[str, ...]]:
-    """The resources by role; those of a request without roles are of the role ""."""
+    """Return the resources by role. Without roles, all have the role ""."""
     return {role: tuple(resources) for role, resources in request.roles.items()} or {
         "": tuple(request.resources)
     }

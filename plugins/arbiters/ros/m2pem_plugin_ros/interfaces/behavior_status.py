@@ -1,7 +1,4 @@
-"""Statuses of behaviors between an arbiter's node on a vehicle and the executive.
-
-Needs no ROS: what is read and written are messages of m2pem_interfaces/msg/BehaviorStatus.
-"""
+"""m2pem_interfaces/msg/BehaviorStatus, read and written."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -20,22 +17,22 @@ STATES: Mapping[int, BehaviorState] = {
     7: BehaviorState.LOST,
     8: BehaviorState.UNKNOWN,
 }
-"""By the constants of the message."""
+"""By the constants of BehaviorStatus.msg."""
 
 CONSTANTS: Mapping[BehaviorState, int] = {state: number for number, state in STATES.items()}
 
 ENDS = frozenset(state for state in STATES.values() if state.terminal) - {BehaviorState.UNKNOWN}
-"""One of them comes last."""
+"""The states that end a behavior."""
 
 LONGEST_CODE = 64
 LONGEST_REASON = 2000
-"""Characters that are kept of what a vehicle says for people: it goes into journals."""
+"""Longer texts of a vehicle are cut, as they go into journals."""
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What is said of a behavior. `number` rises with each change, from 1; UNKNOWN has 0.
-    `outputs`: of one that has ended; what the mission's data store gets."""
+    """The status of a behavior. `number` rises with each change, from 1; UNKNOWN has 0. `outputs`
+    of a behavior that has ended go to the mission's data store."""
 
     id: str
     number: int
@@ -47,7 +44,8 @@ class Status:
 
 
 def read_status(message: Any) -> Status:
-    """What a message says. An end counts also if an output of it is wrong: `reason` tells then.
+    """Read a message. The end of a behavior counts also if one of its outputs is invalid: `reason`
+    says so.
 
     Raises:
         WireError: it breaks the rules of BehaviorStatus.msg; the text says which.
@@ -73,8 +71,8 @@ def read_status(message: Any) -> Status:
 
 
 def write_status(message: Any, status: Status, make_pair: Callable[..., Any]) -> Any:
-    """Fill a message, but for its stamp, and return it. `make_pair`: a KeyValue of `key` and
-    `value`."""
+    """Fill a message, except for its stamp, and return it. `make_pair` makes a KeyValue of `key`
+    and `value`."""
     message.id = status.id
     message.number = status.number
     message.state = CONSTANTS[status.state]

@@ -1,6 +1,6 @@
-"""Parameters of a behavior as m2pem_interfaces/msg/KeyValue carries them: JSON and GeoJSON.
+"""m2pem_interfaces/msg/KeyValue: parameters and outputs of behaviors, as JSON and GeoJSON.
 
-What is read came over a network: it is trusted in nothing, and an error says which key is wrong.
+Data that is read comes from a network, and is checked. An error names the wrong key.
 """
 
 import json
@@ -15,15 +15,15 @@ Coordinate = tuple[float, float, float | None]
 
 ALTITUDE_FRAMES = ("relative", "amsl", "terrain")
 LONGEST = 4_000_000
-"""Characters of a value: a route of 50,000 waypoints. Longer ones are not read."""
+"""Characters of a value. A route of 50,000 waypoints has about as many."""
 
 
 class WireError(ValueError):
-    """A parameter cannot be sent, or one that was sent cannot be understood."""
+    """A value cannot be sent, or a received one cannot be read."""
 
 
 def encode_parameters(parameters: Mapping[str, ResolvedValue]) -> list[tuple[str, str]]:
-    """Keys, and their values as JSON. A value that is None counts as not given.
+    """Return keys and their values as JSON. Values that are None are left out.
 
     Raises:
         WireError: a value is none that the wire can carry, such as NaN.
@@ -32,7 +32,7 @@ def encode_parameters(parameters: Mapping[str, ResolvedValue]) -> list[tuple[str
 
 
 def decode_parameters(pairs: Iterable[tuple[str, str]]) -> dict[str, ResolvedValue]:
-    """Keys and their values, of keys and JSON.
+    """Return the values by key.
 
     Raises:
         WireError: a value is not JSON, not finite, or none of what msg/KeyValue.msg says.
@@ -191,15 +191,15 @@ def _short(text: str) -> str:
 
 MOST_OUTPUTS = 100
 LONGEST_OUTPUT = 100_000
-"""Characters of one value: it goes into the journal."""
+"""Characters of one value, as it goes into the journal."""
 
 DEEPEST_OUTPUT = 20
 LEAST_WHOLE, MOST_WHOLE = -(2**63), 2**63 - 1
-"""The data store has whole numbers of 64 bits."""
+"""Whole numbers of the data store have 64 bits."""
 
 
 def encode_outputs(outputs: Mapping[str, Value]) -> list[tuple[str, str]]:
-    """Names, and their values as JSON.
+    """Return names and their values as JSON.
 
     Raises:
         WireError: a value is none that JSON can carry, such as NaN.
@@ -214,7 +214,7 @@ def encode_outputs(outputs: Mapping[str, Value]) -> list[tuple[str, str]]:
 
 
 def decode_outputs(pairs: Iterable[tuple[str, str]]) -> tuple[dict[str, Value], list[str]]:
-    """The values by name, and what is wrong with those that were left out."""
+    """Return the values by name, and what is wrong with those that were left out."""
     values: dict[str, Value] = {}
     wrong: list[str] = []
     for name, text in pairs:
@@ -242,7 +242,7 @@ def _decoded_output(text: str) -> Value:
 
 
 def _check_output(value: Value, deep: int) -> None:
-    """Raise WireError for what no data store holds; JSON of Python may be NaN, or without end."""
+    """Raise WireError for values that the data store cannot hold, such as NaN."""
     if isinstance(value, float) and not math.isfinite(value):
         raise WireError("a number in it is not finite")
     if isinstance(value, int) and not LEAST_WHOLE <= value <= MOST_WHOLE:

@@ -1,4 +1,4 @@
-"""What an m2pem node says of its vehicle, as `vehicle_status` carries it."""
+"""m2pem_interfaces/msg/VehicleStatus and PayloadStatus, read and written."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ MOST_REASONS = 20
 
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:
-    """One message. `behavior`: the id of what it does, or ""."""
+    """One message. `behavior` is the id of the current behavior, or ""."""
 
     vehicle: str
     behavior: str
@@ -23,7 +23,7 @@ class VehicleStatus:
 
 
 def read_vehicle_status(message: Any) -> VehicleStatus:
-    """What a message says; a charge that cannot be is not known."""
+    """Read a message. An invalid battery charge is dropped."""
     battery = float(message.battery)
     known = math.isfinite(battery) and 0.0 <= battery <= 1.0
     reasons = [reason[:LONGEST_REASON] for reason in message.not_ready_reasons[:MOST_REASONS]]
@@ -37,12 +37,12 @@ def read_vehicle_status(message: Any) -> VehicleStatus:
 
 
 LINKS = {LinkState.CONNECTED: 1, LinkState.DEGRADED: 2, LinkState.LOST: 3}
-"""By the constants of the message."""
+"""By the constants of PayloadStatus.msg."""
 
 
 def write_payload_status(messages: Any, state: PayloadState, *, to_operators: bool = False) -> Any:
-    """A message without a stamp. `messages`: m2pem_interfaces.msg. `to_operators`: with what the
-    executive alone knows."""
+    """Return a message without a stamp. `messages` is m2pem_interfaces.msg. With `to_operators`, it
+    has the link and the behavior, too."""
     message = messages.PayloadStatus(
         payload=state.resource,
         pan_rad=_nan_if_none(state.pan_rad),

@@ -1,4 +1,4 @@
-"""The action `execute_behavior` of an m2pem node: goals that are behaviors."""
+"""The action server `execute_behavior` of an m2pem node: a goal is a behavior."""
 
 import asyncio
 from collections import defaultdict
@@ -18,26 +18,27 @@ from m2pem_plugin_ros.runtime import RosRuntime
 CANCELING_WITHIN_S = 1.0
 POLL_S = 0.005
 ASKED_WITHIN_S = 0.5
-"""Who hears that a goal has ended asks for its result then, which takes so long at the most."""
+"""A client that receives the end of a goal requests its result within this time."""
 
 
-class Desk(Protocol):
-    """Who does what is asked for."""
+class CommandHandler(Protocol):
+    """Executes the commands of goals."""
 
     def start(self, message: Any) -> None:
-        """As START on `command`; its statuses are said, or said again."""
+        """Handle a START as on the topic `command`. Its statuses are published, or published
+        again."""
         ...
 
     def cancel(self, id_: str) -> None:
-        """As CANCEL on `command`."""
+        """Handle a CANCEL as on the topic `command`."""
         ...
 
 
-class Goals:
-    """Serves the action. A goal lives as long as the behavior of its id, whoever started that."""
+class BehaviorActionServer:
+    """Serves the action. A goal lasts as long as the behavior with its id, whoever started that."""
 
-    def __init__(self, ros: RosRuntime, node: Node, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, ros: RosRuntime, node: Node, handler: CommandHandler) -> None:
+        self._handler = handler
         self._loop = asyncio.get_running_loop()
         self._waiting: defaultdict[str, set[asyncio.Queue[Status]]] = defaultdict(set)
         self._cancelled: set[bytes] = set()
@@ -51,14 +52,14 @@ class Goals:
             cancel_callback=self._cancel,
         )
 
-    def said(self, status: Status) -> None:
-        """Hand a status to the goals that are its behavior."""
+    def publish_status(self, status: Status) -> None:
+        """Pass a status to the goals of its behavior."""
         for queue in self._waiting.get(status.id, ()):
             queue.put_nowait(status)
 
-    async def settled(self, within_s: float) -> None:
-        """Wait until all goals have ended, or for so many real seconds; and until their results can
-        have been asked for."""
+    async def wait_until_ended(self, within_s: float) -> None:
+        """Wait until all goals have ended and their results can have been requested, or for
+        `within_s` in real time."""
         deadline = self._loop.time() + within_s
         while self._waiting and self._loop.time() < deadline:  # noqa: ASYNC110  # at the end only
             await asyncio.sleep(POLL_S)
@@ -68,7 +69,7 @@ class Goals:
     def _cancel(self, handle: Any) -> CancelResponse:
         # In the thread of ROS, before the goal is shown as being canceled.
         self._cancelled.add(_key(handle))
-        self._loop.call_soon_threadsafe(self._desk.cancel, handle.request.command.id)
+        self._loop.call_soon_threadsafe(self._handler.cancel, handle.request.command.id)
         return CancelResponse.ACCEPT
 
     async def _execute(self, handle: Any) -> Any:
@@ -81,9 +82,9 @@ class Goals:
         queue: asyncio.Queue[Status] = asyncio.Queue()
         self._waiting[command.id].add(queue)
         try:
-            self._desk.start(command)
+            self._handler.start(command)
             if _key(handle) in self._cancelled:  # it was, before it had begun
-                self._desk.cancel(command.id)
+                self._handler.cancel(command.id)
             return _result(await self._follow(handle, queue))
         finally:
             self._ended_s = self._loop.time()

@@ -1,6 +1,6 @@
-"""A driver for an m2pem node that has its behaviors done by an arbiter on board.
+"""A driver for an m2pem node that executes behaviors by an arbiter on board.
 
-So any arbiter of one vehicle or payload becomes a node that others command over ROS.
+It makes a node of any arbiter of one vehicle or payload.
 """
 
 import asyncio
@@ -24,30 +24,30 @@ from m2pem.api import (
     VehiclePosition,
     VehicleState,
 )
-from m2pem_plugin_ros.drivers.driver import Health, Order, Outcome, Told
+from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome
 
 EPOCH = 1
-"""The node looks after the epochs of runs itself."""
+"""The node checks the epochs of runs itself."""
 
-HEARD_WITHIN_S = 1.5
-"""Of real time: so long a START waits for what `target` says, which DDS may bring later than it."""
+FIRST_CONTACT_WITHIN_S = 1.5
+"""A START waits this long in real time for states on `target`, which DDS may deliver later."""
 
 
 class ArbiterDriver:
-    """Implements `Driver`. `arbiter`: not connected yet; `resource` is what it is asked about.
-    `bus`: the one that it was lent, which has what is heard on `target`."""
+    """Implements `Driver`. `arbiter` is not connected yet. `bus` is the bus of the arbiter's
+    context, which receives the states on `target`."""
 
     def __init__(
         self,
         arbiter: Arbiter,
         resource: ResourceId,
-        told: Told,
+        events: DriverEvents,
         bus: FleetBus,
         logger: logging.Logger,
     ) -> None:
         self._arbiter = arbiter
         self._resource = resource
-        self._told = told
+        self._events = events
         self._bus = bus
         self._logger = logger
         self._state: VehicleState | PayloadState | None = None
@@ -58,14 +58,13 @@ class ArbiterDriver:
     # --- life -----------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Connect the arbiter; what it commands need not be there yet."""
+        """Connect the arbiter."""
         await self._arbiter.connect()
         create = asyncio.get_running_loop().create_task
         works = (self._call(), self._read_reports(), self._read_states())
         self._tasks = [create(work) for work in works]
 
     async def close(self) -> None:
-        """Let go."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -75,25 +74,24 @@ class ArbiterDriver:
 
     @property
     def state(self) -> PayloadState | None:
-        """Where the payload looks, as the arbiter said last; None: it did not, or is no payload."""
+        """The last state of the payload; None if there is none, or for a vehicle."""
         return self._state if isinstance(self._state, PayloadState) else None
 
     @property
     def health(self) -> Health:
-        """Of a vehicle what the arbiter says; of a payload that it can be commanded."""
+        """The health of a vehicle by the arbiter. A payload is ready when it has a state."""
         if isinstance(self._state, VehicleState):
             own = self._state
             return Health(own.mode, own.ready, own.not_ready_reasons, own.battery_fraction)
         return Health(ready=True if self._state is not None else None)
 
     def refusal(self, request: BehaviorRequest) -> str:
-        """The arbiter says so itself, when it is asked to begin: that is a failure `REJECTED`."""
+        """Return "". The arbiter rejects a request itself when it is started."""
         return ""
 
     # --- orders ---------------------------------------------------------------------------------
 
     def begin(self, order: Order) -> None:
-        """Have the arbiter do this, in place of what it does."""
         before, self._current = self._current, order.goal
         preempts = tuple(str(goal) for goal in dict.fromkeys((*order.preempts, before)) if goal)
         request = BehaviorRequest(
@@ -108,35 +106,29 @@ class ArbiterDriver:
         self._calls.put_nowait(self._start(request, order.goal))
 
     def end(self, goal: UUID) -> None:
-        """Have the arbiter end this."""
         self._calls.put_nowait(self._arbiter.cancel(str(goal), EPOCH))
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
-        """Have the arbiter change it, if it can."""
         if isinstance(self._arbiter, AdjustingArbiter):
             self._calls.put_nowait(self._arbiter.adjust(str(goal), EPOCH, parameters))
 
     def hold(self) -> None:
-        """Have it stand still."""
         self._calls.put_nowait(self._arbiter.hold(self._resource))
 
     def resume(self) -> None:
-        """Have it go on."""
         self._calls.put_nowait(self._arbiter.resume(self._resource))
 
-    async def look(self, order: Order) -> Outcome:
-        """What the arbiter says of a goal."""
+    async def query(self, order: Order) -> Outcome:
         return _outcome(await self._arbiter.query(str(order.goal), None))
 
-    def forget(self) -> None:
-        """What it does is nobody's any more."""
+    def abandon(self) -> None:
         if (goal := self._current) is not None:
             self.end(goal)
 
     # --- inside ---------------------------------------------------------------------------------
 
     async def _call(self) -> None:
-        """One call after the other, in the order in which they were asked for."""
+        """Make the calls to the arbiter one after the other."""
         while True:
             call = await self._calls.get()
             try:
@@ -146,22 +138,23 @@ class ArbiterDriver:
 
     async def _start(self, request: BehaviorRequest, goal: UUID) -> None:
         try:
-            await self._know(request)
+            await self._wait_for_states(request)
             await self._arbiter.start(request)
         except Exception as error:
             reason = f"the arbiter on board is wrong: {error!r}"
-            self._told.ended(goal, Outcome(BehaviorState.FAILED, reason=reason))
+            self._events.ended(goal, Outcome(BehaviorState.FAILED, reason=reason))
             raise
 
-    async def _know(self, request: BehaviorRequest) -> None:
-        """Wait until it was heard where the vehicles are that matter, or not much longer."""
+    async def _wait_for_states(self, request: BehaviorRequest) -> None:
+        """Wait for the states of all vehicles that the request needs, or for
+        FIRST_CONTACT_WITHIN_S."""
         carrier, of_a_vehicle, _ = self._resource.partition("/")
         values = request.parameters.values()
         named = [value.vehicle for value in values if isinstance(value, VehiclePosition)]
         missing = {ResourceId(name) for name in (*named, *([carrier] if of_a_vehicle else ()))}
         missing -= {name for name in missing if self._bus.latest(name) is not None}
         with suppress(TimeoutError):
-            async with asyncio.timeout(HEARD_WITHIN_S):
+            async with asyncio.timeout(FIRST_CONTACT_WITHIN_S):
                 states = self._bus.subscribe()
                 while missing:
                     state = await anext(states)
@@ -172,18 +165,18 @@ class ArbiterDriver:
         async for report in self._arbiter.reports():
             goal = UUID(report.id)
             if report.state is BehaviorState.RUNNING:
-                self._told.progress(goal)
+                self._events.progress(goal)
             elif report.state.terminal:
                 if goal == self._current:
                     self._current = None
-                self._told.ended(goal, _outcome(report))
+                self._events.ended(goal, _outcome(report))
 
     async def _read_states(self) -> None:
         async for state in self._arbiter.telemetry():
             if isinstance(state, VehicleState | PayloadState) and state.resource == self._resource:
                 self._state = state
                 if state.link is not LinkState.LOST:
-                    self._told.heard()
+                    self._events.alive()
 
 
 def _outcome(report: BehaviorReport) -> Outcome:

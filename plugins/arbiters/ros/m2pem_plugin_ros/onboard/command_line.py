@@ -1,4 +1,4 @@
-"""`m2pem ros onboard`: the m2pem node of a vehicle, until Ctrl-C."""
+"""The command `m2pem ros onboard`: the m2pem node of a vehicle, until Ctrl-C."""
 
 import asyncio
 import signal
@@ -17,14 +17,14 @@ _FLAGS = {"true": True, "false": False}
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """KEY=VALUE, where the key may be of an inner map."""
+    """KEY=VALUE. A key of an inner map has a dot: bounds.speed=1.5 m/s."""
 
     name = "key=value"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[tuple[str, ...], str | bool]:
-        """The keys on the way to the value, and the value."""
+        """Return the path of keys, and the value."""
         if isinstance(value, tuple):
             return value
         key, equals, said = (part.strip() for part in str(value).partition("="))
@@ -109,12 +109,12 @@ async def _serve(
 ) -> None:
     from m2pem_plugin_ros.drivers.driver import (  # noqa: PLC0415
         Driver,
-        Seat,
-        Told,
+        DriverEvents,
+        DriverSetup,
         make_driver,  # they need rclpy
     )
-    from m2pem_plugin_ros.onboard.node import LOGGER, Onboard  # noqa: PLC0415
-    from m2pem_plugin_ros.onboard.target_bus import Targets  # noqa: PLC0415
+    from m2pem_plugin_ros.onboard.node import LOGGER, OnboardNode  # noqa: PLC0415
+    from m2pem_plugin_ros.onboard.target_bus import TargetBus  # noqa: PLC0415
     from m2pem_plugin_ros.sensors.localization import TopicLocalization  # noqa: PLC0415
 
     pass
@@ -124,17 +124,17 @@ async def _serve(
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    clock, targets = WallClock(), Targets()
+    clock, targets = WallClock(), TargetBus()
     context = ArbiterContext(clock, targets, LOGGER, origin)
     name = connection.resource
     async with RosRuntime(f"m2pem_{name}", domain_id=settings.domain_id) as ros:
         localization = TopicLocalization(ros, name, settings, context)
 
-        def make(told: Told) -> Driver:
-            return make_driver(Seat(connection, settings, context, ros, localization, told))
+        def make(events: DriverEvents) -> Driver:
+            return make_driver(DriverSetup(connection, settings, context, ros, localization, events))
 
         namespace = settings.namespace
-        node = Onboard(ros, name, namespace, make, clock=clock, bus=targets)
+        node = OnboardNode(ros, name, namespace, make, clock=clock, bus=targets)
         await node.open()
         click.echo(f"{name}: {namespace or '/'}, an m2pem node that drives by {settings.driver}")
         click.echo("ready")
@@ -143,7 +143,8 @@ async def _serve(
 
 
 class WallClock:
-    """Implements `m2pem.api.Clock`: the time of day at its start, and steady time from there."""
+    """Implements `m2pem.api.Clock`: the time of day at its start, advanced by the monotonic
+    clock."""
 
     def __init__(self) -> None:
         self._start_us = time.time_ns() // 1000 - time.monotonic_ns() // 1000

@@ -1,4 +1,4 @@
-"""Which behaviors a vehicle was given, and what was said of them; needs neither ROS nor a clock."""
+"""The behaviors of an m2pem node and their statuses. It needs neither ROS nor a clock."""
 
 from collections.abc import Callable, Mapping
 
@@ -8,50 +8,51 @@ from m2pem_plugin_ros.interfaces.behavior_status import Status
 REMEMBERED = 10_000
 
 
-class Book:
-    """One behavior goes on at a time; each change of one is said once, with a number that rises.
+class BehaviorJournal:
+    """Runs one behavior at a time, and publishes each change of a status once, with a number that
+    rises.
 
-    An id that was seen is known for ever, which is until 10,000 later ones have ended.
+    Ids are kept until 10,000 later behaviors have ended.
     """
 
-    def __init__(self, say: Callable[[Status], None]) -> None:
-        self._say = say
+    def __init__(self, publish: Callable[[Status], None]) -> None:
+        self._publish_status = publish
         self._last: dict[str, Status] = {}
         self._epochs: dict[str, int] = {}
         self._current = ""
 
     @property
     def current(self) -> str:
-        """The id of what goes on, or ""."""
+        """The id of the current behavior, or ""."""
         return self._current
 
     def last(self, id_: str) -> Status:
-        """What was said last; UNKNOWN, with number 0, if nothing was."""
+        """Return the last status; UNKNOWN with number 0 if there is none."""
         reason = "this vehicle knows no such behavior"
         return self._last.get(id_) or Status(id_, 0, BehaviorState.UNKNOWN, reason=reason)
 
     def knows(self, id_: str) -> bool:
-        """Whether it was accepted or rejected before."""
+        """Whether the behavior was accepted or rejected before."""
         return id_ in self._last
 
     def is_past(self, run: str, epoch: int) -> bool:
-        """Whether another executive has taken the run over; a higher epoch is remembered."""
+        """Return whether another executive has taken over the run. The highest epoch is stored."""
         highest = max(epoch, self._epochs.pop(run, epoch))
         self._epochs[run] = highest
         if len(self._epochs) > REMEMBERED:
             del self._epochs[next(iter(self._epochs))]
         return epoch < highest
 
-    def again(self, id_: str) -> None:
-        """Say the last status once more."""
-        self._say(self.last(id_))
+    def repeat(self, id_: str) -> None:
+        """Publish the last status again."""
+        self._publish_status(self.last(id_))
 
     def reject(self, id_: str, code: str, reason: str) -> None:
-        """It will not be done, and nothing has changed."""
+        """Reject a behavior. The current one goes on."""
         self._note(Status(id_, 1, BehaviorState.REJECTED, code, reason))
 
     def accept(self, id_: str) -> None:
-        """It goes on from now on; what went on before has ended."""
+        """Accept a behavior. It replaces the current one, which is cancelled."""
         before, self._current = self._current, id_
         if before:
             number = self._last[before].number + 1
@@ -60,7 +61,7 @@ class Book:
         self._note(Status(id_, 1, BehaviorState.ACCEPTED))
 
     def progress(self, id_: str) -> None:
-        """The vehicle does it: said the first time."""
+        """Publish RUNNING once."""
         if id_ == self._current and self._last[id_].state is BehaviorState.ACCEPTED:
             self._note(Status(id_, 2, BehaviorState.RUNNING))
 
@@ -72,7 +73,7 @@ class Book:
         reason: str = "",
         outputs: Mapping[str, Value] | None = None,
     ) -> None:
-        """It has ended; nothing happens if it is not what goes on."""
+        """End the current behavior. An id that is not current is ignored."""
         if id_ and id_ == self._current:
             self._current = ""
             number = self._last[id_].number + 1
@@ -83,4 +84,4 @@ class Book:
         self._last[status.id] = status
         if len(self._last) > REMEMBERED:
             del self._last[next(id_ for id_ in self._last if id_ != self._current)]
-        self._say(status)
+        self._publish_status(status)

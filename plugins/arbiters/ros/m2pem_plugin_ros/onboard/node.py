@@ -1,4 +1,4 @@
-"""An m2pem node for a vehicle: what it is asked for, a driver on board does."""
+"""An m2pem node: receives commands, and has a driver on board execute them."""
 
 import asyncio
 import logging
@@ -19,11 +19,11 @@ from m2pem.api import (
     PayloadState,
 )
 from m2pem_plugin_ros.catalogue import LEVEL
-from m2pem_plugin_ros.drivers.driver import Driver, Order, Outcome, Told
+from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
 from m2pem_plugin_ros.interfaces.behavior_command import (
-    Asked,
+    Command,
     Verb,
-    misfit,
+    mismatch,
     read_command,
     read_parameters,
     read_request,
@@ -31,37 +31,37 @@ from m2pem_plugin_ros.interfaces.behavior_command import (
 from m2pem_plugin_ros.interfaces.behavior_status import Status
 from m2pem_plugin_ros.interfaces.key_values import WireError
 from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus
-from m2pem_plugin_ros.log_throttle import Complaints
-from m2pem_plugin_ros.onboard.action_server import Goals
-from m2pem_plugin_ros.onboard.journal import Book
-from m2pem_plugin_ros.onboard.publisher import Voice
-from m2pem_plugin_ros.onboard.target_bus import Targets, read_target
+from m2pem_plugin_ros.log_throttle import LogThrottle
+from m2pem_plugin_ros.onboard.action_server import BehaviorActionServer
+from m2pem_plugin_ros.onboard.journal import BehaviorJournal
+from m2pem_plugin_ros.onboard.publisher import StatusPublisher
+from m2pem_plugin_ros.onboard.target_bus import TargetBus, read_target
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 
 LOGGER = logging.getLogger("m2pem.onboard")
 
 IDS = UUID("5f0c3c36-3a52-5e43-9d0a-6f1b0c1f7b61")
-"""Ids of behaviors are any text; drivers know goals by UUIDs, which are made of them by this."""
+"""Namespace of the UUIDs of goals. Ids of behaviors are any text, but drivers need UUIDs."""
 
 SILENT_AFTER_S = 3.0
-"""A driver whose vehicle was not heard for so long has lost it."""
+"""A vehicle that its driver did not report for this time is lost."""
 
 SILENT_LEAST_S = 2.0
-"""Of real time: a clock may be so fast that a busy computer is silent for longer than that."""
+"""The same in real time, as a busy computer may be silent for longer on a fast clock."""
 
 ENDED = "the node on the vehicle was ended"
 STOP_WITHIN_S = 5.0
-SAID_WITHIN_S = 1.0
+SENT_WITHIN_S = 1.0
 
 
-class Onboard:
-    """Serves `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in the vehicle's
-    namespace (docs/ros.md, "Write your own node"), and of a payload `payload_status`.
+class OnboardNode:
+    """The m2pem node of a vehicle or payload (docs/ros.md, "Write your own node"). It serves
+    `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in `namespace`, and for a
+    payload `payload_status`.
 
-    `vehicle`: its name in the fleet, or that of the payload. `make_driver`: of what is on board,
-    and what it tells comes here. `bus`: gets what is heard on `target`; it is to be the one that
-    the driver's context has. `catalogue`: what the driver can do. `sight`: of a payload, where it
-    looks.
+    `vehicle`: its name in the fleet, or that of the payload. `make_driver` gets the `DriverEvents`
+    of this node. `bus` receives the states on `target`; it must be the bus of the driver's context.
+    `catalogue`: the behaviors of the driver. `payload_state` returns where a payload looks.
     """
 
     def __init__(
@@ -69,40 +69,40 @@ class Onboard:
         ros: RosRuntime,
         vehicle: str,
         namespace: str,
-        make_driver: Callable[[Told], Driver],
+        make_driver: Callable[[DriverEvents], Driver],
         *,
         clock: Clock,
         bus: FleetBus | None = None,
         catalogue: Sequence[BehaviorSpec] = LEVEL,
-        sight: Callable[[], PayloadState | None] | None = None,
+        payload_state: Callable[[], PayloadState | None] | None = None,
         logger: logging.Logger = LOGGER,
     ) -> None:
         self._ros = ros
         self._name = vehicle
         self._namespace = namespace
         self._clock = clock
-        self._bus = Targets() if bus is None else bus
+        self._bus = TargetBus() if bus is None else bus
         self._catalogue = catalogue
         self._logger = logger
-        self._complaints = Complaints(logger, vehicle)
-        self._book = Book(self._say)
-        self._voice = Voice(clock, self._about_vehicle, sight)
+        self._log_throttle = LogThrottle(logger, vehicle)
+        self._journal = BehaviorJournal(self._publish_status)
+        self._publisher = StatusPublisher(clock, self._about_vehicle, payload_state)
         self._held = False
         self._ending = False
-        self._heard_us: int | None = None
-        self._heard_s = 0.0
+        self._contact_us: int | None = None
+        self._contact_s = 0.0
         self._request: BehaviorRequest | None = None
         self._ids: dict[UUID, str] = {}
-        self._over = asyncio.Event()
+        self._ended_event = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
         self._node: Any = None
-        self._goals: Goals | None = None
-        self._driver = make_driver(_Told(self))
+        self._goals: BehaviorActionServer | None = None
+        self._driver = make_driver(_Events(self))
 
     # --- life -----------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Open the driver, and be there for commands."""
+        """Open the driver, and serve."""
         await self._driver.open()
         node = self._node = self._ros.make_node(
             "m2pem_onboard",
@@ -110,39 +110,39 @@ class Onboard:
             start_parameter_services=False,
             enable_rosout=False,
         )
-        self._voice.open(node)
-        self._goals = Goals(self._ros, node, self)
+        self._publisher.open(node)
+        self._goals = BehaviorActionServer(self._ros, node, self)
         subscribe = self._ros.subscribe
         subscribe(interfaces.BehaviorCommand, "command", self.command, qos.COMMANDS, node=node)
-        subscribe(interfaces.TargetState, "target", self._hear_target, qos.TELEMETRY, node=node)
+        subscribe(interfaces.TargetState, "target", self._on_target, qos.TELEMETRY, node=node)
         loop = asyncio.get_running_loop()
         self._tasks = [
-            loop.create_task(self._voice.keep_telling()),
+            loop.create_task(self._publisher.keep_publishing()),
             loop.create_task(self._watch()),
         ]
 
     async def close(self) -> None:
-        """Stop the vehicle, say so, and let go."""
+        """Stop the vehicle, publish the end of its behavior, and close."""
         self._ending = True
         try:
-            if id_ := self._book.current:
-                self._over.clear()
+            if id_ := self._journal.current:
+                self._ended_event.clear()
                 self._driver.end(_goal(id_))
-                await self._within(self._over.wait(), STOP_WITHIN_S)
-                self._book.end(id_, BehaviorState.CANCELLED, reason=ENDED)
+                await self._within(self._ended_event.wait(), STOP_WITHIN_S)
+                self._journal.end(id_, BehaviorState.CANCELLED, reason=ENDED)
             if self._goals is not None:
-                await self._goals.settled(SAID_WITHIN_S)
-                await self._voice.heard_out(SAID_WITHIN_S)
+                await self._goals.wait_until_ended(SENT_WITHIN_S)
+                await self._publisher.wait_until_received(SENT_WITHIN_S)
         finally:
             await self.drop()
 
     async def drop(self) -> None:
-        """Let go at once, without a word, as when the power fails."""
+        """Close at once without publishing, as in a power failure."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks = []
-        self._voice.close()
+        self._publisher.close()
         self._goals = None
         try:
             await self._driver.close()
@@ -154,37 +154,39 @@ class Onboard:
     # --- commands -------------------------------------------------------------------------------
 
     def command(self, message: Any) -> None:
-        """What came on `command`."""
+        """Handle a message on `command`."""
         try:
-            asked = read_command(message)
+            command = read_command(message)
         except WireError as error:
-            self._complaints.add("a command that cannot be", str(error))
+            self._log_throttle.log("a command that cannot be", str(error))
             return
-        if asked.verb is Verb.START:
+        if command.verb is Verb.START:
             self.start(message)
-        elif asked.verb is Verb.QUERY:
-            self._book.is_past(asked.run, asked.epoch)  # who asks after a takeover shuts others out
-            self._book.again(asked.id)
-        elif asked.verb is Verb.HOLD:
+        elif command.verb is Verb.QUERY:
+            self._journal.is_past(
+                command.run, command.epoch
+            )  # who asks after a takeover shuts others out
+            self._journal.repeat(command.id)
+        elif command.verb is Verb.HOLD:
             self._hold()
-        elif asked.verb is Verb.RESUME:
+        elif command.verb is Verb.RESUME:
             self._resume()
-        elif self._book.is_past(asked.run, asked.epoch):
-            text = f"{asked.verb.name} of {asked.id}: {_past(asked.epoch)}"
-            self._complaints.add("a command of the past", text)
-        elif asked.verb is Verb.CANCEL:
-            self.cancel(asked.id)
+        elif self._journal.is_past(command.run, command.epoch):
+            text = f"{command.verb.name} of {command.id}: {_past(command.epoch)}"
+            self._log_throttle.log("a command of the past", text)
+        elif command.verb is Verb.CANCEL:
+            self.cancel(command.id)
         else:
-            self._adjust(asked, message)
+            self._adjust(command, message)
 
     def start(self, message: Any) -> None:
-        """START: begin what is new, and say again what was said of what is not."""
+        """Handle a START: begin a new behavior, or publish the status of a known one again."""
         id_ = message.id
-        if self._book.knows(id_):
-            self._book.again(id_)
+        if self._journal.knows(id_):
+            self._journal.repeat(id_)
             return
-        if self._book.is_past(message.run, message.epoch):
-            self._book.reject(id_, "REJECTED", _past(message.epoch))
+        if self._journal.is_past(message.run, message.epoch):
+            self._journal.reject(id_, "REJECTED", _past(message.epoch))
             return
         try:
             request = read_request(message, self._name)
@@ -195,132 +197,130 @@ class Onboard:
             self._logger.exception("%s: %s", self._name, message.behavior)
             reason = f"the driver is wrong: {error!r}"
         if reason:
-            self._book.reject(id_, "REJECTED", reason)
+            self._journal.reject(id_, "REJECTED", reason)
             return
         self._begin(request, message.run)
 
     def cancel(self, id_: str) -> None:
-        """CANCEL: end it, if it goes on; of what has ended, say again how."""
-        if id_ == self._book.current:
+        """Handle a CANCEL: end the current behavior, or publish the status of an ended one
+        again."""
+        if id_ == self._journal.current:
             self._driver.end(_goal(id_))
-        elif self._book.knows(id_):
-            self._book.again(id_)
+        elif self._journal.knows(id_):
+            self._journal.repeat(id_)
 
     def _refusal(self, request: BehaviorRequest) -> str:
         if self._ending:
             return ENDED
         catalogue, parameters = self._catalogue, request.parameters
-        if reason := misfit(catalogue, self._name, request.behavior, parameters):
+        if reason := mismatch(catalogue, self._name, request.behavior, parameters):
             return reason
-        return self._silence() or self._driver.refusal(request)
+        return self._lost_reason() or self._driver.refusal(request)
 
     def _begin(self, request: BehaviorRequest, run: str) -> None:
         preempted = {id_: _goal(id_) for id_ in request.preempts}
-        if current := self._book.current:
+        if current := self._journal.current:
             preempted[current] = _goal(current)
         order = Order(request, _goal(request.id), uuid5(IDS, run), tuple(preempted.values()))
         self._ids = {order.goal: request.id}
         self._request = request
         self._held = False
-        self._book.accept(request.id)
+        self._journal.accept(request.id)
         try:
             self._driver.begin(order)
         except Exception as error:  # of the driver; it must not end the node
             self._logger.exception("%s: %s", self._name, request.behavior)
             reason = f"the driver is wrong: {error!r}"
-            self._book.end(request.id, BehaviorState.FAILED, "FAILED", reason)
-        self._voice.vehicle()
+            self._journal.end(request.id, BehaviorState.FAILED, "FAILED", reason)
+        self._publisher.vehicle()
 
     def _hold(self) -> None:
         if not self._held:
             self._held = True
             self._driver.hold()
-        self._voice.vehicle()
+        self._publisher.vehicle()
 
     def _resume(self) -> None:
         if self._held:
             self._held = False
             self._driver.resume()
-        self._voice.vehicle()
+        self._publisher.vehicle()
 
-    def _adjust(self, asked: Asked, message: Any) -> None:
-        if asked.id != self._book.current or self._request is None:
+    def _adjust(self, command: Command, message: Any) -> None:
+        if command.id != self._journal.current or self._request is None:
             return
         try:
             parameters = read_parameters(message)
         except WireError as error:
-            self._complaints.add("a change that cannot be", str(error))
+            self._log_throttle.log("a change that cannot be", str(error))
             return
         behavior, together = self._request.behavior, {**self._request.parameters, **parameters}
-        if reason := misfit(self._catalogue, self._name, behavior, together):
-            self._complaints.add("a change that cannot be", reason)
+        if reason := mismatch(self._catalogue, self._name, behavior, together):
+            self._log_throttle.log("a change that cannot be", reason)
             return
         self._request = replace(self._request, parameters=together)
-        self._driver.adjust(_goal(asked.id), parameters)
+        self._driver.adjust(_goal(command.id), parameters)
 
     # --- what the driver tells ------------------------------------------------------------------
 
-    def heard(self) -> None:
-        """The vehicle is alive."""
-        self._heard_us = self._clock.now_us()
-        self._heard_s = time.monotonic()
+    def alive(self) -> None:
+        self._contact_us = self._clock.now_us()
+        self._contact_s = time.monotonic()
 
     def progress(self, goal: UUID) -> None:
-        """The vehicle does it."""
         if goal in self._ids:
-            self._book.progress(self._ids[goal])
+            self._journal.progress(self._ids[goal])
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
-        """It has ended."""
         if goal in self._ids:
             reason = outcome.reason or (ENDED if self._ending else "")
-            self._book.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
+            self._journal.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
 
     # --- what is said ---------------------------------------------------------------------------
 
-    def _say(self, status: Status) -> None:
-        self._voice.behavior(status)
+    def _publish_status(self, status: Status) -> None:
+        self._publisher.behavior(status)
         if self._goals is not None:
-            self._goals.said(status)
+            self._goals.publish_status(status)
         if status.state.terminal:
-            self._over.set()
-            self._voice.vehicle()
+            self._ended_event.set()
+            self._publisher.vehicle()
 
     def _about_vehicle(self) -> VehicleStatus:
-        health, silence = self._driver.health, self._silence()
+        health, silence = self._driver.health, self._lost_reason()
         if silence:
             reasons = (*health.not_ready_reasons, silence)
             health = replace(health, ready=False, not_ready_reasons=reasons)
-        return VehicleStatus(self._name, self._book.current, self._held, health)
+        return VehicleStatus(self._name, self._journal.current, self._held, health)
 
     async def _watch(self) -> None:
-        """Give up on a vehicle that is not heard any more."""
-        async for _ in rounds(self._clock, SILENT_AFTER_S / 5):
-            if (reason := self._silence()) and (id_ := self._book.current):
-                self._driver.forget()
-                self._book.end(id_, BehaviorState.LOST, "LINK_LOST", reason)
+        """End the behavior of a vehicle that is lost."""
+        async for _ in watchdog_rounds(self._clock, SILENT_AFTER_S / 5):
+            if (reason := self._lost_reason()) and (id_ := self._journal.current):
+                self._driver.abandon()
+                self._journal.end(id_, BehaviorState.LOST, "LINK_LOST", reason)
 
-    def _silence(self) -> str:
-        """Why the driver's vehicle counts as lost; "" if it does not."""
-        if self._heard_us is None:
+    def _lost_reason(self) -> str:
+        """Return why the vehicle counts as lost; "" if it does not."""
+        if self._contact_us is None:
             return "the vehicle was not heard yet"
-        silent_s = (self._clock.now_us() - self._heard_us) / 1e6
-        if silent_s <= SILENT_AFTER_S or time.monotonic() - self._heard_s <= SILENT_LEAST_S:
+        silent_s = (self._clock.now_us() - self._contact_us) / 1e6
+        if silent_s <= SILENT_AFTER_S or time.monotonic() - self._contact_s <= SILENT_LEAST_S:
             return ""
         return f"the vehicle was not heard for {silent_s:.1f} s"
 
     # --- inside ---------------------------------------------------------------------------------
 
-    def _hear_target(self, message: Any) -> None:
+    def _on_target(self, message: Any) -> None:
         try:
             target = read_target(message, self._clock.now_us())
         except WireError as error:
-            self._complaints.add("a target that cannot be", str(error))
+            self._log_throttle.log("a target that cannot be", str(error))
         else:
             self._bus.publish(target)
 
     async def _within(self, happens: Any, seconds: float) -> None:
-        """Wait for something, or so many seconds of the clock."""
+        """Wait for an awaitable, or for so many seconds of the clock."""
         waited = asyncio.ensure_future(happens)
         late = asyncio.ensure_future(self._clock.sleep(seconds))
         await asyncio.wait([waited, late], return_when=asyncio.FIRST_COMPLETED)
@@ -329,11 +329,11 @@ class Onboard:
         await asyncio.gather(waited, late, return_exceptions=True)
 
 
-class _Told:
-    """What the driver is given to tell: no more of the node than that."""
+class _Events:
+    """The part of the node that its driver may use."""
 
-    def __init__(self, node: Onboard) -> None:
-        self.heard = node.heard
+    def __init__(self, node: OnboardNode) -> None:
+        self.alive = node.alive
         self.progress = node.progress
         self.ended = node.ended
 
@@ -347,14 +347,14 @@ def _past(epoch: int) -> str:
 
 
 LATE = 2.0
-"""Who comes so many times later than it was to, was not running: on a busy computer, say."""
+"""A round that comes this many times later than planned means that the process was suspended."""
 
 
-async def rounds(clock: Clock, every_s: float) -> AsyncIterator[None]:
-    """Once in `every_s`, of the clock.
+async def watchdog_rounds(clock: Clock, every_s: float) -> AsyncIterator[None]:
+    """Yield once in `every_s` of the clock.
 
-    After a round that came late, what arrived meanwhile is not read yet: the round is left out, but
-    never two in a row, so that a computer that is always late does not go without.
+    After a late round, messages that arrived meanwhile are not read yet, so that round is skipped;
+    but never two in a row, so that a computer that is always late still has rounds.
     """
     left_out = False
     while True:

@@ -1,4 +1,4 @@
-"""What an m2pem node says: `behavior_status`, `vehicle_status` and `payload_status`."""
+"""Publishes `behavior_status`, `vehicle_status` and `payload_status` of an m2pem node."""
 
 import asyncio
 import math
@@ -17,7 +17,7 @@ from m2pem_plugin_ros.runtime import qos
 
 STATUS_EVERY_S = 0.4
 FASTEST_S = 0.02
-"""Of real time: a clock may be so fast that telling would flood the network."""
+"""Shortest period in real time, so that a fast clock does not flood the network."""
 
 _READINESS = {
     None: interfaces.VehicleStatus.NOT_KNOWN,
@@ -26,45 +26,45 @@ _READINESS = {
 }
 
 
-class Voice:
-    """Publishes; before `open` and after `close` nothing is said."""
+class StatusPublisher:
+    """Publishes between `open` and `close`."""
 
     def __init__(
         self,
         clock: Clock,
         look: Callable[[], VehicleStatus],
-        sight: Callable[[], PayloadState | None] | None = None,
+        payload_state: Callable[[], PayloadState | None] | None = None,
     ) -> None:
         self._clock = clock
-        self._look = look
-        self._sight = sight
+        self._vehicle_status = look
+        self._payload_state = payload_state
         self._behaviors: Any = None
         self._vehicle: Any = None
         self._payload: Any = None
 
     def open(self, node: Node) -> None:
-        """Publish from this node."""
+        """Create the publishers on a node."""
         create = node.create_publisher
         self._behaviors = create(interfaces.BehaviorStatus, "behavior_status", qos.BEHAVIOR_STATUS)
         self._vehicle = create(interfaces.VehicleStatus, "vehicle_status", qos.STATUS)
-        if self._sight is not None:
+        if self._payload_state is not None:
             self._payload = create(interfaces.PayloadStatus, "payload_status", qos.TELEMETRY)
 
     def close(self) -> None:
-        """Say nothing more."""
+        """Publish nothing more."""
         self._behaviors = self._vehicle = self._payload = None
 
     def behavior(self, status: Status) -> None:
-        """Say a status."""
+        """Publish the status of a behavior."""
         if self._behaviors is not None:
             message = write_status(interfaces.BehaviorStatus(), status, interfaces.KeyValue)
             self._publish(self._behaviors, message)
 
     def vehicle(self) -> None:
-        """Say how the vehicle is."""
+        """Publish the status of the vehicle."""
         if self._vehicle is None:
             return
-        about = self._look()
+        about = self._vehicle_status()
         battery = about.health.battery_fraction
         message = interfaces.VehicleStatus(
             vehicle=about.vehicle,
@@ -78,8 +78,8 @@ class Voice:
         self._publish(self._vehicle, message)
 
     def payload(self) -> None:
-        """Say where the payload looks, if that is known."""
-        state = self._sight() if self._sight is not None else None
+        """Publish where the payload looks, if that is known."""
+        state = self._payload_state() if self._payload_state is not None else None
         if state is not None and self._payload is not None:
             self._publish(self._payload, write_payload_status(interfaces, state))
 
@@ -87,8 +87,8 @@ class Voice:
         set_stamp(message.stamp, self._clock.now_us())
         publisher.publish(message)
 
-    async def keep_telling(self) -> None:
-        """Say how the vehicle or payload is, at a steady rate."""
+    async def keep_publishing(self) -> None:
+        """Publish the status of the vehicle or payload periodically."""
         while True:
             self.vehicle()
             self.payload()
@@ -96,7 +96,7 @@ class Voice:
                 both.create_task(self._clock.sleep(STATUS_EVERY_S))
                 both.create_task(asyncio.sleep(FASTEST_S))
 
-    async def heard_out(self, within_s: float) -> None:
-        """Wait until all who listen have the statuses, or for so many real seconds."""
+    async def wait_until_received(self, within_s: float) -> None:
+        """Wait until all subscribers have the statuses, or for so many real seconds."""
         said = Duration(seconds=within_s)
         await asyncio.to_thread(self._behaviors.wait_for_all_acked, said)

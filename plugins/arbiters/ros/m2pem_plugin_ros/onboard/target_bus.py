@@ -1,4 +1,4 @@
-"""Where other vehicles are that a behavior follows or goes to, as the executive says."""
+"""The states of other vehicles that behaviors on board need, received on `target`."""
 
 import math
 from collections.abc import AsyncIterator
@@ -12,7 +12,7 @@ MOST_TARGETS = 1000
 State = VehicleState | PayloadState
 
 
-class Targets:
+class TargetBus:
     """Implements `m2pem.api.FleetBus` for drivers on board."""
 
     def __init__(self) -> None:
@@ -20,11 +20,11 @@ class Targets:
         self._readers: list[AsyncQueue[State]] = []
 
     def latest(self, resource: ResourceId) -> State | None:
-        """The newest state heard, or None before the first."""
+        """Return the newest state, or None before the first."""
         return self._latest.get(resource)
 
     def publish(self, state: State) -> None:
-        """Make a state known."""
+        """Publish a state to all readers."""
         self._latest.pop(state.resource, None)
         self._latest[state.resource] = state
         if len(self._latest) > MOST_TARGETS:
@@ -33,7 +33,7 @@ class Targets:
             reader.put(state)
 
     async def subscribe(self, size: int = 100) -> AsyncIterator[State]:
-        """States from now on, for one reader; `size` of them wait at most."""
+        """Yield states from now on, for one reader. At most `size` of them wait."""
         reader: AsyncQueue[State] = AsyncQueue(size)
         self._readers.append(reader)
         try:
@@ -44,7 +44,7 @@ class Targets:
 
 
 def read_target(message: Any, now_us: int) -> VehicleState:
-    """A vehicle's state of a TargetState; the altitude of its position is NaN if it is not said.
+    """Read a TargetState. The altitude is NaN if it is not given.
 
     Raises:
         WireError: it has no name, or is not on Earth.

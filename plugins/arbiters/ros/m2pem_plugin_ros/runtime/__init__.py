@@ -1,4 +1,4 @@
-"""rclpy within asyncio. Importing this raises RosError where ROS 2 is not usable, and says why."""
+"""rclpy within asyncio. The import raises RosError where ROS 2 cannot be used, and says why."""
 
 from m2pem_plugin_ros.installation import RosError, require_ros
 

@@ -1,4 +1,5 @@
-"""Calls of services and actions: bounded in number and time, awaited on an event loop."""
+"""Calls of services and actions, bounded in number and time, and the responses of our own
+services."""
 
 import asyncio
 import logging
@@ -13,19 +14,20 @@ from rclpy.executors import Executor
 from m2pem_plugin_ros.installation import RosError
 
 IN_FLIGHT = 8
-"""Calls of one client that are not answered. A service keeps ten by default, of all its clients,
-and loses the others silently."""
+"""Unanswered calls of one client. A service keeps ten requests of all its clients by default, and
+loses the others silently."""
 
 DISCOVERY_S = 0.02
-"""How often it is looked whether a server is there: rclpy tells no other way."""
+"""Period of the check whether a server is there: rclpy has no event for it."""
 
 
 class RosTimeoutError(RosError, TimeoutError):
-    """No answer came in time. Whether the call had an effect is not known."""
+    """No answer came in time. The call may have had an effect."""
 
 
 class Calls:
-    """All calls of a runtime that wait for an answer. Belongs to the loop that it was made on."""
+    """All calls of a runtime that wait for an answer. It belongs to the loop on which it was
+    made."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -41,7 +43,7 @@ class Calls:
         timeout_s: float,
         what: str,
     ) -> Any:
-        """Wait until a server is there and a slot free, send, and wait for the answer.
+        """Wait for a server and a free slot, send, and wait for the answer.
 
         Raises:
             RosTimeoutError: all that took longer than `timeout_s`.
@@ -60,7 +62,7 @@ class Calls:
             raise RosTimeoutError(f"{what}: {doing} within {timeout_s:g} s") from error
 
     async def wait(self, future: Future, what: str, timeout_s: float | None = None) -> Any:
-        """The result of a future of rclpy; it is cancelled when this is.
+        """Return the result of a future of rclpy. The future is cancelled when the caller is.
 
         Never await such a future on an event loop: it keeps the loop spinning.
 
@@ -86,7 +88,7 @@ class Calls:
             future.cancel()  # whose answer is no longer awaited is forgotten by rclpy, too
 
     def close(self) -> None:
-        """End all that waits, with RosError."""
+        """End all waiting calls with RosError."""
         self._closed = True
         for answer in self._open:
             if not answer.done():
@@ -117,19 +119,19 @@ def _settle(answer: asyncio.Future[Any], future: Future) -> None:
 logger = logging.getLogger(__name__)
 
 NOT_SENT = "failed to send response"
-"""How the RuntimeWarning begins that rclpy gives for a response that the middleware dropped."""
+"""Start of the RuntimeWarning of rclpy for a response that the middleware dropped."""
 
 AGAIN_S: Sequence[float] = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""Before each further try. What discovery lost comes again within some seconds; each try blocks the
-executor for up to 0.1 s."""
+"""Delays before each retry. Discovery recovers within some seconds; each try blocks the executor
+for up to 0.1 s."""
 
 
 class Responses:
-    """Sends the responses of one service, again while the client's reader is not discovered.
+    """Sends the responses of one service, and again while the client's reader is not discovered.
 
-    DDS discovers what a client sends its requests with and what it receives the responses with one
-    by one. If a packet in between is lost, a request comes seconds before its response can be
-    delivered. rmw_fastrtps waits 0.1 s for that, then drops the response, and rclpy only warns.
+    DDS discovers the writer of a client's requests and the reader of its responses separately. If a
+    packet is lost, a request arrives seconds before its response can be delivered. rmw_fastrtps
+    waits 0.1 s, then drops the response, and rclpy only warns.
     """
 
     def __init__(self, service: Any, executor: Executor, loop: asyncio.AbstractEventLoop) -> None:
@@ -139,7 +141,8 @@ class Responses:
         self._loop = loop
 
     def send(self, response: Any, header: Any, tries: int = 0) -> None:
-        """Send it now, and if the client is not discovered, later. In the executor's thread."""
+        """Send a response now, or later if the client is not discovered. Call it in the executor's
+        thread."""
         if self._is_sent(response, header):
             return
         if tries == len(AGAIN_S):

@@ -1,4 +1,4 @@
-"""The qualities of service of all topics and services (docs/ros.md)."""
+"""The quality of service of all topics and services (docs/ros.md)."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -7,24 +7,24 @@ STATUS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-"""Who joins late gets the last one: vehicle_status, status, prompts, active_elements."""
+"""A late subscriber gets the last message: vehicle_status, status, prompts, active_elements."""
 
 BEHAVIOR_STATUS = QoSProfile(
     depth=10,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-"""Who joins late gets the last ten, since they are of several behaviors."""
+"""A late subscriber gets the last ten, as they are of several behaviors."""
 
 COMMANDS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-"""Never latched: who joins late must not carry out an old one."""
+"""Volatile: a late subscriber must not execute an old command."""
 
 EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-"""None may be lost on the way to who listens."""
+"""Reliable, with a long queue: no event may be lost."""
 
 TELEMETRY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Of sensors. A reliable reader would never match a writer of best effort; this reads from both."""
+"""For sensors. A reliable reader never matches a best-effort writer; this one matches both."""
 
 SERVICES = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
-"""For both ends of a service: of more calls at once than that, DDS loses the oldest silently. Those
-that wait are refused in turn, so that it takes a client's own flood to come so far."""
+"""For clients and servers. Of more simultaneous calls, DDS loses the oldest silently. Waiting calls
+are refused in turn, so that only a client's own flood comes this far."""

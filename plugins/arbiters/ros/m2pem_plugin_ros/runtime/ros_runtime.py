@@ -1,4 +1,4 @@
-"""rclpy within an asyncio program: one thread for ROS, everything else on the event loop."""
+"""rclpy within an asyncio program: one thread for ROS, all else on the event loop."""
 
 import asyncio
 import logging
@@ -31,13 +31,13 @@ logger = logging.getLogger(__name__)
 
 
 class RosRuntime:
-    """A connection to ROS with a context of its own: nothing global is touched, no signal handled.
+    """A connection to ROS with its own context. It changes no global state and handles no signals.
 
-    Made on a running event loop, which it belongs to. What ROS calls back runs on that loop;
+    It belongs to the running event loop on which it was made. Callbacks of ROS run on that loop;
     publishing and creating entities is done from it directly. `async with` closes it.
 
-    `domain_id`: None takes ROS_DOMAIN_ID. `arguments`: of ROS, such as
-    `["--ros-args", "--remap", "a:=b"]`.
+    `domain_id` None takes ROS_DOMAIN_ID. `arguments` are those of ROS, such as `["--ros-args",
+    "--remap", "a:=b"]`.
 
     Raises:
         RosError: ROS cannot be started like that, for example with DDS security and no keys.
@@ -84,7 +84,7 @@ class RosRuntime:
     # --- nodes and topics -----------------------------------------------------------------------
 
     def make_node(self, name: str, namespace: str = "", **options: Any) -> Node:
-        """Another node of the same connection. Options are those of `rclpy.create_node`.
+        """Make another node of the same connection. Options are those of `rclpy.create_node`.
 
         Raises:
             RosError: the name is not one of ROS, or DDS refuses.
@@ -99,7 +99,7 @@ class RosRuntime:
         return node
 
     def drop_node(self, node: Node) -> None:
-        """Let go of a node that `make_node` made, and of all that belongs to it."""
+        """Destroy a node that `make_node` made, and all that belongs to it."""
         self.executor.remove_node(node)
         self._nodes.remove(node)
         _destroy(node)
@@ -114,7 +114,8 @@ class RosRuntime:
         node: Node | None = None,
         waiting: int = WAITING,
     ) -> Any:
-        """Subscribe with a callback on the loop; of more than `waiting` messages the oldest go."""
+        """Subscribe with a callback on the loop. Of more than `waiting` messages, the oldest are
+        dropped."""
         inbox = Inbox(self._loop, callback, waiting)
         return (node or self.node).create_subscription(message_type, topic, inbox.put, qos)
 
@@ -126,7 +127,7 @@ class RosRuntime:
         return create(service_type, name, qos_profile=qualities.SERVICES)
 
     async def call(self, client: Any, request: Any, timeout_s: float) -> Any:
-        """Call a service, also one that is not there yet, and return its response.
+        """Call a service, which may not be there yet, and return its response.
 
         Raises:
             RosTimeoutError: no answer within `timeout_s`, counted from now.
@@ -145,7 +146,8 @@ class RosRuntime:
         goal_id: UUID,
         feedback: Callable[[Any], None] | None = None,
     ) -> Any:
-        """Send a goal to an action server; returns the handle (`accepted` says whether it was).
+        """Send a goal to an action server, and return its handle; `accepted` says whether it was
+        accepted.
 
         `feedback` gets the feedback messages, on the loop.
 
@@ -164,7 +166,7 @@ class RosRuntime:
         )
 
     async def wait(self, future: Any, timeout_s: float | None = None) -> Any:
-        """The result of a future of rclpy, such as `handle.get_result_async()`.
+        """Return the result of a future of rclpy, such as `handle.get_result_async()`.
 
         Raises:
             RosTimeoutError: it did not come within `timeout_s`.
@@ -181,10 +183,10 @@ class RosRuntime:
         *,
         node: Node | None = None,
     ) -> Any:
-        """Offer a service. `handler(request, response)` is a coroutine function on the loop.
+        """Serve a service. `handler(request, response)` is a coroutine function on the loop.
 
-        Several requests are handled at once. A handler that raises is logged, and an empty response
-        is sent, with the error in its `message` if it has one.
+        Several requests are handled at once. If a handler raises, the error is logged, and an empty
+        response is sent, with the error in its `message` if it has one.
         """
 
         async def answer(request: Any, response: Any) -> Any:
@@ -211,10 +213,10 @@ class RosRuntime:
     def coroutine(
         self, handler: Callable[..., Coroutine[Any, Any, Any]]
     ) -> Callable[..., Coroutine[Any, Any, Any]]:
-        """A callback for rclpy, of a coroutine function that runs on the loop.
+        """Make a callback for rclpy of a coroutine function that runs on the loop.
 
-        It is for what gives an answer: services, and `execute_callback` of an action server. Its
-        entity needs a ReentrantCallbackGroup, or one call waits for the other.
+        It is for callbacks that return an answer: services, and `execute_callback` of an action
+        server. Their entity needs a ReentrantCallbackGroup, or one call waits for the other.
         """
 
         async def callback(*arguments: Any) -> Any:
@@ -248,7 +250,7 @@ class RosRuntime:
     # --- the thread, and its end ----------------------------------------------------------------
 
     async def close(self) -> None:
-        """Let go of everything. May be called again."""
+        """Close the connection. It may be called again."""
         if self._closing is None:
             self._closing = self._loop.create_task(self._close())
         await asyncio.shield(self._closing)
@@ -292,7 +294,7 @@ def _destroy(node: Node) -> None:
 
 
 def _security() -> str:
-    """What an error may have to do with DDS security, if that is asked for."""
+    """Return what an error may have to do with DDS security, if that is enabled."""
     if os.environ.get("ROS_SECURITY_ENABLE", "").lower() != "true":
         return ""
     return (
@@ -304,14 +306,14 @@ def _security() -> str:
 T = TypeVar("T")
 
 BATCH = 100
-"""So many are handled before the loop may do something else."""
+"""Messages that are handled before the loop may do something else."""
 
 
 class Inbox(Generic[T]):
-    """Hands each item to a callback on the loop; if it cannot keep up, the oldest are dropped.
+    """Passes each item to a callback on the loop. If the callback is too slow, the oldest are
+    dropped.
 
-    The loop is woken once for all that waits, not for each. A callback that raises is logged, and
-    gets the next item all the same.
+    The loop is woken once for all waiting items. An error of the callback is logged.
     """
 
     def __init__(
@@ -323,7 +325,7 @@ class Inbox(Generic[T]):
         self._drains = False
 
     def put(self, item: T) -> None:
-        """Called in any thread."""
+        """Add an item. It may be called in any thread."""
         self._items.append(item)
         if not self._drains:
             self._drains = True

@@ -1,1 +1,1 @@
-"""What the topics of vehicles, detectors and payloads say, and who publishes on them."""
+"""What the topics of vehicles, detectors and payloads report, and who publishes on them."""

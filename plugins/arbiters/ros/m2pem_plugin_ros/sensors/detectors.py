@@ -1,4 +1,4 @@
-"""What the detectors of vehicles find: from a topic to the fleet's bus."""
+"""Detections: from the topic of a detector to the bus of the fleet."""
 
 import math
 from collections import deque
@@ -14,7 +14,7 @@ from m2pem.api import (
     ResourceId,
 )
 from m2pem_plugin_ros.frames import to_geodetic
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.sensors.localization import FARTHEST_M
 from m2pem_plugin_ros.settings import DetectorMessage, DetectorSettings
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 LONGEST_TYPE = 200
 WAITING = 100
-"""Detections for which the vehicle's position is awaited; of more, the oldest are lost."""
+"""Detections that wait for a position of the vehicle. Of more, the oldest are dropped."""
 
 LATE_S = 60.0
-"""A stamp that is older than this, or in the future, is of another clock than ours."""
+"""A stamp that is older than this, or in the future, comes from another clock."""
 
 _GEOGRAPHIC = 1
 _LOCAL = 2
@@ -35,7 +35,7 @@ _MAP = "map"
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """`position`: None is that of the vehicle; a NaN in it is the vehicle's altitude."""
+    """`position` None means that of the vehicle; an altitude of NaN means that of the vehicle."""
 
     type: str
     time_us: int
@@ -43,10 +43,10 @@ class _Found:
 
 
 class DetectorTopic:
-    """One payload's detections. Subscribed from the beginning, until the runtime is closed.
+    """The detections of one payload. It is subscribed until the runtime is closed.
 
-    `whereabouts`: where the vehicle is now, if that is known. A detection without a position of its
-    own has the vehicle's; while that is not known it waits for the next `retry`.
+    `vehicle_position` returns the position of the vehicle, if it is known. A detection without a
+    position has that of the vehicle. Until it is known, the detection waits for the next `retry`.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class DetectorTopic:
         resource: ResourceId,
         settings: DetectorSettings,
         context: ArbiterContext,
-        whereabouts: Callable[[], GeoPosition | None],
+        vehicle_position: Callable[[], GeoPosition | None],
         hear: Callable[[PayloadState], None],
     ) -> None:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # it needs rclpy
@@ -63,29 +63,29 @@ class DetectorTopic:
         self._resource = resource
         self._settings = settings
         self._context = context
-        self._whereabouts = whereabouts
-        self._hear = hear
-        self._complaints = Complaints(context.logger, resource)
+        self._vehicle_position = vehicle_position
+        self._on_message = hear
+        self._log_throttle = LogThrottle(context.logger, resource)
         self._waiting: deque[_Found] = deque(maxlen=WAITING)
         if settings.message is DetectorMessage.STRING:
             from std_msgs.msg import String  # noqa: PLC0415  # it is loaded where ROS is only
 
-            ros.subscribe(String, settings.topic, self._hear_text, qos.EVENTS)
+            ros.subscribe(String, settings.topic, self._on_text, qos.EVENTS)
         else:
             from m2pem_plugin_ros.installation import require_interfaces  # noqa: PLC0415
 
             message_type = require_interfaces("m2pem_interfaces").msg.Detection
-            ros.subscribe(message_type, settings.topic, self._hear_detection, qos.EVENTS)
+            ros.subscribe(message_type, settings.topic, self._on_detection, qos.EVENTS)
 
     def retry(self) -> None:
-        """Tell of what waits, if the vehicle's position is known by now."""
+        """Publish the waiting detections, if the position of the vehicle is known now."""
         while self._waiting and self._tell(self._waiting[0]):
             self._waiting.popleft()
 
-    def _hear_text(self, message: Any) -> None:
+    def _on_text(self, message: Any) -> None:
         self._take(message.data, self._context.clock.now_us(), None)
 
-    def _hear_detection(self, message: Any) -> None:
+    def _on_detection(self, message: Any) -> None:
         if message.source not in ("", self._resource, self._resource.partition("/")[2]):
             return  # several payloads share the topic
         stamp = message.header.stamp
@@ -102,44 +102,44 @@ class DetectorTopic:
             if -90.0 <= geo.latitude_deg <= 90.0 and -180.0 <= geo.longitude_deg <= 180.0:
                 return GeoPosition(geo.latitude_deg, geo.longitude_deg, geo.altitude_m)
             cause = "the position of a detection, which cannot be"
-            self._complaints.add(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
+            self._log_throttle.log(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
         elif message.position_kind == _LOCAL:
             place, frame = message.position_local, message.header.frame_id
             if frame.removeprefix("/") != _MAP:
                 cause = "the position of a detection in a frame other than map"
-                self._complaints.add(cause, f"'{frame}'")
+                self._log_throttle.log(cause, f"'{frame}'")
             elif all(abs(number) <= FARTHEST_M for number in (place.x, place.y, place.z)):
                 return to_geodetic(place.x, place.y, place.z, self._context.origin)
             else:
                 cause = "the position of a detection, which cannot be"
-                self._complaints.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
+                self._log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
         return None
 
     def _take(self, type_: str, time_us: int, position: GeoPosition | None) -> None:
         type_ = type_.strip() or self._settings.type
         if not type_:
-            self._complaints.add("a detection without a type")
+            self._log_throttle.log("a detection without a type")
             return
         if len(type_) > LONGEST_TYPE:
-            self._complaints.add("a detection whose type is too long", f"{len(type_)} characters")
+            self._log_throttle.log("a detection whose type is too long", f"{len(type_)} characters")
             return
         found = _Found(type_, time_us, position)
         if self._waiting or not self._tell(found):
             if len(self._waiting) == WAITING:
-                self._complaints.add("detections, as the vehicle's position is not known")
+                self._log_throttle.log("detections, as the vehicle's position is not known")
             self._waiting.append(found)
 
     def _tell(self, found: _Found) -> bool:
         position = found.position
         if position is None:
-            position = self._whereabouts()
+            position = self._vehicle_position()
         if position is None:
             return False
         if not math.isfinite(position.altitude_m):
-            own = self._whereabouts()
+            own = self._vehicle_position()
             altitude_m = own.altitude_m if own is not None else self._context.origin[2]
             position = GeoPosition(position.latitude_deg, position.longitude_deg, altitude_m)
         detection = Detection(found.type, self._resource, position, found.time_us)
         now_us = self._context.clock.now_us()
-        self._hear(PayloadState(self._resource, now_us, detections=(detection,)))
+        self._on_message(PayloadState(self._resource, now_us, detections=(detection,)))
         return True

@@ -1,7 +1,7 @@
-"""Who is at the other end: what of a vehicle must be there once, and of which type it is.
+"""Checks who publishes the topics of a vehicle: one node, and with the right type.
 
-ROS has no arbitration: two vehicles in one namespace both obey one command, and types that do not
-match are never connected, without a word. So the graph is looked at before anything is commanded.
+ROS has no arbitration: two vehicles in one namespace both obey one command, and mismatched types
+never connect, without an error. So the graph is checked before a vehicle is commanded.
 """
 
 from collections.abc import Sequence
@@ -24,14 +24,14 @@ NAV2_ACTIONS = ("navigate_to_pose", "navigate_through_poses", "follow_waypoints"
 
 @dataclass(frozen=True, slots=True)
 class Single:
-    """A topic that one node publishes, and of one type."""
+    """A topic that must have one publisher of one type."""
 
     topic: str
     type: str
 
 
 class Endpoints:
-    """Of one vehicle, or payload with a node of its own (`is_payload`)."""
+    """The endpoints of one vehicle, or of a payload with its own node (`is_payload`)."""
 
     def __init__(
         self, ros: "RosRuntime", settings: Settings, domain: int, *, is_payload: bool = False
@@ -42,9 +42,9 @@ class Endpoints:
         self._singles = _singles(settings, is_payload=is_payload)
 
     @property
-    def trouble(self) -> str:
-        """Why it must not be commanded, for people: who is there too much, or of a wrong type; ""
-        if nothing is wrong."""
+    def problem(self) -> str:
+        """Why the vehicle must not be commanded: too many publishers, or a wrong type; "" if all is
+        right."""
         for single in self._singles:
             found = self._node.get_publishers_info_by_topic(single.topic)
             if len(found) > 1:
@@ -63,7 +63,7 @@ class Endpoints:
 
     @property
     def absence(self) -> str:
-        """Of what is not heard: where it should be, and who publishes there, for people."""
+        """On which topic the vehicle is expected, and who publishes there."""
         awaited = self._singles[0]
         found = self._node.get_publishers_info_by_topic(awaited.topic)
         there = f"has the publisher {_named(found)}" if found else "has no publisher"
@@ -87,7 +87,7 @@ class Endpoints:
 
 
 def _singles(settings: Settings, *, is_payload: bool) -> tuple[Single, ...]:
-    """The first is what says that the vehicle is there."""
+    """Return the topics. The first one shows that the vehicle is there."""
     odometry = Single(settings.topic(settings.topics.odom), ODOMETRY)
     if settings.driver is DriverName.BASE:
         return (odometry,)
@@ -103,7 +103,7 @@ def _singles(settings: Settings, *, is_payload: bool) -> tuple[Single, ...]:
 
 
 def _named(found: Sequence[Any]) -> str:
-    """Nodes by their full names and gids: two of them may have one name."""
+    """Return the full names and gids of nodes. Two nodes may have the same name."""
     return ", ".join(sorted(f"{_name(each)} (gid {_gid(each)})" for each in found))
 
 

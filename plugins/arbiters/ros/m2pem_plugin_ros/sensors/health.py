@@ -1,10 +1,10 @@
-"""How full a vehicle's battery is: sensor_msgs/BatteryState."""
+"""Battery (sensor_msgs/BatteryState) and errors (diagnostic_msgs/DiagnosticArray) of vehicles."""
 
 import math
 from typing import TYPE_CHECKING, Any
 
 from m2pem.api import ArbiterContext, Clock, ResourceId
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.settings import Settings
 
 if TYPE_CHECKING:
@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 
 class Battery:
-    """Subscribed from the beginning. `fraction` of a full one; None: it was not said."""
+    """The battery of a vehicle. `fraction` is 0 to 1; None if it is not known. It is subscribed at
+    once."""
 
     def __init__(
         self, ros: "RosRuntime", resource: ResourceId, settings: Settings, context: ArbiterContext
@@ -22,33 +23,33 @@ class Battery:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
 
         self.fraction: float | None = None
-        self._complaints = Complaints(context.logger, resource)
+        self._log_throttle = LogThrottle(context.logger, resource)
         topic = settings.topic(settings.topics.battery)
-        ros.subscribe(BatteryState, topic, self._hear, qos.TELEMETRY)
+        ros.subscribe(BatteryState, topic, self._on_message, qos.TELEMETRY)
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         share = message.percentage
         if 0.0 <= share <= 1.0:
             self.fraction = share
         elif not math.isnan(share):  # NaN: the battery does not measure it
             hint = "; BatteryState.percentage is from 0 to 1" if 1.0 < share <= 100.0 else ""
-            self._complaints.add("a charge that cannot be", f"{share:g}{hint}")
+            self._log_throttle.log("a charge that cannot be", f"{share:g}{hint}")
 
 
 OLD_AFTER_S = 5.0
-"""Parts say how they are once a second; what one that fell silent said last no longer counts."""
+"""Components report once a second. Older errors do not count."""
 
 OWN = "m2pem:"
-"""So begin the names of what m2pem itself says of the vehicles; it is no news to it."""
+"""Prefix of the names of what m2pem itself publishes about vehicles. It is ignored."""
 
 _ERROR = 2
 MOST_PARTS = 1000
 
 
 class Diagnostics:
-    """One topic with the diagnostics of many vehicles, heard once for all of them.
+    """One topic with the diagnostics of many vehicles, subscribed once.
 
-    `watch` each of them; what is said of others is not kept.
+    Call `watch` for each vehicle. Statuses of others are dropped.
     """
 
     def __init__(self, ros: "RosRuntime", topic: str, clock: Clock) -> None:
@@ -60,14 +61,14 @@ class Diagnostics:
 
         self._clock = clock
         self._errors: dict[str, dict[str, tuple[str, int]]] = {}
-        ros.subscribe(DiagnosticArray, topic, self._hear, qos.TELEMETRY)
+        ros.subscribe(DiagnosticArray, topic, self._on_message, qos.TELEMETRY)
 
     def watch(self, hardware_id: str) -> None:
-        """Keep what is said of a vehicle from now on."""
+        """Keep the errors of a vehicle from now on."""
         self._errors.setdefault(hardware_id, {})
 
     def errors(self, hardware_id: str) -> tuple[str, ...]:
-        """What is wrong with a vehicle now, for people, in the order of the parts' names."""
+        """Return the current errors of a vehicle, sorted by component."""
         said = self._errors.get(hardware_id)
         if not said:
             return ()
@@ -76,7 +77,7 @@ class Diagnostics:
             del said[name]
         return tuple(said[name][0] for name in sorted(said))
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         now_us = self._clock.now_us()
         for status in message.status:
             said = self._errors.get(status.hardware_id)

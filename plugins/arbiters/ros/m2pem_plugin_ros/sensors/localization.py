@@ -1,4 +1,4 @@
-"""Where one vehicle is: from its odometry and its satellite receiver."""
+"""The pose of a vehicle from its odometry and its satellite receiver, and whether it stands."""
 
 import math
 from dataclasses import replace
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from m2pem.api import ArbiterContext, Clock, GeoPosition, ResourceId
 from m2pem_plugin_ros.frames import Origin, to_geodetic, to_local, yaw_of_quaternion
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import OdomFrame, Settings
 
@@ -23,16 +23,16 @@ _STATUS_NOT_SET = -2
 
 
 class Localization(Protocol):
-    """The latest that is known; `None` before the first."""
+    """The latest pose, twist and position; None before the first."""
 
     @property
     def pose(self) -> Pose | None:
-        """In the fleet's local frame."""
+        """In the local frame of the fleet."""
         ...
 
     @property
     def twist(self) -> Twist | None:
-        """In the vehicle's own frame."""
+        """In the frame of the vehicle."""
         ...
 
     @property
@@ -42,15 +42,15 @@ class Localization(Protocol):
 
     @property
     def age_s(self) -> float:
-        """How long ago, on the arbiter's clock, the pose was heard; infinite before the first."""
+        """Seconds of the arbiter's clock since the pose was received; infinite before the first."""
         ...
 
 
 class TopicLocalization:
     """Implements `Localization` with nav_msgs/Odometry and sensor_msgs/NavSatFix.
 
-    Subscribed from the beginning, until the runtime is closed. What cannot be true (NaN, a latitude
-    of 91 degrees, a stamp that was there already) is ignored, and counted by its cause.
+    It is subscribed until the runtime is closed. Invalid messages (NaN, a latitude of 91 degrees, a
+    repeated stamp) are dropped, and counted by their cause.
     """
 
     def __init__(
@@ -66,10 +66,10 @@ class TopicLocalization:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
 
         self.changes = 0
-        self.complaints = Complaints(context.logger, resource)
+        self.log_throttle = LogThrottle(context.logger, resource)
         self._clock = context.clock
         self._frame = settings.odom_frame
-        self._where = Whereabouts(settings.odom_frame, context.origin)
+        self._where = PoseEstimator(settings.odom_frame, context.origin)
         self._resource = resource
         self._odom = settings.topic(settings.topics.odom)
         self.wrong_frame = ""
@@ -77,71 +77,68 @@ class TopicLocalization:
         self._posed_us: int | None = None
         self._fixed_us: int | None = None
         topics = settings.topics
-        ros.subscribe(Odometry, settings.topic(topics.odom), self._hear_odometry, qos.TELEMETRY)
-        ros.subscribe(NavSatFix, settings.topic(topics.fix), self._hear_fix, qos.TELEMETRY)
+        ros.subscribe(Odometry, settings.topic(topics.odom), self._on_odometry, qos.TELEMETRY)
+        ros.subscribe(NavSatFix, settings.topic(topics.fix), self._on_fix, qos.TELEMETRY)
 
     @property
     def pose(self) -> Pose | None:
-        """In the fleet's local frame."""
         return self._where.pose
 
     @property
     def twist(self) -> Twist | None:
-        """In the vehicle's own frame."""
         return self._where.twist
 
     @property
     def position(self) -> GeoPosition | None:
-        """WGS-84; from the pose, or without one from the last fix."""
+        """WGS-84: from the pose, or from the last fix if there is no pose."""
         return self._where.position
 
     @property
     def age_s(self) -> float:
-        """How long ago odometry was heard; infinite as long as there is no pose."""
         if self._posed_us is None or self._where.pose is None:
             return math.inf
         return (self._clock.now_us() - self._posed_us) / 1e6
 
     @property
-    def troubles(self) -> tuple[str, ...]:
-        """What is missing to know well where it is, for people."""
-        troubles = []
+    def problems(self) -> tuple[str, ...]:
+        """Data that is missing, as text."""
+        problems = []
         if self._posed_us is None and not self.wrong_frame:
-            troubles.append(f"no odometry was heard yet on {self._odom}")
+            problems.append(f"no odometry was heard yet on {self._odom}")
         if self._frame is OdomFrame.ODOM:
             if self._fixed_us is None:
-                troubles.append("no satellite fix was heard yet")
+                problems.append("no satellite fix was heard yet")
             elif (self._clock.now_us() - self._fixed_us) / 1e6 > FIX_IS_OLD_S:
-                troubles.append("the last satellite fix is old")
-        return tuple(troubles)
+                problems.append("the last satellite fix is old")
+        return tuple(problems)
 
-    def _hear_odometry(self, message: Any) -> None:
+    def _on_odometry(self, message: Any) -> None:
         stamp = (message.header.stamp.sec, message.header.stamp.nanosec)
         if stamp == self._stamp and stamp != (0, 0):
             detail = f"stamp {stamp[0]}.{stamp[1]:09}"
-            self.complaints.add("odometry that was there already", detail)
+            self.log_throttle.log("odometry that was there already", detail)
             return
         frame = message.header.frame_id
         self.wrong_frame = self._strange(frame)
         if self.wrong_frame:
-            self.complaints.add("odometry in another frame than the declared one", f"'{frame}'")
+            self.log_throttle.log("odometry in another frame than the declared one", f"'{frame}'")
             self.changes += 1
             return
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
         if not _within(FARTHEST_M, place.x, place.y, place.z):
             cause = "odometry with a place that cannot be"
-            self.complaints.add(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
+            self.log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
             return
         speeds_are_sane = _within(FASTEST_M_S, linear.x, linear.y)
         if not speeds_are_sane or not _within(FASTEST_RAD_S, angular.z):
             cause = "odometry with a speed that cannot be"
-            self.complaints.add(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
+            self.log_throttle.log(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
             return
         try:
             yaw_rad = yaw_of_quaternion(turn)
         except ValueError as error:
-            self.complaints.add("odometry with an orientation that cannot be", str(error))
+            self.log_throttle.log("odometry with an orientation that cannot be", str(error))
             return
         self._stamp = stamp
         self._posed_us = self._clock.now_us()
@@ -151,8 +148,8 @@ class TopicLocalization:
         )
 
     def _strange(self, frame: str) -> str:
-        """Why odometry in a frame cannot be used; "" if it can. Of several robots each may have an
-        `odom` of its own (`ugv1/odom`, REP-105); `map` is that of the fleet."""
+        """Return why odometry in a frame cannot be used; "" if it can. Each of several robots may
+        have its own `odom` (`ugv1/odom`, REP-105); `map` is that of the fleet."""
         name = frame.removeprefix("/")
         declared = self._frame.value
         if name == declared:
@@ -169,14 +166,14 @@ class TopicLocalization:
             f" is not read: {right}"
         )
 
-    def _hear_fix(self, message: Any) -> None:
+    def _on_fix(self, message: Any) -> None:
         status = message.status.status
         if status == _NO_FIX:
             return  # the receiver says so itself
         latitude, longitude = message.latitude, message.longitude
         is_unset = status == _STATUS_NOT_SET and latitude == longitude == 0.0
         if is_unset or not (_within(90.0, latitude) and _within(180.0, longitude)):
-            self.complaints.add("a fix that cannot be", f"({latitude:g}, {longitude:g})")
+            self.log_throttle.log("a fix that cannot be", f"({latitude:g}, {longitude:g})")
             return
         altitude = message.altitude if _within(FARTHEST_M, message.altitude) else math.nan
         self._fixed_us = self._clock.now_us()
@@ -185,18 +182,20 @@ class TopicLocalization:
 
 
 def _within(bound: float, *numbers: float) -> bool:
-    """All are finite, and none is beyond the bound."""
+    """Whether all numbers are finite and within the bound."""
     return all(-bound <= number <= bound for number in numbers)
 
 
 FARTHEST_M = 1_000_000.0
-"""From the origin. What claims to be farther away is wrong."""
+"""Distance from the origin. Positions farther away are invalid."""
 
 
-class Whereabouts:
-    """Odometry in the frame `map` is where the vehicle is. One in the frame `odom` begins anywhere,
-    so that each fix says where the vehicle is, and odometry how it went on from there; its yaw is
-    from east all the same (REP-103), as robots with a compass say it.
+class PoseEstimator:
+    """Combines odometry and satellite fixes.
+
+    Odometry in the frame `map` is the pose. In the frame `odom` it begins anywhere: each fix gives
+    the position, and odometry the motion since then. Yaw is from east in both (REP-103), as robots
+    with a compass report it.
     """
 
     def __init__(self, frame: OdomFrame, origin: Origin) -> None:
@@ -208,20 +207,21 @@ class Whereabouts:
         self.twist: Twist | None = None
 
     def odometry(self, pose: Pose, twist: Twist) -> None:
-        """What odometry says, in its own frame. All numbers are finite."""
+        """Process odometry in its own frame. All numbers are finite."""
         self._odometry, self.twist = pose, twist
         if self._frame is OdomFrame.ODOM and self._anchor is None and self._fix is not None:
             self._drop_anchor(pose, self._fix)
 
     def fix(self, position: GeoPosition) -> None:
-        """What the satellite receiver says; its altitude may be NaN."""
+        """Process a satellite fix. Its altitude may be NaN."""
         self._fix = position
         if self._frame is OdomFrame.ODOM and self._odometry is not None:
             self._drop_anchor(self._odometry, position)
 
     @property
     def pose(self) -> Pose | None:
-        """In the fleet's local frame; None: odometry, or in the frame `odom` a fix, is missing."""
+        """The pose in the local frame; None if odometry is missing, or in the frame `odom` a
+        fix."""
         pose = self._odometry
         if pose is None or self._frame is OdomFrame.MAP:
             return pose
@@ -234,7 +234,7 @@ class Whereabouts:
 
     @property
     def position(self) -> GeoPosition | None:
-        """The pose as a position on Earth; without one, that of the last fix."""
+        """The position of the pose; without a pose, that of the last fix."""
         pose = self.pose
         if pose is not None:
             return to_geodetic(pose.east_m, pose.north_m, pose.up_m, self._origin)
@@ -259,7 +259,7 @@ CHECK_EVERY_S = 0.1
 
 
 def moves(localization: Localization) -> str:
-    """Why the vehicle does not stand, as far as is known; "" if it does."""
+    """Return why the vehicle does not stand, or is not known to; "" if it stands."""
     twist = localization.twist
     if twist is None or localization.age_s > FRESH_TWIST_S:
         return "its odometry is not heard"
@@ -270,7 +270,8 @@ def moves(localization: Localization) -> str:
 
 
 async def stands(localization: Localization, clock: Clock, within_s: float) -> str:
-    """Wait until it stands in two looks on end; returns "", or why it does not in time."""
+    """Wait until the vehicle stands in two checks in a row. Return "", or why it does not stand in
+    time."""
     until_us = clock.now_us() + within_s * 1e6
     looks = 0
     while True:

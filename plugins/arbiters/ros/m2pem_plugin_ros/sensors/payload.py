@@ -1,11 +1,11 @@
-"""Where a payload looks, as its m2pem node says: m2pem_interfaces/msg/PayloadStatus."""
+"""The status topic of a payload: where it looks (m2pem_interfaces/msg/PayloadStatus)."""
 
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from m2pem.api import GeoPosition, LinkState, PayloadState, ResourceId
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.sensors.localization import Localization
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 TOPIC = "payload_status"
 MOST_CORNERS = 1000
 LARGEST = 1e6
-"""Of an angle or a zoom. What claims more is wrong."""
+"""Larger angles and zooms are invalid."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """As in `PayloadState`; None: not said."""
+    """The angles, zoom and footprint of `PayloadState`; None if not known."""
 
     pan_rad: float | None = None
     tilt_rad: float | None = None
@@ -30,11 +30,11 @@ class Look:
     footprint: tuple[GeoPosition, ...] = ()
 
 
-class PayloadSight:
-    """Subscribed from the beginning. `look`: what was said last."""
+class PayloadStatusTopic:
+    """Subscribes to the status of a payload. `look` is the last one."""
 
     def __init__(
-        self, ros: "RosRuntime", resource: ResourceId, settings: Settings, complaints: Complaints
+        self, ros: "RosRuntime", resource: ResourceId, settings: Settings, log_throttle: LogThrottle
     ) -> None:
         from m2pem_plugin_ros.installation import require_interfaces  # noqa: PLC0415
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # it needs rclpy
@@ -42,12 +42,14 @@ class PayloadSight:
         self.look = Look()
         self.changes = 0
         self._resource = resource
-        self._complaints = complaints
+        self._log_throttle = log_throttle
         messages = require_interfaces("m2pem_interfaces").msg
-        ros.subscribe(messages.PayloadStatus, settings.topic(TOPIC), self._hear, qos.TELEMETRY)
+        ros.subscribe(
+            messages.PayloadStatus, settings.topic(TOPIC), self._on_message, qos.TELEMETRY
+        )
 
     def state(self, time_us: int, link: LinkState, behavior: str) -> PayloadState:
-        """What the fleet is told. Where a lost payload looks is not known."""
+        """Return the state for the fleet. Of a lost payload, no direction is known."""
         look = Look() if link is LinkState.LOST else self.look
         return PayloadState(
             self._resource,
@@ -60,9 +62,9 @@ class PayloadSight:
             footprint=look.footprint,
         )
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         if message.payload not in ("", self._resource):
-            self._complaints.add("where another payload looks", message.payload[:100])
+            self._log_throttle.log("where another payload looks", message.payload[:100])
             return
         self.look = Look(
             _number(message.pan_rad),
@@ -74,52 +76,48 @@ class PayloadSight:
 
     def _footprint(self, corners: Any) -> tuple[GeoPosition, ...]:
         if len(corners) > MOST_CORNERS:
-            self._complaints.add("a footprint that has too many corners", f"{len(corners)}")
+            self._log_throttle.log("a footprint that has too many corners", f"{len(corners)}")
             return ()
         found = tuple(
             GeoPosition(corner.latitude_deg, corner.longitude_deg, corner.altitude_m)
             for corner in corners
         )
         if not all(map(_is_on_earth, found)):
-            self._complaints.add("a footprint that is not on Earth")
+            self._log_throttle.log("a footprint that is not on Earth")
             return ()
         return found
 
 
-class PayloadSenses:
-    """Implements `Senses`: of a payload itself, not of the vehicle that carries it. It is its own
-    `Localization`, which knows nothing."""
+class PayloadSensors:
+    """Implements `VehicleSensors` for a payload with its own node. As its `Localization`, it knows
+    nothing."""
 
     battery_fraction: float | None = None
     errors: tuple[str, ...] = ()
-    troubles: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
     pose: Pose | None = None
     twist: Twist | None = None
     position: GeoPosition | None = None
     age_s = math.inf
 
-    def __init__(self, sight: PayloadSight, endpoints: Endpoints) -> None:
+    def __init__(self, sight: PayloadStatusTopic, endpoints: Endpoints) -> None:
         self._sight = sight
         self._endpoints = endpoints
 
     @property
     def refusal(self) -> str:
-        """Why nothing may be commanded, for people; "" if it may."""
-        return self._endpoints.trouble
+        return self._endpoints.problem
 
     @property
     def absence(self) -> str:
-        """Where its node is awaited, and who is there, for people."""
         return self._endpoints.absence
 
     @property
     def localization(self) -> Localization:
-        """Nothing."""
         return self
 
     @property
     def changes(self) -> int:
-        """Another number whenever something was heard."""
         return self._sight.changes
 
 
@@ -128,7 +126,7 @@ def _number(value: float) -> float | None:
 
 
 def _is_on_earth(corner: GeoPosition) -> bool:
-    """NaN is not."""
+    """Return whether a position is valid; NaN is not."""
     return (
         abs(corner.latitude_deg) <= 90.0
         and abs(corner.longitude_deg) <= 180.0

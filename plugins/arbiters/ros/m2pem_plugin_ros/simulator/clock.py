@@ -1,4 +1,4 @@
-"""Simulated time, which everything on board of simulated vehicles goes by."""
+"""Simulated time, which the software on board of simulated vehicles uses, too."""
 
 import asyncio
 import math
@@ -8,9 +8,9 @@ US_PER_S = 1_000_000
 
 
 class SimulatedClock:
-    """A clock of `m2pem.api` that runs `speed` times as fast as the one on the wall.
+    """A clock of `m2pem.api` that runs `speed` times as fast as real time.
 
-    It begins at the time of the wall, so that stamps of several programs resemble each other.
+    It starts at the time of day, so that stamps of several programs are comparable.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
@@ -20,7 +20,7 @@ class SimulatedClock:
 
     @property
     def elapsed_s(self) -> float:
-        """Simulated seconds since it was made."""
+        """Simulated seconds since the clock was made."""
         return (time.monotonic() - self._started_s) * self.speed
 
     def now_us(self) -> int:
@@ -38,15 +38,15 @@ class SimulatedClock:
             await asyncio.sleep(remaining_us / US_PER_S / self.speed)
 
 
-class Pace:
-    """Says when something is due that is done at a steady rate of simulated time."""
+class RateTimer:
+    """Tells when periodic work is due, in simulated time."""
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s = 1.0 / rate_hz
         self._next_s = 0.0
 
     def is_due(self, now_s: float) -> bool:
-        """Whether it is to be done now; what was missed is not made up for."""
+        """Return whether the work is due. Missed periods are skipped."""
         if now_s < self._next_s - 1e-9:
             return False
         self._next_s = max(self._next_s + self._period_s, now_s)

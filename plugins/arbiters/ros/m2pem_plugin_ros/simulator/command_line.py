@@ -1,4 +1,4 @@
-"""`m2pem sim ros`: simulated vehicles, until Ctrl-C."""
+"""The command `m2pem sim ros`: simulated vehicles, until Ctrl-C."""
 
 import asyncio
 import os
@@ -17,25 +17,23 @@ from m2pem_plugin_ros.command_options import Place
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.loopback import keep_on_loopback
 from m2pem_plugin_ros.settings import DriverName
-from m2pem_plugin_ros.simulator.faults import WORDS as WHAT
-from m2pem_plugin_ros.simulator.faults import FaultError, PlannedFault, parse
-from m2pem_plugin_ros.simulator.fleet import make_crew
+from m2pem_plugin_ros.simulator.faults import DRIVER_TEXTS, FaultError, PlannedFault, parse
+from m2pem_plugin_ros.simulator.fleet import make_default_vehicles
 from m2pem_plugin_ros.simulator.sensors import Target
-from m2pem_plugin_ros.simulator.specification import FORT, VehicleSpec, WordError
+from m2pem_plugin_ros.simulator.specification import FORT, SettingError, VehicleSpec
 
 MOST = 100
 """Vehicles in one process; 20 are moderate, see docs/ros.md."""
 
 
-class Word(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """KEY=VALUE."""
+class SettingOption(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """KEY=VALUE, a setting of a vehicle."""
 
     name = "key=value"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, str]:
-        """The word and what it is to be."""
         if isinstance(value, tuple):
             return value
         key, equals, said = str(value).partition("=")
@@ -45,14 +43,13 @@ class Word(click.ParamType):  # type: ignore[type-arg]  # older clicks have it b
 
 
 class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """TYPE@LAT,LON."""
+    """TYPE@LAT,LON, something that a detector can find."""
 
     name = "type@lat,lon"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[str, GeoPosition]:
-        """What it is, and where."""
         if isinstance(value, tuple):
             return value
         kind, at, place = str(value).partition("@")
@@ -62,14 +59,13 @@ class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks 
 
 
 class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A fault in words, such as evsg1: silent at 20 s for 5 s."""
+    """A fault as text, such as evsg1: silent at 20 s for 5 s."""
 
     name = "fault"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> PlannedFault:
-        """When and where it happens."""
         if isinstance(value, PlannedFault):
             return value
         try:
@@ -115,7 +111,7 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
 @click.option(
     "--set",
     "words",
-    type=Word(),
+    type=SettingOption(),
     multiple=True,
     help="Of all vehicles, such as max_speed=3 m/s. May be given more than once.",
 )
@@ -157,7 +153,7 @@ def ros(
             domains = ["ground"] * counts[0] + ["surface"] * counts[1]
             name = DriverName(driver or DriverName.NODE)
             specs = _crew(domains, name, home or FORT, targets, said)
-    except WordError as error:
+    except SettingError as error:
         raise click.UsageError(f"--set {error}") from error
     keep_on_loopback()
     try:
@@ -200,7 +196,7 @@ def _crew(
         )
         for kind, at in targets
     ]
-    return list(make_crew(domains, driver, origin, planted, words))
+    return list(make_default_vehicles(domains, driver, origin, planted, words))
 
 
 async def _run(
@@ -227,7 +223,7 @@ async def _run(
             else:
                 click.echo(f"fault: {line}")
 
-        hear_lines(hear)
+        read_stdin_lines(hear)
         ended = asyncio.create_task(vehicles.stopped())
         stopped = asyncio.create_task(stop.wait())
         await asyncio.wait((ended, stopped), return_when=asyncio.FIRST_COMPLETED)
@@ -244,14 +240,14 @@ def _line(spec: VehicleSpec) -> str:
 
     place = Vehicle(spec).position
     where = f"{place.latitude_deg:.6f},{place.longitude_deg:.6f}"
-    what = WHAT[spec.settings.driver].removeprefix("an ").removeprefix("a ")
+    what = DRIVER_TEXTS[spec.settings.driver].removeprefix("an ").removeprefix("a ")
     return f"{spec.name}: {spec.settings.namespace or '/'}, {what}, at {where}"
 
 
-def hear_lines(hear: Callable[[str], None]) -> None:
-    """Have `hear` called on the running loop with each line, until the input ends.
+def read_stdin_lines(hear: Callable[[str], None]) -> None:
+    """Call `hear` on the running loop with each line of standard input, until it ends.
 
-    In the background of a terminal, reading ends, instead of stopping the program.
+    If the program is in the background of a terminal, reading ends, and the program goes on.
     """
     with suppress(ValueError):  # not the main thread: then the signal is its business
         signal.signal(signal.SIGTTIN, signal.SIG_IGN)
@@ -260,7 +256,8 @@ def hear_lines(hear: Callable[[str], None]) -> None:
 
 
 def _read(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) -> None:
-    """`os.read`, since a reader of `sys.stdin` would hold a lock that Python's end waits for."""
+    """Read by `os.read`: a reader of `sys.stdin` would hold a lock that the end of Python waits
+    for."""
     rest = b""
     with suppress(OSError, RuntimeError):  # no input; the loop is closed
         while data := os.read(0, 4096):

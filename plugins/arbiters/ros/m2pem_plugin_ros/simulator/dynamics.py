@@ -1,4 +1,4 @@
-"""How a base on wheels or on water moves: what it is told, and what becomes of it."""
+"""The dynamics of a base on wheels or on water."""
 
 import math
 from dataclasses import dataclass
@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from m2pem_plugin_ros.pose import Pose, Twist
 
 STANDS_M_S = 1e-3
-"""Slower than this, in m/s and rad/s, it stands."""
+"""A base slower than this, in m/s and rad/s, stands."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chassis:
-    """What a base can do, in SI units.
+    """The capabilities of a base, in SI units.
 
-    `turn_radius_m` 0: it turns on the spot. `lag_s`: how long its drives take to follow a command
-    (a first-order lag). `command_timeout_s`: without commands for so long, it stops.
+    `turn_radius_m` 0: the base turns on the spot. `lag_s`: time constant of the drives (first
+    order). `command_timeout_s`: without a command for this time, the base stops.
     """
 
     speed_m_s: float = 2.0
@@ -27,11 +27,11 @@ class Chassis:
     command_timeout_s: float = 0.5
 
 
-class Body:
-    """A base in the plane. Times are seconds of simulated time.
+class Dynamics:
+    """A base in the plane. Times are in simulated seconds.
 
-    `stuck`: its wheels turn in vain. `motions` counts how often it began to move because of
-    commands, after it had stood. `driven_m`: the length of its way.
+    `stuck`: the wheels turn in vain. `motions` counts how often the base started to move from a
+    stand. `driven_m` is the distance driven.
     """
 
     def __init__(self, chassis: Chassis, pose: Pose) -> None:
@@ -48,21 +48,21 @@ class Body:
 
     @property
     def twist(self) -> Twist:
-        """How it moves, in its own frame."""
+        """In the frame of the base."""
         return self._twist
 
     @property
     def stands(self) -> bool:
-        """It does not move, and nothing has it move."""
+        """Whether the base neither moves nor is commanded to."""
         return self._stands
 
     def command(self, twist: Twist, now_s: float) -> None:
-        """What it is told; what is not finite is not heard."""
+        """Process a command. Commands that are not finite are ignored."""
         if math.isfinite(twist.forward_m_s) and math.isfinite(twist.yaw_rad_s):
             self._command, self._commanded_s = twist, now_s
 
     def step(self, now_s: float, dt_s: float) -> None:
-        """Let `dt_s` pass until `now_s`."""
+        """Advance by `dt_s` to `now_s`."""
         told = self._told(now_s)
         if self._stands:
             if not _moves(told):
@@ -75,7 +75,7 @@ class Body:
             self._stands, self._twist, self._wanted = True, Twist(), Twist()
 
     def _told(self, now_s: float) -> Twist:
-        """The command as far as it can be done; nothing if it is old or the wheels are stuck."""
+        """Return the bounded command; zero if it is old, or the wheels are stuck."""
         chassis, command = self.chassis, self._command
         if self.stuck or now_s - self._commanded_s > chassis.command_timeout_s:
             return Twist()
@@ -109,7 +109,7 @@ class Body:
 
 
 def moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:
-    """Where a pose is after `dt_s`. The step is straight, in the mean direction."""
+    """Return the pose after `dt_s`, by one straight step in the mean direction."""
     turn = twist.yaw_rad_s * dt_s
     way = twist.forward_m_s * dt_s
     middle = pose.yaw_rad + turn / 2
@@ -122,7 +122,7 @@ def moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:
 
 
 def wrapped_rad(angle: float) -> float:
-    """The same direction, from -pi to pi."""
+    """Return the same direction, from -pi to pi."""
     return math.remainder(angle, math.tau)
 
 

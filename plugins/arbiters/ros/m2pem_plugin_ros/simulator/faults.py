@@ -1,4 +1,4 @@
-"""What is wrong with the traffic of a vehicle's nodes, for as long as a fault lasts."""
+"""Faults of simulated vehicles: how they are written, and what they do."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -11,12 +11,13 @@ from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 
 @dataclass(slots=True)
-class Troubles:
-    """`silent`: nothing is published but what moves the base. `no_odometry`: that alone.
+class TrafficFaults:
+    """The faults in the messages of a vehicle's nodes.
 
-    Of an m2pem or Nav2 node: `refusal`: what it says to every behavior (None: it takes them).
-    Of an m2pem node: `deaf`: it hears of no new behavior; `lies`: it tells of behaviors that nobody
-    gave it, and contradicts itself; `flood_per_s`: so many statuses in a second of the wall clock.
+    `silent`: nothing is published except what moves the base. `no_odometry`: only odometry is
+    missing. `refusal`: an m2pem or Nav2 node refuses every behavior with this text (None: it does
+    not). `deaf`: an m2pem node receives no START. `lies`: it reports behaviors that it was not
+    given, and contradicts itself. `flood_per_s`: statuses in a second of real time.
     """
 
     silent: bool = False
@@ -28,10 +29,10 @@ class Troubles:
 
 
 @dataclass(slots=True)
-class Faults:
-    """`reject`: no goal is accepted. `hang`: goals are accepted, and nothing is done for them; they
-    cannot be cancelled either. `error_code`: goals are aborted with it after `abort_after_s`.
-    `miss`: waypoints with these indices are not reached."""
+class Nav2Faults:
+    """The faults of a simulated Nav2. `reject`: no goal is accepted. `hang`: accepted goals are not
+    executed, and cannot be cancelled. `error_code`: goals are aborted with it after
+    `abort_after_s`. `miss`: indices of waypoints that are not reached."""
 
     reject: bool = False
     hang: bool = False
@@ -42,48 +43,49 @@ class Faults:
 
 
 LOW = 0.12
-"""So full is a low battery."""
+"""The charge of a low battery."""
 
 REFUSAL = "it has been told to refuse"
 FLOOD_PER_S = 5000.0
 BLOCKED_CODE = 208
-"""What Nav2's planner says when there is no path."""
+"""The error of Nav2's planner if there is no path."""
 
 NUMBER = r"(\d+(?:\.\d+)?)"
 
 
-class Afflicted(Protocol):
-    """A vehicle as a fault sees it."""
+class FaultTarget(Protocol):
+    """The interface of a vehicle that faults use."""
 
     vehicle: Vehicle
-    troubles: Troubles
+    traffic_faults: TrafficFaults
 
     @property
     def nav2(self) -> Any:
-        """Its simulated Nav2, if it has one that is alive."""
+        """The simulated Nav2; None if there is none, or it is killed."""
         ...
 
     def kill(self) -> None:
-        """End all its nodes."""
+        """Kill all nodes."""
         ...
 
     def kill_node(self) -> None:
-        """End what steers it on board."""
+        """Kill the node that controls the vehicle on board."""
         ...
 
     def start(self) -> None:
-        """Begin the nodes that are not there."""
+        """Start the nodes that are missing."""
         ...
 
 
-Action = Callable[[Afflicted], None]
+Action = Callable[[FaultTarget], None]
 Made = tuple[Action, Action | None]
-"""What begins a fault, and what ends it (None: nothing does)."""
+"""The start of a fault, and its end (None: it has no end)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of fault. `drivers`: to which vehicles it can happen; `detector`: only with one."""
+    """A kind of fault. `drivers`: of the vehicles that can have it. `detector`: the vehicle needs
+    one."""
 
     pattern: str
     make: Callable[[re.Match[str]], Made]
@@ -91,11 +93,11 @@ class Kind:
     detector: bool = False
 
 
-def _trouble(name: str, value: object, normal: object) -> Callable[[re.Match[str]], Made]:
+def _traffic_fault(name: str, value: object, normal: object) -> Callable[[re.Match[str]], Made]:
     def made(_: re.Match[str]) -> Made:
         return (
-            lambda host: setattr(host.troubles, name, value),
-            lambda host: setattr(host.troubles, name, normal),
+            lambda simulated: setattr(simulated.traffic_faults, name, value),
+            lambda simulated: setattr(simulated.traffic_faults, name, normal),
         )
 
     return made
@@ -104,8 +106,8 @@ def _trouble(name: str, value: object, normal: object) -> Callable[[re.Match[str
 def _odometer(name: str) -> Callable[[re.Match[str]], Made]:
     def made(_: re.Match[str]) -> Made:
         return (
-            lambda host: setattr(host.vehicle.odometer, name, True),
-            lambda host: setattr(host.vehicle.odometer, name, False),
+            lambda simulated: setattr(simulated.vehicle.odometer, name, True),
+            lambda simulated: setattr(simulated.vehicle.odometer, name, False),
         )
 
     return made
@@ -113,66 +115,68 @@ def _odometer(name: str) -> Callable[[re.Match[str]], Made]:
 
 def _jump(match: re.Match[str]) -> Made:
     distance_m = float(match[1])
-    return (lambda host: host.vehicle.odometer.jump(distance_m)), None
+    return (lambda simulated: simulated.vehicle.odometer.jump(distance_m)), None
 
 
 def _stuck(_: re.Match[str]) -> Made:
     return (
-        lambda host: setattr(host.vehicle.body, "stuck", True),
-        lambda host: setattr(host.vehicle.body, "stuck", False),
+        lambda simulated: setattr(simulated.vehicle.body, "stuck", True),
+        lambda simulated: setattr(simulated.vehicle.body, "stuck", False),
     )
 
 
 def _refuse(match: re.Match[str]) -> Made:
-    return _trouble("refusal", match[1] or REFUSAL, None)(match)
+    return _traffic_fault("refusal", match[1] or REFUSAL, None)(match)
 
 
 def _flood(match: re.Match[str]) -> Made:
     per_s = FLOOD_PER_S if match[1] is None else float(match[1])
-    return _trouble("flood_per_s", per_s, 0.0)(match)
+    return _traffic_fault("flood_per_s", per_s, 0.0)(match)
 
 
 def _battery(match: re.Match[str]) -> Made:
     left = LOW if match[1] is None else float(match[1]) / 100
     if left > 1:
         raise ValueError("a battery has at most 100 %")
-    return (lambda host: setattr(host.vehicle.battery, "fraction", left)), None
+    return (lambda simulated: setattr(simulated.vehicle.battery, "fraction", left)), None
 
 
 def _gps(_: re.Match[str]) -> Made:
     return (
-        lambda host: setattr(host.vehicle, "gps_lost", True),
-        lambda host: setattr(host.vehicle, "gps_lost", False),
+        lambda simulated: setattr(simulated.vehicle, "gps_lost", True),
+        lambda simulated: setattr(simulated.vehicle, "gps_lost", False),
     )
 
 
 def _detect(match: re.Match[str]) -> Made:
     what = match[1] or ""
-    return (lambda host: host.vehicle.detect(what)), None
+    return (lambda simulated: simulated.vehicle.detect(what)), None
 
 
 def _kill(_: re.Match[str]) -> Made:
-    return (lambda host: host.kill()), (lambda host: host.start())
+    return (lambda simulated: simulated.kill()), (lambda simulated: simulated.start())
 
 
 def _kill_node(_: re.Match[str]) -> Made:
-    return (lambda host: host.kill_node()), (lambda host: host.start())
+    return (lambda simulated: simulated.kill_node()), (lambda simulated: simulated.start())
 
 
 def _start(_: re.Match[str]) -> Made:
-    return (lambda host: host.start()), None
+    return (lambda simulated: simulated.start()), None
 
 
 def _nav2(name: str, value: object, normal: object) -> Callable[[re.Match[str]], Made]:
     def made(_: re.Match[str]) -> Made:
-        return (lambda host: _set(host, name, value)), (lambda host: _set(host, name, normal))
+        return (lambda simulated: _set(simulated, name, value)), (
+            lambda simulated: _set(simulated, name, normal)
+        )
 
     return made
 
 
-def _set(host: Afflicted, name: str, value: object) -> None:
-    if host.nav2 is not None:
-        setattr(host.nav2.faults, name, value)
+def _set(simulated: FaultTarget, name: str, value: object) -> None:
+    if simulated.nav2 is not None:
+        setattr(simulated.nav2.faults, name, value)
 
 
 def _nav2_abort(match: re.Match[str]) -> Made:
@@ -180,23 +184,25 @@ def _nav2_abort(match: re.Match[str]) -> Made:
 
 
 def _nav2_inactive(_: re.Match[str]) -> Made:
-    return (lambda host: _enter(host, "inactive")), (lambda host: _enter(host, "active"))
+    return (lambda simulated: _enter(simulated, "inactive")), (
+        lambda simulated: _enter(simulated, "active")
+    )
 
 
-def _enter(host: Afflicted, state: str) -> None:
-    if host.nav2 is not None:
-        host.nav2.enter(state)
+def _enter(simulated: FaultTarget, state: str) -> None:
+    if simulated.nav2 is not None:
+        simulated.nav2.enter(state)
 
 
 NAV2_ONLY = (DriverName.NAV2,)
 NODE_ONLY = (DriverName.NODE,)
 STEERED = (DriverName.NODE, DriverName.NAV2)
 KINDS: Mapping[str, Kind] = {
-    "silent": Kind(r"silent", _trouble("silent", True, False)),
+    "silent": Kind(r"silent", _traffic_fault("silent", True, False)),
     "kill": Kind(r"kill", _kill),
     "kill node": Kind(r"kill node", _kill_node),
     "start": Kind(r"start", _start),
-    "stop odometry": Kind(r"stop odometry", _trouble("no_odometry", True, False)),
+    "stop odometry": Kind(r"stop odometry", _traffic_fault("no_odometry", True, False)),
     "freeze odometry": Kind(r"freeze odometry", _odometer("frozen")),
     "odometry nan": Kind(r"odometry nan", _odometer("nonsense")),
     "jump 20 m": Kind(rf"jump\s+{NUMBER}\s*m", _jump),
@@ -205,15 +211,15 @@ KINDS: Mapping[str, Kind] = {
     "battery low, battery 12 %": Kind(rf"battery\s+(?:low|{NUMBER}\s*%)", _battery),
     "detect, detect gpr": Kind(r"detect(?:\s+(\S+))?", _detect, detector=True),
     'refuse, refuse "text"': Kind(r"refuse(?:\s+\"([^\"]+)\")?", _refuse, STEERED),
-    "never accept": Kind(r"never accept", _trouble("deaf", True, False), NODE_ONLY),
-    "lie": Kind(r"lie", _trouble("lies", True, False), NODE_ONLY),
+    "never accept": Kind(r"never accept", _traffic_fault("deaf", True, False), NODE_ONLY),
+    "lie": Kind(r"lie", _traffic_fault("lies", True, False), NODE_ONLY),
     "flood, flood 5000": Kind(rf"flood(?:\s+{NUMBER})?", _flood, NODE_ONLY),
     "nav2 inactive": Kind(r"nav2 inactive", _nav2_inactive, NAV2_ONLY),
     "nav2 reject": Kind(r"nav2 reject", _nav2("reject", True, False), NAV2_ONLY),
     "nav2 hang": Kind(r"nav2 hang", _nav2("hang", True, False), NAV2_ONLY),
     "nav2 abort, nav2 abort 208": Kind(r"nav2 abort(?:\s+(\d+))?", _nav2_abort, NAV2_ONLY),
 }
-"""How a fault is written, and what it is."""
+"""How each fault is written, and what it is."""
 
 
 EXAMPLE = '"evsg1: silent at 20 s for 5 s"'
@@ -226,15 +232,15 @@ NAME = re.compile(r"[A-Za-z_][\w-]*")
 
 
 class FaultError(ValueError):
-    """It is no fault, or cannot happen there. The text says what would be right."""
+    """A text is not a fault, or the vehicle cannot have it; the message says what is right."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """A fault in words.
+    """A fault that was read from a text.
 
-    `vehicles`: their names (None: all); `at_s`: how long after it was planned; `for_s`: how long it
-    lasts (None: for good). Both are simulated time.
+    `vehicles`: their names (None: all). `at_s`: when it starts after it was planned. `for_s`: how
+    long it lasts (None: for good). Both are in simulated time.
     """
 
     text: str
@@ -246,22 +252,22 @@ class PlannedFault:
     for_s: float | None = None
 
     def check(self, spec: VehicleSpec) -> None:
-        """See that it can happen to a vehicle.
+        """Check that a vehicle can have the fault.
 
         Raises:
             FaultError: it cannot, and why.
         """
         if spec.settings.driver not in self.kind.drivers:
-            needs = " or ".join(WORDS[each] for each in self.kind.drivers)
+            needs = " or ".join(DRIVER_TEXTS[each] for each in self.kind.drivers)
             raise FaultError(
-                f"fault {self.text!r}: {spec.name} is {WORDS[spec.settings.driver]}; that happens "
-                f"to {needs} alone"
+                f"fault {self.text!r}: {spec.name} is {DRIVER_TEXTS[spec.settings.driver]}; "
+                f"that happens to {needs} alone"
             )
         if self.kind.detector and not spec.detectors:
             raise FaultError(f"fault {self.text!r}: {spec.name} carries no detector")
 
 
-WORDS = {
+DRIVER_TEXTS = {
     DriverName.NODE: "an m2pem node",
     DriverName.NAV2: "Nav2",
     DriverName.BASE: "a plain base",

@@ -1,4 +1,5 @@
-"""The vehicles of a fleet file that are to be simulated: of arbiter `ros`, marked `sitl: true`."""
+"""The simulated vehicles of a fleet file (arbiter `ros`, `sitl: true`), or a default row of
+them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -19,17 +20,23 @@ from m2pem_plugin_ros.settings import (
 )
 from m2pem_plugin_ros.simulator.dynamics import Chassis
 from m2pem_plugin_ros.simulator.sensors import DetectorSpec, Target
-from m2pem_plugin_ros.simulator.specification import VehicleSpec, WordError, apply, detector
+from m2pem_plugin_ros.simulator.specification import (
+    SettingError,
+    VehicleSpec,
+    apply_settings,
+    detector,
+)
 
 ARBITER = "ros"
 SIM = "sim"
-"""The map in a connection with what is said of the simulated vehicle."""
+"""The key of the settings of a simulated vehicle in its connection."""
 
 
 def read_specs(fleet: Fleet, words: Mapping[str, Any]) -> Iterator[VehicleSpec]:
-    """What to simulate for a fleet, so that an executive with the same file finds it.
+    """Yield the specifications of the simulated vehicles of a fleet, as an executive with the same
+    file expects them.
 
-    `words`: of all vehicles, over those of the file.
+    `words` are settings of all vehicles, and override those of the file.
 
     Raises:
         PluginError: a connection is wrong; the text names the resource and the key.
@@ -66,14 +73,14 @@ def read_specs(fleet: Fleet, words: Mapping[str, Any]) -> Iterator[VehicleSpec]:
             ),
         )
         try:
-            spec = apply(vehicle.settings.get(SIM, {}), spec)
-        except WordError as error:
+            spec = apply_settings(vehicle.settings.get(SIM, {}), spec)
+        except SettingError as error:
             raise PluginError(f"{vehicle.id}: connection.{SIM}.{error}") from error
-        yield apply(words, spec)
+        yield apply_settings(words, spec)
 
 
 def _chassis(domain: str, settings: Settings) -> Chassis:
-    """A base can do what the fleet says that it can; else what is usual for its domain."""
+    """Return the capabilities that the fleet says; otherwise the defaults of the domain."""
     usual, bounds = chassis_of(domain), settings.bounds
     if settings.driver is not DriverName.BASE and bounds == Bounds():
         return usual
@@ -106,12 +113,12 @@ def _detector(
         return spec
     try:
         return detector(words, spec, origin)
-    except WordError as error:
+    except SettingError as error:
         raise PluginError(f"{payload.resource}: connection.{SIM}.{error}") from error
 
 
 APART_M = 5.0
-"""Vehicles stand in a row to the east, so far from each other, and face north."""
+"""Distance of vehicles in the row to the east. They face north."""
 
 NORTH_RAD = 1.5707963267948966
 
@@ -127,23 +134,23 @@ ROVER = Chassis()
 
 
 def chassis_of(domain: str) -> Chassis:
-    """How vehicles of a domain move unless something else is said."""
+    """Return the default capabilities of a domain."""
     return BOAT if domain == "surface" else ROVER
 
 
 def start_of(number: int) -> Pose:
-    """Where the vehicle with that number stands, from 0."""
+    """Return the start pose of the vehicle with an index."""
     return Pose(number * APART_M, 0.0, NORTH_RAD)
 
 
-def make_crew(
+def make_default_vehicles(
     domains: Sequence[str],
     driver: DriverName,
     origin: Origin,
     targets: Sequence[Target] = (),
     words: Mapping[str, Any] | None = None,
 ) -> Iterator[VehicleSpec]:
-    """A vehicle for each domain, named by it; each carries a detector.
+    """Yield a vehicle with a detector for each domain, named after it: ugv1, ugv2, usv1, ...
 
     Raises:
         WordError: a word is not known, or its value has no sense.
@@ -161,4 +168,4 @@ def make_crew(
             chassis_of(domain),
             detectors=(DetectorSpec(targets=tuple(targets)),),
         )
-        yield apply(words or {}, spec)
+        yield apply_settings(words or {}, spec)

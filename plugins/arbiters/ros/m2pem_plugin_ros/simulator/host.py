@@ -1,4 +1,4 @@
-"""One simulated vehicle with its nodes: it ends them and begins them again, as faults ask."""
+"""A simulated vehicle with its nodes, which faults kill and start."""
 
 import asyncio
 import logging
@@ -7,17 +7,17 @@ from typing import Any
 
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import DriverName
-from m2pem_plugin_ros.simulator.clock import Pace, SimulatedClock
-from m2pem_plugin_ros.simulator.faults import Troubles
+from m2pem_plugin_ros.simulator.clock import RateTimer, SimulatedClock
+from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.onboard_control import (
-    NoWay,
-    OnBoard,
-    OwnLocalization,
-    Way,
-    make_way,
+    ControlContext,
+    NoOnboardControl,
+    OnboardControl,
+    SimulatedLocalization,
+    make_onboard_control,
 )
-from m2pem_plugin_ros.simulator.topics import ODOMETRY_HZ, Ports
-from m2pem_plugin_ros.simulator.traffic import Gate, GuardedRuntime, NodeGate
+from m2pem_plugin_ros.simulator.topics import ODOMETRY_HZ, BaseTopics
+from m2pem_plugin_ros.simulator.traffic import FilteredRuntime, NodeTrafficFilter, TrafficFilter
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 BASE_NODE = "base"
@@ -26,72 +26,74 @@ CLOSED_WITHIN_S = 5.0
 logger = logging.getLogger(__name__)
 
 
-class Host:
-    """`vehicle`: what is true of it, which outlives its nodes. `troubles`: of its traffic.
+class SimulatedVehicle:
+    """Runs the nodes of a vehicle. `vehicle` is its physical state, which outlives the nodes.
+    `traffic_faults` apply to their messages.
 
-    Two nodes, or sets of them: the base's own, with the sensors, and what steers on board.
+    There are two sets of nodes: those of the base and its sensors, and those of the onboard
+    control.
     """
 
     def __init__(self, ros: RosRuntime, vehicle: Vehicle, clock: SimulatedClock) -> None:
-        self.vehicle, self.troubles = vehicle, Troubles()
+        self.vehicle, self.traffic_faults = vehicle, TrafficFaults()
         self._ros, self._clock = ros, clock
-        self._base: GuardedRuntime | None = None
-        self._ports: Ports | None = None
-        self._steering: GuardedRuntime | None = None
-        self._gate: NodeGate | None = None
-        self._way: Way = NoWay()
-        self._localization = OwnLocalization(vehicle.spec, clock)
-        self._pace = Pace(ODOMETRY_HZ)
+        self._base: FilteredRuntime | None = None
+        self._topics: BaseTopics | None = None
+        self._steering: FilteredRuntime | None = None
+        self._traffic_filter: NodeTrafficFilter | None = None
+        self._onboard_control: OnboardControl = NoOnboardControl()
+        self._localization = SimulatedLocalization(vehicle.spec, clock)
+        self._rate_timer = RateTimer(ODOMETRY_HZ)
         self._turn = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def driver(self) -> DriverName:
-        """By what it is steered on board; BASE: by nothing."""
+        """The driver; BASE: there is no onboard control."""
         return self.vehicle.spec.settings.driver
 
     @property
     def nav2(self) -> Any:
-        """The simulated Nav2; None: there is none, or it is dead."""
-        return self._way if self.driver is DriverName.NAV2 and self._steering else None
+        """The simulated Nav2; None if there is none, or it is killed."""
+        return self._onboard_control if self.driver is DriverName.NAV2 and self._steering else None
 
     async def open(self) -> None:
-        """Begin its nodes."""
+        """Start the nodes."""
         await self._begin()
 
     async def close(self) -> None:
-        """End its nodes in good order: it stands, and says what became of what it did."""
+        """Stop the nodes in order: the vehicle stops, and the end of its behavior is published."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         try:
-            await self._end_steering(self._way.close)
+            await self._end_steering(self._onboard_control.close)
         finally:
             self._end_base()
 
     def step(self, now_s: float, wall_dt_s: float) -> None:
-        """Move on, and say what is due."""
+        """Advance the vehicle, and publish what is due."""
         self.vehicle.pass_until(now_s)
-        if not self.troubles.no_odometry and self._pace.is_due(now_s):
+        if not self.traffic_faults.no_odometry and self._rate_timer.is_due(now_s):
             self._localization.hear(self.vehicle.odometer.read(self._clock.now_us()))
-        if self._ports is not None:
-            self._ports.publish()
-        if self._gate is not None:
-            self._gate.step(now_s, wall_dt_s)
+        if self._topics is not None:
+            self._topics.publish()
+        if self._traffic_filter is not None:
+            self._traffic_filter.step(now_s, wall_dt_s)
 
     # --- ending and beginning nodes ---------------------------------------------------------------
 
     def kill(self) -> None:
-        """End all nodes, as a power failure would: they say nothing any more."""
+        """Kill all nodes without a last message, as a power failure would."""
         self._kill(base=True, steering=True)
 
     def kill_node(self) -> None:
-        """End what steers on board, as a crash would; of a plain base, its only node."""
+        """Kill the onboard control, as a crash would; of a plain base, its only node."""
         alone = self.driver is DriverName.BASE
         self._kill(base=alone, steering=not alone)
 
     def start(self) -> None:
-        """Begin those nodes that are not there. The vehicle is where it was."""
+        """Start the nodes that are missing. The vehicle is where it was."""
         self._do(self._start())
 
     def _kill(self, *, base: bool, steering: bool) -> None:
@@ -100,7 +102,7 @@ class Host:
         if base:
             self._end_base()
         if steering:
-            self._do(self._bury())
+            self._do(self._end_dead_node())
 
     def _do(self, what: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(what)
@@ -112,10 +114,10 @@ class Host:
         if not task.cancelled() and (error := task.exception()) is not None:
             logger.error("%s: %s", self.vehicle.spec.name, error, exc_info=error)
 
-    async def _bury(self) -> None:
-        """End the tasks of a node that is dead."""
+    async def _end_dead_node(self) -> None:
+        """End the tasks of a killed node."""
         async with self._turn:
-            way = self._way
+            way = self._onboard_control
             # An m2pem node can be ended without a word. Whatever else wants to say something at
             # its end finds its entities gone.
             end = getattr(way, "drop", way.close)
@@ -132,26 +134,35 @@ class Host:
         spec = self.vehicle.spec
         namespace = spec.settings.namespace
         if self._base is None:
-            self._base = GuardedRuntime(self._ros, Gate(self.troubles), BASE_NODE, namespace)
-            self._ports = Ports(self._base, self.vehicle, self.troubles, self._clock)
+            self._base = FilteredRuntime(
+                self._ros, TrafficFilter(self.traffic_faults), BASE_NODE, namespace
+            )
+            self._topics = BaseTopics(self._base, self.vehicle, self.traffic_faults, self._clock)
         if self._steering is None and self.driver is not DriverName.BASE:
-            gate = NodeGate(self.troubles)
+            traffic_filter = NodeTrafficFilter(self.traffic_faults)
             name = f"{self.driver}_node"
-            self._steering, self._gate = GuardedRuntime(self._ros, gate, name, namespace), gate
-            board = OnBoard(
-                self.vehicle, self._steering, self._localization, self._clock, self.troubles
+            self._steering, self._traffic_filter = (
+                FilteredRuntime(self._ros, traffic_filter, name, namespace),
+                traffic_filter,
+            )
+            context = ControlContext(
+                self.vehicle, self._steering, self._localization, self._clock, self.traffic_faults
             )
             try:
-                self._way = make_way(board)
-                await self._way.open()
+                self._onboard_control = make_onboard_control(context)
+                await self._onboard_control.open()
             except BaseException:  # nothing half open stays, so that it can be begun again
                 self._steering.destroy()
-                self._way, self._steering, self._gate = NoWay(), None, None
+                self._onboard_control, self._steering, self._traffic_filter = (
+                    NoOnboardControl(),
+                    None,
+                    None,
+                )
                 raise
 
     async def _end_steering(self, end: Callable[[], Awaitable[None]]) -> None:
         steering = self._steering
-        self._way, self._steering, self._gate = NoWay(), None, None
+        self._onboard_control, self._steering, self._traffic_filter = NoOnboardControl(), None, None
         try:
             async with asyncio.timeout(CLOSED_WITHIN_S):
                 await end()
@@ -164,4 +175,4 @@ class Host:
     def _end_base(self) -> None:
         if self._base is not None:
             self._base.destroy()
-        self._base = self._ports = None
+        self._base = self._topics = None

@@ -1,4 +1,4 @@
-"""What steers a simulated vehicle on board: nothing, an m2pem node, or Nav2."""
+"""The onboard control of a simulated vehicle: none, an m2pem node, or Nav2."""
 
 import logging
 import math
@@ -17,7 +17,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem_plugin_ros.drivers.driver import Driver, Health, Seat, Told
+from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, DriverSetup, Health
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
@@ -25,108 +25,106 @@ from m2pem_plugin_ros.sensors.localization import Localization
 from m2pem_plugin_ros.settings import Bounds, DriverName
 from m2pem_plugin_ros.simulator.clock import US_PER_S, SimulatedClock
 from m2pem_plugin_ros.simulator.dynamics import wrapped_rad
-from m2pem_plugin_ros.simulator.faults import Troubles
+from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Battery, Reading
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
-from m2pem_plugin_ros.simulator.traffic import GuardedRuntime
+from m2pem_plugin_ros.simulator.traffic import FilteredRuntime
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 logger = logging.getLogger(__name__)
 
 
-class Way(Protocol):
-    """What steers a vehicle on board, once it is open."""
+class OnboardControl(Protocol):
+    """The software that controls a vehicle on board."""
 
     async def open(self) -> None:
-        """Serve."""
+        """Start."""
         ...
 
     async def close(self) -> None:
-        """End, and leave the vehicle standing."""
+        """Stop the vehicle, and close."""
         ...
 
 
-class NoWay:
-    """A plain base: it is steered from elsewhere."""
+class NoOnboardControl:
+    """A plain base has no control on board."""
 
-    async def open(self) -> None:
-        """There is nothing to serve."""
+    async def open(self) -> None: ...
 
-    async def close(self) -> None:
-        """There is nothing to end."""
+    async def close(self) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
-class OnBoard:
-    """All that a way is given."""
+class ControlContext:
+    """The arguments of an onboard control."""
 
     vehicle: Vehicle
-    ros: GuardedRuntime
+    ros: FilteredRuntime
     localization: Localization
     clock: SimulatedClock
-    troubles: Troubles
+    traffic_faults: TrafficFaults
 
-    def make_driver(self, told: Told, bus: FleetBus) -> Driver:
-        """What drives the base when the m2pem node, or Nav2, says so."""
+    def make_driver(self, events: DriverEvents, bus: FleetBus) -> Driver:
+        """Make the driver of the base for the m2pem node, or for Nav2."""
         spec = self.vehicle.spec
-        seat = Seat(
+        setup = DriverSetup(
             Connection(ResourceId(spec.name), spec.domain, sitl=True),
             replace(spec.settings, driver=DriverName.BASE, bounds=_bounds(spec)),
             ArbiterContext(self.clock, bus, logger, spec.origin),
             cast(RosRuntime, self.ros),
             self.localization,
-            told,
+            events,
         )
-        driver: Driver = import_module("m2pem_plugin_ros.drivers.base").BaseDriver(seat)
-        return cast(Driver, OwnDriver(driver, self.vehicle.battery, self.troubles))
+        driver: Driver = import_module("m2pem_plugin_ros.drivers.base").BaseDriver(setup)
+        return cast(Driver, SimulatedDriver(driver, self.vehicle.battery, self.traffic_faults))
 
 
-def make_way(board: OnBoard) -> Way:
-    """What steers the vehicle, by its driver's name.
+def make_onboard_control(context: ControlContext) -> OnboardControl:
+    """Make the onboard control for the driver of the vehicle.
 
     Raises:
         RosError: a package that it needs, such as nav2_msgs, is not there.
     """
-    match board.vehicle.spec.settings.driver:
+    match context.vehicle.spec.settings.driver:
         case DriverName.NODE:
-            return _node(board)
+            return _node(context)
         case DriverName.NAV2:
-            return _nav2(board)
+            return _nav2(context)
         case _:
-            return NoWay()
+            return NoOnboardControl()
 
 
-def _node(board: OnBoard) -> Way:
+def _node(context: ControlContext) -> OnboardControl:
     onboard: Any = import_module("m2pem_plugin_ros.onboard.node")
-    bus: FleetBus = import_module("m2pem_plugin_ros.onboard.target_bus").Targets()
-    spec = board.vehicle.spec
-    made = onboard.Onboard(
-        board.ros,
+    bus: FleetBus = import_module("m2pem_plugin_ros.onboard.target_bus").TargetBus()
+    spec = context.vehicle.spec
+    made = onboard.OnboardNode(
+        context.ros,
         spec.name,
         spec.settings.namespace,
-        lambda told: board.make_driver(told, bus),
-        clock=board.clock,
+        lambda events: context.make_driver(events, bus),
+        clock=context.clock,
         bus=bus,
         logger=logger,
     )
-    return cast(Way, made)
+    return cast(OnboardControl, made)
 
 
-def _nav2(board: OnBoard) -> Way:
+def _nav2(context: ControlContext) -> OnboardControl:
     nav2: Any = import_module("m2pem_plugin_ros.simulator.nav2")
-    spec = board.vehicle.spec
+    spec = context.vehicle.spec
     made = nav2.Nav2Server(
-        board.ros,
+        context.ros,
         spec.settings.namespace,
-        lambda told: board.make_driver(told, _NoBus()),
-        board.localization,
+        lambda events: context.make_driver(events, _NoBus()),
+        context.localization,
         spec.origin,
     )
-    return cast(Way, made)
+    return cast(OnboardControl, made)
 
 
 def _bounds(spec: VehicleSpec) -> Bounds:
-    """What whoever steers on board knows of the base."""
+    """Return the limits of the base that its onboard control knows."""
     chassis = spec.chassis
     return replace(
         spec.settings.bounds,
@@ -139,7 +137,7 @@ def _bounds(spec: VehicleSpec) -> Bounds:
 
 
 class _NoBus:
-    """Nav2 knows nothing of the fleet."""
+    """A bus without states: Nav2 knows nothing of the fleet."""
 
     def latest(self, resource: str) -> VehicleState | PayloadState | None:
         return None
@@ -152,29 +150,30 @@ class _NoBus:
         yield
 
 
-class OwnDriver:
-    """Any driver; it also knows of the vehicle's battery."""
+class SimulatedDriver:
+    """A driver with the battery of the simulated vehicle, which may refuse behaviors as a fault."""
 
-    def __init__(self, driver: Driver, battery: Battery, troubles: Troubles) -> None:
-        self._driver, self._battery, self._troubles = driver, battery, troubles
+    def __init__(self, driver: Driver, battery: Battery, traffic_faults: TrafficFaults) -> None:
+        self._driver, self._battery, self._traffic_faults = driver, battery, traffic_faults
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._driver, name)
 
     @property
     def health(self) -> Health:
-        """What is known by now."""
         return replace(self._driver.health, battery_fraction=self._battery.fraction)
 
     def refusal(self, request: BehaviorRequest) -> str:
-        """Why it cannot be done now; "" if it can."""
-        if self._troubles.refusal is not None:
-            return self._troubles.refusal
+        """Return why a request cannot be done now; "" if it can."""
+        if self._traffic_faults.refusal is not None:
+            return self._traffic_faults.refusal
         return self._driver.refusal(request)
 
 
-class OwnLocalization:
-    """Keeps the promises of `m2pem_plugin_ros.sensors.localization.Localization`."""
+class SimulatedLocalization:
+    """Implements `m2pem_plugin_ros.sensors.localization.Localization` by the odometry of the
+    simulated vehicle, with its faults. It does not use DDS, so that many vehicles in one process
+    stay cheap."""
 
     def __init__(self, spec: VehicleSpec, clock: SimulatedClock) -> None:
         self._spec, self._clock = spec, clock
@@ -184,7 +183,7 @@ class OwnLocalization:
         self._heard_us: int | None = None
 
     def hear(self, reading: Reading) -> None:
-        """Take a reading; one that is old or no place at all is as good as none."""
+        """Process a reading. Old and invalid readings are ignored."""
         pose = reading.pose
         if reading.time_us <= self._stamp_us or not math.isfinite(pose.east_m + pose.yaw_rad):
             return
@@ -195,17 +194,14 @@ class OwnLocalization:
 
     @property
     def pose(self) -> Pose | None:
-        """In the fleet's local frame."""
         return self._pose
 
     @property
     def twist(self) -> Twist | None:
-        """In the vehicle's own frame."""
         return self._twist
 
     @property
     def position(self) -> GeoPosition | None:
-        """WGS-84, altitude above mean sea level."""
         if self._pose is None:
             return None
         origin = self._spec.origin
@@ -214,13 +210,12 @@ class OwnLocalization:
 
     @property
     def age_s(self) -> float:
-        """How long ago the pose was heard; infinite before the first."""
         if self._heard_us is None:
             return math.inf
         return (self._clock.now_us() - self._heard_us) / US_PER_S
 
     def _in_map(self, pose: Pose) -> Pose:
-        """The vehicle knows where its odometry began."""
+        """Return the pose in the frame `map`. The vehicle knows where its odometry began."""
         if self._spec.settings.odom_frame == "map":
             return pose
         start = self._spec.start

@@ -1,4 +1,4 @@
-"""Where a vehicle believes to be: its odometry, with drift, noise and faults."""
+"""The sensors of a simulated vehicle: odometry, battery and detector."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,8 +13,8 @@ NOWHERE = Pose(math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True, slots=True)
 class Inaccuracy:
-    """`drift`: so much of each metre is measured wrong, and as many radians a metre is it turned.
-    `noise_m`: standard deviation of each reading."""
+    """`drift`: relative error of each metre, and rotation in radians for each metre. `noise_m`:
+    standard deviation of each reading."""
 
     drift: float = 0.0
     noise_m: float = 0.0
@@ -22,7 +22,7 @@ class Inaccuracy:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One message's worth. `time_us`: its stamp."""
+    """One odometry message. `time_us` is its stamp."""
 
     time_us: int
     pose: Pose
@@ -30,9 +30,9 @@ class Reading:
 
 
 class Odometer:
-    """Counts the way of a vehicle from `start`.
+    """Integrates the motion of a vehicle from `start`.
 
-    Faults: `frozen` says the same again and again, `nonsense` says NaN.
+    Faults: `frozen` repeats the same reading, `nonsense` gives NaN.
     """
 
     def __init__(self, start: Pose, inaccuracy: Inaccuracy, random: Random) -> None:
@@ -45,7 +45,7 @@ class Odometer:
         self._last: Reading | None = None
 
     def step(self, twist: Twist, dt_s: float) -> None:
-        """The vehicle moved like that for `dt_s`."""
+        """Integrate a motion of `dt_s`."""
         self._twist = twist
         drift = self._inaccuracy.drift
         measured = Twist(
@@ -54,7 +54,7 @@ class Odometer:
         self._pose = moved(self._pose, measured, dt_s)
 
     def jump(self, distance_m: float) -> None:
-        """Believe all at once to be elsewhere, to the left."""
+        """Jump to the left by a distance."""
         left = self._pose.yaw_rad + math.pi / 2
         self._pose = Pose(
             self._pose.east_m + distance_m * math.cos(left),
@@ -64,7 +64,7 @@ class Odometer:
         )
 
     def read(self, time_us: int) -> Reading:
-        """What it says now."""
+        """Return the current reading."""
         if self.frozen and self._last is not None:
             return self._last
         pose = NOWHERE if self.nonsense else self._noisy(self._pose)
@@ -90,14 +90,15 @@ LOW_FRACTION = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Capacity:
-    """How far a full battery drives, in metres, and how long it lasts for one that stands."""
+    """The range of a full battery in metres, and its life in seconds if the vehicle stands."""
 
     range_m: float = 40_000.0
     standing_s: float = 24 * 3600.0
 
 
 class Battery:
-    """`fraction`: what is left, 0 to 1; may be set."""
+    """A battery that drains with distance and time. `fraction` is its charge, 0 to 1, and may be
+    set."""
 
     def __init__(self, capacity: Capacity, fraction: float = 1.0) -> None:
         self._capacity = capacity
@@ -105,18 +106,18 @@ class Battery:
 
     @property
     def voltage_v(self) -> float:
-        """Of seven cells in series; linear, which is good enough for a display."""
+        """The voltage of seven cells in series, linear in the charge."""
         return EMPTY_V + (FULL_V - EMPTY_V) * self.fraction
 
     def drain(self, way_m: float, dt_s: float) -> None:
-        """Drive `way_m` in `dt_s`."""
+        """Drain for a distance that was driven in `dt_s`."""
         used = way_m / self._capacity.range_m + dt_s / self._capacity.standing_s
         self.fraction = max(0.0, self.fraction - used)
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Something to be found, in the fleet's local frame."""
+    """Something that a detector can find, in the local frame of the fleet."""
 
     type: str
     east_m: float
@@ -125,9 +126,8 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class DetectorSpec:
-    """`payload`: its name in the fleet, "" if it has none; `topic`: as the vehicle resolves it;
-    `type`: of what it finds when it is told to find something; `plain`: it publishes only types,
-    as std_msgs/String."""
+    """`payload`: its name in the fleet, or "". `topic`: as the vehicle resolves it. `type`: of
+    detections that are made on request. `plain`: it publishes only types, as std_msgs/String."""
 
     payload: str = ""
     topic: str = "detections"
@@ -139,7 +139,7 @@ class DetectorSpec:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A detection: what, and where in the local frame."""
+    """A detection: its type, and its position in the local frame."""
 
     type: str
     east_m: float
@@ -147,7 +147,7 @@ class Found:
 
 
 class Detector:
-    """Finds each target once."""
+    """Finds each target within its range once."""
 
     def __init__(self, spec: DetectorSpec) -> None:
         self.spec = spec
@@ -155,11 +155,11 @@ class Detector:
 
     @property
     def hidden(self) -> int:
-        """How many targets it has not found."""
+        """The number of targets that were not found yet."""
         return len(self._hidden)
 
     def find(self, pose: Pose) -> Iterator[Found]:
-        """What comes into its reach there."""
+        """Yield the targets within the range."""
         if not self._hidden:
             return
         for target in list(self._hidden):

@@ -1,4 +1,4 @@
-"""Many simulated vehicles in one process: time passes for all of them."""
+"""Many simulated vehicles in one process, and the ROS parameter `fault` of the node /m2pem_sim."""
 
 import asyncio
 import logging
@@ -13,27 +13,28 @@ from rcl_interfaces.msg import SetParametersResult
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.simulator.clock import SimulatedClock
 from m2pem_plugin_ros.simulator.faults import FaultError, PlannedFault, parse
-from m2pem_plugin_ros.simulator.host import Host
+from m2pem_plugin_ros.simulator.host import SimulatedVehicle
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 TICK_S = 0.02
-"""How often vehicles are moved on and publish, in seconds of the wall clock: at most 50 Hz."""
+"""Period in which vehicles are advanced and publish, in real time: at most 50 Hz."""
 
 LATE_S = 0.2
-"""In seconds of the wall clock. A process that was not run for longer simulates no more of it than
-that: nobody could have steered a vehicle meanwhile."""
+"""Real seconds. If the process was suspended for longer, the rest is not simulated, as no vehicle
+could be controlled meanwhile."""
 
 COMMANDS_WITHIN_S = 0.5
-"""A base never stops for want of commands before so long, in seconds of the wall clock."""
+"""A base needs at least this time without commands to stop, in real seconds."""
 
 NODE = "m2pem_sim"
 
 
 class Simulation:
-    """The vehicles; `speed`: simulated seconds in a second. `async with` opens and closes it.
+    """The simulated vehicles. `speed`: simulated seconds in a real second. `async with` opens and
+    closes it.
 
-    `domain_id`: where those are that do not say; None takes ROS_DOMAIN_ID.
+    `domain_id`: for vehicles whose settings have none; None takes ROS_DOMAIN_ID.
 
     Raises:
         ValueError: there is none, or two have the same name or namespace.
@@ -52,9 +53,9 @@ class Simulation:
         _check(specs)
         self.clock = SimulatedClock(speed)
         self._specs, self._domain_id, self._seed = specs, domain_id, seed
-        self._hosts: dict[str, Host] = {}
+        self._hosts: dict[str, SimulatedVehicle] = {}
         self._runtimes: dict[int | None, RosRuntime] = {}
-        self._agenda: list[tuple[float, Callable[[], None]]] = []
+        self._events: list[tuple[float, Callable[[], None]]] = []
         self._planned = tuple(faults)
         for fault in self._planned:
             self.check(fault)
@@ -62,19 +63,19 @@ class Simulation:
         self._left_out_s = 0.0
         self._task: asyncio.Task[None] | None = None
 
-    def __getitem__(self, name: str) -> Host:
+    def __getitem__(self, name: str) -> SimulatedVehicle:
         return self._hosts[name]
 
-    def __iter__(self) -> Iterator[Host]:
+    def __iter__(self) -> Iterator[SimulatedVehicle]:
         return iter(self._hosts.values())
 
     async def __aenter__(self) -> Self:
         try:
             for spec in self._specs:
                 vehicle = Vehicle(_patient(spec, self.clock.speed), self._seed)
-                host = Host(self._runtime(spec), vehicle, self.clock)
-                self._hosts[spec.name] = host
-                await host.open()
+                simulated = SimulatedVehicle(self._runtime(spec), vehicle, self.clock)
+                self._hosts[spec.name] = simulated
+                await simulated.open()
         except BaseException:
             await self._close()
             raise
@@ -96,7 +97,7 @@ class Simulation:
         await self._close()
 
     async def stopped(self) -> None:
-        """Wait for its end, which comes only by an error.
+        """Wait for its end, which is always an error.
 
         Raises:
             Exception: whatever ended it.
@@ -107,7 +108,7 @@ class Simulation:
     # --- faults -----------------------------------------------------------------------------------
 
     def check(self, fault: PlannedFault) -> None:
-        """See that a fault can happen.
+        """Check that a fault can happen.
 
         Raises:
             FaultError: one of its vehicles is not there, or it cannot happen to it.
@@ -122,26 +123,26 @@ class Simulation:
             fault.check(specs[name])
 
     def plan(self, fault: PlannedFault) -> None:
-        """Let a fault happen when its time comes, counted from now.
+        """Plan a fault. Its time counts from now.
 
         Raises:
             FaultError: one of its vehicles is not there, or it cannot happen to it.
         """
         self.check(fault)
-        for host in [self[name] for name in fault.vehicles or self._hosts]:
-            self._after(fault.at_s, lambda host=host: self._begin(fault, host))  # type: ignore[misc]
+        for simulated in [self[name] for name in fault.vehicles or self._hosts]:
+            self._after(fault.at_s, lambda simulated=simulated: self._begin(fault, simulated))  # type: ignore[misc]
 
-    def _begin(self, fault: PlannedFault, host: Host) -> None:
-        fault.begin(host)
+    def _begin(self, fault: PlannedFault, simulated: SimulatedVehicle) -> None:
+        fault.begin(simulated)
         end = fault.end
         if end is not None and fault.for_s is not None:
-            self._after(fault.for_s, lambda: end(host))
+            self._after(fault.for_s, lambda: end(simulated))
 
     def _after(self, seconds: float, action: Callable[[], None]) -> None:
         if seconds <= 0:
             action()
         else:
-            self._agenda.append((self._now_s + seconds, action))
+            self._events.append((self._now_s + seconds, action))
 
     # --- time -------------------------------------------------------------------------------------
 
@@ -155,15 +156,15 @@ class Simulation:
             late_s = max(0.0, wall_s - last_s - LATE_S)
             self._left_out_s += late_s * self.clock.speed
             self._now_s = self.clock.elapsed_s - self._left_out_s
-            for host in self:
-                host.step(self._now_s, wall_s - last_s)
+            for simulated in self:
+                simulated.step(self._now_s, wall_s - last_s)
             last_s = wall_s
             self._do_what_is_due()
 
     def _do_what_is_due(self) -> None:
-        due = [each for each in self._agenda if each[0] <= self._now_s]
+        due = [each for each in self._events if each[0] <= self._now_s]
         if due:
-            self._agenda = [each for each in self._agenda if each[0] > self._now_s]
+            self._events = [each for each in self._events if each[0] > self._now_s]
             for _, action in sorted(due, key=lambda each: each[0]):
                 action()
 
@@ -174,16 +175,17 @@ class Simulation:
         domain = self._domain_id if domain is None else domain
         if domain not in self._runtimes:
             self._runtimes[domain] = RosRuntime(NODE, domain_id=domain)
-            FaultSwitch(self._runtimes[domain].node, self.plan)
+            FaultParameter(self._runtimes[domain].node, self.plan)
         return self._runtimes[domain]
 
     async def _close(self) -> None:
-        await asyncio.gather(*(host.close() for host in self), return_exceptions=True)
+        await asyncio.gather(*(simulated.close() for simulated in self), return_exceptions=True)
         await asyncio.gather(*(ros.close() for ros in self._runtimes.values()))
 
 
 def _patient(spec: VehicleSpec, speed: float) -> VehicleSpec:
-    """At high speed, what is between two commands for a base is long in simulated time."""
+    """Raise the command timeout for a fast clock, on which the time between two commands is
+    long."""
     timeout_s = max(spec.chassis.command_timeout_s, COMMANDS_WITHIN_S * speed)
     return replace(spec, chassis=replace(spec.chassis, command_timeout_s=timeout_s))
 
@@ -208,8 +210,8 @@ WITHIN_S = 2.0
 logger = logging.getLogger(__name__)
 
 
-class FaultSwitch:
-    """Declares the parameter. Setting it begins the fault, or is refused with what is wrong."""
+class FaultParameter:
+    """The ROS parameter `fault`. Setting it plans a fault, or fails with what is wrong."""
 
     def __init__(self, node: Any, plan: Callable[[PlannedFault], None]) -> None:
         self._loop = asyncio.get_running_loop()
@@ -218,7 +220,7 @@ class FaultSwitch:
         node.add_on_set_parameters_callback(self._set)
 
     def _set(self, parameters: Any) -> Any:
-        """Runs in the thread of ROS, and waits until the loop has done it."""
+        """Plan the fault on the loop, and wait for it. It is called in the thread of ROS."""
         for parameter in parameters:
             if parameter.name != PARAMETER or not parameter.value:
                 continue

@@ -1,4 +1,5 @@
-"""What a simulated vehicle is: its names, where it stands, how it moves and what it carries."""
+"""The specification of a simulated vehicle, and the settings of `sim: {max_speed: 3 m/s}` and
+`--set`."""
 
 import difflib
 import math
@@ -14,16 +15,16 @@ from m2pem_plugin_ros.simulator.dynamics import Chassis
 from m2pem_plugin_ros.simulator.sensors import Capacity, DetectorSpec, Inaccuracy, Target
 
 FORT = GeoPosition(38.1075, -77.3192, 60.0)
-"""Where vehicles stand that no fleet places: near the field of the vignettes."""
+"""Where vehicles without a fleet file stand: near the field of the vignettes."""
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleSpec:
     """One simulated vehicle.
 
-    `settings`: the connection as an executive has it, so that both mean the same topics. `start`:
-    in the fleet's local frame. `origin`: of that frame, latitude and longitude in degrees, altitude
-    in metres above mean sea level. `battery`: charge at first, 0 to 1.
+    `settings`: the connection as the executive has it, so that both use the same topics. `start`:
+    in the local frame. `origin`: of that frame, latitude and longitude in degrees, altitude in
+    metres above mean sea level. `battery`: initial charge, 0 to 1.
     """
 
     name: str
@@ -39,11 +40,11 @@ class VehicleSpec:
 
     @property
     def hardware_id(self) -> str:
-        """What it is called in /diagnostics."""
+        """Its name in /diagnostics."""
         return self.settings.hardware_id or self.name
 
 
-OF_REHEARSALS = frozenset(
+REHEARSAL_KEYS = frozenset(
     [
         "cruise_speed",
         "deceleration",
@@ -57,59 +58,59 @@ OF_REHEARSALS = frozenset(
         "state",
     ]
 )
-"""Words that `m2pem run --simulate` alone reads from the same map."""
+"""Keys of the same map that only `m2pem run --simulate` reads."""
 
-OF_DETECTORS = ("range", "targets")
-
-
-class WordError(ValueError):
-    """It cannot be used. The text says what would be right."""
+DETECTOR_SETTINGS = ("range", "targets")
 
 
-def apply(words: Mapping[str, Any], spec: VehicleSpec) -> VehicleSpec:
-    """The vehicle with what was said of it.
+class SettingError(ValueError):
+    """A setting cannot be used. The text says what is right."""
+
+
+def apply_settings(words: Mapping[str, Any], spec: VehicleSpec) -> VehicleSpec:
+    """Return the vehicle with settings applied.
 
     Raises:
         WordError: a word is not known, or its value has no sense.
     """
     for key, value in words.items():
-        if key in WORDS:
+        if key in SETTINGS:
             spec = _applied(key, value, spec)
-        elif key not in OF_REHEARSALS:
-            raise _unknown(key, WORDS)
+        elif key not in REHEARSAL_KEYS:
+            raise _unknown(key, SETTINGS)
     return spec
 
 
 def detector(words: Mapping[str, Any], spec: DetectorSpec, origin: Origin) -> DetectorSpec:
-    """The detector with what was said of it: `range` and `targets`.
+    """Return the detector with the settings `range` and `targets` applied.
 
     Raises:
         WordError: a word is not known, or its value has no sense.
     """
     for key in words:
-        if key not in OF_DETECTORS and key not in OF_REHEARSALS:
-            raise _unknown(key, OF_DETECTORS)
+        if key not in DETECTOR_SETTINGS and key not in REHEARSAL_KEYS:
+            raise _unknown(key, DETECTOR_SETTINGS)
     try:
         targets = words.get("targets", [])
         if not isinstance(targets, list | tuple):
-            raise WordError("it is no list, such as [{type: gpr, position: [38.1, -77.3]}]")
+            raise SettingError("it is no list, such as [{type: gpr, position: [38.1, -77.3]}]")
         found = tuple(_target(each, origin) for each in targets)
     except ValueError as error:
-        raise WordError(f"targets: {error}") from error
+        raise SettingError(f"targets: {error}") from error
     if "range" not in words:
         return replace(spec, targets=found)
     reach_m = _positive(Dimension.DISTANCE)("range", words["range"])
     return replace(spec, range_m=reach_m, targets=found)
 
 
-def _unknown(key: str, known: Collection[str]) -> WordError:
+def _unknown(key: str, known: Collection[str]) -> SettingError:
     near = difflib.get_close_matches(str(key), known, n=1)
     hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-    return WordError(f"{key}: simulated vehicles know no such setting; {hint}")
+    return SettingError(f"{key}: simulated vehicles know no such setting; {hint}")
 
 
 def position(value: Any, altitude_m: float = 0.0) -> GeoPosition:
-    """[lat, lon] or [lat, lon, alt], in degrees and metres above mean sea level.
+    """Read [lat, lon] or [lat, lon, alt], in degrees and metres above mean sea level.
 
     Raises:
         WordError: it is something else.
@@ -117,19 +118,19 @@ def position(value: Any, altitude_m: float = 0.0) -> GeoPosition:
     if isinstance(value, Mapping):
         value = [value[key] for key in ("lat", "lon", "alt") if key in value]
     if not isinstance(value, list | tuple) or len(value) not in (2, 3):
-        raise WordError(f"{value!r} is not [lat, lon] or [lat, lon, alt], such as [38.1, -77.3]")
+        raise SettingError(f"{value!r} is not [lat, lon] or [lat, lon, alt], such as [38.1, -77.3]")
     try:
         latitude, longitude, altitude = (*map(float, value), altitude_m)[:3]
     except (TypeError, ValueError):
-        raise WordError(f"{value!r} is not [lat, lon], such as [38.1, -77.3]") from None
+        raise SettingError(f"{value!r} is not [lat, lon], such as [38.1, -77.3]") from None
     if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-        raise WordError(f"{value!r} is not on Earth: latitude comes first, in degrees")
+        raise SettingError(f"{value!r} is not on Earth: latitude comes first, in degrees")
     return GeoPosition(latitude, longitude, altitude)
 
 
 def _target(item: Any, origin: Origin) -> Target:
     if not isinstance(item, Mapping) or set(item) != {"type", "position"}:
-        raise WordError(f"{item!r} is not {{type: gpr, position: [38.1, -77.3]}}")
+        raise SettingError(f"{item!r} is not {{type: gpr, position: [38.1, -77.3]}}")
     place = position(item["position"], origin[2])
     east_m, north_m, _ = to_local(place, origin)
     return Target(str(item["type"]), east_m, north_m)
@@ -144,7 +145,7 @@ def _number(key: str, value: Any) -> float:
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number):
-        raise WordError(f"{key}: {value!r} is not a number")
+        raise SettingError(f"{key}: {value!r} is not a number")
     return number
 
 
@@ -152,7 +153,9 @@ def _fraction(key: str, value: Any) -> float:
     percent = isinstance(value, str) and value.strip().endswith("%")
     number = _number(key, value.strip()[:-1] if percent else value) / (100 if percent else 1)
     if not 0 <= number <= 1:
-        raise WordError(f"{key}: {value!r} is neither a percentage ('80 %') nor a fraction (0.8)")
+        raise SettingError(
+            f"{key}: {value!r} is neither a percentage ('80 %') nor a fraction (0.8)"
+        )
     return number
 
 
@@ -161,7 +164,7 @@ def _quantity(dimension: Dimension) -> Read:
         try:
             return quantity(value, dimension)
         except UnitError as error:
-            raise WordError(f"{key}: {error}") from error
+            raise SettingError(f"{key}: {error}") from error
 
     return read
 
@@ -172,7 +175,7 @@ def _positive(dimension: Dimension, *, zero: bool = False) -> Read:
     def positive(key: str, value: Any) -> float:
         number = read(key, value)
         if number < 0 or (number == 0 and not zero):
-            raise WordError(f"{key}: {value!r} is {'below' if zero else 'not above'} 0")
+            raise SettingError(f"{key}: {value!r} is {'below' if zero else 'not above'} 0")
         return number
 
     return positive
@@ -182,7 +185,7 @@ _DISTANCE, _SPEED = _positive(Dimension.DISTANCE), _positive(Dimension.SPEED)
 _NO_DISTANCE = _positive(Dimension.DISTANCE, zero=True)
 _DURATION, _NO_DURATION = (_positive(Dimension.DURATION, zero=zero) for zero in (False, True))
 
-WORDS: Mapping[str, tuple[str, str, Read | None]] = {
+SETTINGS: Mapping[str, tuple[str, str, Read | None]] = {
     "home": ("", "start", None),
     "heading": ("", "start", _quantity(Dimension.ANGLE)),
     "battery": ("", "battery", _fraction),
@@ -197,16 +200,16 @@ WORDS: Mapping[str, tuple[str, str, Read | None]] = {
     "battery_range": ("capacity", "range_m", _DISTANCE),
     "battery_life": ("capacity", "standing_s", _DURATION),
 }
-"""Each word, the part of the vehicle and the field that it is about, and how it is read."""
+"""Each setting: the part of the vehicle, its field, and the function that reads it."""
 
 
 def _applied(key: str, value: Any, spec: VehicleSpec) -> VehicleSpec:
-    part, field, read = WORDS[key]
+    part, field, read = SETTINGS[key]
     if read is None:
         try:
             place = position(value, spec.origin[2])
-        except WordError as error:
-            raise WordError(f"{key}: {error}") from error
+        except SettingError as error:
+            raise SettingError(f"{key}: {error}") from error
         east_m, north_m, _ = to_local(place, spec.origin)
         return replace(
             spec, start=Pose(east_m, north_m, spec.start.yaw_rad, place.altitude_m - spec.origin[2])

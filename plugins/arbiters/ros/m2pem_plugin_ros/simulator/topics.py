@@ -1,4 +1,4 @@
-"""The topics of a simulated base: it publishes what its sensors say, and hears cmd_vel."""
+"""The topics of a simulated base: its sensors, and cmd_vel."""
 
 import math
 from typing import Any
@@ -15,24 +15,28 @@ from m2pem_plugin_ros.frames import quaternion_of_yaw, to_geodetic
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import qos
-from m2pem_plugin_ros.simulator.clock import Pace, SimulatedClock
-from m2pem_plugin_ros.simulator.faults import Troubles
+from m2pem_plugin_ros.simulator.clock import RateTimer, SimulatedClock
+from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Detector, Found, Reading
-from m2pem_plugin_ros.simulator.traffic import GuardedRuntime
+from m2pem_plugin_ros.simulator.traffic import FilteredRuntime
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 ODOMETRY_HZ, FIX_HZ, BATTERY_HZ, DIAGNOSTICS_HZ = 20.0, 5.0, 1.0, 1.0
 POSITION_M2, YAW_RAD2, GPS_M2 = 0.01, 0.001, 0.25
-"""Variances that are told, whatever the inaccuracy really is."""
+"""Published variances, whatever the inaccuracy is."""
 
 
-class Ports:
-    """Of one vehicle; made with its nodes, and gone with them."""
+class BaseTopics:
+    """The publishers and subscriptions of one vehicle. They end with its nodes."""
 
     def __init__(
-        self, ros: GuardedRuntime, vehicle: Vehicle, troubles: Troubles, clock: SimulatedClock
+        self,
+        ros: FilteredRuntime,
+        vehicle: Vehicle,
+        traffic_faults: TrafficFaults,
+        clock: SimulatedClock,
     ) -> None:
-        self._vehicle, self._troubles, self._clock = vehicle, troubles, clock
+        self._vehicle, self._traffic_faults, self._clock = vehicle, traffic_faults, clock
         settings = vehicle.spec.settings
         topics, create = settings.topics, ros.node.create_publisher
         self._odometry = create(Odometry, topics.odom, qos.TELEMETRY)
@@ -48,11 +52,11 @@ class Ports:
         }
         kind = TwistStamped if settings.stamped else TwistMessage
         ros.subscribe(kind, topics.cmd_vel, self._command, qos.TELEMETRY)
-        self._paces = {
-            self._publish_odometry: Pace(ODOMETRY_HZ),
-            self._publish_fix: Pace(FIX_HZ),
-            self._publish_battery: Pace(BATTERY_HZ),
-            self._publish_diagnostics: Pace(DIAGNOSTICS_HZ),
+        self._rate_timers = {
+            self._publish_odometry: RateTimer(ODOMETRY_HZ),
+            self._publish_fix: RateTimer(FIX_HZ),
+            self._publish_battery: RateTimer(BATTERY_HZ),
+            self._publish_diagnostics: RateTimer(DIAGNOSTICS_HZ),
         }
         self._told_motions = -1
         frame = settings.namespace.strip("/")
@@ -61,7 +65,7 @@ class Ports:
 
     def publish(self) -> None:
         """Publish what is due."""
-        for publish, pace in self._paces.items():
+        for publish, pace in self._rate_timers.items():
             if pace.is_due(self._vehicle.now_s):
                 publish()
         if (motions := self._vehicle.body.motions) != self._told_motions:
@@ -85,7 +89,7 @@ class Ports:
         return message
 
     def _publish_odometry(self) -> None:
-        if self._troubles.no_odometry:
+        if self._traffic_faults.no_odometry:
             return
         reading = self._vehicle.odometer.read(self._clock.now_us())
         self._odometry.publish(_odometry(self._odometry_message, reading))
@@ -118,11 +122,11 @@ class Ports:
         self._battery.publish(message)
 
     def _publish_diagnostics(self) -> None:
-        vehicle, troubles = self._vehicle, self._vehicle.troubles
+        vehicle, problems = self._vehicle, self._vehicle.problems
         status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK,
+            level=DiagnosticStatus.WARN if problems else DiagnosticStatus.OK,
             name=f"{vehicle.spec.name}: base",
-            message=", ".join(troubles) or "all is well",
+            message=", ".join(problems) or "all is well",
             hardware_id=vehicle.spec.hardware_id,
             values=[
                 KeyValue(key="driven_m", value=f"{vehicle.body.driven_m:.1f}"),
@@ -159,7 +163,7 @@ class Ports:
 
 
 def _odometry(message: Any, reading: Reading) -> Any:
-    """The message with what was read. It is used again and again: making one is slow."""
+    """Fill the message, which is reused, as making one is slow."""
     set_stamp(message.header.stamp, reading.time_us)
     pose, twist = message.pose.pose, message.twist.twist
     pose.position.x, pose.position.y = reading.pose.east_m, reading.pose.north_m

@@ -1,6 +1,7 @@
-"""What stands between the nodes of a simulated vehicle and ROS: it can silence, deafen, end them.
+"""Filters between the nodes of a simulated vehicle and ROS, by which faults silence, deafen and
+kill nodes.
 
-A node on board is given a `GuardedRuntime` as if it were the `RosRuntime`, and need not know.
+A node on board gets a `FilteredRuntime` in place of the `RosRuntime`.
 """
 
 import itertools
@@ -11,63 +12,64 @@ from typing import Any
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
 
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.simulator.clock import Pace
-from m2pem_plugin_ros.simulator.faults import Troubles
+from m2pem_plugin_ros.simulator.clock import RateTimer
+from m2pem_plugin_ros.simulator.faults import TrafficFaults
 
 UNSILENCED = ("cmd_vel",)
-"""What moves the base goes through: a silent vehicle drives on."""
+"""A silent vehicle still receives its commands, and drives on."""
 
 
-class Gate:
-    """Lets messages through, or not. `closed`: its nodes are dead, whatever they still say."""
+class TrafficFilter:
+    """Passes or drops messages. `closed`: its nodes are killed."""
 
-    def __init__(self, troubles: Troubles) -> None:
-        self.troubles = troubles
+    def __init__(self, traffic_faults: TrafficFaults) -> None:
+        self.traffic_faults = traffic_faults
         self.closed = False
 
     def send(self, publisher: Any, leaf: str, message: Any) -> None:
-        """Publish a message, if it may be. `leaf`: the last part of the topic's name."""
-        if not self.closed and (leaf in UNSILENCED or not self.troubles.silent):
+        """Publish a message unless it is dropped. `leaf` is the last part of the topic's name."""
+        if not self.closed and (leaf in UNSILENCED or not self.traffic_faults.silent):
             publisher.publish(message)
 
-    def hears(self, leaf: str, message: Any) -> bool:
-        """Whether a message reaches who has subscribed."""
+    def accepts(self, leaf: str, message: Any) -> bool:
+        """Return whether a message reaches its subscribers."""
         return not self.closed
 
     def made(self, publisher: Any, leaf: str) -> None:
-        """A publisher is there, and has published nothing yet."""
+        """Process a new publisher."""
 
 
-class GuardedPublisher:
-    """A publisher whose messages go through a gate."""
+class FilteredPublisher:
+    """A publisher whose messages pass a filter."""
 
-    def __init__(self, publisher: Any, gate: Gate) -> None:
+    def __init__(self, publisher: Any, traffic_filter: TrafficFilter) -> None:
         self._publisher = publisher
-        self._gate = gate
+        self._traffic_filter = traffic_filter
         self._leaf = leaf(publisher.topic_name)
-        gate.made(publisher, self._leaf)
+        traffic_filter.made(publisher, self._leaf)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._publisher, name)
 
     def publish(self, message: Any) -> None:
-        """Publish a message, if the gate lets it through."""
-        self._gate.send(self._publisher, self._leaf, message)
+        """Publish a message, if the filter passes it."""
+        self._traffic_filter.send(self._publisher, self._leaf, message)
 
 
-class GuardedNode:
-    """A node whose topics go through a gate; everything else is as it was."""
+class FilteredNode:
+    """A node whose topics pass a filter."""
 
-    def __init__(self, node: Any, gate: Gate) -> None:
+    def __init__(self, node: Any, traffic_filter: TrafficFilter) -> None:
         self.inner = node
-        self._gate = gate
+        self._traffic_filter = traffic_filter
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.inner, name)
 
-    def create_publisher(self, *arguments: Any, **options: Any) -> GuardedPublisher:
-        """A publisher behind the gate."""
-        return GuardedPublisher(self.inner.create_publisher(*arguments, **options), self._gate)
+    def create_publisher(self, *arguments: Any, **options: Any) -> FilteredPublisher:
+        return FilteredPublisher(
+            self.inner.create_publisher(*arguments, **options), self._traffic_filter
+        )
 
     def create_subscription(
         self,
@@ -77,22 +79,24 @@ class GuardedNode:
         *arguments: Any,
         **options: Any,
     ) -> Any:
-        """A subscription behind the gate."""
-        gate, name = self._gate, leaf(topic)
+        traffic_filter, name = self._traffic_filter, leaf(topic)
 
         def hear(message: Any) -> None:
-            if gate.hears(name, message):
+            if traffic_filter.accepts(name, message):
                 callback(message)
 
         create = self.inner.create_subscription
         return create(message_type, topic, hear, *arguments, **options)
 
 
-class GuardedRuntime:
-    """A `RosRuntime` for one part of a vehicle: whatever is made with it can be ended together."""
+class FilteredRuntime:
+    """A `RosRuntime` for one part of a vehicle. All that is made with it can be destroyed
+    together."""
 
-    def __init__(self, ros: RosRuntime, gate: Gate, name: str, namespace: str) -> None:
-        self.gate = gate
+    def __init__(
+        self, ros: RosRuntime, traffic_filter: TrafficFilter, name: str, namespace: str
+    ) -> None:
+        self.traffic_filter = traffic_filter
         self._ros = ros
         self._made: list[Any] = []
         self.node = self.make_node(name, namespace)
@@ -100,15 +104,15 @@ class GuardedRuntime:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._ros, name)
 
-    def make_node(self, name: str, namespace: str = "", **options: Any) -> GuardedNode:
-        """A node behind the gate, without services for its parameters unless they are asked for."""
+    def make_node(self, name: str, namespace: str = "", **options: Any) -> FilteredNode:
+        """Make a filtered node. It has no parameter services unless they are requested."""
         options = {"start_parameter_services": False, "enable_rosout": False, **options}
         node = self._ros.make_node(name, namespace, **options)
         self._made.append(node)
-        return GuardedNode(node, self.gate)
+        return FilteredNode(node, self.traffic_filter)
 
-    def drop_node(self, node: GuardedNode) -> None:
-        """End one of them; one that has ended is no more to be ended."""
+    def drop_node(self, node: FilteredNode) -> None:
+        """Destroy a node. It may be destroyed already."""
         if node.inner in self._made:
             self._made.remove(node.inner)
             self._ros.drop_node(node.inner)
@@ -123,32 +127,32 @@ class GuardedRuntime:
         node: Any = None,
         **options: Any,
     ) -> Any:
-        """As that of the runtime; without a node, on our own."""
+        """Subscribe as `RosRuntime.subscribe`; without a node, on the own node."""
         node = node or self.node
         return self._ros.subscribe(message_type, topic, callback, qos, node=node, **options)
 
     def client(self, service_type: Any, name: str, *, node: Any = None) -> Any:
-        """As that of the runtime; without a node, on our own."""
+        """Make a client as `RosRuntime.client`; without a node, on the own node."""
         return self._ros.client(service_type, name, node=node or self.node)
 
     def serve(self, service_type: Any, name: str, handler: Any, *, node: Any = None) -> Any:
-        """As that of the runtime; without a node, on our own."""
+        """Serve as `RosRuntime.serve`; without a node, on the own node."""
         return self._ros.serve(service_type, name, handler, node=node or self.node)
 
     def destroy(self) -> None:
-        """End all nodes, with all that they have: DDS tells the others that they are gone."""
-        self.gate.closed = True
+        """Destroy all nodes. DDS tells the others that they are gone."""
+        self.traffic_filter.closed = True
         for node in self._made:
             self._ros.drop_node(node)
         self._made.clear()
 
     async def close(self) -> None:
-        """The runtime belongs to all vehicles: it stays, our nodes go."""
+        """Destroy the nodes. The runtime itself belongs to all vehicles."""
         self.destroy()
 
 
 def leaf(topic: str) -> str:
-    """The last part of a topic's name."""
+    """Return the last part of a topic's name."""
     return topic.rpartition("/")[2]
 
 
@@ -163,61 +167,61 @@ LIES = (
 )
 LIE_HZ = 2.0
 MOST_AT_ONCE = 500
-"""Of a flood: what is more than that is not made up for when the computer is slow."""
+"""Statuses of a flood at once. More are not caught up on a slow computer."""
 
 
-class NodeGate(Gate):
-    """Lies, floods and does not hear, as the troubles say."""
+class NodeTrafficFilter(TrafficFilter):
+    """Makes a bad node of a good one: lies, floods, and drops START, by the traffic faults."""
 
-    def __init__(self, troubles: Troubles) -> None:
-        super().__init__(troubles)
+    def __init__(self, traffic_faults: TrafficFaults) -> None:
+        super().__init__(traffic_faults)
         self._publisher: Any = None
-        self._said: deque[Any] = deque(maxlen=10)
+        self._recent: deque[Any] = deque(maxlen=10)
         self._numbers = itertools.count(1)
-        self._pace = Pace(LIE_HZ)
+        self._rate_timer = RateTimer(LIE_HZ)
         self._owed = 0.0
 
     def send(self, publisher: Any, leaf: str, message: Any) -> None:
-        """Publish a message, and after a terminal status, while it lies, another one."""
+        """Publish a message, and with the fault `lies`, a contradiction after a terminal status."""
         super().send(publisher, leaf, message)
         if leaf != STATUS:
             return
-        self._said.append(message)
-        if self.troubles.lies and message.state in TERMINAL:
+        self._recent.append(message)
+        if self.traffic_faults.lies and message.state in TERMINAL:
             super().send(publisher, leaf, _contradiction(message))
 
-    def hears(self, leaf: str, message: Any) -> bool:
-        """Whether a message reaches the node."""
-        if self.troubles.deaf and leaf == COMMAND and message.verb == BehaviorCommand.START:
+    def accepts(self, leaf: str, message: Any) -> bool:
+        """Return whether a message reaches the node."""
+        if self.traffic_faults.deaf and leaf == COMMAND and message.verb == BehaviorCommand.START:
             return False
-        return super().hears(leaf, message)
+        return super().accepts(leaf, message)
 
     def made(self, publisher: Any, leaf: str) -> None:
-        """With this it can lie before the node has said anything."""
+        """Keep the publisher, to lie before the node has published."""
         if leaf == STATUS:
             self._publisher = publisher
 
     def step(self, now_s: float, wall_dt_s: float) -> None:
-        """Say what is due by now."""
+        """Publish what is due."""
         if self._publisher is None:
             return
-        if self.troubles.lies and self._pace.is_due(now_s):
+        if self.traffic_faults.lies and self._rate_timer.is_due(now_s):
             self._say(self._invention(next(self._numbers)))
-        if self.troubles.flood_per_s <= 0:
+        if self.traffic_faults.flood_per_s <= 0:
             self._owed = 0.0
             return
-        self._owed = min(self._owed + self.troubles.flood_per_s * wall_dt_s, MOST_AT_ONCE)
+        self._owed = min(self._owed + self.traffic_faults.flood_per_s * wall_dt_s, MOST_AT_ONCE)
         while self._owed >= 1:
             self._owed -= 1
             number = next(self._numbers)
-            said = self._said[number % len(self._said)] if self._said and number % 2 else None
+            said = self._recent[number % len(self._recent)] if self._recent and number % 2 else None
             self._say(said or self._invention(number))
 
     def _say(self, message: Any) -> None:
         super().send(self._publisher, STATUS, message)
 
     def _invention(self, number: int) -> Any:
-        """A status of a behavior that nobody gave it."""
+        """Return a status of a behavior that the node was never given."""
         return BehaviorStatus(
             id=f"never-given-{number}",
             number=1 + number % 7,
@@ -227,7 +231,7 @@ class NodeGate(Gate):
 
 
 def _contradiction(message: Any) -> Any:
-    """The same behavior has ended once more, and otherwise."""
+    """Return a second, different end of the same behavior."""
     succeeded = message.state == BehaviorStatus.SUCCEEDED
     return BehaviorStatus(
         stamp=message.stamp,

@@ -1,4 +1,4 @@
-"""One simulated vehicle without I/O: what is true of it, and what its sensors would say."""
+"""The physical state of a simulated vehicle, and its sensors, without I/O."""
 
 import math
 from collections.abc import Iterator
@@ -7,22 +7,22 @@ from random import Random
 from m2pem.api import GeoPosition
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist
-from m2pem_plugin_ros.simulator.dynamics import Body
+from m2pem_plugin_ros.simulator.dynamics import Dynamics
 from m2pem_plugin_ros.simulator.sensors import Battery, Detector, Found, Odometer
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 
 STEP_S = 0.02
-"""One step of the integration, in simulated time."""
+"""The integration step, in simulated time."""
 
 
 class Vehicle:
-    """`now_s`: simulated seconds since its start. `gps_lost`: its receiver sees no satellites."""
+    """`now_s`: simulated seconds since the start. `gps_lost`: the receiver has no satellites."""
 
     def __init__(self, spec: VehicleSpec, seed: int = 0) -> None:
         self.spec = spec
         self.now_s = 0.0
         self.gps_lost = False
-        self.body = Body(spec.chassis, spec.start)
+        self.body = Dynamics(spec.chassis, spec.start)
         start = spec.start if spec.settings.odom_frame == "map" else Pose(0.0, 0.0, 0.0)
         self.odometer = Odometer(start, spec.inaccuracy, Random(f"{seed}/{spec.name}"))
         self.battery = Battery(spec.capacity, spec.battery)
@@ -32,14 +32,14 @@ class Vehicle:
 
     @property
     def position(self) -> GeoPosition:
-        """Where it really is. The ground is flat: its altitude is that of the origin."""
+        """The true position. The ground is flat, at the altitude of the origin."""
         pose, origin = self.body.pose, self.spec.origin
         place = to_geodetic(pose.east_m, pose.north_m, 0.0, origin)
         return GeoPosition(place.latitude_deg, place.longitude_deg, origin[2] + pose.up_m)
 
     @property
-    def troubles(self) -> tuple[str, ...]:
-        """What its own diagnostics find wrong with it."""
+    def problems(self) -> tuple[str, ...]:
+        """The problems in its own diagnostics."""
         found = {
             "no satellites": self.gps_lost,
             "battery low": self.battery.fraction < 0.2,
@@ -48,11 +48,12 @@ class Vehicle:
         return tuple(text for text, is_so in found.items() if is_so)
 
     def command(self, twist: Twist) -> None:
-        """What comes on cmd_vel."""
+        """Process a message of cmd_vel."""
         self.body.command(twist, self.now_s)
 
     def pass_until(self, now_s: float) -> None:
-        """Move on in whole steps, so that how often this is called changes nothing."""
+        """Advance in whole steps, so that the result does not depend on how often this is
+        called."""
         target = math.floor(now_s / STEP_S + 1e-9)
         while self._steps < target:
             self._steps += 1
@@ -71,8 +72,8 @@ class Vehicle:
             self._found += [(detector, found) for found in detector.find(self.body.pose)]
 
     def detect(self, what: str = "") -> None:
-        """Find something here and now: with the detector of that name, what it usually finds; else
-        such a thing with the first detector.
+        """Make a detection here and now. With the name of a detector, it finds its usual type;
+        otherwise the first detector finds something of type `what`.
 
         Raises:
             ValueError: the vehicle carries no detector.
@@ -86,6 +87,6 @@ class Vehicle:
         self._found.append((detector, found))
 
     def detections(self) -> Iterator[tuple[Detector, Found]]:
-        """What was found since this was asked last."""
+        """Yield the detections since the last call."""
         while self._found:
             yield self._found.pop(0)

@@ -1,4 +1,4 @@
-"""A plain base: it is driven from here, by velocities (docs/ros.md, "A plain base")."""
+"""The driver of a plain base, which takes velocities (docs/ros.md, "A plain base")."""
 
 from m2pem_plugin_ros.drivers.base.driver import BaseDriver
 

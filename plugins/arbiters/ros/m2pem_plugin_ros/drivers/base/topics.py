@@ -1,4 +1,4 @@
-"""The topics of a plain base: velocities out, those of an operator's stick in."""
+"""The topics of a plain base: velocity commands, and those of an operator's joystick."""
 
 import asyncio
 import logging
@@ -13,7 +13,7 @@ from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import Settings
 
 LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-"""An old command is worth nothing, so none waits for another."""
+"""Only the latest command counts."""
 
 ARRIVED_WITHIN_S = 0.5
 
@@ -21,7 +21,7 @@ logger = logging.getLogger(__name__)
 
 
 class CommandTopic:
-    """Tells the base how to move."""
+    """Publishes velocity commands."""
 
     def __init__(self, ros: RosRuntime, settings: Settings) -> None:
         self._node = ros.node
@@ -31,11 +31,9 @@ class CommandTopic:
 
     @property
     def name(self) -> str:
-        """The topic's full name."""
         return str(self._publisher.topic_name)
 
     def send(self, twist: Twist) -> None:
-        """Publish a command."""
         velocity = geometry_msgs.msg.Twist()
         velocity.linear.x = twist.forward_m_s
         velocity.angular.z = twist.yaw_rad_s
@@ -48,11 +46,11 @@ class CommandTopic:
         self._publisher.publish(message)
 
     def others(self) -> int:
-        """How many others publish commands for the base."""
+        """Return how many other nodes publish commands for the base."""
         return max(0, int(self._node.count_publishers(self.name)) - 1)
 
     async def stop(self) -> None:
-        """Tell it to stand, and wait a moment until it has heard that."""
+        """Publish the zero command, and wait until it is acknowledged, or for a short time."""
         self.send(Twist())
         arrived = await asyncio.to_thread(
             self._publisher.wait_for_all_acked, Duration(seconds=ARRIVED_WITHIN_S)
@@ -61,26 +59,26 @@ class CommandTopic:
             logger.warning("%s: the last command, to stand, was not acknowledged", self.name)
 
 
-class StickTopic:
-    """What an operator's stick said last."""
+class TeleopTopic:
+    """The last velocity command of an operator's joystick."""
 
     def __init__(self, ros: RosRuntime, settings: Settings) -> None:
         self._loop = asyncio.get_running_loop()
         self._stamped = settings.stamped
-        self._heard_s = -1e9
+        self._received_s = -1e9
         self.twist: Twist | None = None
         name = settings.topic(settings.topics.teleop)
-        ros.subscribe(_message_type(settings), name, self._hear, qos.TELEMETRY)
+        ros.subscribe(_message_type(settings), name, self._on_message, qos.TELEMETRY)
 
     @property
     def age_s(self) -> float:
-        """In real seconds: the operator is a real one."""
-        return self._loop.time() - self._heard_s
+        """Age in real seconds, as the operator is a real person."""
+        return self._loop.time() - self._received_s
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         twist = message.twist if self._stamped else message
         self.twist = Twist(twist.linear.x, twist.angular.z)
-        self._heard_s = self._loop.time()
+        self._received_s = self._loop.time()
 
 
 def _message_type(settings: Settings) -> Any:

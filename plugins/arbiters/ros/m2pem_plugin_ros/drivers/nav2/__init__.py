@@ -1,4 +1,4 @@
-"""Vehicles that Nav2 steers: its actions are given goals, and nothing else of it is touched."""
+"""The driver of vehicles with Nav2. It uses the actions of Nav2, its state and its speed limit."""
 
 from m2pem_plugin_ros.drivers.nav2.driver import Nav2Driver
 

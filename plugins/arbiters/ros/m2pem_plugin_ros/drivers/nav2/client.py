@@ -1,4 +1,4 @@
-"""Nav2 on one vehicle: whether it is active, what it does, and goals for it."""
+"""A client of Nav2 on one vehicle: its lifecycle state, its activity, and goals for it."""
 
 import asyncio
 import logging
@@ -17,38 +17,43 @@ from m2pem_plugin_ros.installation import require_interfaces
 from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 
 STATE_S = 1.0
-"""Real seconds in which bt_navigator says what state it is in."""
+"""Timeout of the state query to bt_navigator, in real seconds."""
 
-LOOKS = 2
-"""So often it may leave that unanswered before it counts as not there."""
+UNANSWERED = 2
+"""After this many unanswered queries, Nav2 counts as not there."""
 
-RIVAL_S = 0.5
-"""Real seconds in which the goal that took the place of ours is heard of, on another topic."""
+OTHER_CLIENT_S = 0.5
+"""After our goal was aborted, the goal of another client is awaited for this time, in real
+seconds."""
 
 LOOK_S = 0.05
 
 
 class Nav2:
-    """`namespace`: of the vehicle. `heard` is called whenever Nav2 says something, once it was
-    `looked_at`.
+    """A client of the Nav2 in `namespace`. `on_activity` is called with each message of Nav2, after
+    `has_answered`.
 
     Raises:
         RosError: nav2_msgs is not installed.
     """
 
     def __init__(
-        self, ros: RosRuntime, namespace: str, heard: Callable[[], None], logger: logging.Logger
+        self,
+        ros: RosRuntime,
+        namespace: str,
+        on_activity: Callable[[], None],
+        logger: logging.Logger,
     ) -> None:
         self.messages = require_interfaces("nav2_msgs")
         self._ros = ros
-        self._told = heard
+        self._on_activity_reported = on_activity
         self._logger = logger
         self._name = namespace.rstrip("/")
-        self._heard_at_s = self._now_s()
+        self._last_activity_s = self._now_s()
         self._ours: set[UUID] = set()
         self._limit_m_s: float | None = None
         self.state = ""
-        self._looks = 0
+        self._refreshes = 0
         actions = self.messages.action
         self.to_pose = self._client(actions.NavigateToPose, "navigate_to_pose")
         self.through_poses = self._client(actions.NavigateThroughPoses, "navigate_through_poses")
@@ -63,37 +68,36 @@ class Nav2:
 
     @property
     def is_active(self) -> bool:
-        """Whether it takes goals."""
-        return not self.trouble
+        """Whether Nav2 accepts goals."""
+        return not self.problem
 
     @property
-    def looked_at(self) -> bool:
-        """Whether it has answered by now, or had the time to: who is told of it may give it an
-        order at once. An answer may get lost while DDS finds who is there."""
-        return bool(self.state) or self._looks >= LOOKS
+    def has_answered(self) -> bool:
+        """Whether Nav2 has answered, or had the time to. Answers may be lost during discovery."""
+        return bool(self.state) or self._refreshes >= UNANSWERED
 
     @property
-    def trouble(self) -> str:
-        """Why it takes no goals; "" if it does."""
+    def problem(self) -> str:
+        """Why Nav2 accepts no goals; "" if it does."""
         if not self.state:
             return "Nav2 is not heard"
         return "" if self.state == "active" else f"Nav2 is not active: {self.state}"
 
     @property
     def silent_s(self) -> float:
-        """For how many real seconds nothing was heard of it."""
-        return self._now_s() - self._heard_at_s
+        """Real seconds since the last message."""
+        return self._now_s() - self._last_activity_s
 
     @property
     def doing(self) -> str:
-        """The action that it carries out, or "idle"."""
+        """The name of the action that is executed, or "idle"."""
         for client in self._clients():
             if client.active:
                 return client.name.rpartition("/")[2]
         return "idle"
 
-    async def look(self) -> None:
-        """Ask it for its state, and notice one that was started anew. To be called once a second.
+    async def refresh(self) -> None:
+        """Query the lifecycle state, and detect a restart. Call it once a second.
 
         Raises:
             RosError: the connection was closed.
@@ -106,18 +110,18 @@ class Nav2:
             state = answer.current_state
             active = state.id == State.PRIMARY_STATE_ACTIVE
             self.state = "active" if active else state.label or f"state {state.id}"
-        self._looks += 1
+        self._refreshes += 1
         if self.state:
-            self._heard()
+            self._on_activity()
         for client in self._clients():
-            client.look_for_server()
+            client.refresh_server()
 
-    def rival(self) -> str:
-        """The action by which Nav2 drives for somebody else; "" if it does not."""
-        return self._rival((self.waypoints, self.through_poses, self.to_pose))
+    def other_client(self) -> str:
+        """Return the action that Nav2 executes for another client; "" if there is none."""
+        return self._other_client((self.waypoints, self.through_poses, self.to_pose))
 
     def ours(self) -> set[UUID]:
-        """Goals that it was given here, and that go on."""
+        """Return the goals of this client that go on."""
         return {goal for client in self._clients() for goal in client.active & self._ours}
 
     # --- what it is to do -----------------------------------------------------------------------
@@ -125,34 +129,34 @@ class Nav2:
     async def drive(
         self, client: GoalClient, goal_id: UUID, goal: Any, begun: Callable[[], None]
     ) -> Any:
-        """Have a goal carried out in place of what is done; returns its result when it succeeded.
+        """Send a goal in place of all others, and return its result when it succeeded.
 
         Raises:
             NavigationError: it did not succeed.
             RosError: Nav2 does not answer.
         """
-        await self._make_way(client)
+        await self._stop_others(client)
         self._ours = self._ours & client.active | {goal_id}
         try:
             accepted = await client.send(goal_id, goal)
         except RosTimeoutError as error:
             raise NavigationError(f"Nav2 does not answer: {error}") from error
         if not accepted:
-            why = self.trouble or "it said no"
+            why = self.problem or "it said no"
             rejected = BehaviorState.REJECTED
             raise NavigationError(f"Nav2 rejected the goal: {why}", "REJECTED", rejected)
         begun()
         return await self.finish(client, goal_id)
 
     async def finish(self, client: GoalClient, goal_id: UUID) -> Any:
-        """Wait for the end of a goal that Nav2 has; returns its result when it succeeded.
+        """Wait for the end of a goal that Nav2 has, and return its result when it succeeded.
 
         Raises:
             NavigationError: it did not succeed.
         """
         self._ours.add(goal_id)
         ended = await client.result(goal_id)
-        self._heard()
+        self._on_activity()
         if ended.status == GoalStatus.STATUS_SUCCEEDED:
             return ended.result
         if ended.status == GoalStatus.STATUS_CANCELED:
@@ -162,18 +166,19 @@ class Nav2:
         raise NavigationError("Nav2 knows nothing of its goal any more: it was started anew")
 
     async def why_aborted(self, client: GoalClient, result: Any) -> NavigationError:
-        """Why a goal of ours was aborted, by its result, and by what else is going on."""
+        """Return why a goal of this client was aborted, by its result and by the goals of
+        others."""
         if int(getattr(result, "error_code", 0)) == 0:
             # Nav2 says nothing to who is preempted, or when it is deactivated.
-            if rival := await self._awaited_rival(client):
-                return taken_over(f"somebody else has given Nav2 another goal: {rival}")
-            await self.look()
+            if other_client := await self._wait_for_other_client(client):
+                return taken_over(f"somebody else has given Nav2 another goal: {other_client}")
+            await self.refresh()
             if not self.is_active:
-                return NavigationError(f"Nav2 gave it up: {self.trouble}")
+                return NavigationError(f"Nav2 gave it up: {self.problem}")
         return aborted(result)
 
     async def stop(self) -> None:
-        """Cancel all that it does, whoever has asked for it, and wait until that has ended.
+        """Cancel all goals, of any client, and wait until they have ended.
 
         Raises:
             RosError: it does not answer, or does not stop.
@@ -181,7 +186,7 @@ class Nav2:
         await self._all([client for client in self._clients() if client.there or client.active])
 
     async def stop_ours(self, which: Callable[[UUID], bool] = lambda _: True) -> None:
-        """Cancel what it was given here, and leave the rest.
+        """Cancel goals of this client, and leave the others.
 
         Raises:
             RosError: it does not answer, or does not stop.
@@ -191,7 +196,7 @@ class Nav2:
                 await client.cancel(goal)
 
     def limit_speed(self, speed_m_s: float | None) -> None:
-        """Set the highest speed; None takes back what was set before."""
+        """Set the highest speed; None removes the limit that was set before."""
         if speed_m_s is None and self._limit_m_s is None:
             return  # there may be limits of others, which are left alone
         self._limit_m_s = speed_m_s
@@ -206,13 +211,14 @@ class Nav2:
     # --- inside ---------------------------------------------------------------------------------
 
     def _client(self, action: Any, name: str) -> GoalClient:
-        return GoalClient(self._ros, action, f"{self._name}/{name}", self._heard)
+        return GoalClient(self._ros, action, f"{self._name}/{name}", self._on_activity)
 
     def _clients(self) -> tuple[GoalClient, ...]:
         return self.waypoints, self.through_poses, self.to_pose, self.back_up
 
-    async def _make_way(self, client: GoalClient) -> None:
-        """Only bt_navigator lets a new goal take the place of one, and only of the same action."""
+    async def _stop_others(self, client: GoalClient) -> None:
+        """Cancel the goals of other actions. bt_navigator preempts only goals of the same
+        action."""
         preempts = client in (self.to_pose, self.through_poses) and not self.waypoints.active
         others = [c for c in self._clients() if c.busy and not (preempts and c is client)]
         if preempts and client.active:
@@ -223,7 +229,8 @@ class Nav2:
             raise NavigationError(f"Nav2 does not end what it does: {error}") from error
 
     async def _all(self, clients: list[GoalClient]) -> None:
-        """The waypoint follower first: goals that it has given itself end with what it does."""
+        """Cancel the waypoint follower first: the goals that it gives to the navigator end with
+        it."""
         failed: list[BaseException] = []
         for some in (
             [client for client in clients if client is self.waypoints],
@@ -234,26 +241,27 @@ class Nav2:
         if failed:
             raise failed[0]
 
-    async def _awaited_rival(self, client: GoalClient) -> str:
+    async def _wait_for_other_client(self, client: GoalClient) -> str:
         clients = (self.waypoints, self.through_poses, self.to_pose, client)
-        deadline_s = self._now_s() + RIVAL_S
-        while not (rival := self._rival(clients)) and self._now_s() < deadline_s:  # noqa: ASYNC110
+        deadline_s = self._now_s() + OTHER_CLIENT_S
+        while not (other_client := self._other_client(clients)) and self._now_s() < deadline_s:  # noqa: ASYNC110
             await asyncio.sleep(LOOK_S)
-        return rival
+        return other_client
 
-    def _rival(self, clients: Iterable[GoalClient]) -> str:
-        """Goals that Nav2 gives itself are nobody's: the waypoint follower those of navigation,
-        and navigation those of backing up."""
+    def _other_client(self, clients: Iterable[GoalClient]) -> str:
+        """Return the action of another client. Goals that Nav2 gives to itself do not count: those
+        of the waypoint follower to the navigator, and those of the navigator to the behavior
+        server."""
         follows = self._ours & self.waypoints.active
         for client in clients:
             if not (follows and client is self.to_pose) and client.active - self._ours:
                 return client.name
         return ""
 
-    def _heard(self) -> None:
-        self._heard_at_s = self._now_s()
-        if self.looked_at:
-            self._told()
+    def _on_activity(self) -> None:
+        self._last_activity_s = self._now_s()
+        if self.has_answered:
+            self._on_activity_reported()
 
     @staticmethod
     def _now_s() -> float:

@@ -1,4 +1,4 @@
-"""How a goal of Nav2 ended, in the words of missions."""
+"""Errors of Nav2 goals, translated to the error codes of missions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -58,7 +58,8 @@ _OTHER = {
 
 
 class NavigationError(Exception):
-    """The order cannot be done, or not any more. `code` is one of docs/missions.md."""
+    """The order cannot be done, or cannot be continued. `code` is an error code of
+    docs/missions.md."""
 
     def __init__(
         self, reason: str, code: str = "FAILED", state: BehaviorState = BehaviorState.FAILED
@@ -70,12 +71,13 @@ class NavigationError(Exception):
 
 
 def taken_over(reason: str) -> NavigationError:
-    """Somebody else has Nav2 do something: nothing more is sent."""
+    """Another client commands Nav2: nothing more is sent."""
     return NavigationError(reason, "TAKEN_OVER")
 
 
 def aborted(result: Any) -> NavigationError:
-    """What an aborted goal's result says. Not all releases of Nav2 have all fields."""
+    """Return the error of an aborted goal, by its result. Some releases of Nav2 lack some
+    fields."""
     error_code = int(getattr(result, "error_code", 0))
     message = str(getattr(result, "error_msg", "")).strip()
     meaning = _BLOCKED.get(error_code) or _LATE.get(error_code) or _OTHER.get(error_code)
@@ -90,7 +92,7 @@ def aborted(result: Any) -> NavigationError:
 
 
 def missed(waypoints: Sequence[Any]) -> NavigationError:
-    """Waypoints that were left out by a goal that succeeded all the same."""
+    """Return the error for waypoints that were skipped by a goal that succeeded."""
     numbers = [int(getattr(w, "index", getattr(w, "waypoint_index", 0))) + 1 for w in waypoints]
     which = ", ".join(str(number) for number in numbers)
     errors = sorted({int(getattr(w, "error_code", 0)) for w in waypoints} - {0})

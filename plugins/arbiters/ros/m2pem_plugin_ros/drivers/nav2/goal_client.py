@@ -1,7 +1,7 @@
-"""One action of Nav2: goals are sent, watched and cancelled, whoever has sent them.
+"""A client of one Nav2 action: sends, observes and cancels goals, also those of other clients.
 
-It speaks to the services and topics of the action itself. rclpy's client knows only goals that it
-has sent, while after a restart, or a takeover, it is the others that matter.
+It uses the services and topics of the action directly. The client of rclpy knows only the goals
+that it has sent, but goals of other processes matter after a restart or a takeover.
 """
 
 import asyncio
@@ -17,13 +17,13 @@ from unique_identifier_msgs import msg as unique_identifier
 from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 
 ANSWER_S = 3.0
-"""Real seconds in which Nav2 answers, or is not there."""
+"""Timeout of `send`, in real seconds."""
 
 CANCEL_S = 2.0
-"""Real seconds in which Nav2 says that it cancels, and then in which a goal has ended."""
+"""Timeout of a cancel, and then of the end of the goal, in real seconds."""
 
 FOREVER_S = 1e9
-"""A result is waited for as long as the vehicle drives."""
+"""A result is awaited as long as the vehicle drives."""
 
 ACTIVE = frozenset(
     {GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING, GoalStatus.STATUS_CANCELING}
@@ -31,24 +31,26 @@ ACTIVE = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
-    """How a goal ended: a status of action_msgs/GoalStatus (UNKNOWN: the server knows no such
-    goal), and the action's result."""
+class GoalResult:
+    """How a goal ended: a status of action_msgs/GoalStatus (UNKNOWN: the server does not know the
+    goal), and the result of the action."""
 
     status: int
     result: Any
 
 
 class GoalClient:
-    """`name`: of the action, with the namespace. `heard` is called whenever it says something;
-    `feedback(goal, feedback)` with the feedback of any goal."""
+    """`name` is the full name of the action. `on_activity` is called with each message. `feedback`
+    is called with the goal and the feedback of any goal."""
 
-    def __init__(self, ros: RosRuntime, action: Any, name: str, heard: Callable[[], None]) -> None:
+    def __init__(
+        self, ros: RosRuntime, action: Any, name: str, on_activity: Callable[[], None]
+    ) -> None:
         self.name = name
         self.action = action
         self.feedback: Callable[[UUID, Any], None] = lambda _, __: None
         self._ros = ros
-        self._heard = heard
+        self._on_activity = on_activity
         self._sending: dict[UUID, asyncio.Task[bool]] = {}
         self._statuses: dict[UUID, int] = {}
         self._open: set[UUID] = set()
@@ -67,27 +69,27 @@ class GoalClient:
 
     @property
     def there(self) -> bool:
-        """Whether a server of the action is seen."""
+        """Whether a server of the action is discovered."""
         return bool(self._send_client.service_is_ready())
 
     @property
     def statuses(self) -> dict[UUID, int]:
-        """All goals that the server told of last, whoever sent them."""
+        """The last status of all goals, of any client."""
         return self._statuses
 
     @property
     def active(self) -> set[UUID]:
-        """Goals that go on, or may go on, as far as is known."""
+        """Goals that go on, or may go on."""
         told = {goal for goal, status in self._statuses.items() if status in ACTIVE}
         return told | self._open
 
     @property
     def busy(self) -> bool:
-        """Whether a goal goes on, or is just being sent."""
+        """Whether a goal goes on, or is being sent."""
         return bool(self._sending or self.active)
 
-    def look_for_server(self) -> None:
-        """Notice another server than before: it knows nothing of goals that the old one had."""
+    def refresh_server(self) -> None:
+        """Detect another server than before. It does not know the goals of the old one."""
         endpoints = self._ros.node.get_publishers_info_by_topic(self._status_topic)
         writers = frozenset(bytes(endpoint.endpoint_gid) for endpoint in endpoints)
         if not writers:
@@ -101,9 +103,9 @@ class GoalClient:
     # --- what is asked --------------------------------------------------------------------------
 
     async def send(self, goal_id: UUID, goal: Any) -> bool:
-        """Send a goal, in place of what the action does; returns whether it was accepted.
+        """Send a goal, and return whether it was accepted. The server preempts its current goal.
 
-        Who is cancelled while waiting here has sent it all the same: `cancel` reckons with it.
+        If the caller is cancelled, the goal is sent all the same, and `cancel` cancels it.
 
         Raises:
             RosError: no answer came.
@@ -114,8 +116,8 @@ class GoalClient:
         task.add_done_callback(lambda done: self._sent(goal_id, done))
         return await asyncio.shield(task)
 
-    async def result(self, goal_id: UUID, timeout_s: float | None = None) -> Ended:
-        """How a goal ended, when it has. A server that was started anew is asked again.
+    async def result(self, goal_id: UUID, timeout_s: float | None = None) -> GoalResult:
+        """Return how a goal ended, when it has. A restarted server is asked again.
 
         Raises:
             RosTimeoutError: it did not end in time.
@@ -128,10 +130,10 @@ class GoalClient:
             what = f"{self.name}: goal {goal_id} has not ended within {timeout_s} s"
             raise RosTimeoutError(what) from error
         self._open.discard(goal_id)
-        return Ended(int(answer.status), answer.result)
+        return GoalResult(int(answer.status), answer.result)
 
     async def cancel(self, goal_id: UUID | None = None) -> None:
-        """Cancel a goal, or all goals, also foreign ones, and wait until they have ended.
+        """Cancel a goal, or all goals of any client, and wait until they have ended.
 
         Raises:
             RosError: no answer came, or a goal does not end.
@@ -164,7 +166,7 @@ class GoalClient:
         self._sending.pop(goal_id, None)
         if task.cancelled() or task.exception() is not None:
             return  # whether it has an effect is not known
-        self._heard()
+        self._on_activity()
         if not task.result():
             self._open.discard(goal_id)
 
@@ -184,7 +186,7 @@ class GoalClient:
                 await asyncio.gather(ask, renewed, return_exceptions=True)
 
     def _on_status(self, message: Any) -> None:
-        self._heard()
+        self._on_activity()
         self._statuses = {
             UUID(bytes=bytes(status.goal_info.goal_id.uuid)): int(status.status)
             for status in message.status_list
@@ -192,7 +194,7 @@ class GoalClient:
         self._open -= {goal for goal, status in self._statuses.items() if status not in ACTIVE}
 
     def _on_feedback(self, message: Any) -> None:
-        self._heard()
+        self._on_activity()
         self.feedback(UUID(bytes=bytes(message.goal_id.uuid)), message.feedback)
 
 
@@ -204,11 +206,12 @@ _NUMBERS = (1 << 32) - 1
 
 
 def numbered(order: UUID, number: int) -> UUID:
-    """The goal of that number, from 0 to 2**32 - 1."""
+    """Return the id of a goal of an order. Goal 0 has the id of the order. Goal n differs only in
+    the last four bytes, so that `number_of` recognizes it after a restart."""
     return UUID(int=order.int ^ (number & _NUMBERS))
 
 
 def number_of(order: UUID, goal: UUID) -> int | None:
-    """Which goal of the order it is; None: it is none of them."""
+    """Return the number of a goal of the order; None if it is not one of them."""
     difference = order.int ^ goal.int
     return difference if difference <= _NUMBERS else None

@@ -17,7 +17,7 @@ from m2pem.api import (
 )
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
 from m2pem_plugin_ros.frames import to_local
-from m2pem_plugin_ros.pose import Pose, bow_rad
+from m2pem_plugin_ros.pose import Pose, known_yaw_rad
 
 STALE_S = 3.0
 """Where a vehicle was so long ago, it need not be any more."""
@@ -55,7 +55,7 @@ class LocalParameters(BehaviorParameters):
             raise NavigationError(f"{vehicle} has not been heard for {STALE_S:g} s")
         position = state.position
         place = self._at(position.latitude_deg, position.longitude_deg)
-        return replace(place, yaw_rad=bow_rad(state))
+        return replace(place, yaw_rad=known_yaw_rad(state))
 
     def route_poses(self) -> list[Pose]:
         """`route`, each pose in the direction of the next."""

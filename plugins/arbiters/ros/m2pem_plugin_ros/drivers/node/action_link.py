@@ -1,4 +1,4 @@
-"""An m2pem node that is commanded by the action `execute_behavior`."""
+"""Commands an m2pem node by the action `execute_behavior`."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -12,25 +12,25 @@ from m2pem_interfaces.action import ExecuteBehavior
 from unique_identifier_msgs import msg as unique_identifier
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.node.link import (
-    LOOK_WITHIN_S,
+    QUERY_WITHIN_S,
     REMEMBERED,
     RESTARTED,
     STILL_S,
-    Insisting,
+    Retries,
 )
 from m2pem_plugin_ros.interfaces.behavior_command import start_command
 from m2pem_plugin_ros.interfaces.behavior_status import ENDS, read_status
 from m2pem_plugin_ros.interfaces.key_values import WireError
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 
 CALL_S = 2.0
-"""Of real time, for a service that answers at once."""
+"""Timeout of a service that answers at once, in real seconds."""
 
 ATTEMPTS = 5
-"""So many unanswered goals, while the node is heard, and it will not do it."""
+"""After this many unanswered goals to a node that is received, the order fails."""
 
 CANCELS = action_services.CancelGoal.Response.ERROR_NONE
 
@@ -42,13 +42,13 @@ _ENDS = {
 
 
 @dataclass(slots=True)
-class _Pursued:
-    """A goal. `heard`: the node has it. `answered`: whether the node has it is known. `news`: set
-    when it was shown to have ended, or when it should be asked for."""
+class _PendingGoal:
+    """A goal. `acknowledged`: the node has it. `answered`: it is known whether the node has it.
+    `news`: set when it has ended, or when its result is to be requested."""
 
     goal: UUID
     order: Order | None
-    heard: bool = False
+    acknowledged: bool = False
     answered: bool = False
     cancelled: bool = False
     over: bool = False
@@ -57,16 +57,14 @@ class _Pursued:
     news: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-class ByAction:
-    """Implements `Link`."""
-
-    def __init__(self, seat: Seat, name: str, complaints: Complaints) -> None:
-        self._seat = seat
-        self._complaints = complaints
-        self._client = GoalClient(seat.ros, name, Listeners(self._status, self._feedback))
-        self._pauses = Insisting(seat.context.clock)
-        self._current: _Pursued | None = None
-        self._pursued: dict[UUID, _Pursued] = {}
+class ActionLink:
+    def __init__(self, setup: DriverSetup, name: str, log_throttle: LogThrottle) -> None:
+        self._setup = setup
+        self._log_throttle = log_throttle
+        self._client = GoalClient(setup.ros, name, Listeners(self._status, self._feedback))
+        self._pauses = Retries(setup.context.clock)
+        self._current: _PendingGoal | None = None
+        self._pending: dict[UUID, _PendingGoal] = {}
         self._shown: dict[UUID, int] = {}
         self._goals_shown = asyncio.Event()
         self._ended: dict[UUID, Outcome] = {}
@@ -75,37 +73,36 @@ class ByAction:
 
     @property
     def order(self) -> Order | None:
-        """What the vehicle is to do now."""
         return self._current.order if self._current is not None else None
 
     # --- what is asked of the vehicle -----------------------------------------------------------
 
     def begin(self, order: Order) -> None:
-        """Send the goal, until it is answered."""
+        """Send the goal until it is answered."""
         self._let_go()
-        pursued = self._pursue(order.goal, order)
-        self._current = pursued
+        pending = self._add_pending(order.goal, order)
+        self._current = pending
         self._node_is_heard = False
-        self._run(self._give(pursued, order))
+        self._run(self._give(pending, order))
 
     def end(self, goal: UUID) -> None:
-        """Cancel the goal, until it has ended."""
+        """Cancel the goal until it has ended."""
         if (outcome := self._ended.get(goal)) is not None:
-            self._seat.told.ended(goal, outcome)
+            self._setup.events.ended(goal, outcome)
             return
-        pursued = self._pursued.get(goal)
-        if pursued is None:
-            pursued = self._pursue(goal, None)
-            pursued.answered = True  # not given by us; if it is unknown, that is its end
-            self._run(self._attend(pursued))
-        if not pursued.cancelled:
-            pursued.cancelled = True
-            self._run(self._cancel(pursued))
+        pending = self._pending.get(goal)
+        if pending is None:
+            pending = self._add_pending(goal, None)
+            pending.answered = True  # not given by us; if it is unknown, that is its end
+            self._run(self._attend(pending))
+        if not pending.cancelled:
+            pending.cancelled = True
+            self._run(self._cancel(pending))
 
-    async def look(self, order: Order) -> Outcome:
-        """What the topic of goals shows, or else what the node answers."""
+    async def query(self, order: Order) -> Outcome:
+        """Return the state of a goal by the status topic, or by its result."""
         create = asyncio.get_running_loop().create_task
-        asked = create(self._client.result(order.goal, LOOK_WITHIN_S))
+        asked = create(self._client.result(order.goal, QUERY_WITHIN_S))
         shown = create(self._shown_active(order.goal))  # of such a goal, no result comes
         try:
             await asyncio.wait([asked, shown], return_when=asyncio.FIRST_COMPLETED)
@@ -114,7 +111,7 @@ class ByAction:
                 return Outcome(BehaviorState.RUNNING)
             number, status = asked.result()
         except RosTimeoutError:
-            reason = f"the vehicle's node did not answer within {LOOK_WITHIN_S:g} s"
+            reason = f"the vehicle's node did not answer within {QUERY_WITHIN_S:g} s"
             return Outcome(BehaviorState.UNKNOWN, reason=reason)
         finally:
             for task in (asked, shown):
@@ -132,41 +129,40 @@ class ByAction:
     def _adopt(self, order: Order) -> None:
         if self._current is None or self._current.goal != order.goal:
             self._let_go()
-            pursued = self._current = self._pursue(order.goal, order)
-            pursued.heard = pursued.answered = True
-            self._run(self._attend(pursued))
+            pending = self._current = self._add_pending(order.goal, order)
+            pending.acknowledged = pending.answered = True
+            self._run(self._attend(pending))
 
-    def forget(self) -> None:
-        """Nothing is asked any more."""
-        for pursued in self._pursued.values():
-            pursued.over = True
+    def abandon(self) -> None:
+        for pending in self._pending.values():
+            pending.over = True
         for task in self._tasks:
             task.cancel()
-        self._pursued.clear()
+        self._pending.clear()
         self._current = None
 
     async def close(self) -> None:
-        """Ask nothing more."""
         tasks = list(self._tasks)
-        self.forget()
+        self.abandon()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     # --- what the vehicle says ------------------------------------------------------------------
 
     def vehicle_does(self, behavior: str) -> None:
-        """If it is not what it should do, ask: a node may have been restarted."""
+        """Request the result of the current goal if the vehicle does something else: its node may
+        have restarted."""
         self._node_is_heard = True
-        for each in self._pursued.values():
+        for each in self._pending.values():
             if behavior == str(each.goal):
-                each.shown_us = self._seat.context.clock.now_us()
-        pursued = self._current
-        if pursued is None:
+                each.shown_us = self._setup.context.clock.now_us()
+        pending = self._current
+        if pending is None:
             return
-        if behavior == str(pursued.goal):
-            pursued.heard = True
-            self._seat.told.progress(pursued.goal)
-        elif pursued.heard:
-            pursued.news.set()
+        if behavior == str(pending.goal):
+            pending.acknowledged = True
+            self._setup.events.progress(pending.goal)
+        elif pending.acknowledged:
+            pending.news.set()
 
     def _status(self, goal: UUID, number: int) -> None:
         self._shown.pop(goal, None)
@@ -174,58 +170,59 @@ class ByAction:
         if len(self._shown) > REMEMBERED:
             del self._shown[next(iter(self._shown))]
         self._goals_shown.set()
-        pursued = self._pursued.get(goal)
-        if pursued is not None:
-            pursued.heard = True
+        pending = self._pending.get(goal)
+        if pending is not None:
+            pending.acknowledged = True
             if number not in ACTIVE:
-                pursued.news.set()
+                pending.news.set()
 
     def _feedback(self, goal: UUID, message: Any) -> None:
-        pursued = self._pursued.get(goal)
-        if pursued is None:
+        pending = self._pending.get(goal)
+        if pending is None:
             return
-        self._seat.told.heard()
+        self._setup.events.alive()
         try:
             status = read_status(message)
         except WireError as error:
-            self._complaints.add("feedback that cannot be", str(error))
+            self._log_throttle.log("feedback that cannot be", str(error))
             return
-        if status.id != str(goal) or status.number <= pursued.number:
+        if status.id != str(goal) or status.number <= pending.number:
             return
-        pursued.number = status.number
+        pending.number = status.number
         if status.state is BehaviorState.RUNNING:
-            self._seat.told.progress(goal)
+            self._setup.events.progress(goal)
 
     # --- one goal -------------------------------------------------------------------------------
 
-    async def _give(self, pursued: _Pursued, order: Order) -> None:
-        command = start_command(order, self._seat.context.clock.now_us())
+    async def _give(self, pending: _PendingGoal, order: Order) -> None:
+        command = start_command(order, self._setup.context.clock.now_us())
         attempts = 0
-        while not (pursued.heard or pursued.over):
-            if pursued.cancelled and attempts:
+        while not (pending.acknowledged or pending.over):
+            if pending.cancelled and attempts:
                 break  # it may have arrived; `_cancel` finds out
             try:
-                accepted = await self._client.send(pursued.goal, command, CALL_S)
+                accepted = await self._client.send(pending.goal, command, CALL_S)
             except RosTimeoutError:
                 attempts += self._node_is_heard
-                if attempts >= ATTEMPTS and not pursued.cancelled:
-                    self._give_up(pursued)
+                if attempts >= ATTEMPTS and not pending.cancelled:
+                    self._give_up(pending)
                     return
                 continue
-            if accepted or await self._is_known(pursued.goal):
-                pursued.heard = True
+            if accepted or await self._is_known(pending.goal):
+                pending.acknowledged = True
             else:
                 reason = "the vehicle's node refused the goal"
-                self._over(pursued, Outcome(BehaviorState.REJECTED, "REJECTED", reason))
-        pursued.answered = True
-        await self._attend(pursued)
+                self._over(pending, Outcome(BehaviorState.REJECTED, "REJECTED", reason))
+        pending.answered = True
+        await self._attend(pending)
 
-    def _give_up(self, pursued: _Pursued) -> None:
+    def _give_up(self, pending: _PendingGoal) -> None:
         reason = "the vehicle's node is there, and does not answer to goals"
-        self._over(pursued, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
+        self._over(pending, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
 
     async def _is_known(self, goal: UUID) -> bool:
-        """A goal that was sent again is refused, as it is there already."""
+        """Return whether the node has a goal that it refused. It refuses a goal that was sent
+        twice."""
         if goal in self._shown:
             return True
         try:
@@ -234,76 +231,76 @@ class ByAction:
             return True  # it goes on: of others, the answer would have come at once
         return bool(number != action.GoalStatus.STATUS_UNKNOWN)
 
-    async def _attend(self, pursued: _Pursued) -> None:
-        """Wait until there are news, and ask."""
-        while not pursued.over:
-            await pursued.news.wait()
-            pursued.news.clear()
+    async def _attend(self, pending: _PendingGoal) -> None:
+        """Request the result of a goal whenever there is news, until it has ended."""
+        while not pending.over:
+            await pending.news.wait()
+            pending.news.clear()
             try:
-                number, status = await self._client.result(pursued.goal, CALL_S)
+                number, status = await self._client.result(pending.goal, CALL_S)
             except RosTimeoutError:
-                if self._shown.get(pursued.goal, action.GoalStatus.STATUS_EXECUTING) not in ACTIVE:
-                    pursued.news.set()  # it has ended, and how is not known yet
+                if self._shown.get(pending.goal, action.GoalStatus.STATUS_EXECUTING) not in ACTIVE:
+                    pending.news.set()  # it has ended, and how is not known yet
                 continue
             if number != action.GoalStatus.STATUS_UNKNOWN:
-                self._over(pursued, self._outcome(pursued.goal, number, status))
-            elif self._goes_on(pursued):
+                self._over(pending, self._outcome(pending.goal, number, status))
+            elif self._goes_on(pending):
                 cause = "another node in its namespace knows nothing of what it does"
-                self._complaints.add(cause, str(pursued.goal))
+                self._log_throttle.log(cause, str(pending.goal))
                 await self._pauses.pause()
-                pursued.news.set()
-            elif pursued.cancelled:
-                self._over(pursued, Outcome(BehaviorState.CANCELLED, reason=RESTARTED))
+                pending.news.set()
+            elif pending.cancelled:
+                self._over(pending, Outcome(BehaviorState.CANCELLED, reason=RESTARTED))
             else:
-                self._over(pursued, Outcome(BehaviorState.LOST, "LINK_LOST", RESTARTED))
+                self._over(pending, Outcome(BehaviorState.LOST, "LINK_LOST", RESTARTED))
 
-    def _goes_on(self, pursued: _Pursued) -> bool:
-        """Whether vehicle_status said so just now: then it is another node that does not know."""
-        if pursued.shown_us is None:
+    def _goes_on(self, pending: _PendingGoal) -> bool:
+        """Whether vehicle_status reported the goal just now. Then another node answered UNKNOWN."""
+        if pending.shown_us is None:
             return False
-        return self._seat.context.clock.now_us() - pursued.shown_us < STILL_S * 1e6
+        return self._setup.context.clock.now_us() - pending.shown_us < STILL_S * 1e6
 
-    async def _cancel(self, pursued: _Pursued) -> None:
-        while not pursued.over:
+    async def _cancel(self, pending: _PendingGoal) -> None:
+        while not pending.over:
             try:
-                code = await self._client.cancel(pursued.goal, CALL_S)
+                code = await self._client.cancel(pending.goal, CALL_S)
             except RosTimeoutError:
                 continue
-            if code != CANCELS and pursued.answered:
-                pursued.news.set()  # it has ended, or was never there
+            if code != CANCELS and pending.answered:
+                pending.news.set()  # it has ended, or was never there
             await self._pauses.pause()
 
     # --- inside ---------------------------------------------------------------------------------
 
     @property
     def _name(self) -> str:
-        return self._seat.connection.resource
+        return self._setup.connection.resource
 
-    def _pursue(self, goal: UUID, order: Order | None) -> _Pursued:
+    def _add_pending(self, goal: UUID, order: Order | None) -> _PendingGoal:
         self._ended.pop(goal, None)
-        pursued = self._pursued[goal] = _Pursued(goal, order)
-        return pursued
+        pending = self._pending[goal] = _PendingGoal(goal, order)
+        return pending
 
     def _let_go(self) -> None:
-        """What it did is not told of any more: another takes over."""
-        for goal, pursued in self._pursued.items():
-            pursued.over = True
+        """Drop all goals, as another order replaces them."""
+        for goal, pending in self._pending.items():
+            pending.over = True
             self._remember(goal, Outcome(BehaviorState.CANCELLED, reason="another took over"))
         for task in self._tasks:
             task.cancel()
-        self._pursued.clear()
+        self._pending.clear()
         self._current = None
 
-    def _over(self, pursued: _Pursued, outcome: Outcome) -> None:
-        if pursued.over:
+    def _over(self, pending: _PendingGoal, outcome: Outcome) -> None:
+        if pending.over:
             return
-        pursued.over = True
-        pursued.news.set()
-        self._pursued.pop(pursued.goal, None)
-        if self._current is pursued:
+        pending.over = True
+        pending.news.set()
+        self._pending.pop(pending.goal, None)
+        if self._current is pending:
             self._current = None
-        self._remember(pursued.goal, outcome)
-        self._seat.told.ended(pursued.goal, outcome)
+        self._remember(pending.goal, outcome)
+        self._setup.events.ended(pending.goal, outcome)
 
     def _remember(self, goal: UUID, outcome: Outcome) -> None:
         self._ended[goal] = outcome
@@ -311,7 +308,8 @@ class ByAction:
             del self._ended[next(iter(self._ended))]
 
     def _outcome(self, goal: UUID, number: int, message: Any) -> Outcome:
-        """What the status says, if it is one; else what the action says."""
+        """Return the outcome that the status of the behavior says; without a valid one, that of the
+        action."""
         try:
             status = read_status(message)
             if status.id == str(goal) and status.state in ENDS:
@@ -319,7 +317,7 @@ class ByAction:
             wrong = f"the result of {goal} is a status of {status.id} that is {status.state}"
         except WireError as error:
             wrong = str(error)
-        self._complaints.add("a result that cannot be", wrong)
+        self._log_throttle.log("a result that cannot be", wrong)
         return Outcome(_ENDS.get(number, BehaviorState.FAILED), reason=wrong)
 
     def _run(self, work: Coroutine[Any, Any, None]) -> None:
@@ -330,7 +328,7 @@ class ByAction:
     def _done(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._complaints.add("m2pem is wrong", repr(error))
+            self._log_throttle.log("m2pem is wrong", repr(error))
 
 
 Status = action.GoalStatus
@@ -340,15 +338,19 @@ ACTIVE = frozenset({Status.STATUS_ACCEPTED, Status.STATUS_EXECUTING, Status.STAT
 
 @dataclass(frozen=True, slots=True)
 class Listeners:
-    """Called on the event loop: `status` with a goal and its number of GoalStatus, `feedback`
-    with a goal and the feedback."""
+    """Callbacks on the event loop: `status` with a goal and its GoalStatus, `feedback` with a goal
+    and its feedback."""
 
     status: Callable[[UUID, int], None]
     feedback: Callable[[UUID, Any], None]
 
 
 class GoalClient:
-    """A client of the action `execute_behavior` in which goals are their UUIDs."""
+    """A client of the action `execute_behavior`, by its services and topics.
+
+    The client of rclpy knows only the goals that it has sent. After a restart, goals are found by
+    their UUID.
+    """
 
     def __init__(self, ros: RosRuntime, name: str, listeners: Listeners) -> None:
         self._ros = ros
@@ -360,15 +362,16 @@ class GoalClient:
         ros.subscribe(
             action.GoalStatusArray,
             f"{name}/_action/status",
-            self._hear_statuses,
+            self._on_statuses,
             qos.STATUS,
         )
         ros.subscribe(
-            parts.FeedbackMessage, f"{name}/_action/feedback", self._hear_feedback, qos.COMMANDS
+            parts.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback, qos.COMMANDS
         )
 
     async def send(self, goal: UUID, command: Any, timeout_s: float) -> bool:
-        """Whether the goal was accepted. One that is known already is not, too.
+        """Send a goal, and return whether it was accepted. A goal that the node has already is not
+        accepted.
 
         Raises:
             RosTimeoutError: no answer in time; it may have arrived all the same.
@@ -379,8 +382,8 @@ class GoalClient:
         return bool((await self._ros.call(self._send, request, timeout_s)).accepted)
 
     async def result(self, goal: UUID, timeout_s: float) -> tuple[int, Any]:
-        """The number of its GoalStatus, and the status of the behavior. It is answered when the
-        goal has ended, or at once with STATUS_UNKNOWN.
+        """Return the GoalStatus of a goal, and the status of its behavior. The node answers when
+        the goal has ended, or at once with STATUS_UNKNOWN.
 
         Raises:
             RosTimeoutError: no answer in time: it goes on, or nobody is there.
@@ -390,7 +393,7 @@ class GoalClient:
         return response.status, response.result.status
 
     async def cancel(self, goal: UUID, timeout_s: float) -> int:
-        """The return code of CancelGoal.
+        """Cancel a goal, and return the code of CancelGoal.
 
         Raises:
             RosTimeoutError: no answer in time.
@@ -400,11 +403,11 @@ class GoalClient:
         response = await self._ros.call(self._cancel, request, timeout_s)
         return int(response.return_code)
 
-    def _hear_statuses(self, message: Any) -> None:
+    def _on_statuses(self, message: Any) -> None:
         for status in message.status_list:
             self._listeners.status(_uuid(status.goal_info.goal_id), status.status)
 
-    def _hear_feedback(self, message: Any) -> None:
+    def _on_feedback(self, message: Any) -> None:
         self._listeners.feedback(_uuid(message.goal_id), message.feedback.status)
 
 

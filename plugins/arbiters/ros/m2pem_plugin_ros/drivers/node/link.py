@@ -1,4 +1,5 @@
-"""What a driver of an m2pem node asks of the way in which it is commanded."""
+"""The interface of the two links to an m2pem node, by topics or by the action, and their
+retries."""
 
 import asyncio
 from collections.abc import Callable
@@ -9,51 +10,43 @@ from m2pem.api import Clock
 from m2pem_plugin_ros.drivers.driver import Order, Outcome
 
 REPEAT_S = 0.5
-"""After so long without an answer a command is sent again, on the clock that was lent."""
+"""A command without an answer is sent again after this time of the clock."""
 
 ANSWER_WITHIN_S = 10.0
-"""A node that is heard, and answers no START for so long, will not do it."""
+"""A node that is received, but answers no START within this time, will not do it."""
 
-LOOK_WITHIN_S = 3.0
-"""A node that is there answers a question at once."""
+QUERY_WITHIN_S = 3.0
+"""Timeout of a QUERY."""
 
 REMEMBERED = 100
-"""Goals that have ended of which it is known how."""
+"""Number of ended goals whose outcome is kept."""
 
 STILL_S = 2.5
-"""A node says at least once a second what it does. If what was said to be unknown was said to go on
-within this, two nodes are there, and the one that does it was not restarted."""
+"""A node reports its behavior once a second. If it was reported within this time, an UNKNOWN came
+from a second node, and the first was not restarted."""
 
 RESTARTED = "the vehicle's node was restarted and knows nothing of it"
 
 
-class Link(Protocol):
-    """START, CANCEL, and what becomes of them; by topics or as an action."""
+class NodeLink(Protocol):
+    """Sends START, CANCEL and QUERY to a node, and reports the results."""
 
     @property
     def order(self) -> Order | None:
-        """What the vehicle is to do now."""
+        """The current order."""
         ...
 
-    def begin(self, order: Order) -> None:
-        """As `Driver.begin`."""
-        ...
+    def begin(self, order: Order) -> None: ...
 
-    def end(self, goal: UUID) -> None:
-        """As `Driver.end`."""
-        ...
+    def end(self, goal: UUID) -> None: ...
 
-    async def look(self, order: Order) -> Outcome:
-        """As `Driver.look`."""
-        ...
+    async def query(self, order: Order) -> Outcome: ...
 
     def vehicle_does(self, behavior: str) -> None:
-        """vehicle_status has said which behavior is going on; "": none."""
+        """Process the behavior that vehicle_status reports; "" if there is none."""
         ...
 
-    def forget(self) -> None:
-        """As `Driver.forget`."""
-        ...
+    def abandon(self) -> None: ...
 
     async def close(self) -> None:
         """Send nothing more."""
@@ -61,52 +54,53 @@ class Link(Protocol):
 
 
 Send = Callable[[object], None]
-"""Publishes on `command`."""
+"""Publishes a message on `command`."""
 
 
 SHORTEST_S = 0.02
-"""Of real time: a clock may be so fast that repeating would flood the vehicle."""
+"""Shortest period in real time, so that a fast clock does not flood the vehicle."""
 
 
-class Insisting:
-    """Tasks that repeat, each with a name. A new one of the same name takes its place."""
+class Retries:
+    """Repeats messages until they are acknowledged. Each has a name; a new one replaces that of the
+    same name."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
-    def start(self, name: str, say: Callable[[], bool]) -> None:
-        """Call `say` now, and again and again as long as it returns True."""
+    def start(self, name: str, send: Callable[[], bool]) -> None:
+        """Call `send` now, and repeat it while it returns True."""
         self.stop(name)
-        if say():
-            task = asyncio.get_running_loop().create_task(self._repeat(say))
+        if send():
+            task = asyncio.get_running_loop().create_task(self._repeat(send))
             self._tasks[name] = task
             task.add_done_callback(lambda done: self._drop(name, done))
 
     def goes_on(self, name: str) -> bool:
-        """Whether it is repeated still."""
+        """Whether a message is still repeated."""
         return name in self._tasks
 
     def stop(self, name: str) -> None:
-        """Say it no more."""
+        """Stop repeating a message."""
         if (task := self._tasks.pop(name, None)) is not None:
             task.cancel()
 
     def stop_all(self) -> None:
-        """Say nothing more."""
+        """Stop repeating all messages."""
         for name in list(self._tasks):
             self.stop(name)
 
     async def pause(self) -> None:
-        """Wait until it is time to repeat."""
+        """Wait until the next repetition."""
         async with asyncio.TaskGroup() as both:
             both.create_task(self._clock.sleep(REPEAT_S))
             both.create_task(asyncio.sleep(SHORTEST_S))
 
-    async def _repeat(self, say: Callable[[], bool]) -> None:
+    async def _repeat(self, send: Callable[[], bool]) -> None:
         while True:
             await self.pause()
-            if not say():
+            if not send():
                 return
 
     def _drop(self, name: str, task: asyncio.Task[None]) -> None:

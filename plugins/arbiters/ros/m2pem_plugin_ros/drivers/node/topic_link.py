@@ -1,4 +1,4 @@
-"""An m2pem node that is commanded by the topics `command` and `behavior_status`."""
+"""Commands an m2pem node by the topics `command` and `behavior_status`."""
 
 import asyncio
 import logging
@@ -9,14 +9,14 @@ from typing import Any
 from uuid import UUID
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_ros.drivers.driver import Order, Outcome, Seat
+from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.node.link import (
     ANSWER_WITHIN_S,
-    LOOK_WITHIN_S,
+    QUERY_WITHIN_S,
     REMEMBERED,
     RESTARTED,
     STILL_S,
-    Insisting,
+    Retries,
     Send,
 )
 from m2pem_plugin_ros.interfaces.behavior_command import (
@@ -26,119 +26,117 @@ from m2pem_plugin_ros.interfaces.behavior_command import (
     start_command,
 )
 from m2pem_plugin_ros.interfaces.behavior_status import Status
-from m2pem_plugin_ros.log_throttle import Complaints
+from m2pem_plugin_ros.log_throttle import LogThrottle
 
 _GOES_ON = frozenset({BehaviorState.ACCEPTED, BehaviorState.RUNNING})
 
 
 @dataclass(slots=True)
-class _Pursued:
-    """A goal that was not heard to have ended. `heard`: the node has said something of it.
-    `number`: that of its last status. `cancelled`: it is to end. `shown_us`: when vehicle_status
-    said last that it goes on."""
+class _PendingGoal:
+    """A goal that has not ended. `acknowledged`: the node has reported it. `number`: of its last
+    status. `cancelled`: a CANCEL is sent. `shown_us`: when vehicle_status reported it last."""
 
     goal: UUID
     order: Order | None
     number: int = 0
-    heard: bool = False
+    acknowledged: bool = False
     cancelled: bool = False
     shown_us: int | None = None
 
 
-class ByTopics:
-    """Implements `Link`. Statuses come to `status`."""
+class TopicLink:
+    """Implements `NodeLink`. The driver passes behavior statuses to `status`."""
 
-    def __init__(self, seat: Seat, send: Send, complaints: Complaints) -> None:
-        self._seat = seat
+    def __init__(self, setup: DriverSetup, send: Send, log_throttle: LogThrottle) -> None:
+        self._setup = setup
         self._send = send
-        self._complaints = complaints
-        self._insisting = Insisting(seat.context.clock)
-        self._current: _Pursued | None = None
-        self._pursued: dict[str, _Pursued] = {}
+        self._log_throttle = log_throttle
+        self._retries = Retries(setup.context.clock)
+        self._current: _PendingGoal | None = None
+        self._pending: dict[str, _PendingGoal] = {}
         self._ended: dict[str, Outcome] = {}
-        self._looks: dict[str, asyncio.Future[Status]] = {}
+        self._queries: dict[str, asyncio.Future[Status]] = {}
         self._node_heard_us: int | None = None
         self._orders: OrderedDict[UUID, Order] = OrderedDict()
 
     @property
     def order(self) -> Order | None:
-        """What the vehicle is to do now."""
         return self._current.order if self._current is not None else None
 
     # --- what is asked of the vehicle -----------------------------------------------------------
 
     def begin(self, order: Order) -> None:
-        """START, until the node has said something of it."""
+        """Send START until the node reports the goal."""
         self._let_go()
         self._know(order)
-        pursued = _Pursued(order.goal, order)
-        self._current = self._pursued[str(order.goal)] = pursued
+        pending = _PendingGoal(order.goal, order)
+        self._current = self._pending[str(order.goal)] = pending
         self._ended.pop(str(order.goal), None)
         began_us = self._now_us()
         self._node_heard_us = None
 
-        def say() -> bool:
-            if pursued.heard or pursued.cancelled:
+        def send_again() -> bool:
+            if pending.acknowledged or pending.cancelled:
                 return False
             if self._waited_s(began_us) > ANSWER_WITHIN_S:
                 reason = f"the vehicle's node answered no START for {ANSWER_WITHIN_S:g} s"
-                self._send(self._about(Verb.CANCEL, pursued))
-                self._over(pursued, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
+                self._send(self._about(Verb.CANCEL, pending))
+                self._over(pending, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
                 return False
             self._send(start_command(order, self._now_us()))
             return True
 
-        self._insisting.start("start", say)
+        self._retries.start("start", send_again)
 
     def end(self, goal: UUID) -> None:
-        """CANCEL, until the node has said that it has ended, or knows nothing of it."""
+        """Send CANCEL until the node reports that the goal has ended, or is unknown."""
         id_ = str(goal)
         if (outcome := self._ended.get(id_)) is not None:
-            self._seat.told.ended(goal, outcome)
+            self._setup.events.ended(goal, outcome)
             return
-        pursued = self._pursued.setdefault(id_, _Pursued(goal, None))
-        if pursued.cancelled:
+        pending = self._pending.setdefault(id_, _PendingGoal(goal, None))
+        if pending.cancelled:
             return
-        pursued.cancelled = True
-        self._insist(pursued, self._cancel_of(pursued))
+        pending.cancelled = True
+        self._retry(pending, self._cancel_of(pending))
 
-    def _cancel_of(self, pursued: _Pursued) -> Callable[[], bool]:
+    def _cancel_of(self, pending: _PendingGoal) -> Callable[[], bool]:
         said = 0
 
-        def say() -> bool:
+        def send_again() -> bool:
             nonlocal said
-            if str(pursued.goal) not in self._pursued:
+            if str(pending.goal) not in self._pending:
                 return False
-            self._send(self._about(Verb.CANCEL, pursued))
+            self._send(self._about(Verb.CANCEL, pending))
             if said:  # of what it does not know, it answers to nothing else
-                self._send(self._about(Verb.QUERY, pursued))
+                self._send(self._about(Verb.QUERY, pending))
             said += 1
             return True
 
-        return say
+        return send_again
 
-    async def look(self, order: Order) -> Outcome:
-        """QUERY, until it is answered. What goes on is ours from then on."""
+    async def query(self, order: Order) -> Outcome:
+        """Send QUERY until it is answered. A goal that goes on is adopted."""
         id_ = str(order.goal)
         self._know(order)
-        answer = self._looks.setdefault(id_, asyncio.get_running_loop().create_future())
-        query = self._about(Verb.QUERY, _Pursued(order.goal, order))
+        answer = self._queries.setdefault(id_, asyncio.get_running_loop().create_future())
+        query = self._about(Verb.QUERY, _PendingGoal(order.goal, order))
 
-        def say() -> bool:
+        def send_again() -> bool:
             self._send(query)
             return not answer.done()
 
-        self._insisting.start(f"look {id_}", say)
-        late = asyncio.ensure_future(self._seat.context.clock.sleep(LOOK_WITHIN_S))
+        self._retries.start(f"look {id_}", send_again)
+        late = asyncio.ensure_future(self._setup.context.clock.sleep(QUERY_WITHIN_S))
         waited: list[asyncio.Future[Any]] = [answer, late]
         try:
             await asyncio.wait(waited, return_when=asyncio.FIRST_COMPLETED)
         finally:
             late.cancel()
-            self._insisting.stop(f"look {id_}")
-            self._looks.pop(id_, None)
+            self._retries.stop(f"look {id_}")
+            self._queries.pop(id_, None)
         if not answer.done():
-            reason = f"the vehicle's node did not answer within {LOOK_WITHIN_S:g} s"
+            reason = f"the vehicle's node did not answer within {QUERY_WITHIN_S:g} s"
             return Outcome(BehaviorState.UNKNOWN, reason=reason)
         status = answer.result()
         if status.state in _GOES_ON:
@@ -151,130 +149,129 @@ class ByTopics:
     def _adopt(self, order: Order, status: Status) -> None:
         if self._current is None or self._current.goal != order.goal:
             self._let_go()
-            self._current = _Pursued(order.goal, order, status.number, heard=True)
-            self._pursued[str(order.goal)] = self._current
+            self._current = _PendingGoal(order.goal, order, status.number, acknowledged=True)
+            self._pending[str(order.goal)] = self._current
 
-    def forget(self) -> None:
-        """Nothing is repeated any more."""
-        self._insisting.stop_all()
+    def abandon(self) -> None:
+        self._retries.stop_all()
         self._current = None
-        self._pursued.clear()
+        self._pending.clear()
 
     async def close(self) -> None:
-        """Send nothing more."""
-        self.forget()
+        self.abandon()
 
     # --- what the vehicle says ------------------------------------------------------------------
 
     def status(self, status: Status) -> None:
-        """Of any behavior, in any order, any number of times."""
-        if (answer := self._looks.get(status.id)) is not None and not answer.done():
+        """Process a status of any behavior. Statuses may be repeated and out of order."""
+        if (answer := self._queries.get(status.id)) is not None and not answer.done():
             answer.set_result(status)
-        pursued = self._pursued.get(status.id)
-        if pursued is None:
-            if status.id not in self._ended and status.id not in self._looks:
+        pending = self._pending.get(status.id)
+        if pending is None:
+            if status.id not in self._ended and status.id not in self._queries:
                 # Another executive's, perhaps, or of before ours was started.
                 cause = "a status of what we have not given it"
-                self._complaints.add(cause, status.id, logging.INFO)
+                self._log_throttle.log(cause, status.id, logging.INFO)
         elif status.state is BehaviorState.UNKNOWN:
-            self._unknown(pursued)
-        elif status.number > pursued.number:
-            pursued.number = status.number
-            pursued.heard = True
+            self._unknown(pending)
+        elif status.number > pending.number:
+            pending.number = status.number
+            pending.acknowledged = True
             if status.state.terminal:
-                self._over(pursued, _outcome(status))
+                self._over(pending, _outcome(status))
             elif status.state is BehaviorState.RUNNING:
-                self._seat.told.progress(pursued.goal)
+                self._setup.events.progress(pending.goal)
 
-    def _unknown(self, pursued: _Pursued) -> None:
-        if pursued.shown_us is not None and self._waited_since_s(pursued.shown_us) < STILL_S:
+    def _unknown(self, pending: _PendingGoal) -> None:
+        if pending.shown_us is not None and self._waited_since_s(pending.shown_us) < STILL_S:
             cause = "another node in its namespace knows nothing of what it does"
-            self._complaints.add(cause, str(pursued.goal))
-        elif pursued.cancelled:
+            self._log_throttle.log(cause, str(pending.goal))
+        elif pending.cancelled:
             reason = "the vehicle's node knows nothing of it"
-            self._over(pursued, Outcome(BehaviorState.CANCELLED, reason=reason))
-        elif pursued.heard:
-            self._over(pursued, Outcome(BehaviorState.LOST, "LINK_LOST", RESTARTED))
+            self._over(pending, Outcome(BehaviorState.CANCELLED, reason=reason))
+        elif pending.acknowledged:
+            self._over(pending, Outcome(BehaviorState.LOST, "LINK_LOST", RESTARTED))
 
     def vehicle_does(self, behavior: str) -> None:
-        """If it is not what it should do, ask: statuses may be lost, and nodes restarted."""
+        """Send QUERY for the current goal if the vehicle does something else: a status may be lost,
+        or the node restarted."""
         if self._node_heard_us is None:
             self._node_heard_us = self._now_us()
-        if (shown := self._pursued.get(behavior)) is not None:
+        if (shown := self._pending.get(behavior)) is not None:
             shown.shown_us = self._now_us()
-        pursued = self._current
-        if pursued is None or pursued.cancelled:
+        pending = self._current
+        if pending is None or pending.cancelled:
             return
-        id_ = str(pursued.goal)
+        id_ = str(pending.goal)
         if behavior == id_:
-            pursued.heard = True
-            self._seat.told.progress(pursued.goal)
-            self._insisting.stop("query")
+            pending.acknowledged = True
+            self._setup.events.progress(pending.goal)
+            self._retries.stop("query")
             return
-        if not pursued.heard:
+        if not pending.acknowledged:
             return
 
-        def say() -> bool:
-            if self._current is not pursued or id_ not in self._pursued:
+        def send_again() -> bool:
+            if self._current is not pending or id_ not in self._pending:
                 return False
-            self._send(self._about(Verb.QUERY, pursued))
+            self._send(self._about(Verb.QUERY, pending))
             return True
 
-        if not self._insisting.goes_on("query"):
-            self._insisting.start("query", say)
+        if not self._retries.goes_on("query"):
+            self._retries.start("query", send_again)
 
     # --- inside ---------------------------------------------------------------------------------
 
     @property
     def _name(self) -> str:
-        return self._seat.connection.resource
+        return self._setup.connection.resource
 
     def _now_us(self) -> int:
-        return self._seat.context.clock.now_us()
+        return self._setup.context.clock.now_us()
 
     def _waited_since_s(self, then_us: int) -> float:
         return (self._now_us() - then_us) / 1e6
 
     def _waited_s(self, began_us: int) -> float:
-        """For how long a node that is there has not answered."""
+        """Return how long a node that is received has not answered."""
         if self._node_heard_us is None:
             return 0.0
         return (self._now_us() - max(began_us, self._node_heard_us)) / 1e6
 
-    def _about(self, verb: int, pursued: _Pursued) -> Any:
-        order = pursued.order or self._orders.get(pursued.goal)
+    def _about(self, verb: int, pending: _PendingGoal) -> Any:
+        order = pending.order or self._orders.get(pending.goal)
         if order is None:
-            return goal_command(verb, pursued.goal, self._now_us())
-        epoch = self._seat.context.epoch_of(order.request.id)
+            return goal_command(verb, pending.goal, self._now_us())
+        epoch = self._setup.context.epoch_of(order.request.id)
         return behavior_command(verb, order, self._now_us(), epoch)
 
     def _know(self, order: Order) -> None:
-        """What is told of a goal names its run, also after it was given up."""
+        """Keep an order, so that later messages about its goal name its run."""
         self._orders[order.goal] = order
         self._orders.move_to_end(order.goal)
         if len(self._orders) > REMEMBERED:
             self._orders.popitem(last=False)
 
-    def _insist(self, pursued: _Pursued, say: Callable[[], bool]) -> None:
-        self._insisting.start(f"cancel {pursued.goal}", say)
+    def _retry(self, pending: _PendingGoal, send_again: Callable[[], bool]) -> None:
+        self._retries.start(f"cancel {pending.goal}", send_again)
 
     def _let_go(self) -> None:
-        """What it did is not told of any more: another takes over."""
-        self._insisting.stop("start")
-        self._insisting.stop("query")
-        for id_, pursued in list(self._pursued.items()):
-            self._insisting.stop(f"cancel {pursued.goal}")
+        """Drop all goals, as another order replaces them."""
+        self._retries.stop("start")
+        self._retries.stop("query")
+        for id_, pending in list(self._pending.items()):
+            self._retries.stop(f"cancel {pending.goal}")
             self._remember(id_, Outcome(BehaviorState.CANCELLED, reason="another took over"))
-        self._pursued.clear()
+        self._pending.clear()
         self._current = None
 
-    def _over(self, pursued: _Pursued, outcome: Outcome) -> None:
-        id_ = str(pursued.goal)
+    def _over(self, pending: _PendingGoal, outcome: Outcome) -> None:
+        id_ = str(pending.goal)
         self._remember(id_, outcome)
-        del self._pursued[id_]
-        if self._current is pursued:
+        del self._pending[id_]
+        if self._current is pending:
             self._current = None
-        self._seat.told.ended(pursued.goal, outcome)
+        self._setup.events.ended(pending.goal, outcome)
 
     def _remember(self, id_: str, outcome: Outcome) -> None:
         self._ended[id_] = outcome

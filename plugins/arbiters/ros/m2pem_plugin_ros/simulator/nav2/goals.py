@@ -1,5 +1,4 @@
-"""One action with one goal at a time, as Nav2 serves them: a new goal takes the place of the old
-one, which is aborted without a word."""
+"""The goals of a simulated Nav2: its action servers, and the orders for the base."""
 
 import asyncio
 import logging
@@ -13,11 +12,11 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from m2pem.api import BehaviorRequest, BehaviorState, Point, ResolvedValue, ResourceId, Route
-from m2pem_plugin_ros.drivers.driver import Driver, Order, Outcome, Told
+from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
 from m2pem_plugin_ros.frames import Origin, to_geodetic
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.simulator.faults import Faults
+from m2pem_plugin_ros.simulator.faults import Nav2Faults
 
 LOOK_S = 0.02
 
@@ -34,8 +33,12 @@ class AbortedError(Exception):
 
 
 class GoalServer:
-    """`carry_out(handle)` returns the result of a goal that was reached, or raises `AbortedError`;
-    it is cancelled when the goal is. `is_active` says whether goals are accepted."""
+    """One action with one goal at a time. As in Nav2, a new goal preempts the old one, which is
+    aborted without an error.
+
+    `carry_out(handle)` returns the result, or raises `AbortedError`. It is cancelled with its goal.
+    `is_active` tells whether goals are accepted.
+    """
 
     def __init__(
         self,
@@ -44,7 +47,7 @@ class GoalServer:
         name: str,
         carry_out: Callable[[Any], Awaitable[Any]],
         is_active: Callable[[], bool],
-        faults: Faults,
+        faults: Nav2Faults,
     ) -> None:
         self.name = name
         self.action = action
@@ -64,11 +67,10 @@ class GoalServer:
 
     @property
     def busy(self) -> bool:
-        """Whether a goal goes on."""
         return self._current is not None
 
     def drop(self) -> None:
-        """Abort what goes on, as when Nav2 is deactivated."""
+        """Abort the current goal, as when Nav2 is deactivated."""
         self._current = None
 
     def _answer(self, _: Any) -> GoalResponse:
@@ -125,14 +127,15 @@ class GoalServer:
         return result
 
 
-MakeDriver = Callable[[Told], Driver]
+MakeDriver = Callable[[DriverEvents], Driver]
 
 UNLIMITED_M_S = 100.0
-"""No base is so fast: the driver takes its own bound."""
+"""Faster than any base, so that the driver uses its own bound."""
 
 
 class BaseOrders:
-    """Implements `Told` for the driver of the base. `codes`: Nav2's error codes by ours."""
+    """Orders for the driver of the base, one at a time. `codes` maps error codes of the driver to
+    those of Nav2."""
 
     def __init__(self, make_driver: MakeDriver, vehicle: str, origin: Origin) -> None:
         self.driver = make_driver(self)
@@ -144,14 +147,11 @@ class BaseOrders:
 
     # --- what the driver tells ------------------------------------------------------------------
 
-    def heard(self) -> None:
-        """Nobody asks whether a simulated base is alive."""
+    def alive(self) -> None: ...
 
-    def progress(self, goal: UUID) -> None:
-        """Nav2 does not tell it."""
+    def progress(self, goal: UUID) -> None: ...
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
-        """It has ended."""
         waiting = self._waiting.get(goal)
         if waiting is not None and not waiting.done():
             waiting.set_result(outcome)
@@ -159,13 +159,13 @@ class BaseOrders:
     # --- what the base is to do -----------------------------------------------------------------
 
     def limit_speed(self, speed_m_s: float) -> None:
-        """The highest speed from now on; 0: its own."""
+        """Set the highest speed; 0 is that of the base."""
         self._limit_m_s = speed_m_s or None
         for goal in self._waiting:
             self.driver.adjust(goal, {"speed": self._limit_m_s or UNLIMITED_M_S})
 
     async def go_to(self, pose: Pose, codes: Mapping[str, int]) -> None:
-        """To a pose; what cannot turn on the spot arrives as it comes.
+        """Drive to a pose. A base that cannot turn on the spot may arrive with another heading.
 
         Raises:
             AbortedError: it cannot be reached.
@@ -177,7 +177,7 @@ class BaseOrders:
         await self._do(turned, codes)
 
     async def go_along(self, poses: Sequence[Pose], codes: Mapping[str, int]) -> None:
-        """Through poses to the last of them.
+        """Drive through poses to the last one.
 
         Raises:
             AbortedError: they cannot be reached.
@@ -186,7 +186,7 @@ class BaseOrders:
         await self._do(self._request("single_vehicle_routing", route=Route(places)), codes)
 
     async def back_up(self, distance_m: float, speed_m_s: float, codes: Mapping[str, int]) -> None:
-        """Straight back.
+        """Drive straight backwards.
 
         Raises:
             AbortedError: it cannot.
@@ -220,7 +220,7 @@ class BaseOrders:
             raise AbortedError(codes.get(ended.code, codes[""]), ended.reason)
 
     def _stop_unless_replaced(self, goal: UUID) -> None:
-        """A goal that takes the place of one takes over the moving base as it is."""
+        """Stop the base, unless another goal takes over the moving base."""
         if not self._waiting:
             asyncio.get_running_loop().call_soon(self._stop_if_idle, goal)
 

@@ -1,4 +1,5 @@
-"""Nav2 as its clients see it: bt_navigator, the waypoint follower and the behavior server."""
+"""A simulated Nav2 as its clients see it: bt_navigator, the waypoint follower, the behavior
+server."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
@@ -17,7 +18,7 @@ from m2pem_plugin_ros.installation import require_interfaces
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.sensors.localization import Localization
-from m2pem_plugin_ros.simulator.faults import Faults
+from m2pem_plugin_ros.simulator.faults import Nav2Faults
 from m2pem_plugin_ros.simulator.nav2.goals import AbortedError, BaseOrders, GoalServer, MakeDriver
 
 FEEDBACK_S = 0.1
@@ -37,11 +38,11 @@ STATES = {
 
 
 class Nav2Server:
-    """A simulated Nav2 in a vehicle's namespace. `make_driver(told)` makes what drives its base,
-    which `localization` tells the place of; `origin`: of the frame `map`.
+    """A simulated Nav2 in the namespace of a vehicle. `make_driver(events)` makes the driver of the
+    base. `localization` is that of the base; `origin` that of the frame `map`.
 
-    As in Nav2, one goal of an action takes the place of another of the same action; one of the
-    other navigation is aborted while the first goes on; and `faults` may be changed at any time.
+    As in Nav2, a goal preempts another goal of the same action, and a goal of the other navigation
+    action is aborted meanwhile. `faults` may be changed at any time.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class Nav2Server:
         localization: Localization,
         origin: Origin,
     ) -> None:
-        self.faults = Faults()
+        self.faults = Nav2Faults()
         self.state = "active"
         self._ros = ros
         self._namespace = namespace.rstrip("/")
@@ -64,7 +65,7 @@ class Nav2Server:
         self._inner: Any = None
 
     async def open(self) -> None:
-        """Serve.
+        """Start the servers.
 
         Raises:
             RosError: nav2_msgs is not installed.
@@ -90,15 +91,15 @@ class Nav2Server:
         )
 
     def enter(self, state: str) -> None:
-        """Go over to a state of the lifecycle: "active", "inactive", "unconfigured", "finalized".
-        Only an active Nav2 has goals."""
+        """Change the lifecycle state: "active", "inactive", "unconfigured" or "finalized". Only an
+        active Nav2 has goals."""
         self.state = state
         if state != "active":
             for server in self._servers:
                 server.drop()
 
     async def close(self) -> None:
-        """End, and leave the vehicle standing."""
+        """Stop the vehicle, and close."""
         self.enter("finalized")
         if self._orders is not None:
             self._orders.driver.hold()
@@ -148,7 +149,7 @@ class Nav2Server:
         return action.Result(missed_waypoints=missed)
 
     async def _go_to_waypoint(self, pose: Any) -> bool:
-        """As Nav2's follower does: by a goal to its own navigator."""
+        """Send a goal to the navigator, as Nav2's waypoint follower does."""
         goal = self._action("navigate_to_pose").Goal(pose=pose)
         handle = await self._ros.send_goal(self._inner, goal, ANSWER_S, goal_id=uuid4())
         if not handle.accepted:
@@ -195,7 +196,7 @@ class Nav2Server:
         return next(server.action for server in self._servers if server.name == full)
 
     def _have_to_itself(self, name: str) -> None:
-        """bt_navigator navigates by one action at a time."""
+        """Abort a goal while the other navigation action is busy, as bt_navigator does."""
         navigators = ("navigate_to_pose", "navigate_through_poses")
         for server in self._servers:
             leaf = server.name.rpartition("/")[2]

@@ -1,4 +1,4 @@
-"""What Nav2 is told for each behavior."""
+"""The Nav2 task of each behavior."""
 
 from collections.abc import Mapping
 
@@ -6,9 +6,9 @@ from m2pem_plugin_ros.drivers.nav2.tasks.goto import Follow, Goto
 from m2pem_plugin_ros.drivers.nav2.tasks.hold import Hold, Stop, Teleop
 from m2pem_plugin_ros.drivers.nav2.tasks.reverse import Reverse
 from m2pem_plugin_ros.drivers.nav2.tasks.route import Route
-from m2pem_plugin_ros.drivers.nav2.tasks.task import Errand, Job
+from m2pem_plugin_ros.drivers.nav2.tasks.task import Nav2Task, TaskContext
 
-ERRANDS: Mapping[str, type[Errand]] = {
+TASKS: Mapping[str, type[Nav2Task]] = {
     "single_vehicle_routing": Route,
     "goto": Goto,
     "follow": Follow,
@@ -17,6 +17,6 @@ ERRANDS: Mapping[str, type[Errand]] = {
     "drive_stop": Stop,
     "teleop": Teleop,
 }
-"""By behavior's name."""
+"""By name of the behavior."""
 
-__all__ = ["ERRANDS", "Errand", "Job"]
+__all__ = ["TASKS", "Nav2Task", "TaskContext"]

@@ -1,4 +1,4 @@
-"""Going to a place, and after a vehicle."""
+"""The tasks `goto` and `follow`."""
 
 import asyncio
 import math
@@ -13,31 +13,36 @@ from m2pem_plugin_ros.drivers.driver import Outcome
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
 from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
 from m2pem_plugin_ros.drivers.nav2.parameters import apart_m, towards_rad
-from m2pem_plugin_ros.drivers.nav2.tasks.task import GoalErrand, Job, expect_there, stamped
+from m2pem_plugin_ros.drivers.nav2.tasks.task import (
+    Nav2GoalTask,
+    TaskContext,
+    expect_there,
+    stamped,
+)
 from m2pem_plugin_ros.pose import Pose
 
 MOVED_M = 1.0
-"""A target that has moved by so much is told to Nav2 again, which must plan each time."""
+"""When the target has moved by this distance, a new goal is sent, for which Nav2 plans again."""
 
 AGAIN_S = 1.0
 
 
-class Pursuit(GoalErrand):
-    """NavigateToPose, sent again as the place to go to moves."""
+class Pursuit(Nav2GoalTask):
+    """A NavigateToPose goal that is sent again as its target moves."""
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
+    def __init__(self, context: TaskContext) -> None:
+        super().__init__(context)
         self._sent: Pose | None = None
         self._changed = False
 
     @property
     def client(self) -> GoalClient:
-        """One goal takes the place of the other, and the vehicle need not stop for it."""
+        """The action preempts its own goals without a stop of the vehicle."""
         return self.nav2.to_pose
 
     @abstractmethod
     def aim(self) -> Pose:
-        """Where to go now.
+        """Return the target pose.
 
         Raises:
             NavigationError: that is not known any more.
@@ -45,19 +50,18 @@ class Pursuit(GoalErrand):
 
     @abstractmethod
     def arrived(self) -> bool:
-        """Whether it is done now that Nav2 says that the goal was reached.
+        """Return whether the task is done after Nav2 has reached the goal.
 
         Raises:
             NavigationError: it was not reached.
         """
 
     def adjust(self, parameters: Mapping[str, ResolvedValue]) -> None:
-        """Go elsewhere, or otherwise."""
         super().adjust(parameters)
         self._changed = self._changed or bool(parameters.keys() - {"speed"})
 
     async def run(self) -> None:
-        """Send it to where it is to go, as often as that moves."""
+        """Send the goal, and send it again as the target moves."""
         self._sent = None if self._found is None else self.aim()
         way = self._set_out()
         try:
@@ -67,11 +71,13 @@ class Pursuit(GoalErrand):
                     way.result()
                     if not self._moved() and self.arrived():
                         return
-                    if rival := self.nav2.rival():
-                        raise taken_over(f"somebody else has given Nav2 a goal: {rival}")
+                    if other_client := self.nav2.other_client():
+                        raise taken_over(f"somebody else has given Nav2 a goal: {other_client}")
                 if self._moved():
-                    if rival := self.nav2.rival():
-                        raise taken_over(f"somebody else has given Nav2 another goal: {rival}")
+                    if other_client := self.nav2.other_client():
+                        raise taken_over(
+                            f"somebody else has given Nav2 another goal: {other_client}"
+                        )
                     # Only now: what takes the place of a goal must not come after its end.
                     before, way = way, self._set_out()
                     before.cancel()
@@ -87,7 +93,7 @@ class Pursuit(GoalErrand):
         return asyncio.get_running_loop().create_task(self.drive(goal))
 
     async def _pause(self, way: "asyncio.Task[Any]") -> None:
-        """Until the vehicle is there, and no longer than until the next look at the target."""
+        """Wait until the goal has ended, or until the target is checked again."""
         nap = asyncio.get_running_loop().create_task(self.clock.sleep(AGAIN_S))
         try:
             await asyncio.wait([nap] if way.done() else [way, nap], return_when="FIRST_COMPLETED")
@@ -100,17 +106,17 @@ class Pursuit(GoalErrand):
         return apart_m(self.aim(), self._sent) > MOVED_M
 
     def _from_here(self, to: Pose) -> float:
-        """The yaw from where the vehicle is."""
-        here = self.job.seat.localization.pose
+        """Return the yaw from the vehicle to a pose."""
+        here = self.context.setup.localization.pose
         return 0.0 if here is None else towards_rad(here, to)
 
 
 class Goto(Pursuit):
-    """To a place, or to where another vehicle is, as long as it takes."""
+    """Go to a position, or to the current position of another vehicle."""
 
     def refusal(self) -> str:
         """The target must be known."""
-        if self.parameters.target_vehicle == self.job.seat.connection.resource:
+        if self.parameters.target_vehicle == self.context.setup.connection.resource:
             return "parameter 'target': another vehicle is expected"
         try:
             self.aim()
@@ -129,24 +135,25 @@ class Goto(Pursuit):
         return True
 
     def after_success(self, result: Any) -> Outcome:
-        """It is there, unless its target has gone on since."""
+        """SUCCEEDED, unless the target vehicle has moved on."""
         del result
         if self.parameters.target_vehicle is not None and self._away_m() > MOVED_M:
             return Outcome(BehaviorState.UNKNOWN, reason="its target has gone on")
         return Outcome(BehaviorState.SUCCEEDED)
 
     def _away_m(self) -> float:
-        here = self.job.seat.localization.pose
+        here = self.context.setup.localization.pose
         return math.inf if here is None else apart_m(here, self.parameters.target_pose())
 
 
 class Follow(Pursuit):
-    """Keep a station at another vehicle: `offset` from it, at `bearing` from its bow."""
+    """Keep a position at another vehicle: `offset` metres from it, at `bearing` from its
+    heading."""
 
     def refusal(self) -> str:
         """Another vehicle is needed, and must be heard."""
         vehicle = self.parameters.target_vehicle
-        if vehicle is None or vehicle == self.job.seat.connection.resource:
+        if vehicle is None or vehicle == self.context.setup.connection.resource:
             return "parameter 'target': another vehicle is expected"
         try:
             self.aim()
@@ -166,10 +173,10 @@ class Follow(Pursuit):
         return replace(at, east_m=east_m, north_m=north_m)
 
     def arrived(self) -> bool:
-        """Never: it goes on until it is interrupted."""
+        """Return False: the task goes on until it is cancelled."""
         return False
 
     def after_success(self, result: Any) -> Outcome:
-        """It stood at its station, and follows on."""
+        """RUNNING: the vehicle stands at its position, and follows on."""
         del result
         return Outcome(BehaviorState.RUNNING)

@@ -1,4 +1,4 @@
-"""Driving along a route, once or for ever."""
+"""The task `single_vehicle_routing`."""
 
 from typing import Any
 
@@ -7,25 +7,26 @@ from m2pem_plugin_ros.drivers.driver import Outcome
 from m2pem_plugin_ros.drivers.nav2.errors import missed
 from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
 from m2pem_plugin_ros.drivers.nav2.parameters import SAME_PLACE_M, along, apart_m
-from m2pem_plugin_ros.drivers.nav2.tasks.task import GoalErrand, Job, stamped
+from m2pem_plugin_ros.drivers.nav2.tasks.task import Nav2GoalTask, TaskContext, stamped
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import RouteAction
 
 PASSED_M = 0.7
-"""Nearer than this, bt_navigator takes a pose for passed; it looks seldom, so we look, too."""
+"""bt_navigator removes passed poses at this distance, but checks seldom; so it is checked here,
+too."""
 
 
-class Route(GoalErrand):
-    """NavigateThroughPoses, or FollowWaypoints if the fleet says so. What is not driven yet is
-    known from feedback, so that after a hold the vehicle does not go back.
+class Route(Nav2GoalTask):
+    """A NavigateThroughPoses goal, or FollowWaypoints if the fleet says so. Feedback tells which
+    poses are left, so that the vehicle does not drive back after a hold.
 
-    A lap of a route that is repeated leads from its first place to its first place; each lap is a
-    goal of its own, and only the first begins with the way to the first place.
+    With `loop`, each lap is a goal from the first waypoint to the first waypoint. Only the first
+    lap begins with the way to the first waypoint.
     """
 
-    def __init__(self, job: Job) -> None:
-        self._follows = job.seat.settings.route_action is RouteAction.WAYPOINTS
-        super().__init__(job)
+    def __init__(self, context: TaskContext) -> None:
+        self._follows = context.setup.settings.route_action is RouteAction.WAYPOINTS
+        super().__init__(context)
         self._loops = self.parameters.loop
         self._lap = self.parameters.route_poses()
         if self._loops:
@@ -34,17 +35,16 @@ class Route(GoalErrand):
 
     @property
     def client(self) -> GoalClient:
-        """As the fleet says."""
         return self.nav2.waypoints if self._follows else self.nav2.through_poses
 
     def refusal(self) -> str:
-        """What is repeated must be more than one place."""
+        """A route that repeats must have more than one position."""
         if self._loops and all(apart_m(p, self._lap[0]) <= SAME_PLACE_M for p in self._lap):
             return "parameter 'loop': a route of one place cannot be repeated"
         return super().refusal()
 
     async def run(self) -> None:
-        """Lap after lap, or once."""
+        """Send a goal for each lap, or for the route."""
         while True:
             result = await self.drive(self._goal())
             if waypoints := getattr(result, "missed_waypoints", ()):
@@ -53,8 +53,8 @@ class Route(GoalErrand):
                 return
             self._next = 1
 
-    def fed_back(self, feedback: Any) -> None:
-        """Where the vehicle is on the way."""
+    def on_feedback(self, feedback: Any) -> None:
+        """Advance along the lap, by the feedback of the action."""
         if self._follows:
             self._pass(int(feedback.current_waypoint))
             return
@@ -66,7 +66,7 @@ class Route(GoalErrand):
             self._pass(self._next + 1)
 
     def after_success(self, result: Any) -> Outcome:
-        """A lap that has ended while nobody looked has left the vehicle standing."""
+        """A lap that ended while this process did not run has left the vehicle standing."""
         if waypoints := getattr(result, "missed_waypoints", ()):
             error = missed(waypoints)
             return Outcome(error.state, error.code, error.reason)
@@ -75,7 +75,7 @@ class Route(GoalErrand):
         return Outcome(BehaviorState.SUCCEEDED)
 
     def _pass(self, index: int) -> None:
-        """Never back; and the last place remains, until Nav2 says that it was reached."""
+        """Advance to a waypoint, never back. The last one is left to Nav2."""
         self._next = max(self._next, min(index, len(self._lap) - 1))
 
     def _goal(self) -> Any:
