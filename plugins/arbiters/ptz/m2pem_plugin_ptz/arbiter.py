@@ -1,4 +1,4 @@
-"""The arbiter of cameras that turn. Its catalogue needs no library, and no connection."""
+"""The arbiter of cameras that turn. Its catalogue needs no library and no connection."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
@@ -23,31 +23,31 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem_plugin_ptz.catalogue import offered
-from m2pem_plugin_ptz.checkpoint import Kept, native_ref, read_native_ref
+from m2pem_plugin_ptz.checkpoint import Checkpoint, decode_checkpoint, encode_checkpoint
 from m2pem_plugin_ptz.drivers import make_driver as _make_driver
-from m2pem_plugin_ptz.drivers.driver import CameraDriver, Seat
+from m2pem_plugin_ptz.drivers.driver import CameraDriver, DriverSetup
 from m2pem_plugin_ptz.settings import read_settings
 
 if TYPE_CHECKING:
     from m2pem_plugin_ptz.behaviors.behavior import Behavior
-    from m2pem_plugin_ptz.controller import Camera
+    from m2pem_plugin_ptz.controller import CameraController
 
 LOST_AFTER_S = 3.0
 HOLD_WITHIN_S = 1.0
 CANCEL_TIMEOUT_S = 10.0
 
-HEARD_WITHIN_S = 5.0
-"""`connect` waits no longer for cameras to be heard."""
+FIRST_CONTACT_WITHIN_S = 5.0
+"""`connect` waits no longer than this for cameras."""
 
 TELEMETRY_EVERY_S = 0.2
-LATE = 2.0
-"""So many times as long as that since the last look: this process was held up."""
+LATE_FACTOR = 2.0
+"""A round that comes more than twice as late as planned means that this process was suspended."""
 
 STATES_WAITING = 1000
 
 
 class PtzArbiter:
-    """Implements `m2pem.api.Arbiter`. What a fleet may say of it: docs/ptz.md.
+    """The arbiter `ptz` (docs/ptz.md). Implements `m2pem.api.Arbiter`.
 
     Raises:
         PluginError: a connection cannot be used; the text names the resource and the key.
@@ -57,15 +57,15 @@ class PtzArbiter:
         self,
         connections: Mapping[ResourceId, Connection],
         context: ArbiterContext,
-        make_driver: Callable[[Seat], CameraDriver] = _make_driver,
+        make_driver: Callable[[DriverSetup], CameraDriver] = _make_driver,
     ) -> None:
         self._connections = connections
         self._context = context
         self._settings = read_settings(connections)
         self._make_driver = make_driver
-        self._ledger = BehaviorTracker(self.catalogue, context.logger)
+        self._tracker = BehaviorTracker(self.catalogue, context.logger)
         self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
-        self._cameras: dict[ResourceId, Camera] = {}
+        self._cameras: dict[ResourceId, CameraController] = {}
         self._drivers: list[CameraDriver] = []
         self._pending: dict[BehaviorId, Behavior] = {}
         self._tasks: list[asyncio.Task[None]] = []
@@ -73,24 +73,25 @@ class PtzArbiter:
     # --- what is offered ------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What payloads share. What a camera cannot do of it, its driver refuses."""
+        """Return the shared behaviors of payloads. The driver refuses what its camera cannot do."""
         return offered() if resource in self._settings else ()
 
     def limits(self, resource: ResourceId) -> Limits:
-        """The bounds that hold for a camera."""
+        """Return the limits of a camera."""
         own = self._connections[resource].lost_after_s if resource in self._connections else None
         return Limits(LOST_AFTER_S if own is None else own, HOLD_WITHIN_S, CANCEL_TIMEOUT_S)
 
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Listen to all cameras; returns when all were heard, or soon.
+        """Connect to all cameras. Return when each was received once, or after
+        `FIRST_CONTACT_WITHIN_S`.
 
         Raises:
             PluginError: what a driver needs is not installed, or its settings cannot be.
         """
-        from m2pem_plugin_ptz.camera_model.model import Sight  # noqa: PLC0415
-        from m2pem_plugin_ptz.controller import Camera  # noqa: PLC0415  # it needs NumPy
+        from m2pem_plugin_ptz.camera_model.model import CameraModel  # noqa: PLC0415
+        from m2pem_plugin_ptz.controller import CameraController  # noqa: PLC0415  # it needs NumPy
 
         context, cameras = self._context, self._cameras
         for resource, settings in self._settings.items():
@@ -98,23 +99,25 @@ class PtzArbiter:
 
             def heard(resource: ResourceId = resource) -> None:
                 if resource in cameras:
-                    cameras[resource].heard_us = context.clock.now_us()
+                    cameras[resource].last_contact_us = context.clock.now_us()
 
-            driver = self._make_driver(Seat(connection, settings, context, heard))
+            driver = self._make_driver(DriverSetup(connection, settings, context, heard))
             self._drivers.append(driver)
-            sight = Sight(resource, connection.domain, driver, settings, context)
+            model = CameraModel(resource, connection.domain, driver, settings, context)
             limits = self.limits(resource)
-            cameras[resource] = Camera(sight, self._ledger, limits, context.logger)
+            cameras[resource] = CameraController(model, self._tracker, limits, context.logger)
             await driver.open()
         create = asyncio.get_running_loop().create_task
         self._tasks = [create(self._attend(resource)) for resource in cameras]
-        heard_of = await asyncio.gather(*(each.knows(HEARD_WITHIN_S) for each in cameras.values()))
+        heard_of = await asyncio.gather(
+            *(each.wait_for_ptz(FIRST_CONTACT_WITHIN_S) for each in cameras.values())
+        )
         for resource, is_heard in zip(cameras, heard_of, strict=True):
             if not is_heard:
                 context.logger.warning("%s: where it looks was not heard yet", resource)
 
     async def close(self) -> None:
-        """Listen no more. Cameras keep doing what they do."""
+        """Close all connections. The cameras go on with what they do."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -125,54 +128,55 @@ class PtzArbiter:
         for driver in drivers:
             await driver.close()
         self._states.close()
-        self._ledger.close()
+        self._tracker.close()
 
     # --- behaviors ------------------------------------------------------------------------------
 
     async def start(self, request: BehaviorRequest) -> None:
-        """Start a behavior; see `BehaviorRequest`."""
         try:
-            if self._ledger.admit(request, lambda: self._native_ref(request), self._refusal):
+            if self._tracker.admit(
+                request, lambda: self._encoded_checkpoint(request), self._refusal
+            ):
                 camera = self._cameras[request.resources[0]]
                 camera.take(request.id, self._pending[request.id])
         finally:
             self._pending.pop(request.id, None)
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
-        """Stop the camera that does it."""
-        if self._ledger.may_cancel(behavior, epoch):
+        """Stop the camera that does the behavior."""
+        if self._tracker.may_cancel(behavior, epoch):
             for resource, camera in self._cameras.items():
-                if self._ledger.holder(resource) == behavior:
+                if self._tracker.holder(resource) == behavior:
                     camera.cancel(behavior)
 
     async def hold(self, resource: ResourceId) -> None:
-        """Have a camera stop turning at once."""
+        """Stop a camera at once. It keeps its behavior."""
         if resource in self._cameras:
             self._cameras[resource].hold()
 
     async def resume(self, resource: ResourceId) -> None:
-        """Have a camera go on."""
+        """Let a camera continue after `hold`."""
         if resource in self._cameras:
             self._cameras[resource].resume()
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What is known; after a restart, what can be told by where the camera looks."""
-        known = self._ledger.last(behavior)
+        """Return the last report, or after a restart, what the direction of the camera shows."""
+        known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
-        kept = read_native_ref(native_ref) if native_ref else None
-        if kept is None or kept.resource not in self._cameras:
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None or checkpoint.resource not in self._cameras:
             return known
-        return await self._recognise(behavior, kept, native_ref or "")
+        return await self._reattach(behavior, checkpoint, native_ref or "")
 
     # --- streams --------------------------------------------------------------------------------
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Reports as they come, for one reader, until `close`."""
-        return self._ledger.reports()
+        """Yield reports until `close`, for one reader."""
+        return self._tracker.reports()
 
     def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """States as they come, for one reader, until `close`; a slow one misses old states."""
+        """Yield states until `close`, for one reader. A slow reader misses old states."""
         return self._states.read()
 
     # --- inside ---------------------------------------------------------------------------------
@@ -188,82 +192,88 @@ class PtzArbiter:
             return "the arbiter is not connected"
         if reason := self._cameras[resource].driver.refusal(request.behavior):
             return reason
-        behavior = self._make(request.id, self._kept(request))
+        behavior = self._make(request.id, self._make_checkpoint(request))
         self._pending[request.id] = behavior
         return behavior.refusal()
 
-    def _make(self, id_: BehaviorId, kept: Kept) -> "Behavior":
+    def _make(self, id_: BehaviorId, checkpoint: Checkpoint) -> "Behavior":
         from m2pem_plugin_ptz.behaviors import BEHAVIORS  # noqa: PLC0415
-        from m2pem_plugin_ptz.behaviors.behavior import Job  # noqa: PLC0415
+        from m2pem_plugin_ptz.behaviors.behavior import BehaviorContext  # noqa: PLC0415
 
-        sight = self._cameras[kept.resource].sight
-        return BEHAVIORS[kept.behavior](Job(id_, BehaviorParameters(kept.parameters), sight))
+        model = self._cameras[checkpoint.resource].model
+        return BEHAVIORS[checkpoint.behavior](
+            BehaviorContext(id_, BehaviorParameters(checkpoint.parameters), model)
+        )
 
-    def _kept(self, request: BehaviorRequest) -> Kept:
+    def _make_checkpoint(self, request: BehaviorRequest) -> Checkpoint:
         now_us = self._context.clock.now_us()
-        return Kept(request.resources[0], request.behavior, request.parameters, now_us)
+        return Checkpoint(request.resources[0], request.behavior, request.parameters, now_us)
 
-    def _native_ref(self, request: BehaviorRequest) -> str:
-        return native_ref(self._kept(request))
+    def _encoded_checkpoint(self, request: BehaviorRequest) -> str:
+        return encode_checkpoint(self._make_checkpoint(request))
 
-    async def _recognise(self, id_: BehaviorId, kept: Kept, reference: str) -> BehaviorReport:
+    async def _reattach(
+        self, id_: BehaviorId, checkpoint: Checkpoint, reference: str
+    ) -> BehaviorReport:
         from m2pem_plugin_ptz.behaviors import BEHAVIORS  # noqa: PLC0415
         from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError  # noqa: PLC0415
 
-        camera = self._cameras[kept.resource]
+        camera = self._cameras[checkpoint.resource]
         unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
-        if kept.behavior not in BEHAVIORS:
-            return replace(unknown, reason=f"there is no behavior '{kept.behavior}' any more")
-        if not await camera.knows(HEARD_WITHIN_S):
-            return replace(unknown, reason=f"where {kept.resource} looks was not heard")
+        if checkpoint.behavior not in BEHAVIORS:
+            return replace(unknown, reason=f"there is no behavior '{checkpoint.behavior}' any more")
+        if not await camera.wait_for_ptz(FIRST_CONTACT_WITHIN_S):
+            return replace(unknown, reason=f"where {checkpoint.resource} looks was not heard")
         try:
-            behavior = self._make(id_, kept)
-            state = behavior.recognised()
+            behavior = self._make(id_, checkpoint)
+            state = behavior.state_after_restart()
         except (BehaviorFailedError, KeyError) as error:
             return replace(unknown, reason=str(error))
-        if state is BehaviorState.RUNNING and self._ledger.holder(kept.resource) is None:
-            self._ledger.adopt(id_, [kept.resource], reference)
-            elapsed_s = (self._context.clock.now_us() - kept.began_us) / 1e6
+        if state is BehaviorState.RUNNING and self._tracker.holder(checkpoint.resource) is None:
+            self._tracker.adopt(id_, [checkpoint.resource], reference)
+            elapsed_s = (self._context.clock.now_us() - checkpoint.began_us) / 1e6
             camera.adopt(id_, behavior, elapsed_s)
-            return self._ledger.last(id_)
+            return self._tracker.last(id_)
         if state is BehaviorState.SUCCEEDED:
             return replace(unknown, number=3, state=state)
-        return replace(unknown, reason=f"where {kept.resource} looks does not tell")
+        return replace(unknown, reason=f"where {checkpoint.resource} looks does not tell")
 
     async def _attend(self, resource: ResourceId) -> None:
-        """Tell where a camera looks, and notice when it falls silent."""
+        """Publish the state of a camera, and detect its silence."""
         camera, clock = self._cameras[resource], self._context.clock
         bound_us = self.limits(resource).lost_after_s * 1e6
-        began_us = looked_us = clock.now_us()
+        began_us = last_us = clock.now_us()
         was_late = False
         while True:
             now_us = clock.now_us()
             # After a pause of our own, what the camera said meanwhile is still to be read.
-            late = not was_late and now_us - looked_us > LATE * TELEMETRY_EVERY_S * 1e6
-            looked_us, was_late = now_us, late
-            silent_us = now_us - (began_us if camera.heard_us is None else camera.heard_us)
+            late = not was_late and now_us - last_us > LATE_FACTOR * TELEMETRY_EVERY_S * 1e6
+            last_us, was_late = now_us, late
+            silent_us = now_us - (
+                began_us if camera.last_contact_us is None else camera.last_contact_us
+            )
             lost = silent_us >= bound_us and not late
-            if lost and self._ledger.holder(resource) is not None:
+            if lost and self._tracker.holder(resource) is not None:
                 camera.drop()
-                self._ledger.lose(resource, f"not heard for {silent_us / 1e6:.1f} s")
+                self._tracker.lose(resource, f"not heard for {silent_us / 1e6:.1f} s")
             try:
                 self._states.put(self._state(camera, now_us, lost=lost))
             except Exception:  # what one camera or vehicle says must not make us deaf
                 self._context.logger.exception("%s: where it looks cannot be told", resource)
             await clock.sleep(TELEMETRY_EVERY_S)
 
-    def _state(self, camera: "Camera", now_us: int, *, lost: bool) -> PayloadState:
-        sight, look = camera.sight, camera.driver.look
+    def _state(self, camera: "CameraController", now_us: int, *, lost: bool) -> PayloadState:
+        model, ptz = camera.model, camera.driver.ptz
         link = LinkState.LOST if lost else LinkState.CONNECTED
-        if look is None or lost:
-            return PayloadState(sight.resource, now_us, link=link, behavior=camera.behavior)
+        if ptz is None or lost:
+            return PayloadState(model.resource, now_us, link=link, behavior=camera.behavior)
         return PayloadState(
-            sight.resource,
+            model.resource,
             now_us,
-            look.pan_rad + sight.settings.mounting.pan_rad,
-            look.tilt_rad,
-            look.zoom,
+            ptz.pan_rad + model.settings.mounting.pan_rad,
+            ptz.tilt_rad,
+            ptz.zoom,
             link=link,
             behavior=camera.behavior,
-            footprint=sight.footprint(look),
+            footprint=model.footprint(ptz),
         )

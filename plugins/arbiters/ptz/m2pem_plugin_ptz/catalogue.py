@@ -1,4 +1,4 @@
-"""What a camera that turns is offered to do; needs no library and no connection."""
+"""The behaviors of cameras that turn. It needs no library and no connection."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,12 +11,12 @@ _MOST: Mapping[ParameterKind, float] = {
     ParameterKind.COUNT: 10_000,
     ParameterKind.DURATION: 1e7,
 }
-"""Beyond these nobody means it."""
+"""Upper bounds of parameters without a bound of their own."""
 
 
 @cache
 def offered() -> tuple[BehaviorSpec, ...]:
-    """All that payloads share. What a camera cannot do of it, its driver says."""
+    """Return the shared behaviors of payloads. The driver refuses what its camera cannot do."""
     return tuple(
         replace(spec, parameters=tuple(_bounded(parameter) for parameter in spec.parameters))
         for (_, type_), spec in SHARED.items()

@@ -1,6 +1,7 @@
-"""What is kept of a behavior outside of this process: enough to recognise it on the camera.
+"""Checkpoints of behaviors: what is stored to find a behavior on its camera after a restart.
 
-A short text of JSON: which camera, which behavior, its parameters but for areas, and since when.
+A checkpoint is a short JSON text, the `native_ref` of reports: the camera, the behavior, its
+parameters without areas, and its start.
 """
 
 import json
@@ -14,8 +15,8 @@ _VERSION = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """What a reference says. `began_us`: when it was started, microseconds since the Unix epoch."""
+class Checkpoint:
+    """`began_us`: when it was started, in microseconds since the Unix epoch."""
 
     resource: ResourceId
     behavior: str
@@ -23,37 +24,38 @@ class Kept:
     began_us: int
 
 
-def native_ref(kept: Kept) -> str:
-    """The text."""
+def encode_checkpoint(checkpoint: Checkpoint) -> str:
     parameters = {
-        name: _encoded(value)
-        for name, value in kept.parameters.items()
+        name: _encode_value(value)
+        for name, value in checkpoint.parameters.items()
         if isinstance(value, float | int | str | Point | VehiclePosition)
     }
     whole = {
         "v": _VERSION,
-        "camera": kept.resource,
-        "behavior": kept.behavior,
+        "camera": checkpoint.resource,
+        "behavior": checkpoint.behavior,
         "parameters": parameters,
-        "began_us": kept.began_us,
+        "began_us": checkpoint.began_us,
     }
     return json.dumps(whole, separators=(",", ":"))
 
 
-def read_native_ref(text: str) -> Kept | None:
-    """What a text says; None: it was not made by `native_ref`."""
+def decode_checkpoint(text: str) -> Checkpoint | None:
+    """Return the checkpoint; None if the text was not made by `encode_checkpoint`."""
     try:
         whole = json.loads(text)
         if whole["v"] != _VERSION:
             return None
-        parameters = {str(name): _decoded(value) for name, value in whole["parameters"].items()}
+        parameters = {
+            str(name): _decode_value(value) for name, value in whole["parameters"].items()
+        }
         resource, behavior = ResourceId(str(whole["camera"])), str(whole["behavior"])
-        return Kept(resource, behavior, parameters, int(whole["began_us"]))
+        return Checkpoint(resource, behavior, parameters, int(whole["began_us"]))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
 
 
-def _encoded(value: float | int | str | Point | VehiclePosition) -> Any:
+def _encode_value(value: float | int | str | Point | VehiclePosition) -> Any:
     if isinstance(value, Point):
         return {"point": list(value.position), "frame": value.altitude_frame}
     if isinstance(value, VehiclePosition):
@@ -61,7 +63,7 @@ def _encoded(value: float | int | str | Point | VehiclePosition) -> Any:
     return value
 
 
-def _decoded(value: Any) -> ResolvedValue:
+def _decode_value(value: Any) -> ResolvedValue:
     if not isinstance(value, dict):
         return value  # type: ignore[no-any-return]  # a number or text of JSON
     if "vehicle" in value:

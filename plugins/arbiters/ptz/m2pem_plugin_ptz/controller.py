@@ -1,7 +1,7 @@
-"""Who works one camera: one behavior at a time, from its beginning to its end.
+"""Runs the behaviors of one camera, one at a time.
 
-A hold takes effect at once and keeps what is done; a picture that is being taken is finished. A
-cancel, or another behavior, ends what is done before anything else is begun.
+A hold takes effect at once and keeps the progress; a picture that is being taken is finished. A
+cancel, or another behavior, ends the current one before anything else begins.
 """
 
 import asyncio
@@ -11,19 +11,19 @@ from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, Limits
 from m2pem_plugin_ptz.behaviors.behavior import TICK_S, Behavior, BehaviorFailedError
-from m2pem_plugin_ptz.camera_model.model import Sight
+from m2pem_plugin_ptz.camera_model.model import CameraModel
 from m2pem_plugin_ptz.drivers.driver import CameraError
 
 STOP_SHARE = 0.8
-"""Of the time in which a cancelled camera must be free: a stop that takes longer has failed."""
+"""A stop that takes more than this part of the cancel timeout has failed."""
 
-_HEARD_EVERY_S = 0.1
+_POLL_S = 0.1
 
 
 @dataclass(slots=True)
 class _Task:
-    """A behavior that goes on. `elapsed_s`: of which so much has passed, without holds. `adopted`:
-    it was found going on, and is not begun again."""
+    """A behavior that goes on. `elapsed_s`: its time without holds. `adopted`: it was found going
+    on, and is not begun again."""
 
     id: BehaviorId
     behavior: Behavior
@@ -32,56 +32,57 @@ class _Task:
     cancelled: bool = False
 
 
-class Camera:
-    """Works a camera; what becomes of it goes to the ledger. `heard_us`: when it was heard last."""
+class CameraController:
+    """Runs the behaviors of a camera, and reports their ends to the tracker. `last_contact_us`:
+    time of the last message."""
 
     def __init__(
-        self, sight: Sight, ledger: BehaviorTracker, limits: Limits, logger: logging.Logger
+        self, model: CameraModel, tracker: BehaviorTracker, limits: Limits, logger: logging.Logger
     ) -> None:
-        self.sight = sight
-        self.driver = sight.driver
-        self.heard_us: int | None = None
-        self._ledger = ledger
+        self.model = model
+        self.driver = model.driver
+        self.last_contact_us: int | None = None
+        self._tracker = tracker
         self._limits = limits
         self._logger = logger
-        self._clock = sight.context.clock
+        self._clock = model.context.clock
         self._task: _Task | None = None
-        self._leaving: list[Behavior] = []
+        self._replaced: list[Behavior] = []
         self._held = False
         self._work: set[asyncio.Task[None]] = set()
 
     @property
     def behavior(self) -> str:
-        """The name of what it does now, or ""."""
+        """The name of the current behavior, or ""."""
         return self._task.behavior.name if self._task is not None else ""
 
-    async def knows(self, within_s: float | None = None) -> bool:
-        """Wait until it is known where it looks; False: not within so many seconds."""
-        limit_us = None if within_s is None else self.sight.now_us + round(within_s * 1e6)
-        while self.driver.look is None:
-            if limit_us is not None and self.sight.now_us >= limit_us:
+    async def wait_for_ptz(self, within_s: float | None = None) -> bool:
+        """Wait until the direction of the camera is known. Return False after `within_s`."""
+        limit_us = None if within_s is None else self.model.now_us + round(within_s * 1e6)
+        while self.driver.ptz is None:
+            if limit_us is not None and self.model.now_us >= limit_us:
                 return False
-            await self._clock.sleep(_HEARD_EVERY_S)
+            await self._clock.sleep(_POLL_S)
         return True
 
     # --- what may be asked ----------------------------------------------------------------------
 
     def take(self, id_: BehaviorId, behavior: Behavior) -> None:
-        """Do this from now on, in place of what it does."""
+        """Start a behavior in place of the current one."""
         if self._task is not None:
-            self._leaving.append(self._task.behavior)
+            self._replaced.append(self._task.behavior)
         self._task = task = _Task(id_, behavior)
         self._held = False
-        self._replace(lambda: self._do(task))
+        self._replace(lambda: self._run(task))
 
     def adopt(self, id_: BehaviorId, behavior: Behavior, elapsed_s: float) -> None:
-        """It was found doing it, and is to go on."""
+        """Continue a behavior that was found going on."""
         self._task = task = _Task(id_, behavior, elapsed_s, adopted=True)
         self._held = False
-        self._replace(lambda: self._do(task))
+        self._replace(lambda: self._run(task))
 
     def cancel(self, id_: BehaviorId) -> None:
-        """Stop, and be free."""
+        """Stop a behavior."""
         task = self._task
         if task is not None and task.id == id_ and not task.cancelled:
             task.cancelled = True
@@ -93,19 +94,19 @@ class Camera:
         self.driver.halt()
 
     def resume(self) -> None:
-        """Go on with the behavior."""
+        """Continue the behavior."""
         self._held = False
 
     def drop(self) -> None:
-        """It cannot be reached: its behavior is nobody's any more."""
+        """Drop the behavior of a camera that is lost."""
         self._task = None
-        self._leaving.clear()
+        self._replaced.clear()
         self._held = False
         for work in self._work:
             work.cancel()
 
     async def close(self) -> None:
-        """Leave the camera as it is."""
+        """Close. The camera stays as it is."""
         works = list(self._work)
         for work in works:
             work.cancel()
@@ -130,14 +131,14 @@ class Camera:
 
     # --- what is done ---------------------------------------------------------------------------
 
-    async def _do(self, task: _Task) -> None:
+    async def _run(self, task: _Task) -> None:
         try:
-            await self._make_way()
-            await self.knows()
+            await self._end_replaced()
+            await self.wait_for_ptz()
             if not task.adopted:
-                await self._released()
+                await self._wait_while_held()
                 await task.behavior.begin()
-            self._ledger.progress(task.id)
+            self._tracker.progress(task.id)
             await self._steps(task)
             await task.behavior.leave()
         except (BehaviorFailedError, CameraError) as error:
@@ -145,38 +146,38 @@ class Camera:
         except asyncio.CancelledError:
             raise
         except Exception as error:  # one camera's bug must not hang its mission
-            self._logger.exception("%s: %s", self.sight.resource, task.behavior.name)
+            self._logger.exception("%s: %s", self.model.resource, task.behavior.name)
             await self._fail(task, f"m2pem is wrong: {type(error).__name__}: {error}")
         else:
-            self._over(task, BehaviorState.SUCCEEDED)
+            self._end(task, BehaviorState.SUCCEEDED)
 
     async def _steps(self, task: _Task) -> None:
         while True:
-            await self._released()
-            began_us = self.sight.now_us
+            await self._wait_while_held()
+            began_us = self.model.now_us
             if await task.behavior.step(task.elapsed_s):
                 return
             await self._clock.sleep(TICK_S)
-            task.elapsed_s += (self.sight.now_us - began_us) / 1e6
+            task.elapsed_s += (self.model.now_us - began_us) / 1e6
 
-    async def _released(self) -> None:
+    async def _wait_while_held(self) -> None:
         while self._held:
             await self._clock.sleep(TICK_S)
 
-    async def _make_way(self) -> None:
-        """What takes over must not let the old motion or recording go on."""
-        while self._leaving:
-            before = self._leaving[0]
+    async def _end_replaced(self) -> None:
+        """End the motions and recordings of replaced behaviors."""
+        while self._replaced:
+            before = self._replaced[0]
             if before.turns:
                 self.driver.halt()
             try:
                 await before.leave()
             except CameraError as error:
-                self._logger.error("%s: %s: %s", self.sight.resource, before.name, error)
-            self._leaving.pop(0)
+                self._logger.error("%s: %s: %s", self.model.resource, before.name, error)
+            self._replaced.pop(0)
 
     async def _leave(self, behavior: Behavior) -> None:
-        await self._make_way()
+        await self._end_replaced()
         await behavior.leave()
 
     async def _cancel(self, task: _Task) -> None:
@@ -189,27 +190,27 @@ class Camera:
             await asyncio.wait([leave, late], return_when=asyncio.FIRST_COMPLETED)
             if not leave.done():
                 reason = f"it did not stop within {limit_s:g} s of the cancel"
-                self._over(task, BehaviorState.FAILED, "TIMEOUT", reason)
+                self._end(task, BehaviorState.FAILED, "TIMEOUT", reason)
             elif (error := leave.exception()) is not None:
-                self._over(task, BehaviorState.FAILED, "", f"it would not stop: {error}")
+                self._end(task, BehaviorState.FAILED, "", f"it would not stop: {error}")
             else:
-                self._over(task, BehaviorState.CANCELLED)
+                self._end(task, BehaviorState.CANCELLED)
         finally:
             for work in (leave, late):
                 work.cancel()
             await asyncio.gather(leave, late, return_exceptions=True)
 
     async def _fail(self, task: _Task, reason: str, code: str = "") -> None:
-        """What has failed half-way must not go on."""
+        """Stop a failed behavior."""
         if task.behavior.turns:
             self.driver.halt()
         try:
             await task.behavior.leave()
         except CameraError as error:
-            self._logger.error("%s: does not stop: %s", self.sight.resource, error)
-        self._over(task, BehaviorState.FAILED, code, reason)
+            self._logger.error("%s: does not stop: %s", self.model.resource, error)
+        self._end(task, BehaviorState.FAILED, code, reason)
 
-    def _over(self, task: _Task, state: BehaviorState, code: str = "", reason: str = "") -> None:
+    def _end(self, task: _Task, state: BehaviorState, code: str = "", reason: str = "") -> None:
         if self._task is task:
             self._task = None
-        self._ledger.end(task.id, state, code, reason, task.behavior.outputs())
+        self._tracker.end(task.id, state, code, reason, task.behavior.outputs())

@@ -1,8 +1,8 @@
-"""Where a camera looks, and where it can.
+"""The direction of a camera, its limits, and slow turns.
 
-Pan is clockwise from where pan 0 points: the vehicle's bow, unless `Mounting` says otherwise. Tilt
-is up from the vehicle's deck, or from the horizon, for a camera that keeps that level. A vehicle
-that turns or rolls takes both along. Zoom 1 is the widest view.
+Pan is clockwise from the direction of pan 0: the vehicle's bow, unless `Mounting` says otherwise.
+Tilt is up from the vehicle's deck, or from the horizon for a stabilized camera. The camera turns
+with its vehicle. Zoom 1 is the widest view.
 """
 
 import math
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """In radians; `zoom` is a factor, 1 or more."""
+class PanTiltZoom:
+    """In radians. `zoom` is a factor, 1 or more."""
 
     pan_rad: float
     tilt_rad: float
@@ -20,9 +20,9 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Where a camera can look: (lowest, highest). With `endless` it pans all round, and the ends of
-    `pan_rad` are one. `rate_rad_s`: the quickest that it pans and tilts. `view_rad`: the width and
-    the height of what it sees at zoom 1."""
+    """The limits of a camera: (lowest, highest). `endless`: it pans all round, and the ends of
+    `pan_rad` are one. `rate_rad_s`: highest rate of pan and tilt. `view_rad`: horizontal and
+    vertical field of view at zoom 1."""
 
     pan_rad: tuple[float, float] = (-math.pi, math.pi)
     tilt_rad: tuple[float, float] = (-math.pi / 2, math.pi / 2)
@@ -33,8 +33,8 @@ class Reach:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """A picture as the camera gave it. `content` None: the camera keeps it, under `reference`.
+class CapturedImage:
+    """A picture of the camera. `content` None: the camera keeps it as `reference`.
 
     `taken_us`: microseconds since the Unix epoch. `suffix`: of its file, such as ".jpg".
     """
@@ -47,7 +47,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """From one direction to another, both axes at once, so that they arrive together.
+    """A turn at a limited rate, for cameras without one. Both axes arrive together.
 
     Directions are (pan, tilt) in radians, times in seconds of one clock. `endless`: it pans the
     shorter way round.
@@ -68,11 +68,11 @@ class Ramp:
 
     @property
     def seconds(self) -> float:
-        """How long it takes."""
+        """The duration of the turn."""
         return max(map(abs, self._turn_rad)) / self.rate_rad_s
 
     def at(self, now_s: float) -> tuple[float, float]:
-        """Where it is by now; never beyond the end."""
+        """Return the direction at a time; the end after it."""
         if self.is_over(now_s) or not self.seconds:
             return self.end_rad
         share = max(0.0, now_s - self.begun_s) / self.seconds
@@ -80,5 +80,5 @@ class Ramp:
         return self.start_rad[0] + share * pan, self.start_rad[1] + share * tilt
 
     def is_over(self, now_s: float) -> bool:
-        """Whether it has arrived."""
+        """Whether the turn has ended."""
         return now_s - self.begun_s >= self.seconds

@@ -1,6 +1,6 @@
-"""Pictures in files, each with what is known of it in a file of JSON beside it.
+"""Files of pictures, each with a JSON file of its metadata beside it.
 
-A picture is whole or not there, and none takes the place of another, whatever was stored before.
+A file is written whole or not at all, and never replaces another.
 """
 
 import errno
@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from m2pem.api import BehaviorId, GeoPosition, Value
-from m2pem_plugin_ptz.camera_model.model import Sight, iso
-from m2pem_plugin_ptz.gimbal import Look, Picture
+from m2pem_plugin_ptz.camera_model.model import CameraModel, iso
+from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom
 
 _NO_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EACCES)
 
 
 @dataclass(frozen=True, slots=True)
-class Caption:
-    """What is known of a picture. `position`: of the camera: [latitude, longitude, altitude].
+class ImageMetadata:
+    """The metadata of a picture. `position`: of the camera: [latitude, longitude, altitude].
 
     `number`: of the behavior's pictures, from 1. `time_us`: microseconds since the Unix epoch.
     """
@@ -35,70 +35,70 @@ class Caption:
     facts: Mapping[str, Any]
 
     @classmethod
-    def of(cls, sight: Sight, behavior: BehaviorId, number: int) -> "Caption":
-        """As a camera looks now."""
-        now_us, look = sight.now_us, sight.driver.look
-        eye = sight.eye(now_us)
-        where = eye.position if eye is not None else None
+    def of(cls, model: CameraModel, behavior: BehaviorId, number: int) -> "ImageMetadata":
+        """Return the metadata for the current pose of a camera."""
+        now_us, ptz = model.now_us, model.driver.ptz
+        camera_pose = model.camera_pose(now_us)
+        where = camera_pose.position if camera_pose is not None else None
         facts = {
-            "camera": sight.resource,
+            "camera": model.resource,
             "run": behavior.rpartition(".")[0],
             "behavior": behavior,
             "number": number,
-            "journal": str(sight.context.journal),
+            "journal": str(model.context.journal),
             "position": _position(where),
-            "vehicle": _vehicle(sight, now_us),
-            "look": _look(sight, now_us, look),
-            "footprint": [_position(corner) for corner in sight.footprint(look)],
+            "vehicle": _vehicle(model, now_us),
+            "look": _pointing_facts(model, now_us, ptz),
+            "footprint": [_position(corner) for corner in model.footprint(ptz)],
         }
         return cls(behavior, number, now_us, _position(where), facts)
 
-    def taken(self, picture: Picture) -> "Caption":
-        """With when it was taken, as the camera says."""
+    def taken(self, picture: CapturedImage) -> "ImageMetadata":
+        """Return the metadata with the time that the camera reports."""
         return replace(self, time_us=picture.taken_us)
 
 
-def stored(folder: Path, picture: Picture, caption: Caption) -> str:
-    """Store a picture; returns the absolute name of its file, or what the camera calls it, which
-    has kept it.
+def store_image(folder: Path, picture: CapturedImage, metadata: ImageMetadata) -> str:
+    """Store a picture. Return the absolute name of its file, or the reference of a picture that the
+    camera keeps.
 
     Raises:
         OSError: it cannot be stored.
     """
-    run, _, name = caption.behavior.rpartition(".")
-    place = folder.absolute() / _plain(run or "run")
+    run, _, name = metadata.behavior.rpartition(".")
+    place = folder.absolute() / _safe_name(run or "run")
     place.mkdir(parents=True, exist_ok=True)
-    number = caption.number
+    number = metadata.number
     while True:
-        stem = place / f"{_plain(name)}_{number}"
+        stem = place / f"{_safe_name(name)}_{number}"
         notes, file = stem.with_suffix(".json"), stem.with_suffix(_suffix(picture))
         number += 1
         if file.exists():
             continue
-        said = picture.reference if picture.content is None else str(file)
-        if not _written(notes, _notes(caption, picture, said)):
+        stored = picture.reference if picture.content is None else str(file)
+        if not _write_whole(notes, _metadata(metadata, picture, stored)):
             continue
         try:
-            if picture.content is None or _written(file, picture.content):
-                return said
+            if picture.content is None or _write_whole(file, picture.content):
+                return stored
         except BaseException:
             notes.unlink(missing_ok=True)
             raise
         notes.unlink(missing_ok=True)
 
 
-def _notes(caption: Caption, picture: Picture, file: str) -> bytes:
+def _metadata(metadata: ImageMetadata, picture: CapturedImage, file: str) -> bytes:
     whole = {
         "file": file,
         "reference": picture.reference or None,
-        "time": iso(caption.time_us),
-        **caption.facts,
+        "time": iso(metadata.time_us),
+        **metadata.facts,
     }
     return json.dumps(whole, indent=2, ensure_ascii=False).encode()
 
 
-def _written(path: Path, content: bytes) -> bool:
-    """Write a file as a whole; False: there is one of that name."""
+def _write_whole(path: Path, content: bytes) -> bool:
+    """Write a file as a whole. Return False if the name exists."""
     handle, temporary = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -121,12 +121,12 @@ def _written(path: Path, content: bytes) -> bool:
     return True
 
 
-def _plain(name: str) -> str:
-    """A name that can lead nowhere else."""
+def _safe_name(name: str) -> str:
+    """Return a name without path separators."""
     return re.sub(r"[^\w-]", "_", name)
 
 
-def _suffix(picture: Picture) -> str:
+def _suffix(picture: CapturedImage) -> str:
     return picture.suffix if re.fullmatch(r"\.\w{1,8}", picture.suffix) else ".jpg"
 
 
@@ -136,11 +136,11 @@ def _position(position: GeoPosition | None) -> Value:
     return [position.latitude_deg, position.longitude_deg, position.altitude_m]
 
 
-def _vehicle(sight: Sight, now_us: int) -> Mapping[str, Any]:
-    roll, pitch, yaw = sight.carrier.turned(now_us)
-    state = sight.carrier.state()
+def _vehicle(model: CameraModel, now_us: int) -> Mapping[str, Any]:
+    roll, pitch, yaw = model.vehicle_pose.attitude(now_us)
+    state = model.vehicle_pose.state()
     return {
-        "name": sight.carrier.vehicle,
+        "name": model.vehicle_pose.vehicle,
         "position": _position(state.position if state is not None else None),
         "roll_deg": math.degrees(roll),
         "pitch_deg": math.degrees(pitch),
@@ -148,16 +148,18 @@ def _vehicle(sight: Sight, now_us: int) -> Mapping[str, Any]:
     }
 
 
-def _look(sight: Sight, now_us: int, look: Look | None) -> Mapping[str, Any] | None:
-    if look is None:
+def _pointing_facts(
+    model: CameraModel, now_us: int, ptz: PanTiltZoom | None
+) -> Mapping[str, Any] | None:
+    if ptz is None:
         return None
-    heading, elevation = sight.deck(now_us).heading(look.pan_rad, look.tilt_rad)
-    known = sight.carrier.turned(now_us)[2] is not None
-    view = sight.view(look)
+    heading, elevation = model.mount_frame(now_us).heading(ptz.pan_rad, ptz.tilt_rad)
+    known = model.vehicle_pose.attitude(now_us)[2] is not None
+    view = model.field_of_view(ptz)
     return {
-        "pan_deg": math.degrees(look.pan_rad),
-        "tilt_deg": math.degrees(look.tilt_rad),
-        "zoom": look.zoom,
+        "pan_deg": math.degrees(ptz.pan_rad),
+        "tilt_deg": math.degrees(ptz.tilt_rad),
+        "zoom": ptz.zoom,
         "heading_deg": math.degrees(heading) % 360 if known else None,
         "elevation_deg": math.degrees(elevation),
         "view_deg": [math.degrees(view.width_rad), math.degrees(view.height_rad)],

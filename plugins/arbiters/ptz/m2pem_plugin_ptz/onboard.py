@@ -1,4 +1,4 @@
-"""An m2pem node of one camera: what it is asked for over ROS, the arbiter `ptz` on board does."""
+"""The m2pem node of one camera: it executes commands by the arbiter `ptz` on board."""
 
 import logging
 from typing import TYPE_CHECKING
@@ -15,8 +15,8 @@ LOGGER = logging.getLogger("m2pem.onboard")
 
 
 class CameraNode:
-    """Serves what docs/ros.md, "Payloads", says, in `namespace`. Where the vehicle is that carries
-    the camera, and others that it looks at, the executive tells it.
+    """Serves the topics of docs/ros.md, "Payloads", in `namespace`. The executive publishes the
+    states of the camera's vehicle and of targets.
 
     `connection`: of the camera, as a fleet has it for the arbiter `ptz`. `origin`: of the fleet's
     local frame (latitude and longitude in degrees, altitude in metres).
@@ -58,7 +58,7 @@ class CameraNode:
         )
 
     async def open(self) -> None:
-        """Reach the camera, and be there for commands.
+        """Connect to the camera, and serve.
 
         Raises:
             PluginError: what its driver needs is not installed, or its settings cannot be.
@@ -66,5 +66,5 @@ class CameraNode:
         await self._node.open()
 
     async def close(self) -> None:
-        """Stop the camera, say so, and let go."""
+        """Stop the camera, publish the end of its behavior, and close."""
         await self._node.close()

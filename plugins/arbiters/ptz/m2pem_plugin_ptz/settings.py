@@ -1,4 +1,9 @@
-"""What a fleet says of the connection to a camera that turns (docs/ptz.md)."""
+"""What a fleet says of the connection to a camera that turns (docs/ptz.md), and the reader for
+drivers.
+
+A camera inherits the connection of its vehicle, which may have any arbiter. So an unknown key is no
+error, unless it is similar to a key of the camera.
+"""
 
 import difflib
 import math
@@ -13,11 +18,11 @@ from m2pem.errors import PluginError
 from m2pem_plugin_ptz.gimbal import Reach
 
 LONGEST_S = 2.0
-"""A camera that is later than that follows nothing."""
+"""Longest delay."""
 
 
 class DriverName(StrEnum):
-    """The ways to reach a camera."""
+    """The drivers of cameras."""
 
     ROS = "ros"
     MAVLINK = "mavlink"
@@ -26,8 +31,8 @@ class DriverName(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """Where the camera is on its vehicle, in the vehicle's frame (REP-103: x forward, y left, z up;
-    metres), and to where its pan 0 points, from the bow, clockwise, in radians."""
+    """The mount position in the vehicle's frame (REP-103: x forward, y left, z up; metres), and the
+    direction of pan 0 from the bow, clockwise, in radians."""
 
     forward_m: float = 0.0
     left_m: float = 0.0
@@ -37,9 +42,9 @@ class Mounting:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """`own`: the keys that are the driver's own, unread. `pictures`: the folder that pictures are
-    stored in; `stabilized`: the camera keeps its horizon level by itself. `delay_s`: so late it
-    does what it is told: what moves is aimed at where it will be then."""
+    """`own`: the keys of the driver, unread. `pictures`: the folder of pictures. `stabilized`:
+    the camera keeps its horizon level. `delay_s`: delay of commands, by which moving targets are
+    led."""
 
     driver: DriverName
     reach: Reach = field(default_factory=Reach)
@@ -51,7 +56,7 @@ class Settings:
 
 
 def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
-    """The settings of all cameras.
+    """Read the settings of all cameras.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
@@ -204,11 +209,11 @@ def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
 Choice = TypeVar("Choice", bound=StrEnum)
 
 SIMILAR = 0.8
-"""So similar (0 to 1) to one of ours is a key that is taken for a slip of the pen."""
+"""An unknown key this similar to a known one (0 to 1) is an error."""
 
 
 class OwnSettings:
-    """The map at `connection`, or one inside of it.
+    """Reads the map at `connection`, or an inner map.
 
     All methods raise PluginError; the text names the resource and the key.
     """
@@ -222,15 +227,15 @@ class OwnSettings:
 
     @classmethod
     def of(cls, connection: Connection) -> "OwnSettings":
-        """Those of a camera."""
+        """Return the reader of a camera's connection."""
         return cls(connection.resource, connection.settings)
 
     def error(self, key: str, problem: str) -> PluginError:
-        """What is wrong with the value of a key."""
+        """Return the error for the value of a key."""
         return PluginError(f"{self._resource}: {self._path}.{key}: {problem}")
 
     def refuse_slips(self, known: Collection[str]) -> None:
-        """No key may look like one of these without being one."""
+        """Raise an error for unknown keys that are similar to one of these."""
         for key in self.values:
             if key not in known:
                 near = difflib.get_close_matches(str(key), known, n=1, cutoff=SIMILAR)
@@ -240,7 +245,7 @@ class OwnSettings:
                     )
 
     def refuse_others(self, known: Sequence[str]) -> None:
-        """Nothing but these keys may be there."""
+        """Raise an error for keys other than these."""
         for key in self.values:
             if key not in known:
                 near = difflib.get_close_matches(str(key), known, n=1)
@@ -248,14 +253,15 @@ class OwnSettings:
                 raise self.error(str(key), f"there is no such setting; {hint}")
 
     def inner(self, key: str, example: str) -> "OwnSettings":
-        """The map of a key; empty if it is not there."""
+        """Return the reader of an inner map; it is empty if the key is missing."""
         value = self.values.get(key, {})
         if not isinstance(value, Mapping):
             raise self.error(key, f"{value!r} is no map, such as {example}")
         return OwnSettings(self._resource, value, f"{self._path}.{key}")
 
     def whole(self, key: str, default: int | None, lowest: int, highest: int, what: str) -> int:
-        """A whole number; without a default it must be there. `what`: for people."""
+        """Return a whole number. Without a default it is required. `what` describes it in
+        errors."""
         value = self.values.get(key, default)
         if value is None:
             raise self.error(key, f"it is missing: {what}, {lowest} to {highest}")
@@ -265,21 +271,20 @@ class OwnSettings:
         return int(value)
 
     def flag(self, key: str, default: bool) -> bool:
-        """True or false."""
         value = self.values.get(key, default)
         if not isinstance(value, bool):
             raise self.error(key, f"{value!r} is neither true nor false")
         return value
 
     def text(self, key: str, default: str) -> str:
-        """A text; one that is there is not empty."""
+        """Return a text that is not empty."""
         value = self.values.get(key, default)
         if key in self.values and (not isinstance(value, str) or not value.strip()):
             raise self.error(key, f"{value!r} is no text")
         return str(value)
 
     def choice(self, key: str, choices: type[Choice], default: Choice) -> Choice:
-        """One of an enumeration."""
+        """Return a member of an enumeration."""
         value = self.values.get(key, default)
         try:
             return choices(value)

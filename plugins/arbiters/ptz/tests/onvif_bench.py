@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from m2pem_plugin_ptz.drivers.driver import Seat
+from m2pem_plugin_ptz.drivers.driver import DriverSetup
 from m2pem_plugin_ptz.drivers.onvif import OnvifDriver
 from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.settings import DriverName, Settings
@@ -45,26 +45,26 @@ class Bench:
         settings = {"driver": "onvif", "host": "127.0.0.1", "port": port, "timeout": "5 s", **own}
         own_keys = {key: value for key, value in settings.items() if key != "driver"}
         self.driver = OnvifDriver(
-            Seat(
+            DriverSetup(
                 Connection(RESOURCE, "ground", settings),
                 Settings(DriverName.ONVIF, reach=reach, own=own_keys),
                 context(SystemClock()),
-                self._hear,
+                self._on_message,
             )
         )
 
-    def _hear(self) -> None:
+    def _on_message(self) -> None:
         self.heard += 1
 
     async def ready(self) -> None:
-        await until(lambda: not self.driver.refusal("take_picture") and self.driver.look)
+        await until(lambda: not self.driver.refusal("take_picture") and self.driver.ptz)
 
     def looks_at(self, pan_rad: float, tilt_rad: float, within_rad: float = 0.005) -> bool:
-        look = self.driver.look
+        ptz = self.driver.ptz
         return (
-            look is not None
-            and abs(look.pan_rad - pan_rad) < within_rad
-            and abs(look.tilt_rad - tilt_rad) < within_rad
+            ptz is not None
+            and abs(ptz.pan_rad - pan_rad) < within_rad
+            and abs(ptz.tilt_rad - tilt_rad) < within_rad
         )
 
 

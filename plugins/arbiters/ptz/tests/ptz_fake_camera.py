@@ -1,13 +1,13 @@
 """A camera without a network: a head that turns at a bounded rate, in the time of a clock.
 
-A `Head` outlives the arbiter, as a camera outlives a restart. What it is told is kept in `calls`.
+A `Gimbal` outlives the arbiter, as a camera outlives a restart. What it is told is kept in `calls`.
 """
 
 import asyncio
 import math
 
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
+from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
 
 from m2pem.api import Connection, GeoPosition, ResourceId, VehicleState
 
@@ -20,7 +20,7 @@ def rad(degrees):
     return math.radians(degrees)
 
 
-class Head:
+class Gimbal:
     """Turns pan and tilt, each no faster than it may, towards what it was told last."""
 
     def __init__(self, clock=None, **reach):
@@ -67,9 +67,9 @@ class Head:
 
 
 class HeadDriver:
-    def __init__(self, seat, head):
-        self.seat, self.head = seat, head
-        self.head.clock = seat.context.clock
+    def __init__(self, setup, gimbal):
+        self.setup, self.gimbal = setup, gimbal
+        self.gimbal.clock = setup.context.clock
         self._task = None
 
     async def open(self):
@@ -81,64 +81,64 @@ class HeadDriver:
             await asyncio.gather(self._task, return_exceptions=True)
 
     @property
-    def look(self):
-        self.head.move()
-        return Look(self.head.pan, self.head.tilt, self.head.zoom)
+    def ptz(self):
+        self.gimbal.move()
+        return PanTiltZoom(self.gimbal.pan, self.gimbal.tilt, self.gimbal.zoom)
 
     @property
     def reach(self):
-        return self.head.reach
+        return self.gimbal.reach
 
     def refusal(self, behavior):
-        return self.head.refuses.get(behavior, "")
+        return self.gimbal.refuses.get(behavior, "")
 
     def point(self, pan_rad, tilt_rad, rate_rad_s=None):
-        head = self.head
-        head.move()
-        low, high = head.reach.pan_rad
+        gimbal = self.gimbal
+        gimbal.move()
+        low, high = gimbal.reach.pan_rad
         assert low - 1e-9 <= pan_rad <= high + 1e-9, math.degrees(pan_rad)
-        assert head.reach.tilt_rad[0] - 1e-9 <= tilt_rad <= head.reach.tilt_rad[1] + 1e-9
+        assert gimbal.reach.tilt_rad[0] - 1e-9 <= tilt_rad <= gimbal.reach.tilt_rad[1] + 1e-9
         assert rate_rad_s is None or rate_rad_s > 0
-        was_told, head.told, head.rate = head.told, (pan_rad, tilt_rad), rate_rad_s
-        head.begun += head.turning and was_told is None
+        was_told, gimbal.told, gimbal.rate = gimbal.told, (pan_rad, tilt_rad), rate_rad_s
+        gimbal.begun += gimbal.turning and was_told is None
 
     def zoom(self, level):
-        self.head.move()
-        self.head.calls.append(("zoom", level))
-        self.head.zoom_told = level
+        self.gimbal.move()
+        self.gimbal.calls.append(("zoom", level))
+        self.gimbal.zoom_told = level
 
     def halt(self):
-        self.head.move()
-        self.head.calls.append("halt")
-        self.head.told = self.head.zoom_told = None
+        self.gimbal.move()
+        self.gimbal.calls.append("halt")
+        self.gimbal.told = self.gimbal.zoom_told = None
 
     async def take_picture(self):
-        head = self.head
-        head.calls.append("take_picture")
-        await self.seat.context.clock.sleep(head.picture_s)
-        if "picture" in head.refuses:
-            raise CameraError(head.refuses["picture"])
-        number = head.calls.count("take_picture")
-        return Picture(self.seat.context.clock.now_us(), b"picture %d" % number)
+        gimbal = self.gimbal
+        gimbal.calls.append("take_picture")
+        await self.setup.context.clock.sleep(gimbal.picture_s)
+        if "picture" in gimbal.refuses:
+            raise CameraError(gimbal.refuses["picture"])
+        number = gimbal.calls.count("take_picture")
+        return CapturedImage(self.setup.context.clock.now_us(), b"picture %d" % number)
 
     async def start_recording(self):
-        if "recording" in self.head.refuses:
-            raise CameraError(self.head.refuses["recording"])
-        self.head.calls.append("start_recording")
-        self.head.recording = True
+        if "recording" in self.gimbal.refuses:
+            raise CameraError(self.gimbal.refuses["recording"])
+        self.gimbal.calls.append("start_recording")
+        self.gimbal.recording = True
 
     async def stop_recording(self):
-        self.head.calls.append("stop_recording")
-        if not self.head.recording:
+        self.gimbal.calls.append("stop_recording")
+        if not self.gimbal.recording:
             raise CameraError("it does not record")
-        self.head.recording = False
+        self.gimbal.recording = False
         return "/media/video.mp4"
 
     async def _say(self):
         while True:
-            if self.head.audible:
-                self.seat.heard()
-            await self.seat.context.clock.sleep(SAYS_EVERY_S)
+            if self.gimbal.audible:
+                self.setup.heard()
+            await self.setup.context.clock.sleep(SAYS_EVERY_S)
 
 
 def connection(name, **settings):

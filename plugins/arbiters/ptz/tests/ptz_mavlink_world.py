@@ -13,7 +13,7 @@ from m2pem_plugin_mavlink.simulator.camera import Camera
 from m2pem_plugin_mavlink.simulator.gimbal import Gimbal
 from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
-from m2pem_plugin_ptz.drivers.driver import Seat
+from m2pem_plugin_ptz.drivers.driver import DriverSetup
 from m2pem_plugin_ptz.drivers.mavlink import MavlinkDriver
 from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.settings import DriverName, Settings
@@ -64,7 +64,7 @@ class World:
     async def ready(self, behavior: str = "ptz_point_at") -> None:
         await until(lambda: self.driver.refusal(behavior) == "")
         if behavior.startswith("ptz"):
-            await until(lambda: self.driver.look is not None)
+            await until(lambda: self.driver.ptz is not None)
 
     async def stands(self) -> tuple[float, float]:
         """Wait until it has not turned for half a second of its own time; where it points."""
@@ -91,10 +91,10 @@ class World:
 
 def make_seat(
     settings: dict[str, Any], clock: SystemClock, heard: Callable[[], None], **more: Any
-) -> Seat:
+) -> DriverSetup:
     context = ArbiterContext(clock, Bus(), logging.getLogger("test"), (47.4, 8.5, 488.0))
     own = Settings(DriverName.MAVLINK, REACH, own=settings, **{"stabilized": True, **more})
-    return Seat(Connection(CAMERA, "air", settings), own, context, heard)
+    return DriverSetup(Connection(CAMERA, "air", settings), own, context, heard)
 
 
 @asynccontextmanager
@@ -116,11 +116,11 @@ async def world(
         clock = SystemClock(SPEED)
         heard: list[float] = []
         connection = {"url": f"udpout://{host}:{port}", "system_id": 1, **(own or {})}
-        seat = make_seat(connection, clock, lambda: heard.append(clock.now_us() / 1e6), **more)
-        driver = MavlinkDriver(seat)
+        setup = make_seat(connection, clock, lambda: heard.append(clock.now_us() / 1e6), **more)
+        driver = MavlinkDriver(setup)
         await driver.open()
         try:
-            bus = seat.context.bus
+            bus = setup.context.bus
             assert isinstance(bus, Bus)
             yield World(driver, real, clock, bus, heard)
         finally:

@@ -57,13 +57,13 @@ class Watcher:
             ros.subscribe(
                 JointState,
                 topic,
-                lambda message, camera=camera: self._hear(camera, tuple(message.position)),
+                lambda message, camera=camera: self._on_message(camera, tuple(message.position)),
                 qos.TELEMETRY,
             )
         await until(lambda: len(self._at) == len(self._namespaces))
         return ros
 
-    def _hear(self, camera: ResourceId, at: tuple[float, ...]) -> None:
+    def _on_message(self, camera: ResourceId, at: tuple[float, ...]) -> None:
         before = self._at.get(camera, at)
         self._at[camera] = at
         if math.dist(before, at) > 1e-6:

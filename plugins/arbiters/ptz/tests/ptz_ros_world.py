@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from m2pem_plugin_ptz.drivers.driver import Seat
+from m2pem_plugin_ptz.drivers.driver import DriverSetup
 from m2pem_plugin_ptz.drivers.ros import RosDriver
 from m2pem_plugin_ptz.settings import DriverName, Settings
 from m2pem_plugin_ros.runtime import RosRuntime, qos
@@ -41,7 +41,7 @@ def make_driver(
     context = ArbiterContext(SystemClock(), Bus(), logging.getLogger("test"), (38.1, -77.3, 60.0))
     reach = ENDLESS if endless else REACH
     own = Settings(DriverName.ROS, reach, pictures=folder, own=settings)
-    return RosDriver(Seat(Connection(CAMERA, "ground", settings), own, context, heard))
+    return RosDriver(DriverSetup(Connection(CAMERA, "ground", settings), own, context, heard))
 
 
 @dataclass
@@ -57,11 +57,11 @@ class World:
     fault_is: str = "well"
 
     def open(self) -> None:
-        self.ros.subscribe(JointState, "/evsg2/joint_states", self._hear, qos.TELEMETRY)
+        self.ros.subscribe(JointState, "/evsg2/joint_states", self._on_message, qos.TELEMETRY)
         self.ros.subscribe(String, "/evsg2/sim_fault_is", self._hear_fault, qos.STATUS)
         self._faults = self.ros.node.create_publisher(String, "/evsg2/sim_fault", qos.COMMANDS)
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         self.joints = dict(zip(message.name, message.position, strict=True))
         self.history.append(self.joints)
 

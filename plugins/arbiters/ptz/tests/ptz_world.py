@@ -5,7 +5,7 @@ import math
 
 import pymap3d
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from ptz_fake_camera import ORIGIN, Head, HeadDriver, connection, vehicle
+from ptz_fake_camera import ORIGIN, Gimbal, HeadDriver, connection, vehicle
 
 from m2pem.api import Area, Point, ResourceId
 from m2pem.executive.clock import run_virtual
@@ -16,12 +16,12 @@ CAMERA = ResourceId("ugv/ptz")
 
 
 class World:
-    """`bench` has what the arbiter says; `looks` are kept if `watch` is called. `head`: the camera
-    itself; `moves` tells how the vehicle stands, from seconds (arguments of
+    """`bench` has the reports of the arbiter; `looks` are kept if `watch` is called. `gimbal` is
+    the camera itself; `moves` returns the vehicle's pose at a time in seconds (arguments of
     `ptz_fake_camera.vehicle`)."""
 
-    def __init__(self, clock, head, moves, domain):
-        self.clock, self.head, self.moves, self.domain = clock, head, moves, domain
+    def __init__(self, clock, gimbal, moves, domain):
+        self.clock, self.gimbal, self.moves, self.domain = clock, gimbal, moves, domain
         self.context = context(clock)
         self.bench = None
         self.others = {}
@@ -61,26 +61,26 @@ class World:
         azimuth, elevation, _ = pymap3d.geodetic2aer(
             *place, here.latitude_deg, here.longitude_deg, here.altitude_m + 2.0
         )
-        self.head.move()
-        heading = math.pi / 2 - state.yaw_rad + self.head.pan
-        up, level = math.sin(self.head.tilt), math.cos(self.head.tilt)
+        self.gimbal.move()
+        heading = math.pi / 2 - state.yaw_rad + self.gimbal.pan
+        up, level = math.sin(self.gimbal.tilt), math.cos(self.gimbal.tilt)
         el, az = math.radians(elevation), math.radians(azimuth)
         cosine = up * math.sin(el) + level * math.cos(el) * math.cos(heading - az)
         return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
 
 
-def play(main, head=None, moves=lambda _: {}, domain="ground", others=None, **settings):
+def play(main, gimbal=None, moves=lambda _: {}, domain="ground", others=None, **settings):
     """Run `main(world)` with a connected arbiter."""
-    head = head or Head()
+    gimbal = gimbal or Gimbal()
 
     async def run(clock):
-        world = World(clock, head, moves, domain)
+        world = World(clock, gimbal, moves, domain)
         world.others = dict(others or {})
         publishing = asyncio.create_task(world.publish())
         await clock.sleep(0.3)
         made = connection(CAMERA, **settings)
         made = type(made)(made.resource, domain, made.settings, made.behaviors)
-        arbiter = PtzArbiter({CAMERA: made}, world.context, lambda seat: HeadDriver(seat, head))
+        arbiter = PtzArbiter({CAMERA: made}, world.context, lambda setup: HeadDriver(setup, gimbal))
         try:
             async with ArbiterHarness(arbiter, clock) as world.bench:
                 return await main(world)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from ptz_fake_camera import Head, HeadDriver, connection, rad, vehicle
+from ptz_fake_camera import Gimbal, HeadDriver, connection, rad, vehicle
 from ptz_world import CAMERA, START_US, play, point
 
 from m2pem.api import BehaviorState, LinkState, PayloadState, VehiclePosition
@@ -38,7 +38,7 @@ def test_pan_is_told_from_the_bow_whatever_the_mounting():
         await world.clock.sleep(0.5)
         state = world.bench.latest(CAMERA)
         assert math.remainder(state.pan_rad - rad(-120), math.tau) == pytest.approx(0, abs=0.01)
-        assert world.head.pan == pytest.approx(rad(60), abs=0.01)
+        assert world.gimbal.pan == pytest.approx(rad(60), abs=0.01)
 
     play(main, mounting={"pan": "180 deg"})
 
@@ -63,13 +63,13 @@ def test_a_silent_camera_is_lost_with_what_it_does_and_can_be_used_when_it_is_ba
     async def main(world):
         await world.bench.start("r1.b1", "ptz_track", CAMERA, target=point(30, 40))
         await world.clock.sleep(2)
-        world.head.audible = False
+        world.gimbal.audible = False
         end = await world.bench.ended("r1.b1", 4.0)
         assert (end.state, end.code) == (BehaviorState.LOST, "LINK_LOST")
         await world.clock.sleep(1)
         assert world.bench.latest(CAMERA).link is LinkState.LOST
         assert world.bench.latest(CAMERA).pan_rad is None, "nobody knows where it looks"
-        world.head.audible = True
+        world.gimbal.audible = True
         await world.clock.sleep(0.5)
         end = await world.do("ptz_point_at", id_="r1.b2", bearing=0.0, elevation=0.0)
         assert end.state is BehaviorState.SUCCEEDED
@@ -92,36 +92,36 @@ def test_a_silent_camera_is_lost_with_what_it_does_and_can_be_used_when_it_is_ba
     ],
 )
 def test_what_a_camera_cannot_do_is_refused_with_the_reason(behavior, parameters, reason):
-    head = Head(zoom_max=30.0)
-    head.refuses["record_video"] = "the camera has no recorder"
+    gimbal = Gimbal(zoom_max=30.0)
+    gimbal.refuses["record_video"] = "the camera has no recorder"
 
     async def main(world):
         end = await world.do(behavior, **parameters)
         assert end.state is BehaviorState.REJECTED
         assert reason in end.reason
 
-    play(main, head)
+    play(main, gimbal)
 
 
 def test_zoom_ends_when_the_lens_is_there():
     async def main(world):
         end = await world.do("zoom", level=20.0)
         assert end.state is BehaviorState.SUCCEEDED
-        assert world.head.zoom == pytest.approx(20, rel=0.02)
+        assert world.gimbal.zoom == pytest.approx(20, rel=0.02)
 
-    play(main, Head(zoom_max=30.0))
+    play(main, Gimbal(zoom_max=30.0))
 
 
 def test_a_lens_that_is_stuck_is_a_failure():
     async def main(world):
-        world.head.stuck = True
+        world.gimbal.stuck = True
         end = await world.do("zoom", within_s=30, level=20.0)
         assert (end.state, end.reason) == (
             BehaviorState.FAILED,
             "the camera does not zoom to 20: it has not within 20 s",
         )
 
-    play(main, Head(zoom_max=30.0))
+    play(main, Gimbal(zoom_max=30.0))
 
 
 def test_cancel_stops_the_camera_where_it_is():
@@ -130,11 +130,11 @@ def test_cancel_stops_the_camera_where_it_is():
         await world.clock.sleep(1)
         await world.bench.arbiter.cancel("r1.b1", 1)
         assert (await world.bench.ended("r1.b1", 5)).state is BehaviorState.CANCELLED
-        world.head.move()
-        pan = world.head.pan
+        world.gimbal.move()
+        pan = world.gimbal.pan
         await world.clock.sleep(3)
-        world.head.move()
-        assert 0.5 < world.head.pan == pan
+        world.gimbal.move()
+        assert 0.5 < world.gimbal.pan == pan
 
     play(main)
 
@@ -142,9 +142,9 @@ def test_cancel_stops_the_camera_where_it_is():
 # --- after a restart ----------------------------------------------------------------------------
 
 
-def restarted(behavior, gap_s=1.0, change=lambda head: None, folder="unused", **parameters):
+def restarted(behavior, gap_s=1.0, change=lambda gimbal: None, folder="unused", **parameters):
     """Start a behavior, restart the arbiter, and ask; returns the answer and the end, if any."""
-    head = Head(zoom_max=30.0)
+    gimbal = Gimbal(zoom_max=30.0)
     made = {CAMERA: connection(CAMERA, pictures=str(folder))}
 
     async def run(clock):
@@ -152,14 +152,14 @@ def restarted(behavior, gap_s=1.0, change=lambda head: None, folder="unused", **
         lent.bus.publish(vehicle("ugv", clock.now_us()))
 
         def make():
-            return PtzArbiter(made, lent, lambda seat: HeadDriver(seat, head))
+            return PtzArbiter(made, lent, lambda setup: HeadDriver(setup, gimbal))
 
         async with ArbiterHarness(make(), clock) as bench:
             await bench.start("r1.b1", behavior, CAMERA, **parameters)
             await bench.running("r1.b1")
             reference = bench.of("r1.b1")[-1].native_ref
             await clock.sleep(gap_s)
-        change(head)
+        change(gimbal)
         async with ArbiterHarness(make(), clock) as bench:
             found = await bench.arbiter.query("r1.b1", reference)
             if found.state is not BehaviorState.RUNNING:
@@ -186,8 +186,8 @@ def test_tracking_goes_on_for_the_rest_of_its_duration():
 
 
 def test_a_camera_that_looks_elsewhere_does_not_track():
-    def turn(head):
-        head.pan, head.told = 2.0, None
+    def turn(gimbal):
+        gimbal.pan, gimbal.told = 2.0, None
 
     found, _ = restarted("ptz_track", 5, turn, target=point(0, 50))
     assert found.state is BehaviorState.UNKNOWN

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import pytest
 from m2pem_plugin_ptz.arbiter import PtzArbiter
-from ptz_fake_camera import Head, HeadDriver, connection, rad, vehicle
+from ptz_fake_camera import Gimbal, HeadDriver, connection, rad, vehicle
 
 from m2pem.api import ResourceId
 from m2pem.testing import ArbiterCase, ArbiterContract
@@ -22,7 +22,7 @@ class _Heads(ArbiterContract):
 
     @pytest.fixture
     def heads(self):
-        return {A: Head(), B: Head()}
+        return {A: Gimbal(), B: Gimbal()}
 
     @pytest.fixture
     def make_arbiter(self, heads, tmp_path):
@@ -34,7 +34,7 @@ class _Heads(ArbiterContract):
             return PtzArbiter(
                 {each: connection(each, **said) for each in heads},
                 context,
-                lambda seat: HeadDriver(seat, heads[seat.connection.resource]),
+                lambda setup: HeadDriver(setup, heads[setup.connection.resource]),
             )
 
         return make
@@ -70,7 +70,7 @@ class TestEndlessPan(_Heads):
 
     @pytest.fixture
     def heads(self):
-        return {A: Head(endless=True), B: Head(endless=True)}
+        return {A: Gimbal(endless=True), B: Gimbal(endless=True)}
 
 
 class TestZooming(_Heads):
@@ -81,7 +81,7 @@ class TestZooming(_Heads):
 
     @pytest.fixture
     def heads(self):
-        return {A: Head(zoom_max=30.0), B: Head(zoom_max=30.0)}
+        return {A: Gimbal(zoom_max=30.0), B: Gimbal(zoom_max=30.0)}
 
     @pytest.fixture
     def case(self):

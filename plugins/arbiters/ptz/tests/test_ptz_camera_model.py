@@ -8,9 +8,15 @@ import pytest
 from geographiclib.geodesic import Geodesic
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from m2pem_plugin_ptz.camera_model.field_of_view import RANGE_M, View, footprint, ranges_m, visible
-from m2pem_plugin_ptz.camera_model.frames import between, ecef, enu_of_deck, geodetic
-from m2pem_plugin_ptz.camera_model.pose import Stance, deck, eye
+from m2pem_plugin_ptz.camera_model.field_of_view import (
+    RANGE_M,
+    FieldOfView,
+    footprint,
+    ranges_m,
+    visible,
+)
+from m2pem_plugin_ptz.camera_model.frames import angle_between, ecef, enu_of_deck, geodetic
+from m2pem_plugin_ptz.camera_model.pose import VehiclePose, camera_pose, mount_frame
 from m2pem_plugin_ptz.settings import Mounting
 from ptz_fake_camera import rad
 
@@ -27,16 +33,16 @@ leans = st.floats(-0.6, 0.6)
 distances = st.floats(5, 20_000)
 
 
-def stance(lat, lon, alt=100.0, yaw=math.pi / 2, roll=0.0, pitch=0.0):
-    return Stance(GeoPosition(lat, lon, alt), yaw, roll, pitch)
+def pose(lat, lon, alt=100.0, yaw=math.pi / 2, roll=0.0, pitch=0.0):
+    return VehiclePose(GeoPosition(lat, lon, alt), yaw, roll, pitch)
 
 
 def camera(*args, mounting=NONE, stabilized=False, **more):
-    return eye(stance(*args, **more), mounting, stabilized=stabilized)
+    return camera_pose(pose(*args, **more), mounting, stabilized=stabilized)
 
 
 def apart_rad(found, right):
-    return between(found, right)
+    return angle_between(found, right)
 
 
 @given(latitudes, longitudes, angles, distances, st.floats(-200, 200), angles)
@@ -82,29 +88,33 @@ def test_positive_roll_and_pitch_lower_the_right_side_and_the_bow(roll, pitch, v
 
 
 def test_a_vehicle_that_has_its_bow_up_tilts_its_camera_down_to_the_horizon():
-    seen = deck(NONE, 0.0, rad(-15), 0.0, stabilized=False).towards(math.pi / 2, 0.0)
+    seen = mount_frame(NONE, 0.0, rad(-15), 0.0, stabilized=False).towards(math.pi / 2, 0.0)
     assert seen == pytest.approx((0.0, rad(-15)))
-    aside = deck(NONE, rad(8), 0.0, 0.0, stabilized=False).towards(math.pi, 0.0)
+    aside = mount_frame(NONE, rad(8), 0.0, 0.0, stabilized=False).towards(math.pi, 0.0)
     assert aside == pytest.approx((rad(90), rad(8))), "starboard is down: the horizon is above it"
 
 
 def test_a_stabilized_camera_takes_no_notice_of_roll_and_pitch():
-    level = deck(NONE, 0.0, 0.0, 1.0, stabilized=False).towards(0.3, -0.2)
-    assert deck(NONE, 0.4, 0.3, 1.0, stabilized=True).towards(0.3, -0.2) == pytest.approx(level)
+    level = mount_frame(NONE, 0.0, 0.0, 1.0, stabilized=False).towards(0.3, -0.2)
+    assert mount_frame(NONE, 0.4, 0.3, 1.0, stabilized=True).towards(0.3, -0.2) == pytest.approx(
+        level
+    )
 
 
 def test_pan_counts_from_where_the_mounting_has_its_zero():
-    seen = deck(Mounting(pan_rad=rad(90)), 0, 0, math.pi / 2, stabilized=False).towards(rad(90), 0)
+    seen = mount_frame(Mounting(pan_rad=rad(90)), 0, 0, math.pi / 2, stabilized=False).towards(
+        rad(90), 0
+    )
     assert seen == pytest.approx((0.0, 0.0))
 
 
 def test_a_camera_is_where_its_mounting_is_on_a_leaning_vehicle():
     mounted = Mounting(1.0, 0.5, 3.0)
     upright = camera(38.0, -77.0, mounting=mounted, yaw=0.0)
-    offset = camera(38.0, -77.0).seen(upright.place)
+    offset = camera(38.0, -77.0).vector_to(upright.place)
     assert offset == pytest.approx((1.0, 0.5, 3.0), abs=1e-6)
     rolled = camera(38.0, -77.0, mounting=mounted, yaw=0.0, roll=math.pi / 2)
-    assert camera(38.0, -77.0).seen(rolled.place) == pytest.approx((1.0, -3.0, 0.5), abs=1e-6)
+    assert camera(38.0, -77.0).vector_to(rolled.place) == pytest.approx((1.0, -3.0, 0.5), abs=1e-6)
 
 
 @given(latitudes, longitudes, angles, leans, leans, angles, st.floats(-1.5, -0.05))
@@ -115,7 +125,7 @@ def test_the_ground_that_a_look_hits_is_looked_at_by_that_look(
     """The inverse of pointing, on a vehicle that leans; exact on the ellipsoid."""
     mounted = Mounting(0.4, -0.2, 2.0, 0.7)
     high = camera(lat, lon, 300.0, mounting=mounted, yaw=yaw, roll=roll, pitch=pitch)
-    ray = high.deck.vector(bearing, tilt)
+    ray = high.mount_frame.vector(bearing, tilt)
     (far,) = ranges_m(high, ray[None, :], 50.0)
     if math.isnan(far):
         assert ray[2] > -0.01, "what looks down meets the ground"
@@ -129,7 +139,7 @@ def test_the_ground_that_a_look_hits_is_looked_at_by_that_look(
 @settings(max_examples=40)
 def test_the_ground_is_hit_where_proj_has_its_height(lat, lon, heading):
     high = camera(lat, lon, 2_000.0)
-    ray = deck(NONE, 0, 0, math.pi / 2, stabilized=False).vector(heading, rad(-3))
+    ray = mount_frame(NONE, 0, 0, math.pi / 2, stabilized=False).vector(heading, rad(-3))
     (far,) = ranges_m(high, ray[None, :], 100.0)
     place = high.place + far * (ray @ high.enu)
     height = pyproj.Transformer.from_crs("EPSG:4978", "EPSG:4979").transform(*place)[2]
@@ -138,9 +148,9 @@ def test_the_ground_is_hit_where_proj_has_its_height(lat, lon, heading):
 
 def test_above_the_horizon_and_below_the_ground_nothing_is_hit():
     low = camera(38.0, -77.0, 10.0)
-    rays = np.array([low.deck.vector(0.0, tilt) for tilt in (rad(5), 0.0, rad(-0.01))])
+    rays = np.array([low.mount_frame.vector(0.0, tilt) for tilt in (rad(5), 0.0, rad(-0.01))])
     assert np.isnan(ranges_m(low, rays, 0.0)).all(), "10 m up, the horizon is 0.1 deg down"
-    assert np.isnan(ranges_m(low, np.array([low.deck.vector(0.0, rad(-5))]), 20.0)).all()
+    assert np.isnan(ranges_m(low, np.array([low.mount_frame.vector(0.0, rad(-5))]), 20.0)).all()
 
 
 def test_the_ground_ends_at_the_horizon():
@@ -157,8 +167,8 @@ def test_the_ground_ends_at_the_horizon():
 
 
 def footprint_of(high, tilt, pan=0.0, view=None, ground=0.0):
-    axes = high.deck.axes(pan, tilt)
-    return footprint(high, axes, view or View(rad(60), rad(34)), ground)
+    axes = high.mount_frame.axes(pan, tilt)
+    return footprint(high, axes, view or FieldOfView(rad(60), rad(34)), ground)
 
 
 def test_straight_down_the_footprint_is_the_pictures_rectangle():
@@ -172,7 +182,7 @@ def test_straight_down_the_footprint_is_the_pictures_rectangle():
 
 
 def test_zoom_narrows_the_view_as_a_longer_lens_does():
-    view = View(rad(60), rad(34)).zoomed(10.0)
+    view = FieldOfView(rad(60), rad(34)).zoomed(10.0)
     assert math.tan(view.width_rad / 2) * 10 == pytest.approx(math.tan(rad(30)))
 
 
@@ -196,7 +206,7 @@ def test_a_view_above_the_horizon_has_no_footprint():
 def test_what_is_inside_of_the_footprint_is_in_the_picture(roll, pitch, pan, tilt, u, v):
     """Any mixture of the corners of a convex footprint is seen by the camera."""
     high = camera(38.0, -77.0, 120.0, roll=roll, pitch=pitch)
-    axes, view = high.deck.axes(pan, tilt), View(rad(60), rad(34))
+    axes, view = high.mount_frame.axes(pan, tilt), FieldOfView(rad(60), rad(34))
     corners = footprint_of(high, tilt, pan, view)
     if not corners:
         return
@@ -206,7 +216,7 @@ def test_what_is_inside_of_the_footprint_is_in_the_picture(roll, pitch, pan, til
     lon = a.longitude_deg + u * (b.longitude_deg - a.longitude_deg)
     lat += v * (c.latitude_deg - a.latitude_deg)
     lon += v * (c.longitude_deg - a.longitude_deg)
-    seen = high.seen(ecef(GeoPosition(lat, lon, 0.0)))
+    seen = high.vector_to(ecef(GeoPosition(lat, lon, 0.0)))
     assert view.holds(axes, seen[None, :], 1.001)[0]
 
 

@@ -6,21 +6,21 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_ptz import image_files
-from m2pem_plugin_ptz.gimbal import Picture
-from m2pem_plugin_ptz.image_files import Caption, stored
-from ptz_fake_camera import Head, rad
+from m2pem_plugin_ptz.gimbal import CapturedImage
+from m2pem_plugin_ptz.image_files import ImageMetadata, store_image
+from ptz_fake_camera import Gimbal, rad
 from ptz_world import CAMERA, START_US, play
 
 from m2pem.api import BehaviorState
 from m2pem.testing.contracts.arbiter_harness import ORIGIN
 
-CAPTION = Caption("r1.b3", 1, START_US, None, {"run": "r1"})
-PICTURE = Picture(START_US, b"jpeg")
+CAPTION = ImageMetadata("r1.b3", 1, START_US, None, {"run": "r1"})
+PICTURE = CapturedImage(START_US, b"jpeg")
 
 
 def test_pictures_are_stored_with_what_is_known_of_them(tmp_path):
     async def main(world):
-        world.head.pan, world.head.tilt = rad(30), rad(-20)
+        world.gimbal.pan, world.gimbal.tilt = rad(30), rad(-20)
         end = await world.do("take_picture", id_="r7.b12", count=2, interval=3.0)
         assert end.state is BehaviorState.SUCCEEDED
         return dict(end.outputs)
@@ -55,30 +55,30 @@ def test_the_interval_is_from_one_picture_to_the_next(tmp_path):
     async def main(world):
         began = world.seconds
         await world.do("take_picture", count=4, interval=2.0)
-        assert world.seconds - began == pytest.approx(3 * 2.0 + world.head.picture_s, abs=0.3)
+        assert world.seconds - began == pytest.approx(3 * 2.0 + world.gimbal.picture_s, abs=0.3)
 
     play(main, pictures=str(tmp_path))
 
 
 def test_what_was_taken_before_a_restart_is_kept(tmp_path):
-    first = stored(tmp_path, PICTURE, CAPTION)
-    again = stored(tmp_path, Picture(START_US, b"other"), CAPTION)
+    first = store_image(tmp_path, PICTURE, CAPTION)
+    again = store_image(tmp_path, CapturedImage(START_US, b"other"), CAPTION)
     assert (Path(first).name, Path(again).name) == ("b3_1.jpg", "b3_2.jpg")
     assert Path(first).read_bytes() == b"jpeg"
 
 
 def test_a_picture_that_the_camera_keeps_is_known_by_its_reference(tmp_path):
-    kept = Picture(START_US, None, reference="mftp://[;comp=100]/DCIM/1.jpg")
-    assert stored(tmp_path, kept, CAPTION) == kept.reference
+    kept = CapturedImage(START_US, None, reference="mftp://[;comp=100]/DCIM/1.jpg")
+    assert store_image(tmp_path, kept, CAPTION) == kept.reference
     notes = json.loads((tmp_path / "r1" / "b3_1.json").read_text())
     assert notes["reference"] == kept.reference
-    assert stored(tmp_path, kept, CAPTION) == kept.reference
+    assert store_image(tmp_path, kept, CAPTION) == kept.reference
     assert (tmp_path / "r1" / "b3_2.json").exists()
 
 
 def test_names_lead_nowhere_else(tmp_path):
-    caption = Caption("../../r1.b/3", 1, START_US, None, {})
-    file = Path(stored(tmp_path, Picture(START_US, b"x", suffix="/../x"), caption))
+    caption = ImageMetadata("../../r1.b/3", 1, START_US, None, {})
+    file = Path(store_image(tmp_path, CapturedImage(START_US, b"x", suffix="/../x"), caption))
     assert file.parent.parent == tmp_path
     assert file.suffix == ".jpg"
 
@@ -88,7 +88,7 @@ def test_a_card_that_knows_no_links_stores_pictures_too(tmp_path, monkeypatch):
         raise OSError(errno.EPERM, "Operation not permitted")
 
     monkeypatch.setattr(image_files.os, "link", link)
-    names = [Path(stored(tmp_path, PICTURE, CAPTION)).name for _ in range(2)]
+    names = [Path(store_image(tmp_path, PICTURE, CAPTION)).name for _ in range(2)]
     assert names == ["b3_1.jpg", "b3_2.jpg"]
 
 
@@ -98,7 +98,7 @@ def test_a_full_disk_leaves_nothing_half_done(tmp_path, monkeypatch):
 
     monkeypatch.setattr(image_files.os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
-        stored(tmp_path, PICTURE, CAPTION)
+        store_image(tmp_path, PICTURE, CAPTION)
     assert list((tmp_path / "r1").iterdir()) == []
 
 
@@ -111,9 +111,9 @@ def test_a_disk_that_gets_full_ends_the_behavior_with_the_pictures_that_were_sto
         stores.append(caption.number)
         if len(stores) == 3:
             raise OSError(errno.ENOSPC, "No space left on device")
-        return stored(folder, picture, caption)
+        return store_image(folder, picture, caption)
 
-    monkeypatch.setattr("m2pem_plugin_ptz.behaviors.capture.stored", store)
+    monkeypatch.setattr("m2pem_plugin_ptz.behaviors.capture.store_image", store)
 
     async def main(world):
         return await world.do("take_picture", count=5, interval=1.0)
@@ -136,13 +136,13 @@ def test_a_folder_that_cannot_be_made_is_a_failure_with_the_reason(tmp_path):
 
 
 def test_a_camera_that_takes_no_picture_is_a_failure_with_its_reason(tmp_path):
-    head = Head()
-    head.refuses["picture"] = "the storage is full"
+    gimbal = Gimbal()
+    gimbal.refuses["picture"] = "the storage is full"
 
     async def main(world):
         return await world.do("take_picture")
 
-    end = play(main, head, pictures=str(tmp_path))
+    end = play(main, gimbal, pictures=str(tmp_path))
     assert (end.state, end.reason) == (BehaviorState.FAILED, "the storage is full")
 
 
@@ -161,10 +161,10 @@ def test_cancelled_pictures_are_written_as_far_as_they_were_taken(tmp_path):
 def test_a_hold_finishes_the_picture_and_takes_no_more(tmp_path):
     async def main(world):
         await world.bench.start("r1.b1", "take_picture", CAMERA, count=3, interval=1.0)
-        await world.until(lambda: "take_picture" in world.head.calls)
+        await world.until(lambda: "take_picture" in world.gimbal.calls)
         await world.bench.arbiter.hold(CAMERA)
         await world.clock.sleep(30)
-        assert world.head.calls.count("take_picture") == 1
+        assert world.gimbal.calls.count("take_picture") == 1
         await world.bench.arbiter.resume(CAMERA)
         return await world.bench.ended("r1.b1", 10)
 
@@ -194,7 +194,7 @@ def test_a_video_lasts_for_its_duration():
             "video.file": "/media/video.mp4",
             "video.time": "2026-01-01T00:00:00.300000Z",
         }
-        assert not world.head.recording
+        assert not world.gimbal.recording
 
     play(main)
 
@@ -203,14 +203,14 @@ def test_a_cancelled_video_is_stopped_and_written():
     async def main(world):
         await world.bench.start("r1.b1", "record_video", CAMERA)
         await world.clock.sleep(5)
-        assert world.head.recording
+        assert world.gimbal.recording
         await world.bench.arbiter.cancel("r1.b1", 1)
         end = await world.bench.ended("r1.b1", 5)
         assert (end.state, end.outputs["video.file"]) == (
             BehaviorState.CANCELLED,
             "/media/video.mp4",
         )
-        assert not world.head.recording
+        assert not world.gimbal.recording
 
     play(main)
 
@@ -222,28 +222,28 @@ def test_a_behavior_that_takes_over_ends_the_video_first():
         again = {"preempts": ("r1.b1",), "bearing": 0.5, "elevation": 0.0}
         await world.bench.start("r1.b2", "ptz_point_at", CAMERA, **again)
         assert (await world.bench.ended("r1.b2", 10)).state is BehaviorState.SUCCEEDED
-        assert world.head.calls.count("stop_recording") == 1
+        assert world.gimbal.calls.count("stop_recording") == 1
 
     play(main)
 
 
 def test_a_video_that_does_not_begin_is_a_failure():
-    head = Head()
-    head.refuses["recording"] = "there is no card"
+    gimbal = Gimbal()
+    gimbal.refuses["recording"] = "there is no card"
 
     async def main(world):
         end = await world.do("record_video")
         assert (end.state, end.reason) == (BehaviorState.FAILED, "there is no card")
         assert BehaviorState.RUNNING not in world.bench.states_of("r1.b1")
 
-    play(main, head)
+    play(main, gimbal)
 
 
 def test_a_video_that_does_not_stop_is_not_said_to_be_cancelled():
     async def main(world):
         await world.bench.start("r1.b1", "record_video", CAMERA)
         await world.clock.sleep(5)
-        world.head.recording = False
+        world.gimbal.recording = False
         await world.bench.arbiter.cancel("r1.b1", 1)
         end = await world.bench.ended("r1.b1", 12)
         assert (end.state, end.reason) == (

@@ -145,10 +145,10 @@ async def test_it_zooms_to_a_factor_and_says_so() -> None:
         await it.ready()
         await it.ready("zoom")
         it.driver.zoom(6.0)
-        await until(lambda: it.driver.look.zoom == pytest.approx(6.0))
+        await until(lambda: it.driver.ptz.zoom == pytest.approx(6.0))
         assert it.camera.zoom == pytest.approx(50.0)
         it.driver.zoom(1.0)
-        await until(lambda: it.driver.look.zoom == pytest.approx(1.0))
+        await until(lambda: it.driver.ptz.zoom == pytest.approx(1.0))
 
 
 async def test_zoom_that_somebody_else_changes_is_seen() -> None:
@@ -156,7 +156,7 @@ async def test_zoom_that_somebody_else_changes_is_seen() -> None:
         await it.ready()
         await it.ready("zoom")
         it.camera.zoom = 20.0
-        await until(lambda: it.driver.look.zoom == pytest.approx(3.0))
+        await until(lambda: it.driver.ptz.zoom == pytest.approx(3.0))
 
 
 async def test_halt_stops_a_zoom_on_its_way() -> None:

@@ -27,8 +27,8 @@ async def test_it_points_from_the_bow_and_says_so(kind: Kind, firmware: str) -> 
         await it.ready()
         it.point(40.0, -25.0)
         await until(lambda: it.is_at(40.0, -25.0))
-        await until(lambda: it.driver.look.pan_rad == pytest.approx(math.radians(40), abs=0.01))
-        await until(lambda: it.driver.look.tilt_rad == pytest.approx(math.radians(-25), abs=0.01))
+        await until(lambda: it.driver.ptz.pan_rad == pytest.approx(math.radians(40), abs=0.01))
+        await until(lambda: it.driver.ptz.tilt_rad == pytest.approx(math.radians(-25), abs=0.01))
         assert it.gimbal.primary == OURS
 
 
@@ -141,7 +141,7 @@ async def test_a_gimbal_from_north_stays_when_its_vehicle_turns() -> None:
         await until(lambda: it.is_at(30.0, 0.0))
         it.real.autopilot.body.yaw_rad += math.radians(40)
         await until(lambda: it.is_at(-10.0, 0.0))
-        await until(lambda: abs(math.degrees(it.driver.look.pan_rad) + 10.0) < 0.6)
+        await until(lambda: abs(math.degrees(it.driver.ptz.pan_rad) + 10.0) < 0.6)
 
 
 async def test_what_is_meant_from_the_deck_is_told_from_the_horizon() -> None:
@@ -150,7 +150,7 @@ async def test_what_is_meant_from_the_deck_is_told_from_the_horizon() -> None:
         it.vehicle_is(yaw_rad=0.0, pitch_rad=math.radians(10.0))  # the nose is down
         it.point(0.0, 0.0)
         await until(lambda: it.is_at(0.0, -10.0))
-        await until(lambda: abs(it.driver.look.tilt_rad) < math.radians(0.6))
+        await until(lambda: abs(it.driver.ptz.tilt_rad) < math.radians(0.6))
 
 
 async def test_another_station_in_control_is_not_fought() -> None:
@@ -216,7 +216,7 @@ async def test_a_vehicle_without_a_gimbal_says_who_did_not_answer() -> None:
         await it.ready("take_picture")
         await until(lambda: "(" in it.driver.refusal("ptz_track"))
         assert "component 1 of system 1 has not said" in it.driver.refusal("ptz_track")
-        assert it.driver.look is None
+        assert it.driver.ptz is None
         await until(lambda: it.heard)  # by its camera
 
 
@@ -240,7 +240,7 @@ async def test_the_socket_is_that_of_the_vehicles_arbiter() -> None:
 async def test_a_fixed_camera_looks_ahead() -> None:
     async with world(spec={"gimbal": False}, own={"gimbal": False}) as it:
         await it.ready("take_picture")
-        assert (it.driver.look.pan_rad, it.driver.look.tilt_rad) == (0.0, 0.0)
+        assert (it.driver.ptz.pan_rad, it.driver.ptz.tilt_rad) == (0.0, 0.0)
         assert "no gimbal" in it.driver.refusal("ptz_point_at")
         await it.driver.take_picture()
 

@@ -79,7 +79,7 @@ async def test_a_camera_stays_on_its_target_while_its_vehicle_drives_and_turns(t
         longest_us, good_since_us = 0, found.clock.now_us()
         while not found.states_of("r1.b1")[-1].terminal:
             now_us = found.clock.now_us()
-            off = math.remainder(server.camera.look[0] - way.bearing(now_us), math.tau)
+            off = math.remainder(server.camera.ptz[0] - way.bearing(now_us), math.tau)
             if abs(off) > rad(1):
                 good_since_us = now_us
             longest_us = max(longest_us, now_us - good_since_us)

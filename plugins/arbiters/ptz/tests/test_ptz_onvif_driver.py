@@ -23,8 +23,8 @@ async def test_it_points_zooms_and_says_where_it_looks(tmp_path):
         heard = bench.heard
         driver.point(1.0, -0.3)
         driver.zoom(5.0)
-        await until(lambda: bench.looks_at(1.0, -0.3) and abs(driver.look.zoom - 5.0) < 0.05)
-        assert server.camera.look == pytest.approx((1.0, -0.3, 5.0), abs=0.01)
+        await until(lambda: bench.looks_at(1.0, -0.3) and abs(driver.ptz.zoom - 5.0) < 0.05)
+        assert server.camera.ptz == pytest.approx((1.0, -0.3, 5.0), abs=0.01)
         assert server.camera.calls["AbsoluteMove"] == 2, "one turn, one zoom"
         assert bench.heard > heard
 
@@ -49,15 +49,15 @@ async def test_a_halt_stops_at_once_even_while_a_call_is_under_way(tmp_path):
         await bench.ready()
         bench.driver.zoom(20.0)
         bench.driver.point(3.0, 0.2, rad(20))
-        await until(lambda: server.camera.look[0] > 0.3)
+        await until(lambda: server.camera.ptz[0] > 0.3)
         bench.driver.halt()
         await until(lambda: server.camera.calls["Stop"] >= 1)
-        head = server.camera.head
-        await until(lambda: server.camera.look and not any(axis.moving for axis in head.axes))
-        pan, _, zoom = server.camera.look
+        gimbal = server.camera.gimbal
+        await until(lambda: server.camera.ptz and not any(axis.moving for axis in gimbal.axes))
+        pan, _, zoom = server.camera.ptz
         await until(lambda: server.camera.calls["Stop"] >= 2)
-        assert server.camera.look[0] == pan < 2.9
-        assert server.camera.look[2] == zoom < 20.0
+        assert server.camera.ptz[0] == pan < 2.9
+        assert server.camera.ptz[2] == zoom < 20.0
 
 
 async def test_what_is_wanted_after_a_halt_is_done(tmp_path):
@@ -65,7 +65,7 @@ async def test_what_is_wanted_after_a_halt_is_done(tmp_path):
         await bench.ready()
         for _ in range(3):
             bench.driver.point(2.0, 0.0)
-            await until(lambda: server.camera.head.pan.moving)
+            await until(lambda: server.camera.gimbal.pan.moving)
             bench.driver.halt()
             bench.driver.point(-0.2, -0.1)
             await until(lambda: bench.looks_at(-0.2, -0.1))
@@ -75,8 +75,8 @@ async def test_a_rate_is_kept(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
         bench.driver.point(0.3, 0.0, rad(20))
-        await until(lambda: server.camera.look[0] > 0.1)
-        assert 0 < server.camera.head.pan.speed <= rad(20.01)
+        await until(lambda: server.camera.ptz[0] > 0.1)
+        assert 0 < server.camera.gimbal.pan.speed <= rad(20.01)
         await until(lambda: bench.looks_at(0.3, 0.0))
 
 
@@ -93,7 +93,7 @@ async def test_a_moving_target_is_followed_within_a_degree(tmp_path):
             while clock() - good_since < 2.0:
                 bench.driver.point(*target())
                 await asyncio.sleep(1 / 15)
-                pan, tilt, _ = server.camera.look
+                pan, tilt, _ = server.camera.ptz
                 wanted = target()
                 if max(abs(pan - wanted[0]), abs(tilt - wanted[1])) > rad(1.0):
                     good_since = clock()
@@ -107,8 +107,8 @@ async def test_a_generic_camera_is_pointed_by_the_fleets_reach(tmp_path):
         bench.driver.point(1.0, -1.0)
         bench.driver.zoom(3.0)
         await until(lambda: bench.looks_at(1.0, -1.0))
-        await until(lambda: abs(bench.driver.look.zoom - 3.0) < 0.05)
-        assert server.camera.look == pytest.approx((1.0, -1.0, 3.0), abs=0.01)
+        await until(lambda: abs(bench.driver.ptz.zoom - 3.0) < 0.05)
+        assert server.camera.ptz == pytest.approx((1.0, -1.0, 3.0), abs=0.01)
 
 
 async def test_an_inverted_camera_is_told_the_other_way(tmp_path):
@@ -117,7 +117,7 @@ async def test_an_inverted_camera_is_told_the_other_way(tmp_path):
         await bench.ready()
         bench.driver.point(0.5, -1.0)
         await until(lambda: bench.looks_at(0.5, -1.0))
-        assert server.camera.look[:2] == pytest.approx((-0.5, 1.0), abs=0.01)
+        assert server.camera.ptz[:2] == pytest.approx((-0.5, 1.0), abs=0.01)
 
 
 async def test_a_camera_without_the_old_media_service_works(tmp_path):
@@ -175,7 +175,7 @@ async def test_what_a_camera_cannot_do_is_refused_with_the_reason(tmp_path, opti
 async def test_a_camera_that_does_not_say_where_it_looks_is_refused(tmp_path):
     async with camera(positions=False) as server, driven(server, tmp_path) as bench:
         await until(lambda: "GetStatus" in bench.driver.refusal("ptz_point_at"))
-        assert bench.driver.look is None
+        assert bench.driver.ptz is None
         assert bench.heard > 0
 
 

@@ -40,7 +40,7 @@ async def test_a_camera_that_reboots_with_another_clock_is_taken_up_again(tmp_pa
         heard = bench.heard
         await server.faults.switch_on()
         await until(lambda: bench.heard > heard + 3)
-        await until(lambda: server.camera.look[0] > 0.59)
+        await until(lambda: server.camera.ptz[0] > 0.59)
         assert bench.driver.refusal("ptz_point_at") == ""
 
 
@@ -152,7 +152,7 @@ async def test_a_slow_camera_is_still_pointed(tmp_path):
 async def test_a_full_storage_is_an_error_of_the_recording(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
-        server.camera.troubles.full = True
+        server.camera.fault_state.full = True
         with pytest.raises(CameraError, match="the storage is full"):
             await bench.driver.start_recording()
         with pytest.raises(CameraError, match="was not told to record"):

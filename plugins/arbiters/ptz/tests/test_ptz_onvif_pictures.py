@@ -40,10 +40,10 @@ async def test_a_picture_shows_where_the_camera_looks(tmp_path):
         await until(lambda: bench.looks_at(0.5, -0.2))
         after = await bench.driver.take_picture()
         shown = Image.open(io.BytesIO(after.content)).info["comment"].decode()
-        look = re.match(r"pan ([-+.\d]+)  tilt ([-+.\d]+)  zoom 1\.0", shown)
-        assert look is not None, shown
+        ptz = re.match(r"pan ([-+.\d]+)  tilt ([-+.\d]+)  zoom 1\.0", shown)
+        assert ptz is not None, shown
         # It may still turn by the last tenths of a degree.
-        assert [float(angle) for angle in look.groups()] == pytest.approx([28.6, -11.5], abs=0.5)
+        assert [float(angle) for angle in ptz.groups()] == pytest.approx([28.6, -11.5], abs=0.5)
         assert before.content != after.content
 
 
@@ -58,7 +58,7 @@ def test_the_horizon_is_where_it_belongs():
 async def test_what_is_no_picture_is_an_error(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
-        server.camera.troubles.picture = b"<html>Please log in</html>"
+        server.camera.fault_state.picture = b"<html>Please log in</html>"
         with pytest.raises(CameraError, match="gives 26 bytes that are no picture"):
             await bench.driver.take_picture()
 
@@ -67,7 +67,7 @@ async def test_a_picture_has_a_largest_size(tmp_path, monkeypatch):
     monkeypatch.setattr(media, "LARGEST", 100_000)
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
-        server.camera.troubles.picture = b"\xff\xd8\xff" + bytes(200_000)
+        server.camera.fault_state.picture = b"\xff\xd8\xff" + bytes(200_000)
         with pytest.raises(CameraError, match="more than 100000 bytes"):
             await bench.driver.take_picture()
 

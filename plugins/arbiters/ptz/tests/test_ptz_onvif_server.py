@@ -102,19 +102,19 @@ async def test_a_strict_client_turns_the_camera_and_sees_where_it_looks(degrees)
                 break
         assert status.Position.PanTilt.x == pytest.approx(90.0 if degrees else 0.5, abs=1e-3)
         assert status.Position.Zoom.x == pytest.approx(0.5, abs=1e-3)
-        assert server.camera.look == pytest.approx((1.5708, -0.5236, 10.5), abs=1e-3)
+        assert server.camera.ptz == pytest.approx((1.5708, -0.5236, 10.5), abs=1e-3)
 
 
 async def test_a_velocity_lasts_as_long_as_its_timeout_or_until_a_stop():
     async with camera() as server, client(server, "ptz") as ptz:
         half = {"PanTilt": {"x": 0.5, "y": 0.0}}
         await ptz.ContinuousMove("profile_1", half, timedelta(seconds=0.3))
-        await until(lambda: server.camera.look[0] > 0.05)
-        await until(lambda: server.camera.look and not server.camera.head.pan.moving)
-        assert 0.1 < server.camera.look[0] < 0.5
+        await until(lambda: server.camera.ptz[0] > 0.05)
+        await until(lambda: server.camera.ptz and not server.camera.gimbal.pan.moving)
+        assert 0.1 < server.camera.ptz[0] < 0.5
         await ptz.ContinuousMove("profile_1", half, timedelta(seconds=60))
         await ptz.Stop("profile_1")
-        assert server.camera.head.pan.velocity == 0.0
+        assert server.camera.gimbal.pan.velocity == 0.0
 
 
 @pytest.mark.parametrize(

@@ -99,20 +99,20 @@ async def test_planned_faults_begin_and_end():
     async with camera() as server:
         for words in ('fault "too hot" for 3 s', "slow 2 s for 3 s", "clock +60 s for 3 s"):
             server.faults.plan(parse(words))
-        troubles = server.camera.troubles
-        await until(lambda: (troubles.fault, troubles.slow_s) == ("too hot", 2.0))
+        fault_state = server.camera.fault_state
+        await until(lambda: (fault_state.fault, fault_state.slow_s) == ("too hot", 2.0))
         assert server.camera.skew_s == 60.0
-        await until(lambda: (troubles.fault, troubles.slow_s) == ("", 0.0))
+        await until(lambda: (fault_state.fault, fault_state.slow_s) == ("", 0.0))
         await until(lambda: server.camera.skew_s == 0.0)
 
 
 async def test_a_camera_that_reboots_comes_back_at_its_address_looking_ahead():
     async with camera() as server:
-        server.camera.head.pan.at = 1.0
+        server.camera.gimbal.pan.at = 1.0
         port = server.port
         server.faults.plan(parse("reboot for 0.2 s"))
         await until(lambda: server.camera.reboots == 1)
-        assert server.camera.look[0] == 0.0
+        assert server.camera.ptz[0] == 0.0
 
         async def answers():
             try:

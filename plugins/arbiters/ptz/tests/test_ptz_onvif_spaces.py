@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from m2pem_plugin_ptz.drivers.onvif.spaces import Described, Offer, read_spaces
+from m2pem_plugin_ptz.drivers.onvif.spaces import PtzSpaces, SpaceDescription, read_spaces
 from m2pem_plugin_ptz.gimbal import Reach
 
 BASE = "http://www.onvif.org/ver10/tptz"
@@ -24,11 +24,14 @@ def rad(low, high):
 
 
 def generic(**more):
-    return Offer(positions=[Described(GENERIC, BOTH, BOTH)], **more)
+    return PtzSpaces(positions=[SpaceDescription(GENERIC, BOTH, BOTH)], **more)
 
 
 def degrees(pan, tilt, **more):
-    return Offer(positions=[Described(GENERIC, BOTH, BOTH), Described(DEGREES, pan, tilt)], **more)
+    return PtzSpaces(
+        positions=[SpaceDescription(GENERIC, BOTH, BOTH), SpaceDescription(DEGREES, pan, tilt)],
+        **more,
+    )
 
 
 REACH = Reach(pan_rad=(-2.0, 2.0), tilt_rad=(-1.0, 0.5))
@@ -42,7 +45,7 @@ def test_a_generic_camera_is_told_shares_of_the_fleets_reach_and_answers_in_them
     told = spaces.position(pan, tilt)
     sign = -1 if "pan" in inverted else 1
     assert told["x"] == pytest.approx(sign * pan / 2.0, abs=1e-9)
-    assert spaces.look(told["x"], told["y"], GENERIC) == pytest.approx((pan, tilt), abs=1e-9)
+    assert spaces.ptz(told["x"], told["y"], GENERIC) == pytest.approx((pan, tilt), abs=1e-9)
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-1.5, 0.5))
@@ -56,14 +59,14 @@ def test_degrees_are_preferred_and_need_nobodys_word(pan, tilt):
 
 def test_a_camera_that_answers_in_the_generic_space_is_understood_by_its_degrees():
     spaces = read_spaces(degrees((-170.0, 170.0), (-90.0, 30.0)), Reach())
-    assert spaces.look(1.0, -1.0, GENERIC) == pytest.approx((math.radians(170), math.radians(-90)))
-    assert spaces.look(0.0, 0.0, "") == pytest.approx((0.0, math.radians(-30)))
+    assert spaces.ptz(1.0, -1.0, GENERIC) == pytest.approx((math.radians(170), math.radians(-90)))
+    assert spaces.ptz(0.0, 0.0, "") == pytest.approx((0.0, math.radians(-30)))
 
 
 def test_the_case_and_the_host_of_a_space_do_not_matter():
     odd = "http://www.onvif.org/ver10/tptz/PantiltSpaces/positiongenericspace "
-    assert read_spaces(generic(), REACH).look(1.0, 1.0, odd) == pytest.approx((2.0, 0.5))
-    assert read_spaces(generic(), REACH).look(1.0, 1.0, f"{BASE}/Vendor/Space") is None
+    assert read_spaces(generic(), REACH).ptz(1.0, 1.0, odd) == pytest.approx((2.0, 0.5))
+    assert read_spaces(generic(), REACH).ptz(1.0, 1.0, f"{BASE}/Vendor/Space") is None
 
 
 def test_the_reach_is_what_both_the_camera_and_the_fleet_say():
@@ -89,11 +92,11 @@ def test_a_fleet_may_say_a_part_of_a_circle_that_the_camera_counts_otherwise():
     spaces = read_spaces(degrees((0.0, 360.0), (-90.0, 90.0)), fleet)
     assert spaces.reach.pan_rad == rad(-100, -20)
     assert spaces.position(math.radians(-90), 0.0)["x"] == pytest.approx(270.0)
-    assert spaces.look(270.0, 0.0, DEGREES) == pytest.approx((math.radians(-90), 0.0))
+    assert spaces.ptz(270.0, 0.0, DEGREES) == pytest.approx((math.radians(-90), 0.0))
 
 
 def test_limits_that_are_set_in_the_camera_hold():
-    limits = Described(GENERIC, (-0.5, 0.5), (-1.0, 0.0))
+    limits = SpaceDescription(GENERIC, (-0.5, 0.5), (-1.0, 0.0))
     spaces = read_spaces(generic(limits=limits), REACH)
     assert spaces.reach.pan_rad == pytest.approx((-1.0, 1.0))
     assert spaces.reach.tilt_rad == pytest.approx((-1.0, -0.25))
@@ -114,12 +117,12 @@ def test_only_a_camera_that_says_a_whole_circle_can_be_endless():
 
 
 def test_velocities_are_shares_of_the_fleets_rate_or_degrees_per_second():
-    offer = generic(velocities=[Described(VELOCITY, BOTH, BOTH)])
+    offer = generic(velocities=[SpaceDescription(VELOCITY, BOTH, BOTH)])
     slow = read_spaces(offer, Reach(rate_rad_s=2.0), frozenset({"tilt"})).velocity
     assert (slow.pan.to_units(1.0), slow.tilt.to_units(1.0)) == pytest.approx((0.5, -0.5))
     assert slow.pan.to_units(99.0) == 1.0
     ends = (-50.0, 50.0)
-    both = [Described(VELOCITY, BOTH, BOTH), Described(VELOCITY_DEGREES, ends, ends)]
+    both = [SpaceDescription(VELOCITY, BOTH, BOTH), SpaceDescription(VELOCITY_DEGREES, ends, ends)]
     exact = read_spaces(generic(velocities=both), Reach(rate_rad_s=2.0))
     assert exact.velocity.uri == VELOCITY_DEGREES
     assert exact.velocity.pan.to_units(math.radians(10)) == pytest.approx(10.0)
@@ -127,7 +130,7 @@ def test_velocities_are_shares_of_the_fleets_rate_or_degrees_per_second():
 
 
 def test_zoom_is_focal_lengths_or_shares_of_what_the_fleet_says():
-    both = [Described(ZOOM, (0.0, 1.0)), Described(ZOOM_MM, (4.0, 80.0))]
+    both = [SpaceDescription(ZOOM, (0.0, 1.0)), SpaceDescription(ZOOM_MM, (4.0, 80.0))]
     spaces = read_spaces(generic(zooms=both), Reach())
     assert spaces.reach.zoom_max == pytest.approx(20.0)
     assert spaces.zooms[0].scale.to_units(5.0) == pytest.approx(20.0)
@@ -139,5 +142,5 @@ def test_zoom_is_focal_lengths_or_shares_of_what_the_fleet_says():
 
 
 def test_a_fleet_may_allow_less_zoom_than_there_is():
-    offer = generic(zooms=[Described(ZOOM_MM, (4.0, 80.0))])
+    offer = generic(zooms=[SpaceDescription(ZOOM_MM, (4.0, 80.0))])
     assert read_spaces(offer, Reach(zoom_max=5.0)).reach.zoom_max == 5.0

@@ -6,9 +6,14 @@ import math
 from random import Random
 
 import pytest
-from m2pem_plugin_ptz.drivers.onvif.steering import TAKES_EFFECT, Drive, Steering, Turn
+from m2pem_plugin_ptz.drivers.onvif.steering import (
+    TAKES_EFFECT,
+    AbsoluteMove,
+    ContinuousMove,
+    Steering,
+)
 from m2pem_plugin_ptz.gimbal import Reach
-from m2pem_plugin_ptz.simulator.onvif.camera import Axis, Head
+from m2pem_plugin_ptz.simulator.onvif.camera import Axis, Gimbal
 
 rad, deg = math.radians, math.degrees
 QUICK, SLOW, MIXED = (0.05, 0.05), (0.2, 0.2), (0.05, 0.2)
@@ -23,11 +28,11 @@ class Play:
         reach = Reach(rate_rad_s=RATE, endless=endless)
         self.steering = Steering(reach, drives=drives)
         stops = None if endless else (-math.pi, math.pi)
-        self.head = Head(
+        self.gimbal = Gimbal(
             Axis(stops, RATE, rad(240)), Axis((-1.5, 1.5), RATE, rad(240)), Axis(None, 1, 1)
         )
         self.target, self.gain = target, gain
-        self.told, self.errors = [], []
+        self.sent, self.errors = [], []
         self._between = Random(1).uniform
         self._calls_s = calls_s
         self._queue, self._count = [], itertools.count()
@@ -48,35 +53,35 @@ class Play:
         return max(error for time_s, error in self.errors if time_s > settle_s)
 
     def _wish(self, now_s):
-        self.steering.aim.want(*self.target(now_s), None, now_s)
+        self.steering.target.add(*self.target(now_s), None, now_s)
         self._at(now_s + 1 / 15, self._wish)
 
     def _ask(self, began_s):
-        def look(now_s):
-            self.head.advance(now_s)
-            pan = self.head.pan.at
-            if self.head.pan.stops is None:
+        def ptz(now_s):
+            self.gimbal.advance(now_s)
+            pan = self.gimbal.pan.at
+            if self.gimbal.pan.stops is None:
                 pan = math.remainder(pan, math.tau)
-            found = pan, self.head.tilt.at
+            found = pan, self.gimbal.tilt.at
             self._at(now_s + self._way_s(), lambda then_s: heard(then_s, found))
 
         def heard(now_s, found):
-            self.steering.saw(*found, (began_s + now_s) / 2)
+            self.steering.observe(*found, (began_s + now_s) / 2)
             self._at(max(now_s, began_s + EVERY_S), self._ask)
 
-        self._at(began_s + self._way_s(), look)
+        self._at(began_s + self._way_s(), ptz)
 
     def _move(self, began_s):
         move = self.steering.next(began_s)
         if move is None:
             self._at(began_s + EVERY_S, self._move)
             return
-        self.told.append(move)
+        self.sent.append(move)
 
         def obey(now_s):
-            self.head.advance(now_s)
-            pan, tilt = self.head.pan, self.head.tilt
-            if isinstance(move, Turn):
+            self.gimbal.advance(now_s)
+            pan, tilt = self.gimbal.pan, self.gimbal.tilt
+            if isinstance(move, AbsoluteMove):
                 pan.go(move.pan_rad, move.rate_rad_s)
                 tilt.go(move.tilt_rad, move.rate_rad_s)
             else:
@@ -85,16 +90,16 @@ class Play:
             self._at(now_s + self._way_s(), done)
 
         def done(now_s):
-            self.steering.took(now_s - began_s)
-            self.steering.told(move, began_s + TAKES_EFFECT * (now_s - began_s))
+            self.steering.measure_call(now_s - began_s)
+            self.steering.sent(move, began_s + TAKES_EFFECT * (now_s - began_s))
             self._at(max(now_s, began_s + EVERY_S), self._move)
 
         self._at(began_s + self._way_s(), obey)
 
     def _measure(self, now_s):
-        self.head.advance(now_s)
+        self.gimbal.advance(now_s)
         pan, tilt = self.target(now_s)
-        apart = self.steering.aim.apart((pan, tilt), (self.head.pan.at, self.head.tilt.at))
+        apart = self.steering.target.apart((pan, tilt), (self.gimbal.pan.at, self.gimbal.tilt.at))
         self.errors.append((now_s, deg(max(map(abs, apart)))))
         self._at(now_s + 0.02, self._measure)
 
@@ -134,73 +139,73 @@ def test_a_camera_that_turns_more_or_less_quickly_than_it_says_is_followed_too(t
 def test_a_camera_without_velocities_follows_by_absolute_moves():
     play = Play(turn, QUICK, drives=False)
     assert play.run(40) < 1.0
-    assert not any(isinstance(move, Drive) for move in play.told)
+    assert not any(isinstance(move, ContinuousMove) for move in play.sent)
 
 
 def test_a_target_that_stands_is_told_once():
     play = Play(still, QUICK)
     play.run(20)
-    assert play.told == [Turn(rad(50), rad(-10), RATE)]
+    assert play.sent == [AbsoluteMove(rad(50), rad(-10), RATE)]
 
 
 def test_far_targets_get_absolute_moves_and_near_ones_velocities():
     play = Play(turn, QUICK)
     play.run(30)
-    kinds = [type(move) for move in play.told]
-    assert kinds[0] is Turn
-    assert kinds[-1] is Drive
-    assert kinds.index(Drive) < 12, "it has caught up within seconds"
-    assert Turn not in kinds[kinds.index(Drive) :]
+    kinds = [type(move) for move in play.sent]
+    assert kinds[0] is AbsoluteMove
+    assert kinds[-1] is ContinuousMove
+    assert kinds.index(ContinuousMove) < 12, "it has caught up within seconds"
+    assert AbsoluteMove not in kinds[kinds.index(ContinuousMove) :]
 
 
 def test_an_endless_camera_goes_on_all_round():
     play = Play(lambda t: (math.remainder(rad(8 * t), math.tau), 0.0), QUICK, endless=True)
     assert play.run(60) < 1.0
-    assert play.head.pan.at > math.tau, "it went on, and not back"
+    assert play.gimbal.pan.at > math.tau, "it went on, and not back"
 
 
 def test_another_rate_is_told_while_there_is_a_way_to_go_at_it():
     steering = Steering(Reach(rate_rad_s=1.0))
     for seen, rate, told in (
-        (0.0, 1.0, Turn(1.0, 0.0, 1.0)),
-        (0.1, 0.5, Turn(1.0, 0.0, 0.5)),
-        (0.2, 1.0, Turn(1.0, 0.0, 1.0)),
+        (0.0, 1.0, AbsoluteMove(1.0, 0.0, 1.0)),
+        (0.1, 0.5, AbsoluteMove(1.0, 0.0, 0.5)),
+        (0.2, 1.0, AbsoluteMove(1.0, 0.0, 1.0)),
         (0.9, 0.4, None),
         (0.99, 0.02, None),
     ):
-        steering.aim.want(1.0, 0.0, rate, seen)
-        steering.saw(seen, 0.0, seen)
+        steering.target.add(1.0, 0.0, rate, seen)
+        steering.observe(seen, 0.0, seen)
         assert steering.next(seen) == told
         if told is not None:
-            steering.told(told, seen)
+            steering.sent(told, seen)
 
 
 def test_a_wish_out_of_reach_is_met_as_far_as_it_goes():
     steering = Steering(Reach(pan_rad=(-1.0, 1.0), tilt_rad=(-0.5, 0.2)))
-    steering.aim.want(2.0, 1.0, 9.0, 0.0)
-    assert steering.next(0.0) == Turn(1.0, 0.2, 1.0)
+    steering.target.add(2.0, 1.0, 9.0, 0.0)
+    assert steering.next(0.0) == AbsoluteMove(1.0, 0.2, 1.0)
 
 
 def test_a_jump_of_the_wish_is_another_target_and_no_speed():
     steering = Steering(Reach())
     for step in range(5):
-        steering.aim.want(0.0, 0.0, None, step / 15)
-    steering.aim.want(1.5, 0.0, None, 5 / 15)
-    assert steering.aim.velocity(5 / 15) == (0.0, 0.0)
+        steering.target.add(0.0, 0.0, None, step / 15)
+    steering.target.add(1.5, 0.0, None, 5 / 15)
+    assert steering.target.velocity(5 / 15) == (0.0, 0.0)
 
 
 def test_a_camera_that_does_not_turn_is_told_again_and_then_is_stuck():
     steering = Steering(Reach())
-    steering.aim.want(1.0, 0.0, None, 0.0)
+    steering.target.add(1.0, 0.0, None, 0.0)
     now_s, told = 0.0, 0
     while now_s < 8.0:
-        steering.saw(0.0, 0.0, now_s)
+        steering.observe(0.0, 0.0, now_s)
         move = steering.next(now_s)
         if move is not None:
             told += 1
-            steering.told(move, now_s)
+            steering.sent(move, now_s)
         now_s += EVERY_S
     assert 4 <= told <= 6
     assert steering.stuck
-    steering.saw(0.1, 0.0, now_s)
+    steering.observe(0.1, 0.0, now_s)
     assert not steering.stuck

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError, Job
+from m2pem_plugin_ptz.behaviors.behavior import BehaviorContext, BehaviorFailedError
 from m2pem_plugin_ptz.behaviors.pointing import PointAt
-from ptz_fake_camera import ORIGIN, Head, rad
+from ptz_fake_camera import ORIGIN, Gimbal, rad
 from ptz_world import CAMERA, play, point
 
 from m2pem.api import BehaviorParameters, BehaviorState, VehiclePosition
@@ -33,7 +33,9 @@ def test_bearing_is_from_the_bow_and_elevation_from_the_horizon():
     async def main(world):
         end = await world.do("ptz_point_at", bearing=rad(45), elevation=rad(20))
         assert end.state is BehaviorState.SUCCEEDED, end
-        assert (world.head.pan, world.head.tilt) == pytest.approx((rad(45), rad(20)), abs=rad(0.5))
+        assert (world.gimbal.pan, world.gimbal.tilt) == pytest.approx(
+            (rad(45), rad(20)), abs=rad(0.5)
+        )
 
     play(main, moves=lambda _: {"yaw": 0.7})
 
@@ -41,7 +43,7 @@ def test_bearing_is_from_the_bow_and_elevation_from_the_horizon():
 def test_a_vehicle_that_leans_has_its_camera_look_to_the_horizon_all_the_same():
     async def main(world):
         await world.do("ptz_point_at", bearing=rad(90), elevation=0.0)
-        assert world.head.tilt == pytest.approx(rad(10), abs=rad(0.5))
+        assert world.gimbal.tilt == pytest.approx(rad(10), abs=rad(0.5))
 
     play(main, moves=lambda _: {"roll_rad": rad(10)})
 
@@ -92,7 +94,7 @@ def test_a_target_stays_within_a_degree_while_the_vehicle_drives_and_turns(
         return {"east": east, "north": north, "yaw": angle, "velocity": velocity}
 
     target = point(far * math.cos(bearing), far * math.sin(bearing))
-    head = Head(endless=True) if endless else Head(pan_rad=(rad(-720), rad(720)))
+    gimbal = Gimbal(endless=True) if endless else Gimbal(pan_rad=(rad(-720), rad(720)))
 
     async def main(world):
         await world.bench.start("r1.b1", "ptz_track", CAMERA, target=target)
@@ -105,7 +107,7 @@ def test_a_target_stays_within_a_degree_while_the_vehicle_drives_and_turns(
         assert worst < 1.0
 
     reach = {"endless": True} if endless else {"pan": ["-720 deg", "720 deg"]}
-    play(main, head, moves, reach={**reach, "tilt": ["-90 deg", "90 deg"]})
+    play(main, gimbal, moves, reach={**reach, "tilt": ["-90 deg", "90 deg"]})
 
 
 def test_another_vehicle_is_tracked_where_it_drives():
@@ -145,11 +147,11 @@ def test_a_held_camera_does_not_turn_while_its_vehicle_does():
         await world.bench.start("r1.b1", "ptz_track", CAMERA, target=point(0, 50))
         await world.clock.sleep(3)
         await world.bench.arbiter.hold(CAMERA)
-        world.head.move()
-        pan = world.head.pan
+        world.gimbal.move()
+        pan = world.gimbal.pan
         await world.clock.sleep(5)
-        world.head.move()
-        assert world.head.pan == pan
+        world.gimbal.move()
+        assert world.gimbal.pan == pan
         await world.bench.arbiter.resume(CAMERA)
         await world.until(lambda: world.off_target(on_ground(point(0, 50))) < 0.5, 10)
 
@@ -162,7 +164,7 @@ STOPPED = {"reach": {"pan": ["-90 deg", "90 deg"], "tilt": ["-30 deg", "30 deg"]
 
 
 def narrow():
-    return Head(pan_rad=(rad(-90), rad(90)), tilt_rad=(rad(-30), rad(30)))
+    return Gimbal(pan_rad=(rad(-90), rad(90)), tilt_rad=(rad(-30), rad(30)))
 
 
 @pytest.mark.parametrize(
@@ -180,7 +182,7 @@ def test_what_is_out_of_reach_at_the_start_is_rejected_with_the_reason(parameter
     async def main(world):
         end = await world.do("ptz_point_at", **parameters)
         assert (end.state, end.code, end.reason) == (BehaviorState.REJECTED, "REJECTED", reason)
-        assert world.head.told is None, "nothing has turned"
+        assert world.gimbal.told is None, "nothing has turned"
 
     play(main, narrow(), **STOPPED)
 
@@ -191,7 +193,7 @@ def test_a_target_that_leaves_reach_is_looked_after_and_then_given_up():
         end = await world.bench.ended("r1.b1", 60)
         assert end.state is BehaviorState.FAILED
         assert end.reason.startswith("out of reach for 10 s: pan ")
-        assert world.head.pan == pytest.approx(rad(90)), "as near as it goes"
+        assert world.gimbal.pan == pytest.approx(rad(90)), "as near as it goes"
 
     play(main, narrow(), moves=lambda t: {"yaw": math.pi / 2 + min(0.2 * t, 2.6)}, **STOPPED)
 
@@ -211,7 +213,7 @@ def test_a_target_that_comes_back_in_time_is_tracked_on():
 
 def test_a_motor_that_is_stuck_is_a_failure_that_says_so():
     async def main(world):
-        world.head.stuck = True
+        world.gimbal.stuck = True
         end = await world.do("ptz_point_at", within_s=30, bearing=rad(50), elevation=0.0)
         assert end.state is BehaviorState.FAILED
         assert "does not get there: 50.0 deg are left" in end.reason
@@ -222,8 +224,8 @@ def test_a_motor_that_is_stuck_is_a_failure_that_says_so():
 def test_a_coarse_camera_that_rests_within_its_resolution_looks_there():
     async def main(world):
         await world.bench.start("r1.b1", "ptz_point_at", CAMERA, bearing=rad(30), elevation=0.0)
-        await world.until(lambda: world.head.pan > rad(28.5))
-        world.head.stuck = True
+        await world.until(lambda: world.gimbal.pan > rad(28.5))
+        world.gimbal.stuck = True
         assert (await world.bench.ended("r1.b1", 10)).state is BehaviorState.SUCCEEDED
 
     play(main)
@@ -233,7 +235,7 @@ def test_a_late_camera_is_told_ahead():
     """With a delay that the fleet tells, a steady turn of the vehicle is made up for."""
     delay_s, turn = 0.2, rad(20)
 
-    class Late(Head):
+    class Late(Gimbal):
         queue = ()
 
         def move(self):
@@ -267,17 +269,19 @@ def test_a_late_camera_is_told_ahead():
             return worst
 
         reach = {"endless": True}
-        head = Late(endless=True, rate_rad_s=rad(200))
-        return play(main, head, lambda t: {"yaw": turn * t}, reach=reach, delay=delay)
+        gimbal = Late(endless=True, rate_rad_s=rad(200))
+        return play(main, gimbal, lambda t: {"yaw": turn * t}, reach=reach, delay=delay)
 
     assert worst_of("200 ms") < 1.5
     assert worst_of("0 s") > 3.0
 
 
 def test_a_moment_in_which_nobody_looked_does_not_count_as_a_stuck_motor():
-    behavior = PointAt(Job("r1.b1", BehaviorParameters({}), SimpleNamespace(driver=None)))
-    behavior.check_turning(1.0, 0.05, 0.01)
-    behavior.check_turning(1.0, 30.0, 0.01)
+    behavior = PointAt(
+        BehaviorContext("r1.b1", BehaviorParameters({}), SimpleNamespace(driver=None))
+    )
+    behavior.check_progress(1.0, 0.05, 0.01)
+    behavior.check_progress(1.0, 30.0, 0.01)
     with pytest.raises(BehaviorFailedError, match="no nearer for 10 s"):
         for step in range(1, 240):
-            behavior.check_turning(1.0, 30.0 + step * 0.05, 0.01)
+            behavior.check_progress(1.0, 30.0 + step * 0.05, 0.01)

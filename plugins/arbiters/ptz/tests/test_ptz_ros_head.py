@@ -16,8 +16,8 @@ async def test_it_points_clockwise_and_up_and_says_so(ros_domain, tmp_path, comm
         it.point(40.0, 20.0)
         # A joint counts counter-clockwise (REP-103).
         await until(lambda: it.joints_are(pan_joint=-40.0, tilt_joint=20.0))
-        await until(lambda: it.driver.look.pan_rad == pytest.approx(math.radians(40), abs=0.01))
-        await until(lambda: it.driver.look.tilt_rad == pytest.approx(math.radians(20), abs=0.01))
+        await until(lambda: it.driver.ptz.pan_rad == pytest.approx(math.radians(40), abs=0.01))
+        await until(lambda: it.driver.ptz.tilt_rad == pytest.approx(math.radians(20), abs=0.01))
         assert it.heard
 
 
@@ -71,7 +71,7 @@ async def test_it_zooms_while_it_turns(ros_domain, tmp_path) -> None:
         await it.ready()
         it.point(30.0, 0.0)
         it.driver.zoom(4.0)
-        await until(lambda: it.driver.look.zoom == pytest.approx(4.0, abs=0.05))
+        await until(lambda: it.driver.ptz.zoom == pytest.approx(4.0, abs=0.05))
         await until(lambda: it.joints_are(pan_joint=-30.0))
         await until(lambda: it.joints["zoom_joint"] == pytest.approx(4.0, abs=0.05))
         assert it.driver.refusal("zoom") == ""
@@ -83,7 +83,7 @@ async def test_joints_may_be_the_other_way_round_and_have_other_names(ros_domain
         await it.ready()
         it.point(-20.0, 15.0)
         await until(lambda: it.joints_are(mast_yaw=20.0, mast_pitch=-15.0))
-        await until(lambda: it.driver.look.tilt_rad == pytest.approx(math.radians(15), abs=0.01))
+        await until(lambda: it.driver.ptz.tilt_rad == pytest.approx(math.radians(15), abs=0.01))
 
 
 async def test_what_turns_endlessly_goes_the_shorter_way(ros_domain, tmp_path) -> None:
@@ -93,7 +93,7 @@ async def test_what_turns_endlessly_goes_the_shorter_way(ros_domain, tmp_path) -
         await until(lambda: it.joints_are(pan_joint=-170.0))
         it.point(-170.0, 0.0)
         await until(lambda: it.joints_are(pan_joint=-190.0))
-        await until(lambda: abs(it.driver.look.pan_rad - math.radians(-170)) < 0.02)
+        await until(lambda: abs(it.driver.ptz.pan_rad - math.radians(-170)) < 0.02)
 
 
 async def test_a_head_that_was_deaf_is_told_again(ros_domain, tmp_path) -> None:
@@ -123,7 +123,7 @@ async def test_a_camera_that_is_not_there_says_what_is_missing(ros_domain, tmp_p
         assert told == "/evsg2/joint_states does not tell of pan_joint and tilt_joint"
         told = it.driver.refusal("take_picture")
         assert told == "nobody publishes images on /evsg2/camera/image_raw/compressed"
-        assert it.driver.look is None
+        assert it.driver.ptz is None
         it.point(10.0, 10.0)
         it.driver.halt()
         assert not it.heard
@@ -138,6 +138,6 @@ async def test_joints_of_others_are_named(ros_domain, tmp_path) -> None:
         try:
             known = "it tells of wheel, pan_joint, tilt_joint"
             await until(lambda: known in other.refusal("ptz_track"))
-            assert other.look is None
+            assert other.ptz is None
         finally:
             await other.close()

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, Joints, nearest_turn, read_settings
-from m2pem_plugin_ptz.gimbal import Look
+from m2pem_plugin_ptz.gimbal import PanTiltZoom
 
 from m2pem.api import Connection, ResourceId
 from m2pem.errors import PluginError
@@ -60,31 +60,33 @@ def test_what_is_wrong_is_named(own, said):
 
 
 def test_joints_count_counter_clockwise_and_looks_clockwise():
-    assert JOINTS.positions(Look(0.5, 0.2, 3.0)) == {
+    assert JOINTS.positions(PanTiltZoom(0.5, 0.2, 3.0)) == {
         Axis.PAN: -0.5,
         Axis.TILT: 0.2,
         Axis.ZOOM: 3.0,
     }
-    assert JOINTS.look({Axis.PAN: -0.5, Axis.TILT: 0.2, Axis.ZOOM: 3.0}) == Look(0.5, 0.2, 3.0)
+    assert JOINTS.ptz({Axis.PAN: -0.5, Axis.TILT: 0.2, Axis.ZOOM: 3.0}) == PanTiltZoom(
+        0.5, 0.2, 3.0
+    )
 
 
 def test_joints_that_are_mounted_backwards_count_the_other_way():
     backwards = Joints(JOINTS.names, frozenset({Axis.PAN, Axis.TILT}))
-    look = Look(0.5, 0.2, 3.0)
-    assert backwards.positions(look)[Axis.PAN] == 0.5
-    assert backwards.positions(look)[Axis.TILT] == -0.2
-    assert backwards.look(backwards.positions(look)) == look
+    ptz = PanTiltZoom(0.5, 0.2, 3.0)
+    assert backwards.positions(ptz)[Axis.PAN] == 0.5
+    assert backwards.positions(ptz)[Axis.TILT] == -0.2
+    assert backwards.ptz(backwards.positions(ptz)) == ptz
 
 
 def test_only_ours_are_heard_and_only_if_they_are_numbers():
-    heard = JOINTS.heard(["wheel", "t", "p", "z"], [1.0, 0.1, math.nan])
+    heard = JOINTS.read(["wheel", "t", "p", "z"], [1.0, 0.1, math.nan])
     assert heard == {Axis.TILT: 0.1}
-    assert JOINTS.look(heard) is None
+    assert JOINTS.ptz(heard) is None
 
 
 def test_a_joint_that_turns_endlessly_goes_to_the_nearest_turn():
     assert nearest_turn(7.0, 0.5) == pytest.approx(0.5 + math.tau)
     assert nearest_turn(-3.0, 3.0) == pytest.approx(3.0 - math.tau)
-    assert JOINTS.look({Axis.PAN: -7.0, Axis.TILT: 0.0}, endless=True).pan_rad == pytest.approx(
+    assert JOINTS.ptz({Axis.PAN: -7.0, Axis.TILT: 0.0}, endless=True).pan_rad == pytest.approx(
         7.0 - math.tau
     )

@@ -3,7 +3,7 @@
 import math
 from struct import unpack
 
-from m2pem_plugin_ptz.gimbal import Look
+from m2pem_plugin_ptz.gimbal import PanTiltZoom
 from m2pem_plugin_ptz.simulator.ros.image import GROUND, SKY, STRIPE, picture
 
 VIEW = (math.radians(60.0), math.radians(34.0))
@@ -56,14 +56,14 @@ def decoded(content: bytes) -> tuple[int, int, list[int]]:
     return width // 8, height // 8, greys
 
 
-def rows(look: Look) -> list[list[int]]:
-    width, height, greys = decoded(picture(look, VIEW))
+def rows(ptz: PanTiltZoom) -> list[list[int]]:
+    width, height, greys = decoded(picture(ptz, VIEW))
     assert len(greys) == width * height
     return [greys[start : start + width] for start in range(0, len(greys), width)]
 
 
 def test_the_horizon_is_where_the_camera_looks() -> None:
-    level, up, down = (rows(Look(0.05, tilt)) for tilt in (0.0, 1.0, -1.0))
+    level, up, down = (rows(PanTiltZoom(0.05, tilt)) for tilt in (0.0, 1.0, -1.0))
     assert {grey for row in level for grey in row} == {SKY, GROUND, STRIPE}
     assert SKY in level[0]
     assert GROUND not in level[0]
@@ -74,7 +74,7 @@ def test_the_horizon_is_where_the_camera_looks() -> None:
 
 def test_what_it_passes_moves_to_the_left_when_it_pans_clockwise() -> None:
     def stripe(pan_deg: float) -> float:
-        row = rows(Look(math.radians(pan_deg), 0.3, 6.0))[0]
+        row = rows(PanTiltZoom(math.radians(pan_deg), 0.3, 6.0))[0]
         dark = [column for column, grey in enumerate(row) if grey == STRIPE]
         return sum(dark) / len(dark)
 
@@ -82,10 +82,10 @@ def test_what_it_passes_moves_to_the_left_when_it_pans_clockwise() -> None:
 
 
 def test_zoom_makes_things_wider() -> None:
-    wide, narrow = (rows(Look(0.0, 0.3, zoom))[0].count(STRIPE) for zoom in (1.0, 12.0))
+    wide, narrow = (rows(PanTiltZoom(0.0, 0.3, zoom))[0].count(STRIPE) for zoom in (1.0, 12.0))
     assert narrow > wide
 
 
 def test_a_comment_says_where_it_looked() -> None:
-    found, _ = segments(picture(Look(math.radians(30.0), math.radians(-5.5), 2.0), VIEW))
+    found, _ = segments(picture(PanTiltZoom(math.radians(30.0), math.radians(-5.5), 2.0), VIEW))
     assert found[0xFE] == [b"pan 30.00 tilt -5.50 zoom 2.00"]

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pymap3d
 import pytest
-from m2pem_plugin_ptz.camera_model.field_of_view import View
-from m2pem_plugin_ptz.camera_model.pose import Stance, eye
+from m2pem_plugin_ptz.camera_model.field_of_view import FieldOfView
+from m2pem_plugin_ptz.camera_model.pose import VehiclePose, camera_pose
 from m2pem_plugin_ptz.settings import Mounting
-from ptz_fake_camera import ORIGIN, Head, rad
+from ptz_fake_camera import ORIGIN, Gimbal, rad
 from ptz_world import CAMERA, area, play
 
 from m2pem.api import BehaviorState
@@ -45,11 +45,11 @@ class Witness:
         east, north = np.array(points).T
         lat, lon, _ = pymap3d.enu2geodetic(east, north, 0.0, *ORIGIN)
         self.lat, self.lon = lat, lon
-        self.seen = np.zeros(count, dtype=bool)
+        self.vector_to = np.zeros(count, dtype=bool)
 
-    def look(self, world, mast_m=2.0):
-        state, head = world.truth(), world.head
-        head.move()
+    def ptz(self, world, mast_m=2.0):
+        state, gimbal = world.truth(), world.gimbal
+        gimbal.move()
         here = state.position
         azimuth, elevation, _ = pymap3d.geodetic2aer(
             self.lat,
@@ -59,20 +59,20 @@ class Witness:
             here.longitude_deg,
             here.altitude_m + mast_m,
         )
-        heading = math.pi / 2 - state.yaw_rad + head.pan
+        heading = math.pi / 2 - state.yaw_rad + gimbal.pan
         az, el = np.radians(azimuth) - heading, np.radians(elevation)
-        ahead = np.cos(el) * np.cos(az) * math.cos(head.tilt) + np.sin(el) * math.sin(head.tilt)
+        ahead = np.cos(el) * np.cos(az) * math.cos(gimbal.tilt) + np.sin(el) * math.sin(gimbal.tilt)
         right = np.cos(el) * np.sin(az)
-        up = np.sin(el) * math.cos(head.tilt) - np.cos(el) * np.cos(az) * math.sin(head.tilt)
-        wide, high = (math.tan(angle / 2) / head.zoom for angle in VIEW)
-        self.seen |= (ahead > 0) & (abs(right) <= wide * ahead) & (abs(up) <= high * ahead)
+        up = np.sin(el) * math.cos(gimbal.tilt) - np.cos(el) * np.cos(az) * math.sin(gimbal.tilt)
+        wide, high = (math.tan(angle / 2) / gimbal.zoom for angle in VIEW)
+        self.vector_to |= (ahead > 0) & (abs(right) <= wide * ahead) & (abs(up) <= high * ahead)
 
     @property
     def share(self):
-        return float(self.seen.mean())
+        return float(self.vector_to.mean())
 
 
-def scan(ring, head=None, moves=lambda _: {}, domain="ground", holes=(), within_s=900, **options):
+def scan(ring, gimbal=None, moves=lambda _: {}, domain="ground", holes=(), within_s=900, **options):
     """Scan the area; returns the report, the witness and how long it took, in s."""
     witness = options.pop("witness", None) or Witness(ring, holes)
     parameters = options.pop("parameters", {})
@@ -83,19 +83,19 @@ def scan(ring, head=None, moves=lambda _: {}, domain="ground", holes=(), within_
         await world.bench.start("r1.b1", "ptz_scan_polygon", CAMERA, area=target, **parameters)
         while not any(state.terminal for state in world.bench.states_of("r1.b1")):
             assert world.seconds - began < within_s
-            witness.look(world)
+            witness.ptz(world)
             await world.clock.sleep(0.05)
         return world.bench.of("r1.b1")[-1], witness, world.seconds - began
 
-    head = head or Head()
+    gimbal = gimbal or Gimbal()
     settings = {"tilt": ["-90 deg", "90 deg"], "view": ["60 deg", "34 deg"], "zoom_max": 30}
-    return play(main, head, moves, domain, reach=settings, **options)
+    return play(main, gimbal, moves, domain, reach=settings, **options)
 
 
 def zoomed(level, **reach):
-    head = Head(zoom_max=30.0, **reach)
-    head.zoom = level
-    return head
+    gimbal = Gimbal(zoom_max=30.0, **reach)
+    gimbal.zoom = level
+    return gimbal
 
 
 AIRBORNE = {"up": 60.0, "altitude_above_home_m": 60.0}
@@ -130,21 +130,23 @@ def test_a_vehicle_that_drives_past_sees_all_of_the_area_all_the_same():
 
 
 def test_a_vehicle_that_leans_sees_all_of_the_area_too():
-    """The camera's rows are not level then. Seen is what `Deck.axes` has in the picture."""
+    """The camera's rows are not level then. Seen is what `MountFrame.axes` has in the picture."""
 
     def moves(t):
         return {**AIRBORNE, "roll_rad": rad(12), "pitch_rad": rad(-8) + 0.05 * math.sin(t)}
 
     class Leaning(Witness):
-        def look(self, world, mast_m=2.0):
-            state, head = world.truth(), world.head
-            head.move()
-            stance = Stance(state.position, state.yaw_rad, state.roll_rad, state.pitch_rad)
-            here = eye(stance, Mounting(up_m=mast_m), stabilized=False)
+        def ptz(self, world, mast_m=2.0):
+            state, gimbal = world.truth(), world.gimbal
+            gimbal.move()
+            pose = VehiclePose(state.position, state.yaw_rad, state.roll_rad, state.pitch_rad)
+            here = camera_pose(pose, Mounting(up_m=mast_m), stabilized=False)
             ground = [ORIGIN[2]] * len(self.lat)
             places = np.column_stack(pymap3d.geodetic2ecef(self.lat, self.lon, ground))
-            axes = here.deck.axes(head.pan, head.tilt)
-            self.seen |= View(*VIEW).zoomed(head.zoom).holds(axes, here.seen(places))
+            axes = here.mount_frame.axes(gimbal.pan, gimbal.tilt)
+            self.vector_to |= (
+                FieldOfView(*VIEW).zoomed(gimbal.zoom).holds(axes, here.vector_to(places))
+            )
 
     end, witness, _ = scan(SQUARE, zoomed(5.0), moves, "air", witness=Leaning(SQUARE))
     assert end.state is BehaviorState.SUCCEEDED, end
@@ -183,7 +185,7 @@ def test_a_held_scan_goes_on_with_what_is_left():
         target = area(*SQUARE)
         await world.bench.start("r1.b1", "ptz_scan_polygon", CAMERA, area=target)
         while not any(state.terminal for state in world.bench.states_of("r1.b1")):
-            witness.look(world)
+            witness.ptz(world)
             await world.clock.sleep(0.05)
             if not held and witness.share > 0.5:
                 held = 30.0
@@ -204,28 +206,28 @@ def test_a_held_scan_goes_on_with_what_is_left():
 
 
 def test_an_area_that_is_out_of_reach_is_rejected_with_how_much_is_in_reach():
-    head = Head(pan_rad=(rad(-60), rad(60)), tilt_rad=(rad(-90), rad(0)))
-    end, _, _ = scan(AROUND, head)
+    gimbal = Gimbal(pan_rad=(rad(-60), rad(60)), tilt_rad=(rad(-90), rad(0)))
+    end, _, _ = scan(AROUND, gimbal)
     assert end.state is BehaviorState.REJECTED
-    assert head.told is None, "nothing has turned"
+    assert gimbal.told is None, "nothing has turned"
     assert end.reason.startswith("only "), end.reason
     assert end.reason.endswith("of the area is within reach: pan -60 to 60, tilt -90 to 0 deg")
 
 
 def test_an_area_beyond_the_horizon_is_rejected():
     far = ((0, 30_000), (100, 30_000), (100, 30_100), (0, 30_100))
-    end, _, _ = scan(far, Head())
+    end, _, _ = scan(far, Gimbal())
     assert end.state is BehaviorState.REJECTED
     assert end.reason == "100 % of the area is beyond the horizon of the camera"
 
 
 def test_a_vehicle_that_turns_its_blind_side_to_the_area_fails_and_says_why():
-    head = zoomed(8.0, pan_rad=(rad(-60), rad(60)))
+    gimbal = zoomed(8.0, pan_rad=(rad(-60), rad(60)))
 
     def moves(t):
         return {**AIRBORNE, "yaw": math.pi / 2 + (math.pi if t > 4 else 0.0)}
 
-    end, witness, _ = scan(SQUARE, head, moves, "air")
+    end, witness, _ = scan(SQUARE, gimbal, moves, "air")
     assert end.state is BehaviorState.FAILED
     assert end.reason.startswith("out of reach for 10 s: pan ")
     assert witness.share < 0.99
@@ -234,20 +236,20 @@ def test_a_vehicle_that_turns_its_blind_side_to_the_area_fails_and_says_why():
 # --- sectors ------------------------------------------------------------------------------------
 
 
-def sector(parameters, head=None, moves=lambda _: {}, **settings):
+def sector(parameters, gimbal=None, moves=lambda _: {}, **settings):
     """Scan a sector; the report, and the headings (deg) that were looked at meanwhile."""
 
     async def main(world):
         headings = []
         await world.bench.start("r1.b1", "ptz_scan_sector", CAMERA, **parameters)
         while not any(state.terminal for state in world.bench.states_of("r1.b1")):
-            world.head.move()
+            world.gimbal.move()
             yaw = world.truth().yaw_rad
-            headings.append(math.degrees(math.pi / 2 - yaw + world.head.pan))
+            headings.append(math.degrees(math.pi / 2 - yaw + world.gimbal.pan))
             await world.clock.sleep(0.05)
         return world.bench.of("r1.b1")[-1], headings, world
 
-    return play(main, head or Head(), moves, **settings)
+    return play(main, gimbal or Gimbal(), moves, **settings)
 
 
 def test_a_sector_is_swept_from_its_nearer_edge_to_the_other():
@@ -255,7 +257,7 @@ def test_a_sector_is_swept_from_its_nearer_edge_to_the_other():
     assert end.state is BehaviorState.SUCCEEDED
     assert (min(headings), max(headings)) == pytest.approx((0, 100), abs=1.5)
     assert headings[-1] == pytest.approx(100, abs=1.5)
-    assert world.head.tilt == pytest.approx(rad(5), abs=rad(0.5))
+    assert world.gimbal.tilt == pytest.approx(rad(5), abs=rad(0.5))
 
 
 def test_a_sector_stays_in_the_world_while_the_vehicle_turns():
@@ -277,7 +279,7 @@ def test_a_whole_turn_is_swept_by_a_camera_with_stops_too():
 def test_an_endless_camera_sweeps_a_whole_turn_without_turning_back():
     end, headings, _ = sector(
         {"heading": 0.0, "sector": math.tau, "elevation": 0.0},
-        Head(endless=True),
+        Gimbal(endless=True),
         reach={"endless": True},
     )
     assert end.state is BehaviorState.SUCCEEDED
@@ -287,8 +289,8 @@ def test_an_endless_camera_sweeps_a_whole_turn_without_turning_back():
 
 
 def test_a_sector_beyond_the_stops_is_rejected():
-    head = Head(pan_rad=(rad(-60), rad(60)))
-    end, _, _ = sector({"heading": rad(90), "sector": rad(80), "elevation": 0.0}, head)
+    gimbal = Gimbal(pan_rad=(rad(-60), rad(60)))
+    end, _, _ = sector({"heading": rad(90), "sector": rad(80), "elevation": 0.0}, gimbal)
     assert end.state is BehaviorState.REJECTED
     assert end.reason == (
         "heading 78 deg is out of reach: pan 78 deg is beyond its stops, -60 to 60 deg"
@@ -296,7 +298,7 @@ def test_a_sector_beyond_the_stops_is_rejected():
 
 
 def test_without_an_elevation_it_looks_as_high_as_before():
-    head = Head()
-    head.tilt = rad(-12)
-    sector({"heading": 0.0, "sector": rad(60)}, head)
-    assert head.tilt == pytest.approx(rad(-12), abs=rad(0.5))
+    gimbal = Gimbal()
+    gimbal.tilt = rad(-12)
+    sector({"heading": 0.0, "sector": rad(60)}, gimbal)
+    assert gimbal.tilt == pytest.approx(rad(-12), abs=rad(0.5))

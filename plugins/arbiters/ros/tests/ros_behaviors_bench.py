@@ -9,8 +9,8 @@ from uuid import UUID
 from m2pem_plugin_ros.behaviors import (
     Ending,
     LocalParameters,
-    Pilot,
     Observation,
+    Pilot,
     Step,
     Target,
     make_motion,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from m2pem_plugin_ros.behaviors import LocalParameters, Pilot, Observation, make_motion
+from m2pem_plugin_ros.behaviors import LocalParameters, Observation, Pilot, make_motion
 from m2pem_plugin_ros.behaviors.monitors import IGNORED
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.settings import Bounds
@@ -89,7 +89,9 @@ def test_whatever_is_seen_commands_are_numbers_within_the_bounds(
     pilot = Pilot(bounds)
     pilot.begin(GOAL, make_motion(behavior, local, bounds))
     for number, (pose, twist, joystick, age_s, joystick_age_s) in enumerate(seen):
-        step = pilot.step(Observation(number * DT_S, pose, twist, age_s, None, joystick, joystick_age_s))
+        step = pilot.step(
+            Observation(number * DT_S, pose, twist, age_s, None, joystick, joystick_age_s)
+        )
         command = step.twist or Twist()
         assert -bounds.reverse_m_s <= command.forward_m_s <= bounds.speed_m_s
         assert abs(command.yaw_rad_s) <= bounds.yaw_rate_rad_s

@@ -112,7 +112,7 @@ async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(domain:
         connected(domain, {GPR: {"topic": "detections"}}) as bench,
         sensors(domain) as teller,
     ):
-        (topic,) = bench.arbiter._station._detectors
+        (topic,) = bench.arbiter._vehicle_connections._detectors
         early = detection("early")
         await teller.repeat(lambda: topic._waiting, "it waits for a position", early)
         assert found(bench) == []

@@ -1,4 +1,4 @@
-"""What a camera can be asked for: one small class a behavior, none of which knows its camera."""
+"""The behaviors of cameras: one class for each, independent of the driver."""
 
 from collections.abc import Mapping
 
@@ -11,4 +11,4 @@ BEHAVIORS: Mapping[str, type[Behavior]] = {
     each.name: each
     for each in (PointAt, Track, ScanSector, ScanPolygon, Zoom, TakePicture, RecordVideo)
 }
-"""By name."""
+"""By name of the behavior."""

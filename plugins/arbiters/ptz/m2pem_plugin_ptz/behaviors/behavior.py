@@ -1,4 +1,4 @@
-"""What a camera does for one request."""
+"""The interface of behaviors: what a camera does for one request."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from m2pem.api import BehaviorId, BehaviorParameters, BehaviorState, Value
-from m2pem_plugin_ptz.camera_model.model import Sight
+from m2pem_plugin_ptz.camera_model.model import CameraModel
 
 TICK_S = 0.05
-"""So often is a camera told where to look, while something has it look somewhere."""
+"""Period of the commands to a camera while a behavior points it."""
 
 
 class BehaviorFailedError(Exception):
-    """It cannot be done, or not any more. `code`: an error code of docs/missions.md."""
+    """The behavior cannot be done, or cannot be continued. `code` is an error code of
+    docs/missions.md."""
 
     def __init__(self, reason: str, code: str = "FAILED") -> None:
         super().__init__(reason)
@@ -22,48 +23,49 @@ class BehaviorFailedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
-    """What is to be done, with which camera."""
+class BehaviorContext:
+    """The arguments of a behavior: the parameters and the camera."""
 
     id: BehaviorId
     parameters: BehaviorParameters
-    sight: Sight
+    model: CameraModel
 
 
 class Behavior(ABC):
-    """One behavior. It is asked for a `refusal`, then `begin` once, then `step` every `TICK_S`
-    until that returns True; not while it is held. `leave` comes last, however it ends, but for a
-    camera that is lost. `begin` and `step` raise BehaviorFailedError or CameraError if it failed.
+    """One behavior. `refusal` is called first, then `begin` once, then `step` every `TICK_S` until
+    it returns True, except during a hold. `leave` is called at the end of any kind, unless the
+    camera is lost. `begin` and `step` raise BehaviorFailedError or CameraError on failure.
 
-    `turns`: it turns or zooms the camera.
+    `turns`: the behavior turns or zooms the camera.
     """
 
     name: ClassVar[str]
     turns: ClassVar[bool] = True
 
-    def __init__(self, job: Job) -> None:
-        self.job = job
-        self.sight = job.sight
-        self.driver = job.sight.driver
+    def __init__(self, context: BehaviorContext) -> None:
+        self.context = context
+        self.model = context.model
+        self.driver = context.model.driver
 
     def refusal(self) -> str:
-        """Why it cannot be done; "" if it can. Nothing has been sent yet."""
+        """Return why the behavior cannot be done; "" if it can. Nothing has been sent yet."""
         return ""
 
     async def begin(self) -> None:  # noqa: B027  # most begin with their first step
-        """The camera is heard, and it is to be done now."""
+        """Begin. The camera was received."""
 
     @abstractmethod
     async def step(self, elapsed_s: float) -> bool:
-        """Go on; whether it is done. `elapsed_s`: since `begin`, without the time in a hold."""
+        """Continue, and return whether the behavior is done. `elapsed_s` counts from `begin`,
+        without holds."""
 
     async def leave(self) -> None:  # noqa: B027  # most leave nothing behind
-        """Undo what must not outlive it."""
+        """Undo what must not outlast the behavior."""
 
     def outputs(self) -> Mapping[str, Value]:
-        """What it writes to the mission's data store; after `leave`."""
+        """Return what the behavior writes to the mission's data store. Call it after `leave`."""
         return {}
 
-    def recognised(self) -> BehaviorState:
-        """After a restart, by where the camera looks: RUNNING, SUCCEEDED or UNKNOWN."""
+    def state_after_restart(self) -> BehaviorState:
+        """Return RUNNING, SUCCEEDED or UNKNOWN after a restart, by the direction of the camera."""
         return BehaviorState.UNKNOWN

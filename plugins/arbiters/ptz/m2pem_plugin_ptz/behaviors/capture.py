@@ -1,47 +1,46 @@
-"""To take pictures."""
+"""The behaviors `take_picture` and `record_video`."""
 
 import asyncio
 from collections.abc import Mapping
 
 from m2pem.api import Value
-from m2pem_plugin_ptz.behaviors.behavior import Behavior, BehaviorFailedError, Job
+from m2pem_plugin_ptz.behaviors.behavior import Behavior, BehaviorContext, BehaviorFailedError
 from m2pem_plugin_ptz.camera_model.model import iso
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.image_files import Caption, stored
+from m2pem_plugin_ptz.image_files import ImageMetadata, store_image
 
 
 class TakePicture(Behavior):
-    """So many, one after the other, each stored before the next one is taken."""
+    """Take pictures one after the other. Each is stored before the next one is taken."""
 
     name = "take_picture"
     turns = False
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
         self._files: list[Value] = []
-        self._last: Caption | None = None
+        self._last: ImageMetadata | None = None
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done when the last one is stored."""
-        interval_s = self.job.parameters.interval_s
+        interval_s = self.context.parameters.interval_s
         taken = len(self._files)
         if elapsed_s >= taken * interval_s:
             # Where it looked when it was told to; that is nearer to the truth than afterwards.
-            caption = Caption.of(self.sight, self.job.id, taken + 1)
+            metadata = ImageMetadata.of(self.model, self.context.id, taken + 1)
             picture = await self.driver.take_picture()
-            caption = caption.taken(picture)
-            folder = self.sight.settings.pictures
+            metadata = metadata.taken(picture)
+            folder = self.model.settings.pictures
             try:
-                file = await asyncio.to_thread(stored, folder, picture, caption)
+                file = await asyncio.to_thread(store_image, folder, picture, metadata)
             except OSError as error:
                 reason = f"cannot store a picture in {folder}: {error.strerror or error}"
                 raise BehaviorFailedError(reason) from error
             self._files.append(file)
-            self._last = caption
-        return len(self._files) >= self.job.parameters.count
+            self._last = metadata
+        return len(self._files) >= self.context.parameters.count
 
     def outputs(self) -> Mapping[str, Value]:
-        """The pictures, and where and when the last one was taken."""
+        """Return the files, and position and time of the last picture."""
         if self._last is None:
             return {}
         return {
@@ -53,30 +52,28 @@ class TakePicture(Behavior):
 
 
 class RecordVideo(Behavior):
-    """For the duration, or until it is cancelled. It goes on in a hold: nothing moves for it."""
+    """Record for `duration`, or until cancelled. Recording goes on in a hold, as nothing moves."""
 
     name = "record_video"
     turns = False
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
         self._asked = self._records = False
         self._began_us = 0
         self._file: str | None = None
 
     async def begin(self) -> None:
-        """Start."""
-        self._asked, self._began_us = True, self.sight.now_us
+        self._asked, self._began_us = True, self.model.now_us
         await self.driver.start_recording()
         self._records = True
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done after the duration."""
-        duration_s = self.job.parameters.duration_s
+        duration_s = self.context.parameters.duration_s
         return duration_s is not None and elapsed_s >= duration_s
 
     async def leave(self) -> None:
-        """Stop, if it was started."""
+        """Stop recording, if it was started."""
         if not self._asked:
             return
         try:
@@ -87,7 +84,7 @@ class RecordVideo(Behavior):
         self._asked = False
 
     def outputs(self) -> Mapping[str, Value]:
-        """Where the video is, and when it began."""
+        """Return the file of the video, and when it began."""
         if self._file is None:
             return {}
         return {"video.file": self._file, "video.time": iso(self._began_us)}

@@ -1,85 +1,97 @@
-"""To look at something that may move, from a vehicle that may move."""
+"""The behaviors `ptz_point_at`, `ptz_track` and `zoom`."""
 
 import math
 from abc import abstractmethod
 
 from m2pem.api import BehaviorState, VehiclePosition
-from m2pem_plugin_ptz.behaviors.behavior import TICK_S, Behavior, BehaviorFailedError, Job
-from m2pem_plugin_ptz.camera_model.frames import between
-from m2pem_plugin_ptz.camera_model.limits import Turn
+from m2pem_plugin_ptz.behaviors.behavior import (
+    TICK_S,
+    Behavior,
+    BehaviorContext,
+    BehaviorFailedError,
+)
+from m2pem_plugin_ptz.camera_model.frames import angle_between
+from m2pem_plugin_ptz.camera_model.limits import Reachable
 
 THERE_RAD = math.radians(0.5)
 COARSE_RAD = math.radians(2.0)
-"""A camera that has come to rest so near looks there as well as it can."""
+"""A camera that rests this near to its target has reached it."""
 
 RESTED_S = 2.0
 LEFT_S = 10.0
-"""So long may a target be out of reach before it counts as lost from view."""
+"""A target that is out of reach for this time is lost."""
 
 STUCK_S = 10.0
-"""So long may a camera come no nearer to where it is told to look."""
+"""A camera that comes no nearer to its target for this time is stuck."""
 
 LONGEST_STEP_S = 0.5
-"""Of a step that took longer, no more counts: this process was held up, and has not yet read what
-the camera said meanwhile."""
+"""A longer step counts as this: the process was suspended, and has not read the camera's
+messages."""
 
 _NEARER_RAD = math.radians(0.1)
 _SLOWEST_RAD_S = 0.02
 _SLACK_RAD = math.radians(5.0)
 
 
-class Aiming(Behavior):
-    """Has the camera told where to look, ahead of time by what it takes to get there."""
+class Pointing(Behavior):
+    """Points the camera at a target. It commands the direction that will be right after the
+    delay."""
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
         self._reachable_s = 0.0
         self._nearest_rad = math.inf
         self._looked_s = 0.0
         self._unmoved_s = 0.0
 
     @abstractmethod
-    def wanted(self, at_us: int) -> tuple[float, float]:
-        """The pan and the tilt that would be right at a time, within reach or not.
+    def target_angles(self, at_us: int) -> tuple[float, float]:
+        """Return pan and tilt that point at the target at a time, within reach or not.
 
         Raises:
             BehaviorFailedError: nobody can tell.
         """
 
-    def aim(self, slack_rad: float = 0.0) -> Turn:
-        """Tell the camera where to look, so that it is right when it is there."""
-        ahead_s = TICK_S + self.sight.settings.delay_s
-        turn = self.sight.turn(*self.wanted(self.sight.now_us + round(ahead_s * 1e6)), slack_rad)
-        reach, look = self.driver.reach, self.driver.look
+    def point_ahead(self, slack_rad: float = 0.0) -> Reachable:
+        """Point the camera at where the target will be when the camera is there."""
+        ahead_s = TICK_S + self.model.settings.delay_s
+        reachable = self.model.nearest_reachable(
+            *self.target_angles(self.model.now_us + round(ahead_s * 1e6)), slack_rad
+        )
+        reach, ptz = self.driver.reach, self.driver.ptz
         rate: float | None = None
-        if look is not None:
-            pan = turn.pan_rad - look.pan_rad
+        if ptz is not None:
+            pan = reachable.pan_rad - ptz.pan_rad
             if reach.endless:
                 pan = math.remainder(pan, math.tau)
-            needed = max(abs(pan), abs(turn.tilt_rad - look.tilt_rad)) / ahead_s
+            needed = max(abs(pan), abs(reachable.tilt_rad - ptz.tilt_rad)) / ahead_s
             rate = max(needed, _SLOWEST_RAD_S) if needed < reach.rate_rad_s else None
-        self.driver.point(turn.pan_rad, turn.tilt_rad, rate)
-        return turn
+        self.driver.point(reachable.pan_rad, reachable.tilt_rad, rate)
+        return reachable
 
-    def off(self) -> float:
-        """The angle between where it looks and the nearest to the target that it can look."""
-        look = self.driver.look
-        if look is None:
+    def pointing_error_rad(self) -> float:
+        """Return the angle between the direction of the camera and the nearest reachable one to the
+        target."""
+        ptz = self.driver.ptz
+        if ptz is None:
             return math.inf
-        turn = self.sight.turn(*self.wanted(self.sight.now_us), _SLACK_RAD)
-        return between((look.pan_rad, look.tilt_rad), (turn.pan_rad, turn.tilt_rad))
+        reachable = self.model.nearest_reachable(*self.target_angles(self.model.now_us), _SLACK_RAD)
+        return angle_between((ptz.pan_rad, ptz.tilt_rad), (reachable.pan_rad, reachable.tilt_rad))
 
-    def check_reach(self, turn: Turn, elapsed_s: float, bound_rad: float = THERE_RAD) -> bool:
-        """Whether the target is within reach; fails when it has not been for too long."""
-        if turn.missing_rad <= bound_rad:
+    def check_reach(
+        self, reachable: Reachable, elapsed_s: float, bound_rad: float = THERE_RAD
+    ) -> bool:
+        """Return whether the target is within reach. Raise an error if it has not been for too
+        long."""
+        if reachable.missing_rad <= bound_rad:
             self._reachable_s = elapsed_s
             return True
         if elapsed_s - self._reachable_s >= LEFT_S:
-            raise BehaviorFailedError(f"out of reach for {LEFT_S:g} s: {turn.why}")
+            raise BehaviorFailedError(f"out of reach for {LEFT_S:g} s: {reachable.why}")
         return False
 
-    def check_turning(self, off_rad: float, elapsed_s: float, enough_rad: float) -> None:
-        """Fails when the camera comes no nearer to where it is told to look."""
+    def check_progress(self, off_rad: float, elapsed_s: float, enough_rad: float) -> None:
+        """Raise an error if the camera has come no nearer to its target for too long."""
         self._unmoved_s += min(elapsed_s - self._looked_s, LONGEST_STEP_S)
         self._looked_s = elapsed_s
         if off_rad <= enough_rad or off_rad < self._nearest_rad - _NEARER_RAD:
@@ -92,125 +104,131 @@ class Aiming(Behavior):
             )
 
     def unreachable(self, bound_rad: float = THERE_RAD) -> str:
-        """Why the target cannot be looked at now; "" if it can."""
+        """Return why the target cannot be pointed at now; "" if it can."""
         try:
-            turn = self.sight.turn(*self.wanted(self.sight.now_us))
+            reachable = self.model.nearest_reachable(*self.target_angles(self.model.now_us))
         except BehaviorFailedError as error:
             return error.reason
-        return turn.why if turn.missing_rad > bound_rad else ""
+        return reachable.why if reachable.missing_rad > bound_rad else ""
 
 
-class _AtTarget(Aiming):
-    """At the parameter `target`, or else at `bearing` and `elevation`."""
+class _PointingAtTarget(Pointing):
+    """Points at the parameter `target`, or in the direction `bearing` and `elevation`."""
 
-    def wanted(self, at_us: int) -> tuple[float, float]:
-        """Where the target is then, from where the vehicle is then."""
-        target = self.job.parameters.target
+    def target_angles(self, at_us: int) -> tuple[float, float]:
+        """Return the angles from the predicted pose of the vehicle to the predicted target."""
+        target = self.context.parameters.target
         if target is None:
             return self._direction(at_us)
-        place = self.sight.place(target, at_us)
+        place = self.model.place(target, at_us)
         if place is None:
             assert isinstance(target, VehiclePosition)
             raise BehaviorFailedError(f"where {target.vehicle} is, is not known")
-        eye = self.sight.eye(at_us)
-        if eye is None:
-            raise BehaviorFailedError(self.sight.carrier.missing())
-        return eye.at(place)
+        camera_pose = self.model.camera_pose(at_us)
+        if camera_pose is None:
+            raise BehaviorFailedError(self.model.vehicle_pose.missing())
+        return camera_pose.at(place)
 
     def refusal(self) -> str:
-        """It must be able to look there now."""
+        """The target must be within reach now."""
         return self.unreachable()
 
     def _direction(self, at_us: int) -> tuple[float, float]:
-        bearing, elevation = self.job.parameters.bearing_rad, self.job.parameters.elevation_rad
+        bearing, elevation = (
+            self.context.parameters.bearing_rad,
+            self.context.parameters.elevation_rad,
+        )
         assert bearing is not None  # the catalogue asks for both where there is no target
         assert elevation is not None
         # Headings are from north, clockwise; yaw is from east, counter-clockwise.
-        _, _, yaw = self.sight.carrier.turned(at_us)
+        _, _, yaw = self.model.vehicle_pose.attitude(at_us)
         bow = math.pi / 2 - (yaw or 0.0)
-        return self.sight.deck(at_us).towards(bow + bearing, elevation)
+        return self.model.mount_frame(at_us).towards(bow + bearing, elevation)
 
 
-class PointAt(_AtTarget):
-    """Look there, once."""
+class PointAt(_PointingAtTarget):
+    """Point at the target once."""
 
     name = "ptz_point_at"
 
-    def __init__(self, job: Job) -> None:
-        super().__init__(job)
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
         self._moved_s = 0.0
         self._last = (math.inf, math.inf)
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done when it looks there, or rests as near as it can."""
-        turn = self.aim()
-        if not self.check_reach(turn, elapsed_s):
+        """Done when the camera points at the target, or rests near it."""
+        reachable = self.point_ahead()
+        if not self.check_reach(reachable, elapsed_s):
             return False
-        off = self.off()
-        if off <= THERE_RAD:
+        pointing_error_rad = self.pointing_error_rad()
+        if pointing_error_rad <= THERE_RAD:
             return True
-        look = self.driver.look
-        now = (look.pan_rad, look.tilt_rad) if look else self._last
+        ptz = self.driver.ptz
+        now = (ptz.pan_rad, ptz.tilt_rad) if ptz else self._last
         if now != self._last:
             self._last, self._moved_s = now, elapsed_s
-        if off <= COARSE_RAD and elapsed_s - self._moved_s >= RESTED_S:
+        if pointing_error_rad <= COARSE_RAD and elapsed_s - self._moved_s >= RESTED_S:
             return True
-        self.check_turning(off, elapsed_s, THERE_RAD)
+        self.check_progress(pointing_error_rad, elapsed_s, THERE_RAD)
         return False
 
-    def recognised(self) -> BehaviorState:
-        """To look there twice does no harm: what is on its way goes on."""
-        return BehaviorState.SUCCEEDED if self.off() <= THERE_RAD else BehaviorState.RUNNING
+    def state_after_restart(self) -> BehaviorState:
+        """SUCCEEDED, or RUNNING: it does no harm to point there twice."""
+        return (
+            BehaviorState.SUCCEEDED
+            if self.pointing_error_rad() <= THERE_RAD
+            else BehaviorState.RUNNING
+        )
 
 
-class Track(_AtTarget):
-    """Keep looking there."""
+class Track(_PointingAtTarget):
+    """Point at the target continuously."""
 
     name = "ptz_track"
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done after the duration."""
-        duration_s = self.job.parameters.duration_s
+        """Done after `duration`."""
+        duration_s = self.context.parameters.duration_s
         if duration_s is not None and elapsed_s >= duration_s:
             return True
-        if self.check_reach(self.aim(_SLACK_RAD), elapsed_s, self._in_view_rad()):
-            self.check_turning(self.off(), elapsed_s, self._in_view_rad())
+        if self.check_reach(self.point_ahead(_SLACK_RAD), elapsed_s, self._in_view_rad()):
+            self.check_progress(self.pointing_error_rad(), elapsed_s, self._in_view_rad())
         return False
 
-    def recognised(self) -> BehaviorState:
-        """It goes on if it has the target in view."""
-        in_view = self.off() <= self._in_view_rad()
+    def state_after_restart(self) -> BehaviorState:
+        """RUNNING if the target is in view."""
+        in_view = self.pointing_error_rad() <= self._in_view_rad()
         return BehaviorState.RUNNING if in_view else BehaviorState.UNKNOWN
 
     def _in_view_rad(self) -> float:
-        """What is farther away from the middle may be out of the picture."""
-        view = self.sight.view(self.driver.look)
-        return min(view.width_rad, view.height_rad) / 2
+        """Return the angle from the center within which a target is certainly in view."""
+        field_of_view = self.model.field_of_view(self.driver.ptz)
+        return min(field_of_view.width_rad, field_of_view.height_rad) / 2
 
 
 _ZOOM_ENOUGH = 0.02
-"""Of the level: as near as lenses come."""
+"""Relative tolerance of the zoom level."""
 
 _ZOOM_AGAIN_S = 1.0
 _ZOOM_STUCK_S = 20.0
 
 
 class Zoom(Behavior):
-    """To the parameter `level`."""
+    """Zoom to `level`."""
 
     name = "zoom"
 
     _told_s = -_ZOOM_AGAIN_S
 
     def refusal(self) -> str:
-        """The lens must have such a level."""
         most = self.driver.reach.zoom_max
         level = self._level()
         return f"parameter 'level': {level:g} is above {most:g}" if level > most + 1e-9 else ""
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done when it is there."""
-        if self._there():
+        """Done at the level."""
+        if self._is_there():
             return True
         if elapsed_s >= _ZOOM_STUCK_S:
             raise BehaviorFailedError(
@@ -222,13 +240,13 @@ class Zoom(Behavior):
             self.driver.zoom(self._level())
         return False
 
-    def recognised(self) -> BehaviorState:
-        """To zoom there twice does no harm: what is on its way goes on."""
-        return BehaviorState.SUCCEEDED if self._there() else BehaviorState.RUNNING
+    def state_after_restart(self) -> BehaviorState:
+        """SUCCEEDED, or RUNNING: it does no harm to zoom there twice."""
+        return BehaviorState.SUCCEEDED if self._is_there() else BehaviorState.RUNNING
 
     def _level(self) -> float:
-        return self.job.parameters.zoom
+        return self.context.parameters.zoom
 
-    def _there(self) -> bool:
-        look = self.driver.look
-        return look is not None and abs(look.zoom - self._level()) <= _ZOOM_ENOUGH * self._level()
+    def _is_there(self) -> bool:
+        ptz = self.driver.ptz
+        return ptz is not None and abs(ptz.zoom - self._level()) <= _ZOOM_ENOUGH * self._level()

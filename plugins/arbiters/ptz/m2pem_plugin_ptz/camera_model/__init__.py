@@ -1,1 +1,1 @@
-"""Where a camera looks in the world, what of the ground it sees, and how to look over an area."""
+"""The model of a camera on a vehicle: pose, field of view, footprint, and coverage of an area."""

@@ -1,4 +1,4 @@
-"""An area as places on the ground that stand for it: each of them is to be seen."""
+"""The coverage of an area by a camera: points that stand for the area, and rows to see them."""
 
 import math
 from dataclasses import dataclass
@@ -9,31 +9,37 @@ import pymap3d
 from numpy.typing import NDArray
 
 from m2pem.api import Area
-from m2pem_plugin_ptz.camera_model.field_of_view import View, ranges_m
+from m2pem_plugin_ptz.camera_model.field_of_view import FieldOfView, ranges_m
 from m2pem_plugin_ptz.camera_model.frames import Vector
-from m2pem_plugin_ptz.camera_model.pose import Eye
+from m2pem_plugin_ptz.camera_model.pose import CameraPose
 
 EVEN = 2_500
-"""So many places are spread evenly over the ground."""
+"""Number of points that are spread evenly over the ground."""
 
 _CELLS_IN_A_VIEW = 10
 _MOST_CELLS = 20_000
 _EACH_EDGE = 64
 
 
-def places_of(area: Area, eye: Eye, view: View, ground_m: float) -> Vector:
-    """Places in ECEF, one in each row: evenly on the ground, evenly as the camera sees it, and
-    along the border. Never empty."""
+def points_in_area(
+    area: Area, camera_pose: CameraPose, field_of_view: FieldOfView, ground_m: float
+) -> Vector:
+    """Return points in ECEF, one in each row: even on the ground, even in the view of the camera,
+    and along the border. There is at least one."""
     rings = [np.array([corner[:2] for corner in ring], dtype=float) for ring in area.rings]
     border = np.concatenate([_along(ring) for ring in rings])
     on_border = _ecef(border, ground_m)
     return np.concatenate(
-        (on_border, _evenly(rings, ground_m), _as_seen(rings, on_border, eye, view, ground_m))
+        (
+            on_border,
+            _evenly(rings, ground_m),
+            _as_seen(rings, on_border, camera_pose, field_of_view, ground_m),
+        )
     )
 
 
 def inside(rings: list[Vector], points: Vector) -> NDArray[np.bool_]:
-    """Which points (latitude, longitude) are in the outer ring and in none of the holes."""
+    """Return which points (latitude, longitude) are in the outer ring and in none of the holes."""
     latitude, longitude = points[:, 0], points[:, 1]
     odd = np.zeros(len(points), dtype=bool)
     for ring in rings:
@@ -70,17 +76,25 @@ def _grid(low: Vector, high: Vector, tall: float, wide: float, count: int) -> Ve
     return points
 
 
-def _as_seen(rings: list[Vector], border: Vector, eye: Eye, view: View, ground_m: float) -> Vector:
-    vectors = eye.seen(border)
+def _as_seen(
+    rings: list[Vector],
+    border: Vector,
+    camera_pose: CameraPose,
+    field_of_view: FieldOfView,
+    ground_m: float,
+) -> Vector:
+    vectors = camera_pose.vector_to(border)
     elevation = np.arctan2(vectors[:, 2], np.hypot(vectors[:, 0], vectors[:, 1]))
     heading = np.unwrap(np.arctan2(vectors[:, 0], vectors[:, 1]))
-    below = inside(rings, np.array([[eye.position.latitude_deg, eye.position.longitude_deg]]))
+    below = inside(
+        rings, np.array([[camera_pose.position.latitude_deg, camera_pose.position.longitude_deg]])
+    )
     bottom = -math.pi / 2 if below[0] else float(elevation.min())
     left, right = float(heading.min()), float(heading.max())
     if below[0] or right - left > math.tau:
         left, right = -math.pi, math.pi
     tall, wide = float(elevation.max()) - bottom, right - left
-    step = min(view.width_rad, view.height_rad) / _CELLS_IN_A_VIEW
+    step = min(field_of_view.width_rad, field_of_view.height_rad) / _CELLS_IN_A_VIEW
     step = max(step, math.sqrt(tall * wide / _MOST_CELLS), 1e-6)
     up = bottom + (np.arange(max(1, math.ceil(tall / step))) + 0.5) * step
     across = left + (np.arange(max(1, math.ceil(wide / step))) + 0.5) * step
@@ -89,11 +103,11 @@ def _as_seen(rings: list[Vector], border: Vector, eye: Eye, view: View, ground_m
     rays = np.column_stack(
         (level * np.sin(mesh[:, 1]), level * np.cos(mesh[:, 1]), np.sin(mesh[:, 0]))
     )
-    far = ranges_m(eye, rays, ground_m)
+    far = ranges_m(camera_pose, rays, ground_m)
     rays, far = rays[np.isfinite(far)], far[np.isfinite(far)]
     if not len(far):
         return np.empty((0, 3))
-    places = eye.place + far[:, None] * (rays @ eye.enu)
+    places = camera_pose.place + far[:, None] * (rays @ camera_pose.enu)
     latitude, longitude, _ = pymap3d.ecef2geodetic(*places.T)
     return places[inside(rings, np.column_stack((latitude, longitude)))]
 
@@ -105,10 +119,8 @@ def _ecef(points: Vector, ground_m: float) -> Vector:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Look along one elevation, from a heading to another, which may lie beyond a whole turn.
-
-    `points`: which of the places are to be seen by it.
-    """
+    """A sweep along one elevation from a heading to another, which may be more than a turn away.
+    `points`: the indices of the points to see."""
 
     elevation_rad: float
     start_rad: float
@@ -119,20 +131,21 @@ class Row:
 def next_row(
     seen_from: Vector,
     unseen: NDArray[np.intp],
-    view: View,
+    field_of_view: FieldOfView,
     overlap: float,
     heading_rad: float,
     stop_heading_rad: float | None,
 ) -> Row:
-    """The uppermost row of what is left.
+    """Return the uppermost row of the points that are left.
 
-    `seen_from`: directions from the camera, ENU, one in each row, of which `unseen` are left; at
-    least one. `overlap`: of neighbouring rows, a fraction. `heading_rad`: where it looks now.
-    `stop_heading_rad`: over which it cannot turn; None: it turns all round.
+    `seen_from`: directions from the camera in ENU, one in each row. `unseen`: indices of those that
+    are left; at least one. `overlap`: of neighboring rows, as a fraction. `heading_rad`: of the
+    camera now. `stop_heading_rad`: over which the camera cannot turn; None if it can turn all
+    round.
     """
     vectors = seen_from[unseen]
     elevations = np.arctan2(vectors[:, 2], np.hypot(vectors[:, 0], vectors[:, 1]))
-    band = view.height_rad * (1 - overlap)
+    band = field_of_view.height_rad * (1 - overlap)
     top, bottom = float(elevations.max()), float(elevations.min())
     of_row = unseen[elevations >= top - band]
     middle = max(top - band / 2, (top + bottom) / 2)
@@ -142,7 +155,7 @@ def next_row(
     order = np.argsort(along)
     along, of_row = along[order], of_row[order]
     # Where nothing is left for a whole view, there is no need to look along slowly.
-    breaks = np.flatnonzero(np.diff(along) > view.width_rad) + 1
+    breaks = np.flatnonzero(np.diff(along) > field_of_view.width_rad) + 1
     here = (heading_rad - cut) % math.tau
     runs = list(zip(np.split(along, breaks), np.split(of_row, breaks), strict=True))
 
@@ -163,7 +176,7 @@ def _apart(a: float, b: float, stop: float | None) -> float:
 
 
 def _widest_gap(headings: Vector) -> float:
-    """The middle of the widest gap between headings."""
+    """Return the middle of the widest gap between headings."""
     ordered = np.sort(headings)
     gaps = np.diff(np.append(ordered, ordered[0] + math.tau))
     widest = int(np.argmax(gaps))

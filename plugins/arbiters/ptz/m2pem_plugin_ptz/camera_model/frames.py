@@ -1,7 +1,7 @@
-"""Rotations between the frames in which a camera, its vehicle and the Earth are told.
+"""Rotations between the frames of a camera, its vehicle and the Earth.
 
-Vectors and matrices are of NumPy, metres and unit vectors. ECEF: of the Earth (WGS-84). ENU: east,
-north, up at a place. Deck: forward, left, up of a vehicle (REP-103).
+Vectors and matrices are of NumPy, in metres or unit vectors. ECEF: of the Earth (WGS-84). ENU:
+east, north, up at a position. Deck: forward, left, up of a vehicle (REP-103).
 """
 
 import math
@@ -18,7 +18,7 @@ Matrix: TypeAlias = NDArray[np.float64]
 
 
 def ecef(position: GeoPosition) -> Vector:
-    """The place in ECEF; the altitude counts from the ellipsoid."""
+    """Return a position in ECEF. The altitude counts from the ellipsoid."""
     return np.array(
         pymap3d.geodetic2ecef(position.latitude_deg, position.longitude_deg, position.altitude_m),
         dtype=float,
@@ -26,13 +26,13 @@ def ecef(position: GeoPosition) -> Vector:
 
 
 def geodetic(place: Vector) -> GeoPosition:
-    """The position of a place in ECEF."""
+    """Return the position of a point in ECEF."""
     latitude, longitude, altitude = pymap3d.ecef2geodetic(*(float(part) for part in place))
     return GeoPosition(float(latitude), float(longitude), float(altitude))
 
 
 def enu_of_ecef(position: GeoPosition) -> Matrix:
-    """Turns vectors of ECEF into those of ENU at a position."""
+    """Return the rotation from ECEF to ENU at a position."""
     latitude, longitude = math.radians(position.latitude_deg), math.radians(position.longitude_deg)
     sin_lat, cos_lat = math.sin(latitude), math.cos(latitude)
     sin_lon, cos_lon = math.sin(longitude), math.cos(longitude)
@@ -46,7 +46,7 @@ def enu_of_ecef(position: GeoPosition) -> Matrix:
 
 
 def enu_of_deck(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
-    """Turns vectors of the deck into ENU.
+    """Return the rotation from the deck to ENU.
 
     Angles as in `VehicleState`: a positive roll has the right side down, a positive pitch the bow;
     yaw is from east, counter-clockwise.
@@ -62,7 +62,7 @@ def enu_of_deck(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
 
 
 def deck_vector(bearing_rad: float, tilt_rad: float) -> Vector:
-    """The unit vector, in the deck's frame, of a bearing from the bow, clockwise, and a tilt up."""
+    """Return the unit vector, in the deck frame, of a bearing clockwise from the bow and a tilt."""
     level = math.cos(tilt_rad)
     return np.array(
         [level * math.cos(bearing_rad), -level * math.sin(bearing_rad), math.sin(tilt_rad)]
@@ -70,7 +70,7 @@ def deck_vector(bearing_rad: float, tilt_rad: float) -> Vector:
 
 
 def deck_angles(vector: Vector) -> tuple[float, float]:
-    """Bearing from the bow, clockwise, and tilt up, of a vector in the deck's frame."""
+    """Return bearing from the bow, clockwise, and tilt up of a vector in the deck frame."""
     forward, left, up = (float(part) for part in vector)
     level = math.hypot(forward, left)
     # Straight up and down every bearing is as good.
@@ -79,7 +79,7 @@ def deck_angles(vector: Vector) -> tuple[float, float]:
 
 
 def enu_vector(heading_rad: float, elevation_rad: float) -> Vector:
-    """The unit vector, in ENU, of a heading from north, clockwise, and an elevation."""
+    """Return the unit vector in ENU of a heading from north, clockwise, and an elevation."""
     level = math.cos(elevation_rad)
     return np.array(
         [level * math.sin(heading_rad), level * math.cos(heading_rad), math.sin(elevation_rad)]
@@ -87,14 +87,14 @@ def enu_vector(heading_rad: float, elevation_rad: float) -> Vector:
 
 
 def enu_angles(vector: Vector) -> tuple[float, float]:
-    """Heading from north, clockwise, and elevation, of a vector in ENU."""
+    """Return heading from north, clockwise, and elevation of a vector in ENU."""
     east, north, up = (float(part) for part in vector)
     level = math.hypot(east, north)
     heading = math.atan2(east, north) if level > 1e-12 else 0.0
     return heading, math.atan2(up, level)
 
 
-def between(first: tuple[float, float], second: tuple[float, float]) -> float:
-    """The angle between two directions, each of a bearing and a tilt."""
+def angle_between(first: tuple[float, float], second: tuple[float, float]) -> float:
+    """Return the angle between two directions, each of a bearing and a tilt."""
     a, b = deck_vector(*first), deck_vector(*second)
     return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(np.dot(a, b)))

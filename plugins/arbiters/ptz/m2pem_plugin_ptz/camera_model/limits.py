@@ -1,4 +1,4 @@
-"""What a camera can reach of where it should look: pan stops, endless pan, tilt limits."""
+"""The reachable directions of a camera: pan stops, endless pan, tilt limits."""
 
 import math
 from dataclasses import dataclass
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from m2pem_plugin_ptz.camera_model.frames import Vector, between
+from m2pem_plugin_ptz.camera_model.frames import Vector, angle_between
 from m2pem_plugin_ptz.gimbal import Reach
 
 _ROUNDING_RAD = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
-    """Where to turn. `missing_rad`: how far that is from where it should look; 0 if it is there.
+class Reachable:
+    """A reachable direction. `missing_rad`: its angle to the wanted direction; 0 if it is the same.
 
-    `why`: what keeps it, for people; "" if nothing does.
+    `why`: what limits the direction, as text; "" if nothing does.
     """
 
     pan_rad: float
@@ -25,14 +25,14 @@ class Turn:
     why: str = ""
 
 
-def turn(
+def nearest_reachable(
     reach: Reach, pan_rad: float, tilt_rad: float, from_pan_rad: float, slack_rad: float = 0.0
-) -> Turn:
-    """The nearest that a camera can look to (`pan_rad`, `tilt_rad`), coming from `from_pan_rad`.
+) -> Reachable:
+    """Return the reachable direction nearest to (`pan_rad`, `tilt_rad`), from `from_pan_rad`.
 
     A camera with stops turns straight from one pan to another, so it never turns through them.
-    `slack_rad`: by so much it rather stays short of the target at a stop than turns all the way
-    round to it.
+    `slack_rad`: a camera at a stop stays there if the target is no farther beyond it than this,
+    and does not turn all the way round.
     """
     low, high = reach.tilt_rad
     tilt = min(max(tilt_rad, low), high)
@@ -43,14 +43,14 @@ def turn(
     if stopped:
         asked = 180 - (180 - round(math.degrees(pan_rad))) % 360
         why = f"pan {asked} deg is beyond its stops, {_range(reach.pan_rad)}"
-    missing = between((pan, tilt), (pan_rad, tilt_rad)) if why else 0.0
+    missing = angle_between((pan, tilt), (pan_rad, tilt_rad)) if why else 0.0
     # Straight up and down, no pan misses anything.
-    return Turn(pan, tilt, missing, why) if missing > _ROUNDING_RAD else Turn(pan, tilt)
+    return Reachable(pan, tilt, missing, why) if missing > _ROUNDING_RAD else Reachable(pan, tilt)
 
 
-def within(reach: Reach, vectors: Vector, bound_rad: float) -> NDArray[np.bool_]:
-    """Which directions (unit vectors of the deck as pan 0 sees it, one in each row) are no farther
-    than `bound_rad` from where a camera can look."""
+def within_reach(reach: Reach, vectors: Vector, bound_rad: float) -> NDArray[np.bool_]:
+    """Return which directions (unit vectors in the deck frame of pan 0, one in each row) are no
+    farther than `bound_rad` from a reachable direction."""
     forward, left, up = vectors.T
     pan, tilt = np.arctan2(-left, forward), np.arcsin(np.clip(up, -1.0, 1.0))
     near_tilt = np.clip(tilt, *reach.tilt_rad)

@@ -1,4 +1,4 @@
-"""A camera in the world: how its pan and tilt go with places and headings."""
+"""The pose of a camera in the world, and the frame in which it turns."""
 
 from dataclasses import dataclass
 
@@ -21,8 +21,8 @@ from m2pem_plugin_ptz.settings import Mounting
 
 
 @dataclass(frozen=True, slots=True)
-class Stance:
-    """How a vehicle stands. Angles as in `VehicleState`."""
+class VehiclePose:
+    """The pose of a vehicle. Angles as in `VehicleState`."""
 
     position: GeoPosition
     yaw_rad: float
@@ -31,84 +31,87 @@ class Stance:
 
 
 @dataclass(frozen=True, slots=True)
-class Deck:
-    """What a camera turns on. `enu`: turns vectors of the camera at pan 0 and tilt 0 into ENU.
-
-    `pan_zero_rad`: where pan 0 points, from the bow, clockwise.
-    """
+class MountFrame:
+    """The frame in which a camera turns. `enu` rotates vectors of the camera at pan 0 and tilt 0 to
+    ENU. `pan_zero_rad`: direction of pan 0 from the bow, clockwise."""
 
     enu: Matrix
     pan_zero_rad: float = 0.0
 
     def angles(self, enu: Vector) -> tuple[float, float]:
-        """The pan and the tilt of a direction."""
+        """Return pan and tilt of a direction."""
         bearing, tilt = deck_angles(self.enu.T @ enu)
         return bearing - self.pan_zero_rad, tilt
 
     def as_pan_zero_sees(self, enu: Vector) -> Vector:
-        """Directions of ENU, one in each row, in the frame of a deck whose bow is at pan 0."""
+        """Rotate directions of ENU, one in each row, to the frame of a deck whose bow is at pan
+        0."""
         turned: Vector = enu @ self.enu @ enu_of_deck(0.0, 0.0, -self.pan_zero_rad)
         return turned
 
     def vector(self, pan_rad: float, tilt_rad: float) -> Vector:
-        """The direction, in ENU, of a pan and a tilt."""
+        """Return the direction of pan and tilt, in ENU."""
         vector: Vector = self.enu @ deck_vector(pan_rad + self.pan_zero_rad, tilt_rad)
         return vector
 
     def towards(self, heading_rad: float, elevation_rad: float) -> tuple[float, float]:
-        """The pan and the tilt that look to a heading, from north, clockwise."""
+        """Return pan and tilt towards a heading, from north, clockwise."""
         return self.angles(enu_vector(heading_rad, elevation_rad))
 
     def heading(self, pan_rad: float, tilt_rad: float) -> tuple[float, float]:
-        """The heading and the elevation to which a pan and a tilt look."""
+        """Return heading and elevation of pan and tilt."""
         return enu_angles(self.vector(pan_rad, tilt_rad))
 
     def axes(self, pan_rad: float, tilt_rad: float) -> Matrix:
-        """Turns ENU into what the camera sees: ahead, left and up in the picture."""
+        """Return the rotation from ENU to the picture: ahead, left and up."""
         ahead = deck_vector(pan_rad + self.pan_zero_rad, tilt_rad)
         level = deck_vector(pan_rad + self.pan_zero_rad, 0.0)
         left = np.array([-level[1], level[0], 0.0])
         return np.array([ahead, left, np.cross(ahead, left)]) @ self.enu.T
 
 
-def deck(
+def mount_frame(
     mounting: Mounting, roll_rad: float, pitch_rad: float, yaw_rad: float, *, stabilized: bool
-) -> Deck:
-    """What a camera turns on, on a vehicle that stands so. A stabilized one keeps its horizon."""
+) -> MountFrame:
+    """Return the frame of a camera on a vehicle with this attitude. A stabilized camera keeps its
+    horizon."""
     if stabilized:
         roll_rad = pitch_rad = 0.0
-    return Deck(enu_of_deck(roll_rad, pitch_rad, yaw_rad), mounting.pan_rad)
+    return MountFrame(enu_of_deck(roll_rad, pitch_rad, yaw_rad), mounting.pan_rad)
 
 
 @dataclass(frozen=True, slots=True)
-class Eye:
-    """A camera and where it is: in ECEF, and `position`, with ENU there."""
+class CameraPose:
+    """A camera and its position: `place` in ECEF, `position`, and the rotation to ENU there."""
 
-    deck: Deck
+    mount_frame: MountFrame
     place: Vector
     position: GeoPosition
     enu: Matrix
 
-    def seen(self, place: Vector) -> Vector:
-        """From the camera to a place of ECEF, in ENU, metres. Several places: one in each row."""
+    def vector_to(self, place: Vector) -> Vector:
+        """Return the vector from the camera to a point of ECEF, in ENU, in metres. Several points:
+        one in each row."""
         vector: Vector = (place - self.place) @ self.enu.T
         return vector
 
     def at(self, place: Vector) -> tuple[float, float]:
-        """The pan and the tilt that look at a place of ECEF."""
-        return self.deck.angles(self.seen(place))
+        """Return pan and tilt towards a point of ECEF."""
+        return self.mount_frame.angles(self.vector_to(place))
 
 
-def eye(stance: Stance, mounting: Mounting, *, stabilized: bool) -> Eye:
-    """The camera of a vehicle that stands so."""
-    enu = enu_of_ecef(stance.position)
-    body = enu_of_deck(stance.roll_rad, stance.pitch_rad, stance.yaw_rad)
+def camera_pose(pose: VehiclePose, mounting: Mounting, *, stabilized: bool) -> CameraPose:
+    """Return the pose of a camera on a vehicle."""
+    enu = enu_of_ecef(pose.position)
+    body = enu_of_deck(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
     offset = body @ np.array([mounting.forward_m, mounting.left_m, mounting.up_m])
-    place = ecef(stance.position) + enu.T @ offset
+    place = ecef(pose.position) + enu.T @ offset
     position = geodetic(place)
-    turns_on = deck(
-        mounting, stance.roll_rad, stance.pitch_rad, stance.yaw_rad, stabilized=stabilized
+    turns_on = mount_frame(
+        mounting, pose.roll_rad, pose.pitch_rad, pose.yaw_rad, stabilized=stabilized
     )
     # A few metres aside, ENU is turned by less than a thousandth of a millirad; exact all the same.
     here = enu_of_ecef(position)
-    return Eye(Deck(here @ enu.T @ turns_on.enu, mounting.pan_rad), place, position, here)
+    return CameraPose(
+        MountFrame(here @ enu.T @ turns_on.enu, mounting.pan_rad), place, position, here
+    )

@@ -1,4 +1,5 @@
-"""Where vehicles are between what they say: of the camera's own vehicle, and of targets."""
+"""The pose of a vehicle, predicted from its last states: of the camera's vehicle, and of
+targets."""
 
 import math
 from dataclasses import dataclass
@@ -7,36 +8,36 @@ import numpy as np
 
 from m2pem.api import ArbiterContext, ResourceId, VehicleState
 from m2pem_plugin_ptz.camera_model.frames import Vector, ecef, enu_of_ecef, geodetic
-from m2pem_plugin_ptz.camera_model.pose import Stance
+from m2pem_plugin_ptz.camera_model.pose import VehiclePose
 
 AHEAD_S = 1.0
-"""A vehicle that says nothing new for longer is taken to have stopped there."""
+"""A vehicle without a new state for longer counts as stopped there."""
 
 _SHORTEST_S, _LONGEST_S = 0.02, 1.5
-"""Between these, two states tell how fast a vehicle turns."""
+"""Two states between these times apart give the turn rates."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rates:
-    """How fast a vehicle rolls, pitches and turns, in rad/s, in the sense of `VehicleState`."""
+class AttitudeRates:
+    """Roll, pitch and yaw rates in rad/s, with the signs of `VehicleState`."""
 
     roll: float = 0.0
     pitch: float = 0.0
     yaw: float = 0.0
 
 
-class Carrier:
-    """One vehicle, as it was heard on the bus. Ask it often: it looks when it is asked."""
+class TrackedVehicle:
+    """One vehicle on the bus. It reads the bus when it is called, so call it often."""
 
     def __init__(self, vehicle: ResourceId, domain: str, context: ArbiterContext) -> None:
         self.vehicle = vehicle
         self._domain = domain
         self._context = context
         self._newest: VehicleState | None = None
-        self._rates = Rates()
+        self._rates = AttitudeRates()
 
     def state(self) -> VehicleState | None:
-        """The newest that it said."""
+        """Return the newest state."""
         state = self._context.bus.latest(self.vehicle)
         if isinstance(state, VehicleState) and state is not self._newest:
             if self._newest is None or state.time_us > self._newest.time_us:
@@ -44,8 +45,8 @@ class Carrier:
             self._newest = state
         return self._newest
 
-    def turned(self, at_us: int) -> tuple[float, float, float | None]:
-        """Roll, pitch and yaw at a time that is near; yaw None: not known."""
+    def attitude(self, at_us: int) -> tuple[float, float, float | None]:
+        """Return roll, pitch and yaw at a near time; yaw None if it is not known."""
         state = self.state()
         if state is None:
             return 0.0, 0.0, None
@@ -57,42 +58,43 @@ class Carrier:
             None if yaw is None else yaw + self._rates.yaw * ahead_s,
         )
 
-    def place(self, at_us: int) -> Vector | None:
-        """Where it is at a time that is near, in ECEF; None: not known."""
+    def place_ecef(self, at_us: int) -> Vector | None:
+        """Return the position in ECEF at a near time; None if it is not known."""
         state = self.state()
         if state is None or state.position is None:
             return None
-        place = ecef(state.position)
+        place_ecef = ecef(state.position)
         if state.velocity_enu_m_s is None:
-            return place
+            return place_ecef
         gone = np.array(state.velocity_enu_m_s) * self._ahead_s(state, at_us)
-        moved: Vector = place + enu_of_ecef(state.position).T @ gone
+        moved: Vector = place_ecef + enu_of_ecef(state.position).T @ gone
         return moved
 
-    def stance(self, at_us: int) -> Stance | None:
-        """How it stands at a time that is near; None: where it is or heads is not known."""
-        place = self.place(at_us)
-        roll, pitch, yaw = self.turned(at_us)
-        if place is None or yaw is None:
+    def pose(self, at_us: int) -> VehiclePose | None:
+        """Return the pose at a near time; None if position or heading is not known."""
+        place_ecef = self.place_ecef(at_us)
+        roll, pitch, yaw = self.attitude(at_us)
+        if place_ecef is None or yaw is None:
             return None
-        return Stance(geodetic(place), yaw, roll, pitch)
+        return VehiclePose(geodetic(place_ecef), yaw, roll, pitch)
 
-    def home_m(self) -> float:
-        """The altitude of its home: what relative altitudes count from."""
+    def home_altitude_m(self) -> float:
+        """Return the altitude of its home, from which relative altitudes count."""
         state = self.state()
         if state is None or state.position is None or state.altitude_above_home_m is None:
             return self._context.origin[2]
         return state.position.altitude_m - state.altitude_above_home_m
 
     def ground_m(self) -> float:
-        """The altitude of the ground: where it drives or floats; of what flies or dives, home's."""
+        """Return the altitude of the ground: that of a vehicle on land or water; otherwise that of
+        its home."""
         state = self.state()
         if self._domain in ("ground", "surface") and state is not None and state.position:
             return state.position.altitude_m
-        return self.home_m()
+        return self.home_altitude_m()
 
     def missing(self) -> str:
-        """What is not known of it; "" if all is."""
+        """Return what is not known of the pose; "" if all is."""
         state = self.state()
         if state is None or state.position is None:
             return f"where {self.vehicle} is, is not known"
@@ -105,16 +107,16 @@ class Carrier:
         return min(max((at_us - state.time_us) / 1e6, 0.0), AHEAD_S)
 
 
-def _rates(before: VehicleState | None, after: VehicleState) -> Rates:
+def _rates(before: VehicleState | None, after: VehicleState) -> AttitudeRates:
     if before is None:
-        return Rates()
+        return AttitudeRates()
     apart_s = (after.time_us - before.time_us) / 1e6
     if not _SHORTEST_S <= apart_s <= _LONGEST_S:
-        return Rates()
+        return AttitudeRates()
     yaw = 0.0
     if before.yaw_rad is not None and after.yaw_rad is not None:
         yaw = math.remainder(after.yaw_rad - before.yaw_rad, math.tau)
-    return Rates(
+    return AttitudeRates(
         math.remainder(after.roll_rad - before.roll_rad, math.tau) / apart_s,
         math.remainder(after.pitch_rad - before.pitch_rad, math.tau) / apart_s,
         yaw / apart_s,

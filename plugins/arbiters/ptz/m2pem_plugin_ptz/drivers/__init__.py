@@ -1,9 +1,9 @@
-"""The ways to reach a camera that turns: over ROS, MAVLink and ONVIF."""
+"""The drivers of cameras that turn: over ROS, MAVLink and ONVIF."""
 
 from importlib import import_module
 from typing import cast
 
-from m2pem_plugin_ptz.drivers.driver import CameraDriver, Seat
+from m2pem_plugin_ptz.drivers.driver import CameraDriver, DriverSetup
 from m2pem_plugin_ptz.settings import DriverName
 
 # Loaded for the camera that needs it: not everyone has the library of each.
@@ -14,8 +14,8 @@ _DRIVERS = {
 }
 
 
-def make_driver(seat: Seat) -> CameraDriver:
-    """The driver that the fleet names for a camera."""
-    module, name = _DRIVERS[seat.settings.driver]
+def make_driver(setup: DriverSetup) -> CameraDriver:
+    """Make the driver that the fleet names."""
+    module, name = _DRIVERS[setup.settings.driver]
     make = getattr(import_module(f"m2pem_plugin_ptz.drivers.{module}"), name)
-    return cast(CameraDriver, make(seat))
+    return cast(CameraDriver, make(setup))

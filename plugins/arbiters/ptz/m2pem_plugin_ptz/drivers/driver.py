@@ -1,7 +1,7 @@
-"""What the arbiter asks of a way to reach one camera.
+"""The interface of drivers. A driver is one way to reach one camera.
 
-A driver imports its transport when it is opened. `point`, `zoom` and `halt` return at once, and the
-last one called counts: they are called again and again while a target or the vehicle moves.
+A driver imports its transport in `open`. `point`, `zoom` and `halt` return at once, and the last
+call counts: they are called repeatedly while a target or the vehicle moves.
 """
 
 from collections.abc import Callable
@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from m2pem.api import ArbiterContext, Connection
-from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
+from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
 from m2pem_plugin_ptz.settings import Settings
 
 
 class CameraError(Exception):
-    """The camera refused, or did not answer; the text is for the operator. `code`: of the error
-    that the mission gets."""
+    """The camera refused, or did not answer; the text is for the operator. `code` is the error code
+    for the mission."""
 
     def __init__(self, reason: str, code: str = "FAILED") -> None:
         super().__init__(reason)
@@ -24,10 +24,10 @@ class CameraError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Seat:
-    """What a driver is given. `heard` is to be called whenever the camera says where it looks, or
-    answers in another way; its silence makes it LOST. All time goes through `context.clock`, but
-    for what bounds a call on a network."""
+class DriverSetup:
+    """The arguments of a driver. `heard` is to be called with each message of the camera. A
+    camera that is silent is LOST. `context.clock` is used for all times, except timeouts of
+    network calls."""
 
     connection: Connection
     settings: Settings
@@ -36,10 +36,10 @@ class Seat:
 
 
 class CameraDriver(Protocol):
-    """One way to reach one camera. Constructed as `Driver(seat)`."""
+    """One way to reach one camera. It is made as `Driver(setup)`."""
 
     async def open(self) -> None:
-        """Listen; the camera need not be there yet.
+        """Connect. The camera need not be there yet.
 
         Raises:
             PluginError: what it needs is not installed, or the settings cannot be.
@@ -47,32 +47,30 @@ class CameraDriver(Protocol):
         ...
 
     @property
-    def look(self) -> Look | None:
-        """Where it looks, as it said last."""
+    def ptz(self) -> PanTiltZoom | None:
+        """The last reported pan, tilt and zoom."""
         ...
 
     @property
     def reach(self) -> Reach:
-        """Where it can look: as the camera says, within what the fleet says."""
+        """The limits of the camera, within those of the fleet."""
         ...
 
     def refusal(self, behavior: str) -> str:
-        """Why the camera cannot do such a behavior, now or ever; "" if it can."""
+        """Return why the camera cannot do a behavior, now or ever; "" if it can."""
         ...
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None = None) -> None:
-        """Turn there, within `reach`, not faster than `rate_rad_s`, and stay."""
+        """Turn to a direction within `reach`, not faster than `rate_rad_s`, and stay."""
         ...
 
     def zoom(self, level: float) -> None:
-        """Zoom there, within `reach`."""
+        """Zoom to a level within `reach`."""
         ...
 
-    def halt(self) -> None:
-        """Stop turning and zooming."""
-        ...
+    def halt(self) -> None: ...
 
-    async def take_picture(self) -> Picture:
+    async def take_picture(self) -> CapturedImage:
         """Take one picture.
 
         Raises:
@@ -89,7 +87,7 @@ class CameraDriver(Protocol):
         ...
 
     async def stop_recording(self) -> str:
-        """End the video; returns where it is: a file's or the camera's own name for it.
+        """End the video, and return its file, or the name that the camera has for it.
 
         Raises:
             CameraError: it could not.
@@ -97,5 +95,5 @@ class CameraDriver(Protocol):
         ...
 
     async def close(self) -> None:
-        """Let go. The camera stays as it is."""
+        """Disconnect. The camera stays as it is."""
         ...

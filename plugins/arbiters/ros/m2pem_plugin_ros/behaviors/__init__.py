@@ -7,7 +7,7 @@ from m2pem_plugin_ros.behaviors.follow import Follow
 from m2pem_plugin_ros.behaviors.goto import Goto
 from m2pem_plugin_ros.behaviors.hold_and_teleop import DriveStop, Hold, Teleop
 from m2pem_plugin_ros.behaviors.motion import Motion
-from m2pem_plugin_ros.behaviors.motion_state import Ending, RefusedError, Observation, Step, Target
+from m2pem_plugin_ros.behaviors.motion_state import Ending, Observation, RefusedError, Step, Target
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.pilot import STALE_S, STANDING, Pilot
 from m2pem_plugin_ros.behaviors.reverse import Reverse

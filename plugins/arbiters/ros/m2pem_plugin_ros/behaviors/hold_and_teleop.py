@@ -1,7 +1,7 @@
 """The behaviors in which m2pem does not steer: `hold`, `drive_stop` and `teleop`."""
 
 from m2pem_plugin_ros.behaviors.motion import Motion
-from m2pem_plugin_ros.behaviors.motion_state import STANDSTILL, Ending, MotionState, DesiredMotion
+from m2pem_plugin_ros.behaviors.motion_state import STANDSTILL, DesiredMotion, Ending, MotionState
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds

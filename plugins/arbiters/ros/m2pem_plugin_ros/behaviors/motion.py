@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from m2pem_plugin_ros.behaviors.motion_state import Ending, Place, MotionState, DesiredMotion
+from m2pem_plugin_ros.behaviors.motion_state import DesiredMotion, Ending, MotionState, Place
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Bounds

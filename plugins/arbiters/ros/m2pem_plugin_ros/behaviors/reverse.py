@@ -3,7 +3,13 @@
 import math
 
 from m2pem_plugin_ros.behaviors.motion import Motion
-from m2pem_plugin_ros.behaviors.motion_state import STANDSTILL, Ending, MotionState, DesiredMotion, position_of
+from m2pem_plugin_ros.behaviors.motion_state import (
+    STANDSTILL,
+    DesiredMotion,
+    Ending,
+    MotionState,
+    position_of,
+)
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
 from m2pem_plugin_ros.behaviors.path import Leg
 from m2pem_plugin_ros.behaviors.steering import (

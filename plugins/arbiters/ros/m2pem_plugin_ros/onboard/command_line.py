@@ -131,7 +131,9 @@ async def _serve(
         localization = TopicLocalization(ros, name, settings, context)
 
         def make(events: DriverEvents) -> Driver:
-            return make_driver(DriverSetup(connection, settings, context, ros, localization, events))
+            return make_driver(
+                DriverSetup(connection, settings, context, ros, localization, events)
+            )
 
         namespace = settings.namespace
         node = OnboardNode(ros, name, namespace, make, clock=clock, bus=targets)

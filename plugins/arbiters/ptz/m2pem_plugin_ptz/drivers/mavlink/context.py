@@ -1,8 +1,9 @@
-"""From directions as a camera is mounted on a deck to those from the horizon, and back. Pure.
+"""What the parts of a MAVLink camera share: their context, and the rotation between mount and
+horizon.
 
-MAVLink's gimbals are level whatever the vehicle does, and are told so. `roll_rad` and `pitch_rad`
-are those of a VehicleState (REP-103): roll is positive when the right side is down, pitch when the
-nose is down.
+MAVLink gimbals are level whatever the vehicle does, and are commanded so. `roll_rad` and
+`pitch_rad` are those of a VehicleState (REP-103): roll is positive when the right side is down,
+pitch when the nose is down.
 """
 
 import logging
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
 
 
 Direction = tuple[float, float]
-"""Pan from the bow, clockwise, and tilt upwards; radians."""
+"""Pan from the bow, clockwise, and tilt upwards, in radians."""
 
 
 def deck_to_horizon(direction: Direction, roll_rad: float, pitch_rad: float) -> Direction:
-    """The same direction, from the horizon."""
+    """Return a direction of the deck from the horizon."""
     x, y, z = _vector(direction)
     y, z = _turned(y, z, roll_rad)
     z, x = _turned(z, x, pitch_rad)
@@ -32,7 +33,7 @@ def deck_to_horizon(direction: Direction, roll_rad: float, pitch_rad: float) -> 
 
 
 def horizon_to_deck(direction: Direction, roll_rad: float, pitch_rad: float) -> Direction:
-    """The inverse."""
+    """Return a direction of the horizon from the deck."""
     x, y, z = _vector(direction)
     z, x = _turned(z, x, -pitch_rad)
     y, z = _turned(y, z, -roll_rad)
@@ -40,7 +41,7 @@ def horizon_to_deck(direction: Direction, roll_rad: float, pitch_rad: float) -> 
 
 
 def _vector(direction: Direction) -> tuple[float, float, float]:
-    """Forward, left, up."""
+    """Return forward, left, up."""
     pan, tilt = direction
     return math.cos(tilt) * math.cos(pan), -math.cos(tilt) * math.sin(pan), math.sin(tilt)
 
@@ -54,8 +55,9 @@ def _turned(first: float, second: float, angle_rad: float) -> tuple[float, float
     return cos * first - sin * second, sin * first + cos * second
 
 
-class Carrier:
-    """What was heard last of it. `stabilized`: directions are said from the horizon already."""
+class VehicleAttitude:
+    """The last attitude of the camera's vehicle. `stabilized`: directions are from the horizon
+    already."""
 
     def __init__(self, vehicle: ResourceId, bus: FleetBus, *, stabilized: bool) -> None:
         self._vehicle = vehicle
@@ -64,19 +66,19 @@ class Carrier:
 
     @property
     def heading_rad(self) -> float | None:
-        """From true north, clockwise; None: not known."""
+        """From true north, clockwise; None if it is not known."""
         yaw_rad = self._state.yaw_rad if self._state is not None else None
         return None if yaw_rad is None else math.remainder(math.pi / 2 - yaw_rad, math.tau)
 
-    def from_horizon(self, direction: Direction) -> Direction:
-        """What is meant as the camera is mounted, for a gimbal that is level."""
+    def to_horizon(self, direction: Direction) -> Direction:
+        """Return the direction of a level gimbal for a direction of the mount."""
         state = self._state
         if self._stabilized or state is None:
             return direction
         return deck_to_horizon(direction, state.roll_rad, state.pitch_rad)
 
-    def from_deck(self, direction: Direction) -> Direction:
-        """Where a gimbal that is level points, as the camera is mounted."""
+    def to_mount(self, direction: Direction) -> Direction:
+        """Return the direction of the mount for a direction of a level gimbal."""
         state = self._state
         if self._stabilized or state is None:
             return direction
@@ -89,19 +91,18 @@ class Carrier:
 
 
 @dataclass(frozen=True, slots=True)
-class Post:
-    """`reach`: as the fleet says. `heard`: is called when a part of the camera has said something
-    that shows that it is there."""
+class CameraContext:
+    """The context of the parts of a camera. `reach` is that of the fleet. `heard` is called with
+    each message that shows that the part is there."""
 
     resource: ResourceId
     settings: MavlinkSettings
     reach: Reach
-    carrier: Carrier
+    attitude: VehicleAttitude
     link: "VehicleLink"
     clock: Clock
     logger: logging.Logger
     heard: Callable[[], None]
 
     def now_s(self) -> float:
-        """Seconds of the clock."""
         return self.clock.now_us() / 1e6

@@ -1,20 +1,21 @@
-"""Reaches a camera through the MAVLink of its vehicle, over the socket that its arbiter uses."""
+"""The driver of a camera over the MAVLink connection of its vehicle, which its arbiter uses,
+too."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from m2pem.api import ResourceId
 from m2pem.errors import PluginError
-from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
-from m2pem_plugin_ptz.drivers.mavlink.context import Carrier
+from m2pem_plugin_ptz.drivers.driver import CameraError, DriverSetup
+from m2pem_plugin_ptz.drivers.mavlink.context import VehicleAttitude
 from m2pem_plugin_ptz.drivers.mavlink.settings import read_settings
-from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
+from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink import RoutedLink
 
-    from m2pem_plugin_ptz.drivers.mavlink.camera import CameraUnit
-    from m2pem_plugin_ptz.drivers.mavlink.gimbal import GimbalHead
+    from m2pem_plugin_ptz.drivers.mavlink.camera import CameraComponent
+    from m2pem_plugin_ptz.drivers.mavlink.gimbal import GimbalDriver
 
 MISSING = (
     "cameras over MAVLink need the plugin m2pem-plugin-mavlink: "
@@ -31,15 +32,15 @@ class MavlinkDriver:
         PluginError: the connection cannot be used; the text names the resource and the key.
     """
 
-    def __init__(self, seat: Seat) -> None:
-        self._seat = seat
-        self._settings = read_settings(seat.connection)
+    def __init__(self, setup: DriverSetup) -> None:
+        self._setup = setup
+        self._settings = read_settings(setup.connection)
         self._link: RoutedLink | None = None
-        self._gimbal: GimbalHead | None = None
-        self._camera: CameraUnit | None = None
+        self._gimbal: GimbalDriver | None = None
+        self._camera: CameraComponent | None = None
 
     async def open(self) -> None:
-        """Listen; the camera need not be there yet.
+        """Connect. The camera need not be there yet.
 
         Raises:
             PluginError: the MAVLink plugin is not installed, or a URL cannot be opened.
@@ -47,12 +48,12 @@ class MavlinkDriver:
         try:
             from m2pem_plugin_mavlink import Address, open_link  # noqa: PLC0415  # optional
 
-            from m2pem_plugin_ptz.drivers.mavlink.camera import CameraUnit  # noqa: PLC0415
-            from m2pem_plugin_ptz.drivers.mavlink.context import Post  # noqa: PLC0415
-            from m2pem_plugin_ptz.drivers.mavlink.gimbal import GimbalHead  # noqa: PLC0415
+            from m2pem_plugin_ptz.drivers.mavlink.camera import CameraComponent  # noqa: PLC0415
+            from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext  # noqa: PLC0415
+            from m2pem_plugin_ptz.drivers.mavlink.gimbal import GimbalDriver  # noqa: PLC0415
         except ModuleNotFoundError as error:
             raise PluginError(f"{self._resource}: {MISSING} ({error})") from error
-        own, context = self._settings, self._seat.context
+        own, context = self._settings, self._setup.context
         source = Address(own.gcs_system_id, own.own_component)
         try:
             self._link = await open_link(
@@ -61,25 +62,24 @@ class MavlinkDriver:
         except PluginError as error:
             raise PluginError(f"{self._resource}: connection.url: {error}") from error
         vehicle = ResourceId(self._resource.partition("/")[0])
-        stabilized = self._seat.settings.stabilized
-        post = Post(
+        stabilized = self._setup.settings.stabilized
+        camera_context = CameraContext(
             self._resource,
             own,
-            self._seat.settings.reach,
-            Carrier(vehicle, context.bus, stabilized=stabilized),
+            self._setup.settings.reach,
+            VehicleAttitude(vehicle, context.bus, stabilized=stabilized),
             self._link,
             context.clock,
             context.logger,
-            self._seat.heard,
+            self._setup.heard,
         )
         if own.gimbal:
-            self._gimbal = GimbalHead(post)
+            self._gimbal = GimbalDriver(camera_context)
             self._gimbal.open()
-        self._camera = CameraUnit(replace(post, heard=self._camera_heard))
+        self._camera = CameraComponent(replace(camera_context, heard=self._camera_heard))
         self._camera.open()
 
     async def close(self) -> None:
-        """Let go. The camera stays as it is."""
         if self._camera is not None:
             await self._camera.close()
         if self._gimbal is not None:
@@ -90,24 +90,22 @@ class MavlinkDriver:
     # --- what is known --------------------------------------------------------------------------
 
     @property
-    def look(self) -> Look | None:
-        """Where it looks, as it said last."""
+    def ptz(self) -> PanTiltZoom | None:
         zoom = self._camera.level if self._camera is not None else 1.0
         if not self._settings.gimbal:
-            return Look(0.0, 0.0, zoom)
+            return PanTiltZoom(0.0, 0.0, zoom)
         direction = self._gimbal.direction if self._gimbal is not None else None
-        return None if direction is None else Look(*direction, zoom)
+        return None if direction is None else PanTiltZoom(*direction, zoom)
 
     @property
     def reach(self) -> Reach:
-        """Where it can look: as the gimbal says, within what the fleet says."""
+        """The limits of the gimbal, within those of the fleet."""
         if not self._settings.gimbal:
-            of_fleet = self._seat.settings.reach
+            of_fleet = self._setup.settings.reach
             return Reach((0.0, 0.0), (0.0, 0.0), of_fleet.zoom_max, view_rad=of_fleet.view_rad)
-        return self._gimbal.reach() if self._gimbal is not None else self._seat.settings.reach
+        return self._gimbal.reach() if self._gimbal is not None else self._setup.settings.reach
 
     def refusal(self, behavior: str) -> str:
-        """Why the camera cannot do such a behavior, now or ever; "" if it can."""
         if self._camera is None:
             return NOT_OPEN
         if behavior in OF_THE_CAMERA:
@@ -119,24 +117,21 @@ class MavlinkDriver:
     # --- orders ---------------------------------------------------------------------------------
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None = None) -> None:
-        """Turn there, not faster than `rate_rad_s`, and stay."""
         if self._gimbal is not None:
             self._gimbal.point((pan_rad, tilt_rad), rate_rad_s)
 
     def zoom(self, level: float) -> None:
-        """Zoom there."""
         if self._camera is not None:
             self._camera.zoom(level)
 
     def halt(self) -> None:
-        """Stop turning and zooming."""
         if self._gimbal is not None:
             self._gimbal.halt()
         if self._camera is not None:
             self._camera.halt()
 
-    async def take_picture(self) -> Picture:
-        """Take one picture; the camera keeps it.
+    async def take_picture(self) -> CapturedImage:
+        """Take one picture, which the camera keeps.
 
         Raises:
             CameraError: it could not.
@@ -144,15 +139,10 @@ class MavlinkDriver:
         return await self._opened.take_picture()
 
     async def start_recording(self) -> None:
-        """Begin a video.
-
-        Raises:
-            CameraError: it could not.
-        """
         await self._opened.start_recording()
 
     async def stop_recording(self) -> str:
-        """End the video; returns the camera's own name for it.
+        """End the video, and return the camera's name for it.
 
         Raises:
             CameraError: it could not.
@@ -163,15 +153,16 @@ class MavlinkDriver:
 
     @property
     def _resource(self) -> ResourceId:
-        return self._seat.connection.resource
+        return self._setup.connection.resource
 
     @property
-    def _opened(self) -> "CameraUnit":
+    def _opened(self) -> "CameraComponent":
         if self._camera is None:
             raise CameraError(NOT_OPEN)
         return self._camera
 
     def _camera_heard(self) -> None:
-        """A gimbal that points is what counts: its silence must not be hidden by its camera."""
+        """Report a message of the camera, unless there is a gimbal, whose silence must not be
+        hidden."""
         if self._gimbal is None or not self._gimbal.is_heard:
-            self._seat.heard()
+            self._setup.heard()

@@ -1,4 +1,4 @@
-"""Being in control of a gimbal: its manager obeys who is, and there may be other stations."""
+"""The gimbal of a MAVLink camera: its control, its direction and its commands (gimbal protocol)."""
 
 import asyncio
 import math
@@ -17,30 +17,31 @@ from m2pem_plugin_mavlink import (
     message_type,
 )
 
-from m2pem_plugin_ptz.drivers.mavlink.context import Direction, Post
+from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext, Direction
 from m2pem_plugin_ptz.drivers.mavlink.settings import Yaw
 from m2pem_plugin_ptz.gimbal import Ramp, Reach
 
 RELEASE_WITHIN_S = 1.0
-"""Of real time: nobody waits longer for a gimbal to be left to others."""
+"""Real seconds to release the control of the gimbal."""
 
 NOBODY = 0
 
 
 class GimbalControl:
-    """Control is taken when it is needed, from nobody. `device`: of the manager's gimbals."""
+    """The control of a gimbal. It is acquired when it is needed, if no other station has it.
+    `device`: of the manager's gimbals."""
 
-    def __init__(self, post: Post, manager: Address, device: int) -> None:
-        self._post = post
+    def __init__(self, context: CameraContext, manager: Address, device: int) -> None:
+        self._context = context
         self._manager, self._device = manager, device
-        self._own = Address(post.settings.gcs_system_id, post.settings.own_component)
-        self._ours = False
+        self._own = Address(context.settings.gcs_system_id, context.settings.own_component)
+        self._in_control = False
         self._other: Address | None = None
         self._taking: asyncio.Task[None] | None = None
 
     @property
     def refusal(self) -> str:
-        """Why the gimbal is not to be moved; "" if it may be."""
+        """Why the gimbal must not be moved; "" if it may be."""
         if self._other is None:
             return ""
         system, component = self._other
@@ -50,24 +51,24 @@ class GimbalControl:
         )
 
     def told(self, controller: Address | None) -> None:
-        """The manager has said who is in control."""
+        """Process the controller that the manager reports."""
         if controller is None:
             return
         before = self._other
         is_other = controller.system != NOBODY and controller != self._own
         self._other = controller if is_other else None
         if controller != self._own:
-            self._ours = False
+            self._in_control = False
         if self._other is not None and self._other != before:
-            self._post.logger.warning("%s: %s", self._post.resource, self.refusal)
+            self._context.logger.warning("%s: %s", self._context.resource, self.refusal)
 
     async def take(self) -> None:
-        """Be in control; whoever else is asking meanwhile waits for the same answer.
+        """Acquire the control. Concurrent callers wait for the same answer.
 
         Raises:
             ExchangeError: the manager refuses, or does not answer.
         """
-        if self._ours:
+        if self._in_control:
             return
         if self._taking is None or self._taking.done():
             self._taking = asyncio.get_running_loop().create_task(self._take())
@@ -77,39 +78,39 @@ class GimbalControl:
 
     async def _take(self) -> None:
         command = gimbal.take_control(self._manager, self._own, self._device)
-        await self._post.link.perform(command)
-        self._ours = True
+        await self._context.link.perform(command)
+        self._in_control = True
 
     async def close(self) -> None:
-        """Leave the gimbal to others."""
+        """Release the control."""
         if self._taking is not None:
             self._taking.cancel()
             await asyncio.gather(self._taking, return_exceptions=True)
-        if self._ours:
+        if self._in_control:
             try:
                 async with asyncio.timeout(RELEASE_WITHIN_S):
-                    await self._post.link.perform(gimbal.release(self._manager, self._device))
+                    await self._context.link.perform(gimbal.release(self._manager, self._device))
             except (ExchangeError, TimeoutError) as error:
-                self._post.logger.debug("%s: not released: %s", self._post.resource, error)
+                self._context.logger.debug("%s: not released: %s", self._context.resource, error)
 
 
 ATTITUDE_EVERY_S, STATUS_EVERY_S = 0.1, 1.0
 ATTEND_S = 1.0
 SILENT_S = 2.5
-"""After so long without an attitude it is asked for again: the manager may have been restarted."""
+"""After this time without an attitude it is requested again, as the manager may have restarted."""
 
 STEP_S = 0.1
-"""A gimbal that is not to turn quickly is given its way in steps of so long."""
+"""A slow turn is commanded in steps of this time."""
 
 QUIET_S = 0.3
-"""An aim that has stood for so long is given again by a command that is answered: the messages
-before are not."""
+"""A direction that is unchanged for this time is sent again as a command with an acknowledgment,
+which the messages before do not have."""
 
 FORGOTTEN_S = 1.0
-"""What was ordered longer ago than this is no longer where the gimbal is on its way from."""
+"""A command older than this no longer tells where the gimbal is turning from."""
 
 HIGHEST_DEVICE = 6
-"""Gimbals with higher ids are components of their own, and say 0 for their device."""
+"""Gimbals with higher ids are components of their own, whose device id is 0."""
 
 _ATTITUDE = message_type("GIMBAL_DEVICE_ATTITUDE_STATUS").id
 _STATUS = message_type("GIMBAL_MANAGER_STATUS").id
@@ -121,52 +122,51 @@ class _Found:
     control: GimbalControl
 
 
-class GimbalHead:
-    """Directions are as the camera is mounted: see `Look`."""
+class GimbalDriver:
+    """Finds and points the gimbal. Directions are those of the mount; see `PanTiltZoom`."""
 
-    def __init__(self, post: Post) -> None:
-        self._post = post
+    def __init__(self, context: CameraContext) -> None:
+        self._context = context
         self._status = gimbal_status.GimbalStatus()
         self._found: _Found | None = None
-        self._why = ""
+        self._last_error = ""
         self._ordered: tuple[float, Direction] | None = None
         self._job: asyncio.Task[None] | None = None
         self._attending: asyncio.Task[None] | None = None
         self._stop_listening: Callable[[], None] = lambda: None
 
     def open(self) -> None:
-        """Look for it, and listen."""
-        self._stop_listening = self._post.link.listen(gimbal_status.WANTED, self._hear)
-        self._attending = asyncio.get_running_loop().create_task(self._attend())
+        """Search the gimbal manager, and subscribe."""
+        self._stop_listening = self._context.link.listen(gimbal_status.WANTED, self._on_message)
+        self._attending = asyncio.get_running_loop().create_task(self._poll())
 
     # --- what is known --------------------------------------------------------------------------
 
     @property
     def direction(self) -> Direction | None:
-        """Where it points, as it said last; None: it has not, or from what is not known.
+        """The last reported direction; None if there is none, or its reference is not known.
 
-        PX4 tells it before its manager was found, and could be pointed: then it counts only if the
-        search was in vain.
+        PX4 reports it before its manager was found. Then it counts only if the search has failed.
         """
-        attitude, is_searching = self._attitude, self._found is None and not self._why
+        attitude, is_searching = self._attitude, self._found is None and not self._last_error
         if attitude is None or is_searching:
             return None
         yaw_rad = attitude.yaw_from_bow_rad
         if yaw_rad is None:
-            heading_rad = self._post.carrier.heading_rad
+            heading_rad = self._context.attitude.heading_rad
             if attitude.yaw_from_north_rad is None or heading_rad is None:
                 return None
             yaw_rad = math.remainder(attitude.yaw_from_north_rad - heading_rad, math.tau)
-        return self._post.carrier.from_deck((yaw_rad, attitude.pitch_rad))
+        return self._context.attitude.to_mount((yaw_rad, attitude.pitch_rad))
 
     @property
     def is_heard(self) -> bool:
-        """Whether it has ever said where it points."""
+        """Whether the gimbal has ever reported its direction."""
         return bool(self._status.attitudes)
 
     def reach(self) -> Reach:
-        """What the fleet says, as far as the gimbal goes."""
-        reach = self._post.reach
+        """Return the limits of the fleet, reduced to those of the gimbal."""
+        reach = self._context.reach
         if self._found is None:
             return reach
         known = self._found.gimbal
@@ -182,25 +182,25 @@ class GimbalHead:
 
     @property
     def refusal(self) -> str:
-        """Why it cannot be pointed; "" if it can."""
+        """Why the gimbal cannot be pointed; "" if it can."""
         if self._found is None:
-            settings = self._post.settings
+            settings = self._context.settings
             what = f"component {settings.gimbal_component} of system {settings.system_id}"
-            return f"{what} has not said that it manages a gimbal{self._why}"
+            return f"{what} has not said that it manages a gimbal{self._last_error}"
         return self._found.control.refusal
 
     # --- orders ---------------------------------------------------------------------------------
 
     def point(self, direction: Direction, rate_rad_s: float | None) -> None:
-        """Turn there; what was ordered before is over."""
+        """Turn to a direction in place of the last one."""
         self._begin(lambda: self._turn_to(direction, rate_rad_s))
 
     def halt(self) -> None:
-        """Turn no further."""
+        """Stop turning."""
         self._begin(self._stop)
 
     async def close(self) -> None:
-        """Leave it as it is, and to others."""
+        """Close, and release the control. The gimbal stays as it is."""
         self._stop_listening()
         tasks = [each for each in (self._attending, self._job) if each is not None]
         for task in tasks:
@@ -211,11 +211,11 @@ class GimbalHead:
 
     # --- finding and hearing --------------------------------------------------------------------
 
-    def _hear(self, message: Message, sender: Address) -> None:
-        self._status.take(message, sender, self._post.now_s())
+    def _on_message(self, message: Message, sender: Address) -> None:
+        self._status.take(message, sender, self._context.now_s())
         if message.TYPE.id == _ATTITUDE:
             if self._attitude is not None:
-                self._post.heard()
+                self._context.heard()
         elif self._found is not None:
             known = self._found.gimbal
             self._found.control.told(self._status.controller(known.manager, known.device))
@@ -225,7 +225,7 @@ class GimbalHead:
         device = self._found.gimbal.device if self._found is not None else 0
         return self._status.attitude(device if device <= HIGHEST_DEVICE else 0)
 
-    async def _attend(self) -> None:
+    async def _poll(self) -> None:
         while True:
             try:
                 if self._found is None:
@@ -233,25 +233,25 @@ class GimbalHead:
                 if self._found is not None:
                     await self._keep_hearing(self._found.gimbal.manager)
             except ExchangeError as error:
-                self._why = f" ({error})"
-                self._post.logger.debug("%s: gimbal: %s", self._post.resource, error)
-            await self._post.clock.sleep(ATTEND_S)
+                self._last_error = f" ({error})"
+                self._context.logger.debug("%s: gimbal: %s", self._context.resource, error)
+            await self._context.clock.sleep(ATTEND_S)
 
     async def _find(self) -> None:
-        settings = self._post.settings
+        settings = self._context.settings
         manager = Address(settings.system_id, settings.gimbal_component)
-        known = await self._post.link.perform(gimbal.FindGimbal(manager, settings.gimbal_device))
-        self._found = _Found(known, GimbalControl(self._post, manager, known.device))
+        known = await self._context.link.perform(gimbal.FindGimbal(manager, settings.gimbal_device))
+        self._found = _Found(known, GimbalControl(self._context, manager, known.device))
 
     async def _keep_hearing(self, manager: Address) -> None:
         attitude = self._attitude
-        if attitude is not None and self._post.now_s() - attitude.at_s < SILENT_S:
+        if attitude is not None and self._context.now_s() - attitude.at_s < SILENT_S:
             return
-        await self._post.link.perform(SetMessageInterval(manager, _ATTITUDE, ATTITUDE_EVERY_S))
+        await self._context.link.perform(SetMessageInterval(manager, _ATTITUDE, ATTITUDE_EVERY_S))
         try:
-            await self._post.link.perform(SetMessageInterval(manager, _STATUS, STATUS_EVERY_S))
+            await self._context.link.perform(SetMessageInterval(manager, _STATUS, STATUS_EVERY_S))
         except RefusedError as error:  # then nobody can be seen to take control, but can be felt to
-            self._post.logger.debug("%s: gimbal status: %s", self._post.resource, error)
+            self._context.logger.debug("%s: gimbal status: %s", self._context.resource, error)
 
     # --- turning --------------------------------------------------------------------------------
 
@@ -264,28 +264,28 @@ class GimbalHead:
         try:
             await job()
         except ExchangeError as error:
-            self._post.logger.warning("%s: gimbal: %s", self._post.resource, error)
+            self._context.logger.warning("%s: gimbal: %s", self._context.resource, error)
 
     async def _turn_to(self, direction: Direction, rate_rad_s: float | None) -> None:
         found = self._found
         if found is None or found.control.refusal:
             return
         await found.control.take()
-        known, link, clock = found.gimbal, self._post.link, self._post.clock
+        known, link, clock = found.gimbal, self._context.link, self._context.clock
         if rate_rad_s is not None:
             ramp = Ramp(
                 self._from_where() or direction,
                 direction,
-                self._post.now_s(),
+                self._context.now_s(),
                 rate_rad_s,
                 endless=self.reach().endless,
             )
-            while not ramp.is_over(now_s := self._post.now_s()):
+            while not ramp.is_over(now_s := self._context.now_s()):
                 aim = self._aim(known, ramp.at(now_s + STEP_S))
                 link.send(gimbal.pointing(known.manager, aim, known.device))
                 await clock.sleep(STEP_S)
-                self._ordered = self._post.now_s(), ramp.at(self._post.now_s())
-        self._ordered = self._post.now_s(), direction
+                self._ordered = self._context.now_s(), ramp.at(self._context.now_s())
+        self._ordered = self._context.now_s(), direction
         link.send(gimbal.pointing(known.manager, self._aim(known, direction), known.device))
         await clock.sleep(QUIET_S)
         if not found.control.refusal:
@@ -294,15 +294,16 @@ class GimbalHead:
             )
 
     def _from_where(self) -> Direction | None:
-        """Where a new way begins: with the last order, if it is new; else where it points."""
-        if self._ordered is not None and self._post.now_s() - self._ordered[0] < FORGOTTEN_S:
+        """Return where a turn begins: at the last command, if it is recent; otherwise at the
+        reported direction."""
+        if self._ordered is not None and self._context.now_s() - self._ordered[0] < FORGOTTEN_S:
             return self._ordered[1]
         return self.direction
 
     def _aim(self, known: gimbal.Gimbal, direction: Direction) -> gimbal.Aim:
-        yaw_rad, pitch_rad = self._post.carrier.from_horizon(direction)
-        heading_rad = self._post.carrier.heading_rad
-        locks = self._post.settings.yaw is Yaw.NORTH and known.locks_yaw
+        yaw_rad, pitch_rad = self._context.attitude.to_horizon(direction)
+        heading_rad = self._context.attitude.heading_rad
+        locks = self._context.settings.yaw is Yaw.NORTH and known.locks_yaw
         if locks and heading_rad is not None:
             return gimbal.Aim(pitch_rad, yaw_rad + heading_rad, gimbal.YawFrame.NORTH)
         return gimbal.Aim(pitch_rad, yaw_rad)
@@ -315,15 +316,15 @@ class GimbalHead:
         known = found.gimbal
         await found.control.take()
         try:
-            await self._post.link.perform(gimbal.stop(known.manager, device=known.device))
+            await self._context.link.perform(gimbal.stop(known.manager, device=known.device))
         except RefusedError:  # one that knows no rates
             if direction is not None:
                 aim = self._aim(known, direction)
-                await self._post.link.perform(gimbal.point(known.manager, aim, known.device))
+                await self._context.link.perform(gimbal.point(known.manager, aim, known.device))
 
 
 def _both(fleet: tuple[float, float], camera: tuple[float, float] | None) -> tuple[float, float]:
-    """What both ranges allow; what is no range is none."""
+    """Return the intersection of two ranges. An invalid range is ignored."""
     if camera is None or not all(map(math.isfinite, camera)) or camera[0] >= camera[1]:
         return fleet
     low, high = max(fleet[0], camera[0]), min(fleet[1], camera[1])

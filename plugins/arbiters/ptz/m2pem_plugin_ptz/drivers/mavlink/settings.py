@@ -1,4 +1,4 @@
-"""What a fleet says of a camera that is reached over MAVLink."""
+"""What a fleet says of a camera over MAVLink."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,13 +9,13 @@ from m2pem_plugin_ptz.settings import OwnSettings
 AUTOPILOT_COMPONENT, CAMERA_COMPONENT = 1, 100
 GCS_SYSTEM_ID = 255
 OWN_COMPONENT = 191
-"""As which component of the ground station cameras are commanded; its vehicles are as 190."""
+"""Cameras are commanded as this component of the ground station; vehicles as 190."""
 
 MOST_DEVICES = 255
 
 
 class Yaw(StrEnum):
-    """What a gimbal keeps between two orders."""
+    """What a gimbal keeps between two commands."""
 
     VEHICLE = "vehicle"
     NORTH = "north"
@@ -23,9 +23,9 @@ class Yaw(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MavlinkSettings:
-    """`system_id`, `component_id`: of the vehicle's autopilot. `gimbal`: there is one; without, the
-    camera looks ahead, fixed. `gimbal_component`: of the gimbal's manager. `camera_component` None:
-    a camera of its own, or else the autopilot. Devices: 0 is the one that is there."""
+    """`system_id`, `component_id`: of the vehicle's autopilot. `gimbal`: without one, the camera
+    points ahead. `gimbal_component`: of the gimbal manager. `camera_component` None: a camera of
+    its own, or else the autopilot. Device 0 is the one that is there."""
 
     urls: tuple[str, ...]
     system_id: int
@@ -41,7 +41,7 @@ class MavlinkSettings:
 
     @property
     def camera_components(self) -> tuple[int, ...]:
-        """Who may speak for the camera, the likeliest first."""
+        """Components that may be the camera, the likeliest first."""
         if self.camera_component is not None:
             return (self.camera_component,)
         return CAMERA_COMPONENT, self.component_id
@@ -63,7 +63,7 @@ _KEYS = (
 
 
 def read_settings(connection: Connection) -> MavlinkSettings:
-    """Those of one camera.
+    """Read the settings of one camera.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.

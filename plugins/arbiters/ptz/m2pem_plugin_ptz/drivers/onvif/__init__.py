@@ -1,4 +1,4 @@
-"""Cameras that speak ONVIF."""
+"""The driver of ONVIF cameras."""
 
 from m2pem_plugin_ptz.drivers.onvif.driver import OnvifDriver
 

@@ -1,18 +1,24 @@
-"""What one profile of a camera can, as the camera says."""
+"""The capabilities of a media profile of a camera."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from m2pem_plugin_ptz.drivers.onvif.session import RefusedError, Session, camera
-from m2pem_plugin_ptz.drivers.onvif.spaces import Described, Interval, Offer, Spaces, read_spaces
+from m2pem_plugin_ptz.drivers.onvif.spaces import (
+    Interval,
+    PtzSpaces,
+    SpaceDescription,
+    Spaces,
+    read_spaces,
+)
 from m2pem_plugin_ptz.gimbal import Reach
 
 
 @dataclass(frozen=True, slots=True)
-class Abilities:
-    """`spaces` None: it does not turn. `snapshot`: where its pictures are; "": `no_snapshot` says
-    why there are none. `records`: it can be told to."""
+class Capabilities:
+    """`spaces` None: the camera does not turn. `snapshot`: URL of pictures; if it is "",
+    `no_snapshot` says why. `records`: it has a recording service."""
 
     profile: str
     spaces: Spaces | None
@@ -31,8 +37,8 @@ class _Profile:
     service: str
 
 
-async def read_abilities(session: Session, reach: Reach) -> Abilities:
-    """Ask the camera for all of it. `reach`: what the fleet says.
+async def read_capabilities(session: Session, reach: Reach) -> Capabilities:
+    """Request the capabilities. `reach` is that of the fleet.
 
     Raises:
         CameraError: it did not answer, or what it says does not fit the fleet.
@@ -47,7 +53,7 @@ async def read_abilities(session: Session, reach: Reach) -> Abilities:
     except RefusedError as error:
         why = error.reason
     records = session.has("recording")
-    return Abilities(profile.token, spaces, snapshot and session.near(snapshot), why, records)
+    return Capabilities(profile.token, spaces, snapshot and session.near(snapshot), why, records)
 
 
 async def _profile(session: Session) -> _Profile:
@@ -87,7 +93,7 @@ def _token(configuration: Any) -> str:
 
 
 def _turning(configurations: Any) -> str:
-    """The token of the element PTZ, which is read as it came."""
+    """Return the token of the element PTZ, which zeep leaves as XML."""
     for element in getattr(configurations, "_value_1", None) or ():
         if str(getattr(element, "tag", "")).endswith("}PTZ"):
             return str(element.get("token") or "")
@@ -101,7 +107,7 @@ async def _spaces(session: Session, profile: _Profile, reach: Reach) -> Spaces:
     node = await session.call("ptz", "GetNode", NodeToken=said.NodeToken)
     listed = node.SupportedPTZSpaces
     limits = getattr(said.PanTiltLimits, "Range", None)
-    offer = Offer(
+    offer = PtzSpaces(
         positions=_described(listed.AbsolutePanTiltPositionSpace),
         velocities=_described(listed.ContinuousPanTiltVelocitySpace),
         speeds=_described(listed.PanTiltSpeedSpace),
@@ -115,17 +121,19 @@ async def _spaces(session: Session, profile: _Profile, reach: Reach) -> Spaces:
         raise RefusedError(f"{camera(session.settings)}: {error}", "REJECTED") from error
 
 
-def _described(spaces: Iterable[Any] | None) -> list[Described]:
+def _described(spaces: Iterable[Any] | None) -> list[SpaceDescription]:
     found = []
     for each in spaces or ():
         x = _interval(getattr(each, "XRange", None))
         if x is not None and each.URI:
-            found.append(Described(str(each.URI), x, _interval(getattr(each, "YRange", None))))
+            found.append(
+                SpaceDescription(str(each.URI), x, _interval(getattr(each, "YRange", None)))
+            )
     return found
 
 
 def _interval(said: Any) -> Interval | None:
-    """A range that is one; limits may be endless, or missing."""
+    """Return a valid range; None for an endless or missing one."""
     if said is None or said.Min is None or said.Max is None:
         return None
     low, high = float(said.Min), float(said.Max)

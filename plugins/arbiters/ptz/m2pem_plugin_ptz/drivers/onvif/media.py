@@ -1,4 +1,4 @@
-"""Video that the camera keeps itself: its recording control service."""
+"""Pictures by HTTP, and video by the recording control service."""
 
 import asyncio
 import base64
@@ -9,8 +9,8 @@ from m2pem_plugin_ptz.drivers.onvif.session import (
     RefusedError,
     Session,
     camera,
-    translated,
-    unauthorized,
+    translate_error,
+    unauthorized_error,
 )
 
 PROFILE = "http://www.onvif.org/ver10/schema/Profile"
@@ -19,7 +19,7 @@ TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One that goes on. `own`: the job was made for it. `begun`: by the camera's clock."""
+    """A recording that goes on. `own`: the job was made for it. `begun`: by the camera's clock."""
 
     token: str
     job: str
@@ -28,7 +28,7 @@ class Recording:
 
 
 async def start_recording(session: Session, profile: str) -> Recording:
-    """Have the camera record.
+    """Start recording.
 
     Raises:
         CameraError: it does not.
@@ -69,7 +69,7 @@ async def start_recording(session: Session, profile: str) -> Recording:
 
 
 async def stop_recording(session: Session, recording: Recording) -> str:
-    """End it; returns the camera's name for it, with the time by the camera's clock.
+    """Stop recording, and return the camera's URI of it, with times of the camera's clock.
 
     Raises:
         CameraError: it could not be told.
@@ -95,18 +95,18 @@ async def _idle_job(session: Session, token: str) -> str | None:
 
 
 LARGEST = 32 * 1024 * 1024
-"""Bytes."""
+"""In bytes."""
 
-RETRIES = 4.0
-"""So many times as long as a call: a picture is more to carry."""
+TIMEOUT_FACTOR = 4.0
+"""Timeout of a picture, in timeouts of a call."""
 
 CHUNK = 64 * 1024
 KINDS = {b"\xff\xd8\xff": ".jpg", b"\x89PNG": ".png"}
-"""How a picture begins. What a camera says of its type is wrong too often."""
+"""First bytes of pictures. The type that a camera reports is often wrong."""
 
 
 async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
-    """The picture, and the suffix for its file.
+    """Return a picture, and the suffix of its file.
 
     Raises:
         CameraError: there is none; the text says why.
@@ -115,11 +115,11 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
 
     settings = session.settings
     try:
-        async with asyncio.timeout(settings.timeout_s * RETRIES):
+        async with asyncio.timeout(settings.timeout_s * TIMEOUT_FACTOR):
             async with aiohttp.ClientSession() as client:
                 content = await _ask(client, session, url)
     except Exception as error:
-        raise translated(error, "a picture", settings, session.user) from error
+        raise translate_error(error, "a picture", settings, session.user) from error
     suffix = next((kind for start, kind in KINDS.items() if content.startswith(start)), None)
     if suffix is None:
         raise RefusedError(f"{camera(settings)} gives {len(content)} bytes that are no picture")
@@ -127,7 +127,8 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
 
 
 async def _ask(client: Any, session: Session, url: str) -> bytes:
-    """The password goes out as a digest, and in the clear only if the camera takes nothing else."""
+    """Request the picture with digest authentication; with basic only if the camera accepts nothing
+    else."""
     import aiohttp  # noqa: PLC0415
 
     account = session.credentials
@@ -147,7 +148,7 @@ async def _ask(client: Any, session: Session, url: str) -> bytes:
 async def _read(answer: Any, session: Session) -> bytes:
     settings = session.settings
     if answer.status in (401, 403):
-        raise unauthorized(settings, session.user)
+        raise unauthorized_error(settings, session.user)
     if answer.status != 200:
         raise RefusedError(f"{camera(settings)} refuses a picture: HTTP status {answer.status}")
     content = bytearray()

@@ -1,4 +1,4 @@
-"""Turns one camera: tells it what `Steering` finds, watches where it looks, stops it."""
+"""Executes the moves of one camera: sends those of `Steering`, polls its direction, stops it."""
 
 import asyncio
 import logging
@@ -7,44 +7,49 @@ from collections.abc import Callable
 
 from m2pem.api import Clock
 from m2pem_plugin_ptz.drivers.driver import CameraError
-from m2pem_plugin_ptz.drivers.onvif.capabilities import Abilities
+from m2pem_plugin_ptz.drivers.onvif.capabilities import Capabilities
 from m2pem_plugin_ptz.drivers.onvif.session import RefusedError, Session, SilentError
 from m2pem_plugin_ptz.drivers.onvif.spaces import Spaces
-from m2pem_plugin_ptz.drivers.onvif.steering import TAKES_EFFECT, Drive, Steering, Turn
-from m2pem_plugin_ptz.gimbal import Look, Reach
+from m2pem_plugin_ptz.drivers.onvif.steering import (
+    TAKES_EFFECT,
+    AbsoluteMove,
+    ContinuousMove,
+    Steering,
+)
+from m2pem_plugin_ptz.gimbal import PanTiltZoom, Reach
 
 IDLE_S = 0.25
-"""How often a camera that need not turn is asked where it looks."""
+"""Poll period of a camera that need not turn."""
 
 RUNS_ON_S = 1.0
-"""A camera that hears no more stops turning by itself after so long, or `LAGS_ON` calls."""
+"""A camera stops turning by itself this long after the last command, or after `LAGS_ON` calls."""
 
 LAGS_ON = 4.0
 SILENT_CALLS = 3
-"""After so many calls without an answer, all begins anew."""
+"""After this many calls without an answer, the session ends."""
 
 BACKOFF_S = 0.5
 ZOOM_AGAIN_S = 3.0
 SAME_ZOOM = 0.02
-"""Of a factor."""
+"""Relative tolerance."""
 
 
 class Mover:
-    """Before the camera is there, and while it is away, wishes are kept: the last one counts.
+    """Keeps the last request while the camera is not connected.
 
-    `answered`: it did, since `run` began.
+    `answered`: the camera has answered since `run` began.
     """
 
     def __init__(
         self, clock: Clock, logger: logging.Logger, heard: Callable[[], None], name: str
     ) -> None:
         self._clock, self._logger, self._heard, self._name = clock, logger, heard, name
-        self.look: Look | None = None
+        self.ptz: PanTiltZoom | None = None
         self.says_position = True
         self.answered = False
         self._spaces: Spaces | None = None
         self._steering = Steering(Reach())
-        self._wish: tuple[float, float, float | None] | None = None
+        self._request: tuple[float, float, float | None] | None = None
         self._zoom: float | None = None
         self._zoomed_s = -math.inf
         self._halting = False
@@ -55,32 +60,30 @@ class Mover:
         self._fault = ""
 
     @property
-    def trouble(self) -> str:
-        """Why it does not turn as it is told now; "" if it does, or is told nothing."""
-        if self._wish is None and self._zoom is None:
+    def problem(self) -> str:
+        """Why the camera does not turn as commanded; "" if it does, or has no command."""
+        if self._request is None and self._zoom is None:
             return ""
         if self._steering.stuck:
             return f"{self._name} takes moves, but does not turn: see whether its head is free"
         return self._fault
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None) -> None:
-        """See `CameraDriver`."""
         self._halting = False
-        self._wish = pan_rad, tilt_rad, rate_rad_s
-        self._steering.aim.want(pan_rad, tilt_rad, rate_rad_s, self._now_s)
+        self._request = pan_rad, tilt_rad, rate_rad_s
+        self._steering.target.add(pan_rad, tilt_rad, rate_rad_s, self._now_s)
         self._news.set()
 
     def zoom(self, level: float) -> None:
-        """See `CameraDriver`."""
         self._halting = False
         if self._zoom != level:
             self._zoom, self._zoomed_s = level, -math.inf
         self._news.set()
 
     def halt(self) -> None:
-        """Stop at once, and once more when what is under way has come through."""
-        self._wish = self._zoom = None
-        self._steering.aim.forget()
+        """Stop at once, and again when the calls in flight have ended."""
+        self._request = self._zoom = None
+        self._steering.target.forget()
         self._steering.forget()
         self._halting = True
         self._news.set()
@@ -89,20 +92,20 @@ class Mover:
             self._stops.add(task)
             task.add_done_callback(self._stops.discard)
 
-    async def run(self, session: Session, abilities: Abilities) -> None:
-        """Turn it, as long as it answers.
+    async def run(self, session: Session, capabilities: Capabilities) -> None:
+        """Poll and turn the camera as long as it answers.
 
         Raises:
             CameraError: it does not any more, or answers strangely.
         """
-        spaces = abilities.spaces
-        self._spaces, self._profile, self._session = spaces, abilities.profile, session
+        spaces = capabilities.spaces
+        self._spaces, self._profile, self._session = spaces, capabilities.profile, session
         if spaces is not None:
             self._steering = Steering(
                 spaces.reach, turns=bool(spaces.positions), drives=spaces.velocity is not None
             )
-            if self._wish is not None:
-                self._steering.aim.want(*self._wish, self._now_s)
+            if self._request is not None:
+                self._steering.target.add(*self._request, self._now_s)
         self._zoomed_s = -math.inf
         self._fault, self.answered = "", False
         create = asyncio.get_running_loop().create_task
@@ -120,24 +123,24 @@ class Mover:
     # --- watching -------------------------------------------------------------------------------
 
     async def _watch(self, session: Session) -> None:
-        silent = 0
+        silent_error = 0
         while True:
             started_s = self._now_s
             try:
                 await self._ask(session)
-                silent, self.answered = 0, True
+                silent_error, self.answered = 0, True
                 self._heard()
             except SilentError:
-                silent += 1
-                if silent >= SILENT_CALLS:
+                silent_error += 1
+                if silent_error >= SILENT_CALLS:
                     raise
-            busy = self._wish is not None or self._zoom is not None or self._halting
+            busy = self._request is not None or self._zoom is not None or self._halting
             await self._wait(started_s, self._interval_s(session) if busy else IDLE_S)
 
     async def _ask(self, session: Session) -> None:
         if self._spaces is None:
             await session.call("devicemgmt", "GetSystemDateAndTime")
-            self.look = Look(0.0, 0.0)  # what does not turn looks ahead
+            self.ptz = PanTiltZoom(0.0, 0.0)  # what does not turn looks ahead
             return
         started_s = self._now_s
         status = await session.call("ptz", "GetStatus", ProfileToken=self._profile)
@@ -146,13 +149,13 @@ class Mover:
         place = getattr(position, "PanTilt", None)
         found = None
         if place is not None:
-            found = self._spaces.look(float(place.x), float(place.y), place.space or "")
+            found = self._spaces.ptz(float(place.x), float(place.y), place.space or "")
         self.says_position = found is not None
         if found is not None:
             said = getattr(position, "Zoom", None)
             zoom = self._spaces.zoom(float(said.x), said.space or "") if said is not None else None
-            self._steering.saw(*found, at_s)
-            self.look = Look(*found, 1.0 if zoom is None else zoom)
+            self._steering.observe(*found, at_s)
+            self.ptz = PanTiltZoom(*found, 1.0 if zoom is None else zoom)
 
     # --- turning --------------------------------------------------------------------------------
 
@@ -162,7 +165,7 @@ class Mover:
             try:
                 if not await self._do(session):
                     self._news.clear()
-                    if self._wish is None and self._zoom is None and not self._halting:
+                    if self._request is None and self._zoom is None and not self._halting:
                         await self._news.wait()
                     else:
                         await self._wait(started_s, self._interval_s(session))
@@ -180,7 +183,7 @@ class Mover:
             await self._wait(started_s, self._interval_s(session))
 
     async def _do(self, session: Session) -> bool:
-        """Tell the camera something, if there is something to tell."""
+        """Send the next command, and return whether there was one."""
         if self._halting:
             await self._stop(session)
             self._halting = False
@@ -202,17 +205,17 @@ class Mover:
         move = self._steering.next(started_s)
         if move is None:
             return False
-        if isinstance(move, Turn):
+        if isinstance(move, AbsoluteMove):
             await self._call(session, "AbsoluteMove", **_absolute(spaces, move))
         else:
             await self._call(session, "ContinuousMove", **self._continuous(spaces, move))
         took_s = self._now_s - started_s
-        self._steering.took(took_s)
-        if self._wish is not None:
-            self._steering.told(move, started_s + TAKES_EFFECT * took_s)
+        self._steering.measure_call(took_s)
+        if self._request is not None:
+            self._steering.sent(move, started_s + TAKES_EFFECT * took_s)
         return True
 
-    def _continuous(self, spaces: Spaces, move: Drive) -> dict[str, object]:
+    def _continuous(self, spaces: Spaces, move: ContinuousMove) -> dict[str, object]:
         space = spaces.velocity
         assert space is not None, "nothing drives a camera that takes no velocities"
         seconds = max(RUNS_ON_S, LAGS_ON * self._steering.lag_s)
@@ -229,8 +232,8 @@ class Mover:
         level = min(max(self._zoom, 1.0), spaces.reach.zoom_max)
         if self._zoomed_s == -math.inf:
             return level
-        look = self.look
-        if look is None or abs(look.zoom - level) <= SAME_ZOOM * level:
+        ptz = self.ptz
+        if ptz is None or abs(ptz.zoom - level) <= SAME_ZOOM * level:
             return None
         return level if self._now_s - self._zoomed_s > ZOOM_AGAIN_S else None
 
@@ -255,18 +258,18 @@ class Mover:
         return self._clock.now_us() / 1e6
 
     def _interval_s(self, session: Session) -> float:
-        """Half of all calls ask, half tell."""
+        """Return the call period. Half of the calls poll, half command."""
         return 2.0 / session.settings.calls_s
 
     async def _wait(self, since_s: float, seconds: float) -> None:
         await self._clock.sleep(max(0.0, since_s + seconds - self._now_s))
 
 
-def _absolute(spaces: Spaces, move: Turn) -> dict[str, object]:
-    told: dict[str, object] = {
+def _absolute(spaces: Spaces, move: AbsoluteMove) -> dict[str, object]:
+    sent: dict[str, object] = {
         "Position": {"PanTilt": spaces.position(move.pan_rad, move.tilt_rad)}
     }
     if spaces.speed is not None:
         speed = spaces.speed.scale.to_units(move.rate_rad_s)
-        told["Speed"] = {"PanTilt": {"x": speed, "y": speed, "space": spaces.speed.uri}}
-    return told
+        sent["Speed"] = {"PanTilt": {"x": speed, "y": speed, "space": spaces.speed.uri}}
+    return sent

@@ -1,4 +1,4 @@
-"""The package onvif: whether it is there, and what it may not touch."""
+"""A session with one ONVIF camera, its errors, and the import of the package onvif."""
 
 import asyncio
 import importlib
@@ -21,7 +21,7 @@ PROXIES = ("http_proxy", "https_proxy")
 
 
 def require(module: str = "onvif.client") -> ModuleType:
-    """Import a module of the package.
+    """Import and return a module of the package.
 
     Raises:
         PluginError: the package is not installed, or another one of the same name is.
@@ -50,7 +50,7 @@ def require(module: str = "onvif.client") -> ModuleType:
 
 @contextmanager
 def kept_environment() -> Iterator[None]:
-    """It takes proxies away from the whole process; here they are put back."""
+    """Keep the proxy variables of the process, which the package removes."""
     kept = {key: os.environ[key] for key in PROXIES if key in os.environ}
     try:
         yield
@@ -58,25 +58,24 @@ def kept_environment() -> Iterator[None]:
         os.environ.update(kept)
 
 
-class SilentError(CameraError):
-    """The camera did not answer."""
+class SilentError(CameraError): ...
 
 
 class UnauthorizedError(CameraError):
-    """The camera did not let this user do it."""
+    """The camera denied the user."""
 
 
 class RefusedError(CameraError):
-    """The camera answered with a fault, or with something that is no answer."""
+    """The camera answered with a fault, or with an invalid answer."""
 
 
 def camera(settings: OnvifSettings) -> str:
-    """Which one, for people."""
+    """Return the name of the camera for texts."""
     return f"the ONVIF camera at {settings.address}"
 
 
-def silent(settings: OnvifSettings, error: BaseException) -> SilentError:
-    """Nothing came back."""
+def silent_error(settings: OnvifSettings, error: BaseException) -> SilentError:
+    """Make the error of a camera that did not answer."""
     if isinstance(error, TimeoutError):
         why = f"nothing within {settings.timeout_s:g} s"
     else:
@@ -84,8 +83,8 @@ def silent(settings: OnvifSettings, error: BaseException) -> SilentError:
     return SilentError(f"{camera(settings)} does not answer: {why}", "LINK_LOST")
 
 
-def unauthorized(settings: OnvifSettings, user: str | None) -> UnauthorizedError:
-    """Wrong user, wrong password, or none."""
+def unauthorized_error(settings: OnvifSettings, user: str | None) -> UnauthorizedError:
+    """Make the error of a wrong or missing user or password."""
     if user is None or settings.credentials is None:
         return UnauthorizedError(
             f"{camera(settings)} asks for a user and a password: write them into a file, and name "
@@ -99,10 +98,10 @@ def unauthorized(settings: OnvifSettings, user: str | None) -> UnauthorizedError
     )
 
 
-def translated(
+def translate_error(
     error: Exception, operation: str, settings: OnvifSettings, user: str | None
 ) -> CameraError:
-    """What a call of the library raised, as the operator should read it."""
+    """Translate an error of the library for the operator."""
     import aiohttp  # noqa: PLC0415  # comes with the library
     import zeep.exceptions  # noqa: PLC0415
 
@@ -111,19 +110,19 @@ def translated(
     if isinstance(
         error, TimeoutError | aiohttp.ClientConnectionError | aiohttp.ClientPayloadError | OSError
     ):
-        return silent(settings, error)
+        return silent_error(settings, error)
     if isinstance(error, zeep.exceptions.Fault):
         if require("onvif.util").is_auth_error(error):
-            return unauthorized(settings, user)
+            return unauthorized_error(settings, user)
         return RefusedError(f"{camera(settings)} refuses {operation}: {fault_text(error)}")
     if isinstance(error, zeep.exceptions.TransportError) and error.status_code in (401, 403):
-        return unauthorized(settings, user)
+        return unauthorized_error(settings, user)
     text = " ".join(str(error).split())[:200]
     return RefusedError(f"{camera(settings)} answers {operation} with what is no ONVIF: {text}")
 
 
 def fault_text(fault: Any) -> str:
-    """Its text and its codes."""
+    """Return the text and the codes of a fault."""
     codes = [str(getattr(code, "localname", code)) for code in fault.subcodes or ()]
     text = " ".join(str(fault.message or "").split())[:200]
     return f"{text} ({', '.join(codes)})" if codes else text or "no reason given"
@@ -139,7 +138,8 @@ NAMESPACES = {
 
 
 class Session:
-    """Opened once, closed once. All calls raise CameraError."""
+    """A session with one camera, which is opened and closed once. All calls raise CameraError. It
+    is made again after a lost connection, as the camera may have another clock then."""
 
     def __init__(self, settings: OnvifSettings, credentials: Credentials | None) -> None:
         self.settings = settings
@@ -150,7 +150,7 @@ class Session:
 
     @property
     def user(self) -> str | None:
-        """As whom it speaks."""
+        """The user, if there is one."""
         return None if self.credentials is None else self.credentials.user
 
     @property
@@ -159,11 +159,12 @@ class Session:
 
     @property
     def camera_time(self) -> datetime:
-        """What the camera's clock shows."""
+        """The time of the camera's clock."""
         return datetime.now(UTC) + self._ahead
 
     async def open(self) -> None:
-        """Ask for the camera's time first, for its passwords are good for seconds only."""
+        """Connect. The time of the camera is read first, as its passwords are valid for seconds
+        only."""
         onvif = require()
         with kept_environment():
             self._camera = onvif.ONVIFCamera(
@@ -181,25 +182,24 @@ class Session:
         self._camera.dt_diff = self._ahead
 
     async def close(self) -> None:
-        """Hang up."""
         if self._media2 is not None:
             await self._media2.close()
         if self._camera is not None:
             await self._camera.close()
 
     def has(self, service: str) -> bool:
-        """Whether the camera has such a service; one of `NAMESPACES`."""
+        """Return whether the camera has a service of `NAMESPACES`."""
         return NAMESPACES[service] in self._camera.xaddrs
 
     async def call(self, service: str, operation: str, **arguments: object) -> Any:
-        """Ask the camera."""
+        """Call an operation."""
         proxy = await self._service(service)
         name = operation if self.credentials is not None else f"authless_{operation}"
         return await self._bounded(operation, lambda: getattr(proxy, name)(arguments))
 
     def near(self, url: str) -> str:
-        """An address that the camera names: on another host than the fleet's, it is one that cannot
-        be reached from here, and that may not get the password."""
+        """Return a URL of the camera with the host of the fleet. Another host may not be reachable,
+        and must not get the password."""
         parts = urlsplit(url)
         if parts.hostname == self.settings.host:
             return url
@@ -228,7 +228,7 @@ class Session:
         return service
 
     async def _read_clock(self) -> None:
-        """A camera whose clock is wrong takes passwords that are made by its clock."""
+        """Read the camera's clock, by which it checks passwords."""
         device = await self._camera.create_devicemgmt_service()
         before = datetime.now(UTC)
         try:
@@ -250,11 +250,12 @@ class Session:
             async with asyncio.timeout(self.settings.timeout_s):
                 return await ask()
         except Exception as error:
-            raise translated(error, operation, self.settings, self.user) from error
+            raise translate_error(error, operation, self.settings, self.user) from error
 
 
 def _moment(said: Any, else_: datetime) -> datetime:
-    """The camera's clock, which counts whole seconds; some do not say it."""
+    """Return the time of the camera's clock in half seconds; `else_` if the camera does not report
+    it."""
     utc: Any = getattr(said, "UTCDateTime", None)
     try:
         date, time = utc.Date, utc.Time

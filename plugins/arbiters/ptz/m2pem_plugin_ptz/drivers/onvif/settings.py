@@ -1,4 +1,4 @@
-"""What a fleet says of the connection to an ONVIF camera."""
+"""What a fleet says of the connection to an ONVIF camera, and the file with user and password."""
 
 import configparser
 import difflib
@@ -19,14 +19,14 @@ from m2pem.errors import PluginError
 KEYS = ("host", "port", "credentials", "profile", "timeout", "calls", "invert")
 AXES = ("pan", "tilt")
 LIKE = 0.75
-"""So like a known key, another one is a mistake; else it is the vehicle's, which is inherited."""
+"""A key this similar to a known one is an error; otherwise it is inherited from the vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
 class OnvifSettings:
-    """`credentials`: the file with user and password; None: the camera asks for none. `profile`:
-    token or name of the media profile; "": the first one that turns. `timeout_s`: of one call.
-    `calls_s`: so many calls per second at most. `inverted`: axes that run the other way."""
+    """`credentials`: the file with user and password; None if the camera needs none. `profile`:
+    token or name of the media profile; "" for the first one that turns. `timeout_s`: of one call.
+    `calls_s`: most calls per second. `inverted`: axes that run the other way."""
 
     host: str
     port: int = 80
@@ -38,13 +38,13 @@ class OnvifSettings:
 
     @property
     def address(self) -> str:
-        """For people."""
+        """Host and port, as text."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{host}:{self.port}"
 
 
 def read_onvif(resource: ResourceId, own: Mapping[str, Any]) -> OnvifSettings:
-    """The settings of one camera. Keys that are its vehicle's are left alone.
+    """Read the settings of one camera. Keys of its vehicle are ignored.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
@@ -118,7 +118,7 @@ def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
 
 
 LONGEST = 64 * 1024
-"""Bytes; a longer file is something else."""
+"""In bytes. A longer file is not one with a password."""
 
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
 EXAMPLE = "two lines, user: NAME and password: SECRET"
@@ -126,14 +126,13 @@ EXAMPLE = "two lines, user: NAME and password: SECRET"
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """Of one account."""
-
     user: str
     password: str = field(repr=False)
 
 
 def read_credentials(path: Path) -> Credentials:
-    """Read the file.
+    """Read user and password from a file that only its owner may read: YAML (`user: operator`,
+    `password: secret`), or INI with these two in one section.
 
     Raises:
         PluginError: it is not there, others may read it, or it is something else.

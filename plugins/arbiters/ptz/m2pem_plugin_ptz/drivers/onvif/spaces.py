@@ -1,4 +1,9 @@
-"""How a camera counts: its numbers for angles, angular speeds and zoom factors, and back."""
+"""The coordinate spaces of a camera: conversions of its numbers to angles, rates and zoom factors.
+
+A camera counts in degrees, or in parts of its range (-1 to 1, "generic"), and its zoom in
+millimetres of focal length or in parts (0 to 1). Parts are spread evenly over the range that the
+camera reports in degrees; otherwise over that of the fleet.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -8,30 +13,30 @@ from typing import TypeVar
 from m2pem_plugin_ptz.gimbal import Reach
 
 EDGE_RAD = 1e-6
-"""So far outside a range is still its edge."""
+"""Angles this far outside a range count as its end."""
 
 Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """`units = offset + gain * value`, within `units`."""
+    """A linear scale: `units = offset + gain * value`, within `units`."""
 
     gain: float
     offset: float
     units: Interval
 
     def to_units(self, value: float) -> float:
-        """What the camera is told."""
+        """Convert to a number of the camera."""
         return min(max(self.offset + self.gain * value, self.units[0]), self.units[1])
 
     def to_value(self, units: float) -> float:
-        """What it means."""
+        """Convert from a number of the camera."""
         return (units - self.offset) / self.gain
 
     @property
     def values(self) -> Interval:
-        """All that it can say."""
+        """The range of values."""
         ends = sorted(map(self.to_value, self.units))
         return ends[0], ends[1]
 
@@ -46,7 +51,7 @@ class PanTiltSpace:
 
 
 @dataclass(frozen=True, slots=True)
-class OneSpace:
+class ScalarSpace:
     """Zoom factors, or a speed of both axes in rad/s."""
 
     uri: str
@@ -55,33 +60,33 @@ class OneSpace:
 
 @dataclass(frozen=True, slots=True)
 class Spaces:
-    """How to speak with a camera. `positions` and `zooms`: all in which it may answer, the first is
-    the one to be used; `velocity`, `speed` None: it takes none. `default_position`: the URI of the
-    space in which it answers without naming one."""
+    """The spaces of a camera. `positions` and `zooms`: those in which it may answer; the first is
+    used in commands. `velocity`, `speed`: None if it takes none. `default_position`: URI of the
+    space of answers without one."""
 
     reach: Reach
     positions: tuple[PanTiltSpace, ...] = ()
     velocity: PanTiltSpace | None = None
-    speed: OneSpace | None = None
-    zooms: tuple[OneSpace, ...] = ()
+    speed: ScalarSpace | None = None
+    zooms: tuple[ScalarSpace, ...] = ()
     default_position: str = ""
 
-    def look(self, x: float, y: float, uri: str) -> tuple[float, float] | None:
-        """Where it looks, in rad, within `reach`; None: the space is not known."""
+    def ptz(self, x: float, y: float, uri: str) -> tuple[float, float] | None:
+        """Return pan and tilt in rad, within `reach`; None if the space is not known."""
         space = _named(self.positions, uri or self.default_position)
         if space is None:
             return None
-        return into(space.pan.to_value(x), self.reach.pan_rad), space.tilt.to_value(y)
+        return wrap_into(space.pan.to_value(x), self.reach.pan_rad), space.tilt.to_value(y)
 
     def zoom(self, x: float, uri: str) -> float | None:
-        """The zoom factor; None: the space is not known."""
+        """Return the zoom factor; None if the space is not known."""
         space = _named(self.zooms, uri)
         return None if space is None else max(1.0, space.scale.to_value(x))
 
     def position(self, pan_rad: float, tilt_rad: float) -> dict[str, object]:
-        """A position as the camera is told it; there must be `positions`."""
+        """Return a position for a command. There must be `positions`."""
         space = self.positions[0]
-        pan = into(pan_rad, space.pan.values)
+        pan = wrap_into(pan_rad, space.pan.values)
         return {
             "x": space.pan.to_units(pan),
             "y": space.tilt.to_units(tilt_rad),
@@ -90,19 +95,19 @@ class Spaces:
 
 
 def last_part(uri: str) -> str:
-    """Of a space's URI, in small letters: not all cameras write the others alike."""
+    """Return the last part of a space's URI in lower case; cameras write the rest differently."""
     return uri.strip().rsplit("/", 1)[-1].lower()
 
 
-def into(angle_rad: float, interval: Interval) -> float:
-    """The same direction, a whole number of turns away, as near to the interval as can be."""
+def wrap_into(angle_rad: float, interval: Interval) -> float:
+    """Return the same direction, by whole turns as near to the interval as possible."""
     low, high = interval
     if low - EDGE_RAD <= angle_rad <= high + EDGE_RAD:
         return angle_rad
     return angle_rad + math.tau * round(((low + high) / 2 - angle_rad) / math.tau)
 
 
-Space = TypeVar("Space", PanTiltSpace, OneSpace)
+Space = TypeVar("Space", PanTiltSpace, ScalarSpace)
 
 
 def _named(spaces: Sequence[Space], uri: str) -> Space | None:
@@ -115,12 +120,12 @@ def _named(spaces: Sequence[Space], uri: str) -> Space | None:
 
 
 FULL_CIRCLE_RAD = math.tau - 0.02
-"""Cameras that turn all round say 359.9 degrees as often as 360."""
+"""Cameras that turn all round often report 359.9 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
-class Described:
-    """A space as the camera describes it: its URI, and the range of each axis."""
+class SpaceDescription:
+    """The description of a space by the camera: its URI, and the range of each axis."""
 
     uri: str
     x: Interval
@@ -128,38 +133,36 @@ class Described:
 
     @property
     def in_degrees(self) -> bool:
-        """It counts degrees, or degrees per second."""
+        """Whether it counts degrees, or degrees per second."""
         name = last_part(self.uri)
         return name.endswith("degrees") or name == "sphericalpositionspace"
 
     @property
     def in_millimetres(self) -> bool:
-        """It counts the focal length."""
+        """Whether it counts the focal length."""
         return last_part(self.uri).endswith("millimeter")
 
     @property
     def in_shares(self) -> bool:
-        """It counts shares of what the camera can do."""
+        """Whether it counts parts of the range."""
         return "generic" in last_part(self.uri)
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
-    """All that the PTZ node and the PTZ configuration of a profile say.
+class PtzSpaces:
+    """All spaces of the PTZ node and the PTZ configuration of a profile. `limits`: of positions,
+    set in the camera by its owner."""
 
-    `limits`: of positions, set in the camera by its owner.
-    """
-
-    positions: Sequence[Described] = ()
-    velocities: Sequence[Described] = ()
-    speeds: Sequence[Described] = ()
-    zooms: Sequence[Described] = ()
-    limits: Described | None = None
+    positions: Sequence[SpaceDescription] = ()
+    velocities: Sequence[SpaceDescription] = ()
+    speeds: Sequence[SpaceDescription] = ()
+    zooms: Sequence[SpaceDescription] = ()
+    limits: SpaceDescription | None = None
     default_position: str = ""
 
 
-def read_spaces(offer: Offer, fleet: Reach, inverted: frozenset[str] = frozenset()) -> Spaces:
-    """What they mean. `inverted`: "pan" and "tilt" if they run the other way.
+def read_spaces(offer: PtzSpaces, fleet: Reach, inverted: frozenset[str] = frozenset()) -> Spaces:
+    """Read the spaces. `inverted`: "pan" and "tilt" if they run the other way.
 
     Raises:
         ValueError: what the camera reaches and what the fleet says do not meet.
@@ -182,7 +185,9 @@ def read_spaces(offer: Offer, fleet: Reach, inverted: frozenset[str] = frozenset
         for each in _usable(offer.velocities)
         if each.y is not None
     ]
-    speeds = [OneSpace(each.uri, _rate(each, each.x, rate, 1.0)) for each in _usable(offer.speeds)]
+    speeds = [
+        ScalarSpace(each.uri, _rate(each, each.x, rate, 1.0)) for each in _usable(offer.speeds)
+    ]
     zooms = tuple(_zooms(offer.zooms, fleet.zoom_max))
     own = _within_limits(offer.limits, positions, whole)
     reach = replace(
@@ -203,16 +208,16 @@ def read_spaces(offer: Offer, fleet: Reach, inverted: frozenset[str] = frozenset
     )
 
 
-def _usable(spaces: Iterable[Described]) -> list[Described]:
-    """Degrees first: they need nobody's word for the range."""
+def _usable(spaces: Iterable[SpaceDescription]) -> list[SpaceDescription]:
+    """Return the known spaces, those in degrees first, as they need no range from the fleet."""
     known = [each for each in spaces if each.in_degrees or each.in_shares]
     return sorted(known, key=lambda each: not each.in_degrees)
 
 
 def _whole(
-    spaces: Sequence[Described], fleet: Reach, signs: tuple[float, float]
+    spaces: Sequence[SpaceDescription], fleet: Reach, signs: tuple[float, float]
 ) -> tuple[Interval, Interval]:
-    """What shares are shares of."""
+    """Return the ranges that parts count."""
     for each in spaces:
         if each.in_degrees and each.y is not None:
             return _radians(each.x, signs[0]), _radians(each.y, signs[1])
@@ -242,24 +247,24 @@ def _position(
     return PanTiltSpace(uri, scales[0], scales[1])
 
 
-def _rate(space: Described, units: Interval | None, rate_rad_s: float, sign: float) -> Scale:
+def _rate(space: SpaceDescription, units: Interval | None, rate_rad_s: float, sign: float) -> Scale:
     units = units or (0.0, 1.0)
     gain = math.degrees(1.0) if space.in_degrees else units[1] / rate_rad_s
     return Scale(sign * gain, 0.0, units)
 
 
-def _zooms(spaces: Iterable[Described], fleet_max: float) -> Iterable[OneSpace]:
+def _zooms(spaces: Iterable[SpaceDescription], fleet_max: float) -> Iterable[ScalarSpace]:
     known = [each for each in spaces if each.x[1] > each.x[0]]
     for each in sorted(known, key=lambda each: not each.in_millimetres):
         if each.in_millimetres and each.x[0] > 0:
-            yield OneSpace(each.uri, Scale(each.x[0], 0.0, each.x))
+            yield ScalarSpace(each.uri, Scale(each.x[0], 0.0, each.x))
             fleet_max = each.x[1] / each.x[0]
         elif each.in_shares and fleet_max > 1.0:
             gain = (each.x[1] - each.x[0]) / (fleet_max - 1.0)
-            yield OneSpace(each.uri, Scale(gain, each.x[0] - gain, each.x))
+            yield ScalarSpace(each.uri, Scale(gain, each.x[0] - gain, each.x))
 
 
-def _zoom_max(zooms: Sequence[OneSpace], fleet_max: float) -> float:
+def _zoom_max(zooms: Sequence[ScalarSpace], fleet_max: float) -> float:
     if not zooms:
         return 1.0
     own = zooms[0].scale.values[1]
@@ -267,7 +272,9 @@ def _zoom_max(zooms: Sequence[OneSpace], fleet_max: float) -> float:
 
 
 def _within_limits(
-    limits: Described | None, positions: Sequence[PanTiltSpace], whole: tuple[Interval, Interval]
+    limits: SpaceDescription | None,
+    positions: Sequence[PanTiltSpace],
+    whole: tuple[Interval, Interval],
 ) -> tuple[Interval, Interval]:
     if limits is None or limits.y is None:
         return whole
@@ -286,7 +293,7 @@ def _values(scale: Scale, units: Interval) -> Interval:
 
 
 def _shared_pan(own: Interval, fleet: Interval) -> Interval:
-    """Cameras count pan from 0 to 360 degrees as well as from -180 to 180."""
+    """Return the common pan range. Cameras count pan from 0 to 360 degrees, or from -180 to 180."""
     if fleet[1] - fleet[0] >= FULL_CIRCLE_RAD:
         return own
     turns = (math.tau * count for count in (0, -1, 1))

@@ -1,4 +1,5 @@
-"""One connection to ROS for all cameras of a domain, while any of them needs it."""
+"""The driver of a camera on a pan-tilt unit, by the topics of its joints and its images. All
+cameras of a ROS domain share one connection."""
 
 import asyncio
 from dataclasses import dataclass, replace
@@ -7,15 +8,15 @@ from weakref import WeakKeyDictionary
 
 from m2pem.api import ResourceId
 from m2pem.errors import PluginError
-from m2pem_plugin_ptz.drivers.driver import CameraError, Seat
+from m2pem_plugin_ptz.drivers.driver import CameraError, DriverSetup
 from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, read_settings
-from m2pem_plugin_ptz.gimbal import Look, Picture, Reach
+from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros import RosRuntime
 
     from m2pem_plugin_ptz.drivers.ros.images import ImageFeed, Recorder
-    from m2pem_plugin_ptz.drivers.ros.steering import Steering
+    from m2pem_plugin_ptz.drivers.ros.steering import JointController
 
 
 @dataclass(slots=True)
@@ -30,7 +31,7 @@ _shared: WeakKeyDictionary[asyncio.AbstractEventLoop, dict[int | None, _Shared]]
 
 
 def join_runtime(domain_id: int | None, name: str) -> "RosRuntime":
-    """The connection to a domain, which is named `name` if it is new.
+    """Return the connection to a domain; a new one is named `name`.
 
     Raises:
         RosError: ROS cannot be used; the text says what would be right.
@@ -45,7 +46,7 @@ def join_runtime(domain_id: int | None, name: str) -> "RosRuntime":
 
 
 async def leave_runtime(domain_id: int | None) -> None:
-    """Undo one `join`."""
+    """Undo one `join_runtime`."""
     domains = _shared[asyncio.get_running_loop()]
     shared = domains[domain_id]
     shared.users -= 1
@@ -65,21 +66,21 @@ class RosDriver:
         PluginError: the connection cannot be used; the text names the resource and the key.
     """
 
-    def __init__(self, seat: Seat) -> None:
-        self._seat = seat
-        self._settings = read_settings(seat.connection)
+    def __init__(self, setup: DriverSetup) -> None:
+        self._setup = setup
+        self._settings = read_settings(setup.connection)
         self._ros: RosRuntime | None = None
         self._made: list[Any] = []
         self._positions: dict[Axis, float] = {}
-        self._strangers: tuple[str, ...] = ()
-        self._steering: Steering | None = None
+        self._other_joints: tuple[str, ...] = ()
+        self._joint_controller: JointController | None = None
         self._images: ImageFeed | None = None
         self._recorder: Recorder | None = None
 
     # --- life -----------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Listen; the camera need not be there yet.
+        """Connect. The camera need not be there yet.
 
         Raises:
             PluginError: ROS or its plugin is not installed, or cannot be used.
@@ -96,13 +97,13 @@ class RosDriver:
             from m2pem_plugin_ros import keep_on_loopback  # noqa: PLC0415  # optional
         except ModuleNotFoundError as error:
             raise PluginError(f"{self._resource}: {MISSING} ({error})") from error
-        if self._seat.connection.sitl:
+        if self._setup.connection.sitl:
             try:
                 keep_on_loopback()
             except PluginError:  # other vehicles are reached over other networks already
-                self._seat.context.logger.info("%s: DDS is not on 127.0.0.1 alone", self._resource)
+                self._setup.context.logger.info("%s: DDS is not on 127.0.0.1 alone", self._resource)
         # Two executives on one network have two journals, and so two names.
-        name = f"m2pem_ptz_{self._seat.context.journal.hex[:8]}"
+        name = f"m2pem_ptz_{self._setup.context.journal.hex[:8]}"
         return join_runtime(self._settings.domain_id, name)
 
     def _listen(self, ros: "RosRuntime") -> None:
@@ -112,30 +113,30 @@ class RosDriver:
         from trajectory_msgs.msg import JointTrajectory  # noqa: PLC0415
 
         from m2pem_plugin_ptz.drivers.ros.images import ImageFeed, Recorder  # noqa: PLC0415
-        from m2pem_plugin_ptz.drivers.ros.steering import Steering  # noqa: PLC0415
+        from m2pem_plugin_ptz.drivers.ros.steering import JointController  # noqa: PLC0415
 
-        own, clock = self._settings, self._seat.context.clock
+        own, clock = self._settings, self._setup.context.clock
         as_trajectory = own.command is Command.TRAJECTORY
         kind = JointTrajectory if as_trajectory else Float64MultiArray
         publisher = ros.node.create_publisher(kind, own.command_topic, qos.COMMANDS)
-        heard = ros.subscribe(JointState, own.joint_states, self._hear, qos.TELEMETRY)
+        heard = ros.subscribe(JointState, own.joint_states, self._on_message, qos.TELEMETRY)
         self._made = [publisher, heard]
-        self._steering = Steering(
+        self._joint_controller = JointController(
             own.joints,
             self.reach,
             clock,
-            lambda: self.look,
+            lambda: self.ptz,
             publisher.publish,
             as_trajectory=as_trajectory,
         )
         self._images = ImageFeed(ros, own.image, clock)
-        folder = self._seat.settings.pictures
+        folder = self._setup.settings.pictures
         self._recorder = Recorder(self._images, folder, self._resource, clock)
 
     async def close(self) -> None:
-        """Let go. The camera stays as it is; a video that is being recorded ends."""
-        if self._steering is not None:
-            await self._steering.close()
+        """Disconnect. The camera stays as it is, and a recording ends."""
+        if self._joint_controller is not None:
+            await self._joint_controller.close()
         if self._recorder is not None:
             await self._recorder.close()
         if self._images is not None:
@@ -152,19 +153,16 @@ class RosDriver:
     # --- what is known --------------------------------------------------------------------------
 
     @property
-    def look(self) -> Look | None:
-        """Where it looks, as its joints said last."""
-        endless = self._seat.settings.reach.endless
-        return self._settings.joints.look(self._positions, endless=endless)
+    def ptz(self) -> PanTiltZoom | None:
+        endless = self._setup.settings.reach.endless
+        return self._settings.joints.ptz(self._positions, endless=endless)
 
     @property
     def reach(self) -> Reach:
-        """Where it can look: the fleet says."""
-        reach = self._seat.settings.reach
+        reach = self._setup.settings.reach
         return reach if self._settings.joints.zooms else replace(reach, zoom_max=1.0)
 
     def refusal(self, behavior: str) -> str:
-        """Why the camera cannot do such a behavior, now or ever; "" if it can."""
         if self._ros is None or self._images is None:
             return NOT_OPEN
         if behavior in ("take_picture", "record_video"):
@@ -172,7 +170,7 @@ class RosDriver:
             return "" if is_there else f"nobody publishes images on {self._images.topic}"
         if behavior == "zoom" and not self._settings.joints.zooms:
             return "the fleet names no joint that zooms (connection.joints.zoom)"
-        if self.look is None:
+        if self.ptz is None:
             return self._unheard()
         if not self._ros.node.count_subscribers(self._settings.command_topic):
             return f"nobody listens to {self._settings.command_topic}, which moves its joints"
@@ -181,22 +179,19 @@ class RosDriver:
     # --- orders ---------------------------------------------------------------------------------
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None = None) -> None:
-        """Turn there, not faster than `rate_rad_s`, and stay."""
-        if self._steering is not None:
-            self._steering.point(pan_rad, tilt_rad, rate_rad_s)
+        if self._joint_controller is not None:
+            self._joint_controller.point(pan_rad, tilt_rad, rate_rad_s)
 
     def zoom(self, level: float) -> None:
-        """Zoom there, if there is a joint for it."""
-        if self._steering is not None and self._settings.joints.zooms:
-            self._steering.zoom(level)
+        if self._joint_controller is not None and self._settings.joints.zooms:
+            self._joint_controller.zoom(level)
 
     def halt(self) -> None:
-        """Stop turning and zooming."""
-        if self._steering is not None:
-            self._steering.halt()
+        if self._joint_controller is not None:
+            self._joint_controller.halt()
 
-    async def take_picture(self) -> Picture:
-        """The next image.
+    async def take_picture(self) -> CapturedImage:
+        """Return the next image.
 
         Raises:
             CameraError: none comes.
@@ -204,10 +199,10 @@ class RosDriver:
         if self._images is None:
             raise CameraError(NOT_OPEN)
         frame = await self._images.next()
-        return Picture(frame.taken_us, frame.content, frame.suffix)
+        return CapturedImage(frame.taken_us, frame.content, frame.suffix)
 
     async def start_recording(self) -> None:
-        """Store the images from now on.
+        """Start to store images.
 
         Raises:
             CameraError: there are none, or they cannot be stored.
@@ -217,7 +212,7 @@ class RosDriver:
         await self._recorder.start()
 
     async def stop_recording(self) -> str:
-        """End the video; returns the path of its file.
+        """End the video, and return its file.
 
         Raises:
             CameraError: none was begun, or not all could be stored.
@@ -230,17 +225,17 @@ class RosDriver:
 
     @property
     def _resource(self) -> ResourceId:
-        return self._seat.connection.resource
+        return self._setup.connection.resource
 
-    def _hear(self, message: Any) -> None:
-        found = self._settings.joints.heard(message.name, message.position)
+    def _on_message(self, message: Any) -> None:
+        found = self._settings.joints.read(message.name, message.position)
         self._positions.update(found)
-        if self.look is None:
-            self._strangers = tuple(message.name)
+        if self.ptz is None:
+            self._other_joints = tuple(message.name)
         elif found:
-            self._seat.heard()
+            self._setup.heard()
 
     def _unheard(self) -> str:
         names = " and ".join(list(self._settings.joints.names.values())[:2])
-        others = f"; it tells of {', '.join(self._strangers)}" if self._strangers else ""
+        others = f"; it tells of {', '.join(self._other_joints)}" if self._other_joints else ""
         return f"{self._settings.joint_states} does not tell of {names}{others}"

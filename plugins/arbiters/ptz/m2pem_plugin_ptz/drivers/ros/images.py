@@ -1,4 +1,5 @@
-"""The images of a camera: they are listened to only while somebody wants them, as they are big."""
+"""The images of a camera: subscribed only while they are needed, as they are large; and their
+recording."""
 
 import asyncio
 from collections import deque
@@ -18,17 +19,18 @@ if TYPE_CHECKING:
 
 
 WITHIN_S = 5.0
-"""Of real time: a camera that shows nothing for so long shows nothing."""
+"""Timeout of the next image, in real seconds."""
 
 LINGER_S = 10.0
-"""It is listened to for so much longer: the next picture then needs no looking for its camera."""
+"""The subscription is kept this long after the last reader, so that the next picture needs no
+discovery."""
 
 SUFFIXES = {b"\xff\xd8\xff": ".jpg", b"\x89PNG": ".png"}
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
-    """An image; `suffix`: of its file. `taken_us`: since the Unix epoch."""
+class ImageFrame:
+    """An image. `suffix`: of its file. `taken_us`: microseconds since the Unix epoch."""
 
     content: bytes
     suffix: str
@@ -36,23 +38,23 @@ class Frame:
 
 
 class ImageFeed:
-    """Frames of one topic of sensor_msgs/CompressedImage."""
+    """The images of one topic of sensor_msgs/CompressedImage."""
 
     def __init__(self, ros: "RosRuntime", topic: str, clock: Clock) -> None:
         self.topic = topic
         self._ros = ros
         self._clock = clock
-        self._readers: set[Callable[[Frame], None]] = set()
+        self._readers: set[Callable[[ImageFrame], None]] = set()
         self._subscription: Any = None
         self._lingering: asyncio.TimerHandle | None = None
 
     @property
     def has_publisher(self) -> bool:
-        """Whether anybody publishes images there."""
+        """Whether the topic has a publisher."""
         return bool(self._ros.node.count_publishers(self.topic))
 
-    def read(self, reader: Callable[[Frame], None]) -> Callable[[], None]:
-        """Have each frame from now on handed over; the function that is returned ends it."""
+    def read(self, reader: Callable[[ImageFrame], None]) -> Callable[[], None]:
+        """Call `reader` with each image, until the returned function is called."""
         self._readers.add(reader)
         if self._lingering is not None:
             self._lingering.cancel()
@@ -61,7 +63,7 @@ class ImageFeed:
             from m2pem_plugin_ros import qos  # noqa: PLC0415  # it needs rclpy
 
             self._subscription = self._ros.subscribe(
-                CompressedImage, self.topic, self._hear, qos.TELEMETRY, waiting=2
+                CompressedImage, self.topic, self._on_message, qos.TELEMETRY, waiting=2
             )
 
         def end() -> None:
@@ -72,15 +74,15 @@ class ImageFeed:
 
         return end
 
-    async def next(self) -> Frame:
-        """The next frame.
+    async def next(self) -> ImageFrame:
+        """Return the next image.
 
         Raises:
             CameraError: none comes, or it is of no known kind.
         """
-        came: asyncio.Future[Frame] = asyncio.get_running_loop().create_future()
+        came: asyncio.Future[ImageFrame] = asyncio.get_running_loop().create_future()
 
-        def take(frame: Frame) -> None:
+        def take(frame: ImageFrame) -> None:
             if not came.done():
                 came.set_result(frame)
 
@@ -101,7 +103,7 @@ class ImageFeed:
         return frame
 
     def close(self) -> None:
-        """Listen no more."""
+        """Unsubscribe."""
         if self._lingering is not None:
             self._lingering.cancel()
             self._lingering = None
@@ -109,22 +111,22 @@ class ImageFeed:
             self._ros.node.destroy_subscription(self._subscription)
             self._subscription = None
 
-    def _hear(self, message: Any) -> None:
+    def _on_message(self, message: Any) -> None:
         content = bytes(message.data)
         stamp = message.header.stamp
         stamp_us = stamp.sec * 1_000_000 + stamp.nanosec // 1000
         suffix = next((each for start, each in SUFFIXES.items() if content.startswith(start)), "")
-        frame = Frame(content, suffix, stamp_us or self._clock.now_us())
+        frame = ImageFrame(content, suffix, stamp_us or self._clock.now_us())
         for reader in tuple(self._readers):
             reader(frame)
 
 
 MOST_WAITING = 60
-"""Of more images that a slow disk has not taken yet, the oldest are left out."""
+"""Images that wait for a slow disk. Of more, the oldest are dropped."""
 
 
 class Recorder:
-    """One video at a time, in `folder`."""
+    """Records images to a file of Motion JPEG, one video at a time."""
 
     def __init__(self, feed: ImageFeed, folder: Path, resource: ResourceId, clock: Clock) -> None:
         self._feed = feed
@@ -140,7 +142,7 @@ class Recorder:
         self._failure = ""
 
     async def start(self) -> None:
-        """Begin; what goes on already goes on.
+        """Start a video. A video that goes on is kept.
 
         Raises:
             CameraError: there are no images, or no file can be written.
@@ -161,7 +163,7 @@ class Recorder:
         self._writing = asyncio.get_running_loop().create_task(self._write(self._file))
 
     async def stop(self) -> str:
-        """End it, and return the path of the file.
+        """End the video, and return its file.
 
         Raises:
             CameraError: none was begun, or not all could be written.
@@ -182,7 +184,7 @@ class Recorder:
         return str(self._path)
 
     async def close(self) -> None:
-        """End what goes on; what was written stays."""
+        """End the video. What was written stays."""
         if self._file is not None:
             try:
                 await self.stop()
@@ -202,7 +204,7 @@ class Recorder:
             return file
         raise FileExistsError(f"there are too many videos of {began}")
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: ImageFrame) -> None:
         if frame.suffix == ".jpg":
             self._waiting.append(frame.content)
             self._news.set()
@@ -222,5 +224,4 @@ class Recorder:
                 return
 
 
-def _nothing() -> None:
-    """There is nothing to end."""
+def _nothing() -> None: ...

@@ -1,7 +1,7 @@
-"""The joints of a pan-tilt head, and what they mean for where its camera looks. Pure.
+"""What a fleet says of a camera over ROS, and the joints of its pan-tilt unit.
 
-A joint's position is positive counter-clockwise as it is seen from above, and upwards (REP-103); a
-`Look` pans clockwise. That of a zoom joint is the factor.
+The position of a joint is positive counter-clockwise as seen from above, and upwards (REP-103);
+`PanTiltZoom` pans clockwise. The position of a zoom joint is the factor.
 """
 
 import math
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from m2pem.api import Connection
-from m2pem_plugin_ptz.gimbal import Look
+from m2pem_plugin_ptz.gimbal import PanTiltZoom
 from m2pem_plugin_ptz.settings import OwnSettings
 
 
 class Axis(StrEnum):
-    """What a joint moves."""
+    """The axis that a joint moves."""
 
     PAN = "pan"
     TILT = "tilt"
@@ -25,41 +25,41 @@ class Axis(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Joints:
-    """`names`: of each joint that there is; their order is that of all commands. `backwards`: those
-    that are mounted the other way round."""
+    """`names`: of each joint, in the order of commands. `backwards`: joints that are mounted the
+    other way round."""
 
     names: Mapping[Axis, str]
     backwards: frozenset[Axis] = frozenset()
 
     @property
     def zooms(self) -> bool:
-        """Whether there is a joint for that."""
+        """Whether there is a zoom joint."""
         return Axis.ZOOM in self.names
 
-    def heard(self, names: Sequence[str], positions: Sequence[float]) -> dict[Axis, float]:
-        """The positions of our joints in a message that may have many others."""
-        told = dict(zip(names, positions, strict=False))
+    def read(self, names: Sequence[str], positions: Sequence[float]) -> dict[Axis, float]:
+        """Return the positions of these joints from a message that may have many others."""
+        reported = dict(zip(names, positions, strict=False))
         return {
-            axis: told[name]
+            axis: reported[name]
             for axis, name in self.names.items()
-            if name in told and math.isfinite(told[name])
+            if name in reported and math.isfinite(reported[name])
         }
 
-    def look(self, positions: Mapping[Axis, float], *, endless: bool = False) -> Look | None:
-        """Where the camera looks; None: not all is known. `endless`: pan is -pi to pi."""
+    def ptz(self, positions: Mapping[Axis, float], *, endless: bool = False) -> PanTiltZoom | None:
+        """Return pan, tilt and zoom; None if a position is missing. `endless`: pan is -pi to pi."""
         if not {Axis.PAN, Axis.TILT} <= positions.keys():
             return None
         pan = -self._signed(Axis.PAN, positions[Axis.PAN])
         tilt = self._signed(Axis.TILT, positions[Axis.TILT])
         zoom = max(1.0, positions.get(Axis.ZOOM, 1.0))
-        return Look(math.remainder(pan, math.tau) if endless else pan, tilt, zoom)
+        return PanTiltZoom(math.remainder(pan, math.tau) if endless else pan, tilt, zoom)
 
-    def positions(self, look: Look) -> dict[Axis, float]:
-        """Where the joints are to be for that."""
+    def positions(self, ptz: PanTiltZoom) -> dict[Axis, float]:
+        """Return the positions of the joints."""
         wanted = {
-            Axis.PAN: self._signed(Axis.PAN, -look.pan_rad),
-            Axis.TILT: self._signed(Axis.TILT, look.tilt_rad),
-            Axis.ZOOM: look.zoom,
+            Axis.PAN: self._signed(Axis.PAN, -ptz.pan_rad),
+            Axis.TILT: self._signed(Axis.TILT, ptz.tilt_rad),
+            Axis.ZOOM: ptz.zoom,
         }
         return {axis: wanted[axis] for axis in self.names}
 
@@ -68,7 +68,7 @@ class Joints:
 
 
 def nearest_turn(position_rad: float, to_rad: float) -> float:
-    """The same direction as `to_rad`, in the turn in which a joint is that turns endlessly."""
+    """Return the direction `to_rad` in the turn of an endless joint."""
     return position_rad + math.remainder(to_rad - position_rad, math.tau)
 
 
@@ -77,14 +77,15 @@ HIGHEST_DOMAIN = 232
 
 
 class Command(StrEnum):
-    """What moves the joints: trajectory_msgs/JointTrajectory, or std_msgs/Float64MultiArray."""
+    """The message that moves the joints: trajectory_msgs/JointTrajectory, or
+    std_msgs/Float64MultiArray."""
 
     TRAJECTORY = "trajectory"
     POSITIONS = "positions"
 
 
 class Via(StrEnum):
-    """How a camera is commanded. A camera inherits what its vehicle says of its own node."""
+    """How a camera is commanded. A camera inherits the setting of its vehicle's node."""
 
     JOINTS = "joints"
     TOPICS = "topics"
@@ -95,12 +96,12 @@ COMMAND_TOPICS = {
     Command.TRAJECTORY: "pan_tilt_controller/joint_trajectory",
     Command.POSITIONS: "pan_tilt_controller/commands",
 }
-"""As ros2_control names those of its controllers."""
+"""The names of ros2_control's controllers."""
 
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """Topics have their full names. `domain_id` None: that of the environment."""
+    """Topics have full names. `domain_id` None: that of the environment."""
 
     joints: Joints
     command: Command
@@ -116,7 +117,7 @@ _JOINTS = ("pan", "tilt", "zoom", "reversed")
 
 
 def read_settings(connection: Connection) -> RosSettings:
-    """Those of one camera.
+    """Read the settings of one camera.
 
     Raises:
         PluginError: something is wrong; the text names the resource and the key.

@@ -1,4 +1,4 @@
-"""How the simulated camera turns: each axis with a rate, an acceleration, and stops."""
+"""A simulated camera: its motors, its specification, its clock and its recordings."""
 
 import asyncio
 import itertools
@@ -29,7 +29,7 @@ class Axis:
     stuck: bool = False
 
     def go(self, goal: float, most: float | None = None) -> None:
-        """Turn there and stay, not faster than `most`."""
+        """Turn to a goal and stay, not faster than `most`."""
         if self.stops is None:
             goal = self.at + math.remainder(goal - self.at, math.tau)
         else:
@@ -38,21 +38,20 @@ class Axis:
         self.most = self.rate if most is None else min(most, self.rate)
 
     def run(self, velocity: float, until_s: float = math.inf) -> None:
-        """Turn on, until a time at the latest."""
+        """Turn at a velocity, until a time at the latest."""
         self.goal, self.until_s = None, until_s
         self.velocity = min(max(velocity, -self.rate), self.rate)
 
     def stop(self) -> None:
-        """Brake."""
         self.goal, self.velocity = None, 0.0
 
     @property
     def moving(self) -> bool:
-        """It turns, or is about to."""
+        """Whether it turns, or is about to."""
         return abs(self.speed) > NEAR or (self.goal is not None and abs(self.goal - self.at) > NEAR)
 
     def step(self, now_s: float, seconds: float) -> None:
-        """Let time pass."""
+        """Advance by a time."""
         if self.stuck:
             self.speed = 0.0
             return
@@ -79,8 +78,8 @@ class Axis:
 
 
 @dataclass(slots=True)
-class Head:
-    """Pan from the camera's own zero, clockwise; tilt up; zoom as a factor."""
+class Gimbal:
+    """The motors. Pan is clockwise from the camera's zero, tilt is up, zoom is a factor."""
 
     pan: Axis
     tilt: Axis
@@ -89,11 +88,10 @@ class Head:
 
     @property
     def axes(self) -> tuple[Axis, Axis, Axis]:
-        """All of them."""
         return self.pan, self.tilt, self.zoom
 
     def advance(self, now_s: float) -> None:
-        """Let it turn until now."""
+        """Advance to a time."""
         if self._now_s is None:
             self._now_s = now_s
         while self._now_s < now_s:
@@ -117,7 +115,7 @@ class Asks(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Who may do everything."""
+    """The account that may do everything."""
 
     user: str
     password: str
@@ -125,12 +123,12 @@ class Account:
 
 @dataclass(frozen=True, slots=True)
 class CameraSpec:
-    """One camera. Pan is clockwise and tilt is up, from the camera's own zero.
+    """One camera. Pan is clockwise and tilt is up, from the camera's zero.
 
-    `account` None: everybody may do everything. `skew_s`: how far its clock is ahead. `latency_s`:
-    until it has answered. `degrees`: it has spaces in degrees, beside those from -1 to 1. `turns`,
-    `drives`: it takes absolute moves, and velocities. `media`, `media2`: which media services it
-    has. `endless`: it pans all round.
+    `account` None: no password is needed. `skew_s`: how far its clock is ahead. `latency_s`: of
+    answers. `degrees`: it has spaces in degrees, besides those from -1 to 1. `turns`, `drives`: it
+    takes absolute moves, and velocities. `media`, `media2`: its media services. `endless`: it pans
+    all round.
     """
 
     name: str = "m2pem simulated camera"
@@ -155,13 +153,13 @@ class CameraSpec:
     skew_s: float = 0.0
     latency_s: float = 0.05
 
-    def head(self) -> Head:
-        """Its motors, at rest at zero."""
+    def gimbal(self) -> Gimbal:
+        """Make its motors, at rest at zero."""
         rate, acceleration = math.radians(self.rate_deg_s), math.radians(self.acceleration_deg_s2)
         pan = None if self.endless else _radians(self.pan_deg)
         tilt = _radians(self.tilt_deg)
         zoom_rate = (self.zoom_max - 1.0) / ZOOM_S
-        return Head(
+        return Gimbal(
             Axis(pan, rate, acceleration),
             Axis(tilt, rate, acceleration, at=min(max(0.0, tilt[0]), tilt[1])),
             Axis((1.0, self.zoom_max), zoom_rate, zoom_rate * 10, at=1.0),
@@ -176,10 +174,10 @@ Moment = Callable[[], float]
 
 
 @dataclass(slots=True)
-class Troubles:
-    """What is wrong with it. `speaks`: unset, it takes requests and does not answer. `slow_s`: it
-    answers so much later. `locked`: no password is right. `fault`: it answers moves with this one.
-    `picture`: what it gives instead of a picture. `full`: it has no room for video."""
+class FaultState:
+    """The active faults. `speaks`: if it is not set, requests are not answered. `slow_s`:
+    additional latency. `locked`: no password is right. `fault`: answer to moves. `picture`: content
+    in place of a picture. `full`: no storage for video."""
 
     speaks: asyncio.Event = field(default_factory=asyncio.Event)
     slow_s: float = 0.0
@@ -202,17 +200,17 @@ class Job:
 
 @dataclass(slots=True)
 class Recorded:
-    """A stretch of video, by the camera's clock in seconds since the Unix epoch."""
+    """A part of a video, by the camera's clock in seconds since the Unix epoch."""
 
     begin_s: float
     end_s: float | None = None
 
 
 class Camera:
-    """`monotonic` and `wall` tell its time.
+    """`monotonic` and `wall` are its clocks.
 
-    `calls`: how often each operation was asked for and done. `moves`: how often it was told to turn
-    somewhere else. `reboots`: how often it was switched on again.
+    `calls`: number of calls of each operation. `moves`: number of moves. `reboots`: number of
+    restarts.
     """
 
     def __init__(
@@ -220,48 +218,46 @@ class Camera:
     ) -> None:
         self.spec = spec
         self.monotonic, self.wall = monotonic, wall
-        self.troubles = Troubles()
+        self.fault_state = FaultState()
         self.calls: Counter[str] = Counter()
         self.jobs: dict[str, Job] = {}
         self.recorded: list[Recorded] = []
         self.skew_s = spec.skew_s
         self.moves = 0
         self.reboots = 0
-        self.head = spec.head()
-        self.head.advance(monotonic())
+        self.gimbal = spec.gimbal()
+        self.gimbal.advance(monotonic())
         self._numbers = itertools.count(1)
 
     @property
     def now_s(self) -> float:
-        """What its clock shows, in seconds since the Unix epoch."""
+        """The time of its clock, in seconds since the Unix epoch."""
         return self.wall() + self.skew_s
 
     def advance(self) -> None:
-        """Let it turn until now."""
-        self.head.advance(self.monotonic())
+        self.gimbal.advance(self.monotonic())
 
     @property
-    def look(self) -> tuple[float, float, float]:
-        """Where it really looks now: pan and tilt in rad, the zoom factor."""
+    def ptz(self) -> tuple[float, float, float]:
+        """The true pan and tilt in rad, and the zoom factor."""
         self.advance()
-        head = self.head
-        pan = math.remainder(head.pan.at, math.tau) if self.spec.endless else head.pan.at
-        return pan, head.tilt.at, head.zoom.at
+        gimbal = self.gimbal
+        pan = math.remainder(gimbal.pan.at, math.tau) if self.spec.endless else gimbal.pan.at
+        return pan, gimbal.tilt.at, gimbal.zoom.at
 
     @property
     def recording(self) -> bool:
-        """It records."""
         return any(job.active for job in self.jobs.values())
 
     def add_job(self, active: bool) -> Job:
-        """A new recording job."""
+        """Add a recording job."""
         job = Job(f"job_{next(self._numbers)}", active=False)
         self.jobs[job.token] = job
         self.set_job(job, active)
         return job
 
     def set_job(self, job: Job, active: bool) -> None:
-        """Let it record, or not."""
+        """Start or stop a recording job."""
         before = self.recording
         job.active = active
         if self.recording and not before:
@@ -270,17 +266,17 @@ class Camera:
             self.recorded[-1].end_s = self.now_s
 
     def remove_job(self, job: Job) -> None:
-        """No more of it."""
+        """Remove a recording job."""
         self.set_job(job, False)
         del self.jobs[job.token]
 
     def restart(self) -> None:
-        """It was switched off and on: its head is at zero again, nothing records."""
+        """Restart: the motors are at zero again, and nothing is recorded."""
         for job in tuple(self.jobs.values()):
             self.remove_job(job)
-        stuck = [axis.stuck for axis in self.head.axes]
-        self.head = self.spec.head()
-        for axis, is_stuck in zip(self.head.axes, stuck, strict=True):
+        stuck = [axis.stuck for axis in self.gimbal.axes]
+        self.gimbal = self.spec.gimbal()
+        for axis, is_stuck in zip(self.gimbal.axes, stuck, strict=True):
             axis.stuck = is_stuck
-        self.head.advance(self.monotonic())
+        self.gimbal.advance(self.monotonic())
         self.reboots += 1

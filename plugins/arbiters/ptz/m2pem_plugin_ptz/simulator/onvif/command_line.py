@@ -1,4 +1,4 @@
-"""`m2pem sim onvif`: a simulated camera, until Ctrl-C."""
+"""The command `m2pem sim onvif`: a simulated camera, until Ctrl-C."""
 
 import asyncio
 import re
@@ -9,7 +9,7 @@ import click
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.onvif.settings import read_credentials
 from m2pem_plugin_ptz.simulator.onvif.camera import Account, CameraSpec
-from m2pem_plugin_ptz.simulator.onvif.faults import FaultWordsError, PlannedFault, parse
+from m2pem_plugin_ptz.simulator.onvif.faults import FaultTextError, PlannedFault, parse
 from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 
 Address = tuple[str, int]
@@ -24,7 +24,6 @@ class HttpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks ha
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Address:
-        """Host and port."""
         if isinstance(value, tuple):
             return value
         match = re.fullmatch(r"(?:http://)?([^:/]+|\[[^]]+\]):(\d{1,5})/?", str(value))
@@ -42,7 +41,6 @@ class Seconds(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """In seconds."""
         match = re.fullmatch(r"([+-]?\d+(?:\.\d+)?)\s*(s|ms|)", str(value))
         if match is None:
             self.fail(f"{value!r} is not a duration such as 50ms or 3600s", param, ctx)
@@ -57,7 +55,6 @@ class Range(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[float, float]:
-        """Both ends."""
         if isinstance(value, tuple):
             return value
         try:
@@ -70,19 +67,18 @@ class Range(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
 
 
 class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A fault in words, such as silent at 10 s for 5 s."""
+    """A fault as text, such as silent at 10 s for 5 s."""
 
     name = "fault"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> PlannedFault:
-        """What happens, and when."""
         if isinstance(value, PlannedFault):
             return value
         try:
             return parse(str(value))
-        except FaultWordsError as error:
+        except FaultTextError as error:
             self.fail(str(error), param, ctx)
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong with the simulated camera: by calls, or in words (`silent at 10 s for 5 s`).
+"""Faults of the simulated camera: by calls, or as text (`silent at 10 s for 5 s`).
 
 A fault without `at` begins at once, one without `for` stays.
 """
@@ -16,12 +16,12 @@ EXAMPLE = '"silent at 10 s for 5 s"'
 Switch = Callable[[], Awaitable[None]]
 
 
-class FaultWordsError(ValueError):
-    """Not understood; the text says what would be."""
+class FaultTextError(ValueError):
+    """The text is not a fault; the message says what is right."""
 
 
 class Faults:
-    """All that can go wrong with one camera, to be switched on and off while it runs."""
+    """The faults of one camera, which are switched while it runs."""
 
     def __init__(self, camera: Camera, switch_on: Switch, switch_off: Switch) -> None:
         self._camera = camera
@@ -29,48 +29,48 @@ class Faults:
         self._tasks: set[asyncio.Task[None]] = set()
 
     def silent(self, on: bool) -> None:
-        """It takes requests, and does not answer them."""
-        speaks = self._camera.troubles.speaks
+        """Take requests, and do not answer them."""
+        speaks = self._camera.fault_state.speaks
         (speaks.clear if on else speaks.set)()
 
     def slow(self, seconds: float) -> None:
-        """It answers so much later."""
-        self._camera.troubles.slow_s = seconds
+        """Add a latency."""
+        self._camera.fault_state.slow_s = seconds
 
     def locked(self, on: bool) -> None:
-        """No user and no password is right."""
-        self._camera.troubles.locked = on
+        """Accept no user and no password."""
+        self._camera.fault_state.locked = on
 
     def stuck(self, on: bool) -> None:
-        """Its pan and tilt motors do not turn, whatever it answers."""
+        """Stop the pan and tilt motors, whatever is answered."""
         self._camera.advance()
-        self._camera.head.pan.stuck = self._camera.head.tilt.stuck = on
+        self._camera.gimbal.pan.stuck = self._camera.gimbal.tilt.stuck = on
 
     def fault(self, text: str) -> None:
-        """It answers moves with a fault; "": no more."""
-        self._camera.troubles.fault = text
+        """Answer moves with a fault; "" ends it."""
+        self._camera.fault_state.fault = text
 
     def clock(self, seconds: float) -> None:
-        """Its clock is so much further ahead."""
+        """Advance the clock."""
         self._camera.skew_s += seconds
 
     async def switch_off(self) -> None:
-        """Nobody listens any more."""
+        """Stop the server."""
         await self._off()
 
     async def switch_on(self) -> None:
-        """It starts: its head is at zero."""
+        """Restart: the motors are at zero."""
         self._camera.restart()
         await self._on()
 
     def plan(self, fault: "PlannedFault") -> None:
-        """Let it happen when its time comes."""
+        """Plan a fault. Its time counts from now."""
         task = asyncio.get_running_loop().create_task(fault.happen(self))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
     async def close(self) -> None:
-        """Nothing more goes wrong."""
+        """Cancel all planned faults."""
         for task in tuple(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -81,7 +81,7 @@ Action = Callable[[Faults], Awaitable[None] | None]
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """`begin` after `at_s` seconds, `end` after `for_s` more (None: never)."""
+    """`begin` after `at_s` seconds, and `end` after `for_s` more (None: never)."""
 
     begin: Action
     end: Action
@@ -89,7 +89,7 @@ class PlannedFault:
     for_s: float | None = None
 
     async def happen(self, faults: Faults) -> None:
-        """Wait for its time, and do it."""
+        """Wait for the time of the fault, and apply it."""
         await asyncio.sleep(self.at_s)
         await _done(self.begin(faults))
         if self.for_s is not None:
@@ -157,7 +157,7 @@ def parse(text: str) -> PlannedFault:
             if known == "reboot" and for_s is None:
                 for_s = REBOOT_S
             return PlannedFault(*make(match), at_s or 0.0, for_s)
-    raise FaultWordsError(
+    raise FaultTextError(
         f"{text!r}: {what!r} is no action. Actions: {'; '.join(_ACTIONS)}. Then 'at 10 s' "
         f"(without: at once) and 'for 5 s' (without: for good), such as {EXAMPLE}"
     )

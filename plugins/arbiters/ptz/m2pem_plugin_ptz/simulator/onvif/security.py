@@ -1,4 +1,4 @@
-"""Who speaks: WS-Security user name tokens with digests, and HTTP digest and basic."""
+"""Authentication: WS-Security user name tokens with digests, and HTTP digest and basic."""
 
 import base64
 import binascii
@@ -13,20 +13,21 @@ from m2pem_plugin_ptz.simulator.onvif.camera import Account, Asks
 from m2pem_plugin_ptz.simulator.onvif.soap import Element, FaultError
 
 WINDOW_S = 10.0
-"""So far the client's time may be from the camera's."""
+"""Largest difference of the client's time from the camera's."""
 
 REALM = "m2pem camera"
 
 
 class TokenCheck:
-    """Checks user name tokens. A nonce is taken once within the window; the time decides after."""
+    """Checks user name tokens. A nonce is accepted once within the window; after it, the time
+    decides."""
 
     def __init__(self, account: Account) -> None:
         self._account = account
         self._nonces: dict[bytes, float] = {}
 
     def check(self, header: Element | None, now_s: float) -> None:
-        """Let it pass.
+        """Check a token.
 
         Raises:
             FaultError: it may not; the text says why.
@@ -60,7 +61,7 @@ class HttpCheck:
         self._nonces: dict[str, int] = {}
 
     def challenge(self) -> str:
-        """What to send when it does not pass."""
+        """Return the challenge for a client that does not pass."""
         if self._asks is Asks.BASIC:
             return f'Basic realm="{REALM}"'
         nonce = secrets.token_hex(16)
@@ -68,7 +69,7 @@ class HttpCheck:
         return f'Digest realm="{REALM}", qop="auth", algorithm=MD5, nonce="{nonce}"'
 
     def passes(self, method: str, target: str, authorization: str) -> bool:
-        """Whether it is the account's."""
+        """Return whether the authorization is that of the account."""
         scheme, _, rest = authorization.partition(" ")
         if self._asks is Asks.BASIC:
             expected = f"{self._account.user}:{self._account.password}".encode()

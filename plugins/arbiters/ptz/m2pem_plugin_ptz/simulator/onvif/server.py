@@ -1,4 +1,9 @@
-"""What the simulated camera sees: a horizon, bearings, and where it looks, as a JPEG."""
+"""The simulated camera on HTTP, and its pictures: a horizon, bearings and the direction.
+
+async with OnvifServer(CameraSpec(account=Account("operator", "secret"))) as server:
+
+    server.port, server.camera.ptz, server.faults.silent(True)
+"""
 
 import asyncio
 import io
@@ -26,7 +31,7 @@ SPACING = 10
 def draw(
     pan_rad: float, tilt_rad: float, zoom: float, view_rad: tuple[float, float], note: str
 ) -> bytes:
-    """A picture. `view_rad`: width and height of what it sees at zoom 1."""
+    """Draw a picture. `view_rad`: field of view at zoom 1."""
     width, height = SIZE
     image = Image.new("RGB", SIZE, SKY)
     canvas = ImageDraw.Draw(image)
@@ -48,9 +53,9 @@ def draw(
     text = f"pan {pan_deg:+.1f}  tilt {tilt_deg:+.1f}  zoom {zoom:.1f}  {note}"
     canvas.rectangle((0, height - 18, width, height), fill=PAPER)
     canvas.text((6, height - 15), text, fill=INK)
-    stored = io.BytesIO()
-    image.save(stored, "JPEG", quality=85, comment=text.encode())
-    return stored.getvalue()
+    store_image = io.BytesIO()
+    image.save(store_image, "JPEG", quality=85, comment=text.encode())
+    return store_image.getvalue()
 
 
 SERVICES: Mapping[str, Operations] = {
@@ -65,7 +70,7 @@ CLOSE_S = 0.2
 
 
 class OnvifServer:
-    """One camera on one port; 0: a free one is chosen, and kept when it restarts."""
+    """One camera on one port. With port 0, a free one is chosen, and kept in a restart."""
 
     def __init__(
         self,
@@ -118,9 +123,9 @@ class OnvifServer:
             await runner.cleanup()
 
     async def _delay(self, share: float) -> None:
-        troubles = self.camera.troubles
-        await troubles.speaks.wait()
-        await asyncio.sleep((self.camera.spec.latency_s + troubles.slow_s) * share)
+        fault_state = self.camera.fault_state
+        await fault_state.speaks.wait()
+        await asyncio.sleep((self.camera.spec.latency_s + fault_state.slow_s) * share)
 
     async def _soap(self, request: web.Request) -> web.Response:
         # Half of the time is the way there, half the way back: what is done is done in between.
@@ -138,7 +143,7 @@ class OnvifServer:
         offered = tuple(device.offered(self.camera))
         operations = SERVICES[asked.namespace] if asked.namespace in offered else {}
         if asked.namespace != soap.DEVICE or asked.name not in device.FREE:
-            if self.camera.troubles.locked:
+            if self.camera.fault_state.locked:
                 raise FaultError("Sender not authorized", "NotAuthorized")
             if self._tokens is not None:
                 self._tokens.check(header, self.camera.now_s)
@@ -152,7 +157,7 @@ class OnvifServer:
     async def _snapshot(self, request: web.Request) -> web.StreamResponse:
         await self._delay(1.0)
         camera = self.camera
-        if camera.troubles.locked or (
+        if camera.fault_state.locked or (
             self._http is not None
             and not self._http.passes(
                 "GET", request.raw_path, request.headers.get("Authorization", "")
@@ -162,9 +167,9 @@ class OnvifServer:
             return web.Response(status=401, headers={"WWW-Authenticate": challenge})
         if not camera.spec.snapshots:
             return web.Response(status=404)
-        if camera.troubles.picture is not None:
-            return web.Response(body=camera.troubles.picture, content_type="text/html")
+        if camera.fault_state.picture is not None:
+            return web.Response(body=camera.fault_state.picture, content_type="text/html")
         width, height = map(math.radians, camera.spec.view_deg)
-        picture = draw(*camera.look, (width, height), camera.spec.name)
+        picture = draw(*camera.ptz, (width, height), camera.spec.name)
         camera.calls["snapshot"] += 1
         return web.Response(body=picture, content_type="image/jpeg")

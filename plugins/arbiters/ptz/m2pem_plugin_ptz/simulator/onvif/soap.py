@@ -1,4 +1,4 @@
-"""SOAP 1.2 as cameras speak it: requests in, answers and faults out."""
+"""SOAP 1.2: reads requests, and writes answers and faults."""
 
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
@@ -27,7 +27,7 @@ _DECLARED = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in _PREFIXES.item
 
 
 class FaultError(Exception):
-    """What the camera answers instead. `subcodes`: of the ONVIF error, the outer one first."""
+    """The fault that the camera answers. `subcodes`: of the ONVIF error, the outer one first."""
 
     def __init__(self, text: str, *subcodes: str, receiver: bool = False) -> None:
         super().__init__(text)
@@ -37,43 +37,40 @@ class FaultError(Exception):
 
     @property
     def status(self) -> int:
-        """Of HTTP."""
+        """The HTTP status."""
         return 500 if self.receiver else 400
 
 
 class Element:
-    """An element of a request. Names are without namespaces: clients prefix as they like."""
+    """An element of a request. Names are without namespaces, as the prefixes of clients differ."""
 
     def __init__(self, element: etree._Element) -> None:
         self._element = element
 
     @property
     def name(self) -> str:
-        """Its name."""
         return etree.QName(self._element).localname
 
     @property
     def namespace(self) -> str:
-        """Its namespace."""
         return etree.QName(self._element).namespace or ""
 
     @property
     def text(self) -> str:
-        """Its text."""
         return (self._element.text or "").strip()
 
     def attribute(self, name: str) -> str:
-        """An attribute's text; "" if it is not there."""
+        """Return the text of an attribute; "" if it is missing."""
         return self._element.get(name) or ""
 
     def all(self, name: str) -> Iterator["Element"]:
-        """Its children of this name."""
+        """Yield the children with a name."""
         for child in self._element:
             if isinstance(child.tag, str) and etree.QName(child).localname == name:
                 yield Element(child)
 
     def child(self, *path: str) -> "Element | None":
-        """The first child of this name, or its first one of the next."""
+        """Return the first child along a path of names; None if one is missing."""
         here = self
         for name in path:
             found = next(here.all(name), None)
@@ -83,18 +80,17 @@ class Element:
         return here
 
     def says(self, *path: str) -> str:
-        """A child's text; "" if it is not there."""
+        """Return the text of a child; "" if it is missing."""
         child = self.child(*path)
         return "" if child is None else child.text
 
     def first(self) -> "Element | None":
-        """Its first child."""
         children = (child for child in self._element if isinstance(child.tag, str))
         return next((Element(child) for child in children), None)
 
 
 def read(content: bytes) -> tuple[Element | None, Element]:
-    """The header, and what is asked for.
+    """Return the header and the requested operation.
 
     Raises:
         FaultError: it is no SOAP 1.2.
@@ -113,7 +109,7 @@ def read(content: bytes) -> tuple[Element | None, Element]:
 
 
 def answer(content: str) -> bytes:
-    """An envelope around it."""
+    """Return an envelope with a body."""
     text = (
         f'<?xml version="1.0" encoding="UTF-8"?><env:Envelope {_DECLARED}>'
         f"<env:Body>{content}</env:Body></env:Envelope>"
@@ -122,7 +118,7 @@ def answer(content: str) -> bytes:
 
 
 def refusal(fault: FaultError) -> bytes:
-    """An envelope around a fault."""
+    """Return an envelope with a fault."""
     codes = ""
     for code in reversed(fault.subcodes):
         codes = f"<env:Subcode><env:Value>ter:{escape(code)}</env:Value>{codes}</env:Subcode>"

@@ -1,5 +1,5 @@
-"""Simulated pan-tilt heads with cameras, over ROS (`m2pem sim ros-cameras`).
+"""Simulated pan-tilt units with cameras, over ROS (`m2pem sim ros-cameras`).
 
-`head` is how one moves, `mosaic` what its camera shows; `camera` has its topics; `fleet` reads
-which there are, and `command_line` runs them.
+`gimbal` is the motion of a unit, `image` the picture of its camera, and `camera` has the topics.
+`fleet` reads the cameras of a fleet file, and `command_line` runs them.
 """

@@ -1,4 +1,4 @@
-"""One simulated camera on a head: its topics. Needs ROS."""
+"""The topics of one simulated camera. It needs ROS."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,19 +11,20 @@ from trajectory_msgs.msg import JointTrajectory
 from m2pem.api import Clock, Connection
 from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, RosSettings
 from m2pem_plugin_ptz.gimbal import Reach
-from m2pem_plugin_ptz.simulator.ros.gimbal import Head
+from m2pem_plugin_ptz.simulator.ros.gimbal import Gimbal
 from m2pem_plugin_ptz.simulator.ros.image import picture
 
 JOINTS_EVERY_S, IMAGES_EVERY_S = 0.05, 0.2
 US_PER_S = 1_000_000
 
 FAULTS = ("silent", "stuck", "blind", "garbled", "well")
-"""Its joints say nothing; they do not turn; it shows nothing; nothing that is a picture; none."""
+"""No joint states; joints that do not turn; no images; invalid images; no fault."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeSpec:
-    """`connection`: how the arbiter on board reaches the head. `origin`: as in `ArbiterContext`."""
+    """`connection`: of the arbiter on board to the pan-tilt unit. `origin`: as in
+    `ArbiterContext`."""
 
     connection: Connection
     namespace: str
@@ -32,8 +33,8 @@ class NodeSpec:
 
 @dataclass(frozen=True, slots=True)
 class CameraSpec:
-    """`name`: of the payload, such as evsg1/ptz; `settings` as an executive has them. `node`: the
-    m2pem node that it has of its own, if any."""
+    """`name`: of the payload, such as evsg1/ptz. `settings`: as the executive has them. `node`: its
+    own m2pem node, if any."""
 
     name: str
     settings: RosSettings
@@ -42,12 +43,12 @@ class CameraSpec:
 
 
 class SimulatedCamera:
-    """Faults are switched by a std_msgs/String on `sim_fault` beside its joint states, and
-    `sim_fault_is` says which one there is."""
+    """A camera on a pan-tilt unit. A std_msgs/String on `sim_fault`, beside its joint states, sets
+    a fault; `sim_fault_is` reports it."""
 
     def __init__(self, ros: RosRuntime, spec: CameraSpec, clock: Clock) -> None:
         self.spec = spec
-        self.head = Head(spec.reach)
+        self.gimbal = Gimbal(spec.reach)
         self.fault = "well"
         self._clock = clock
         own, create = spec.settings, ros.node.create_publisher
@@ -65,10 +66,10 @@ class SimulatedCamera:
         self._joints_us = self._images_us = self._now_us
 
     def step(self) -> None:
-        """Move on, and say what is due."""
+        """Advance, and publish what is due."""
         now_us = self._clock.now_us()
-        self.head.stuck = self.fault == "stuck"
-        self.head.step((now_us - self._now_us) / US_PER_S)
+        self.gimbal.stuck = self.fault == "stuck"
+        self.gimbal.step((now_us - self._now_us) / US_PER_S)
         self._now_us = now_us
         if now_us >= self._joints_us:
             self._joints_us = now_us + round(JOINTS_EVERY_S * US_PER_S)
@@ -92,10 +93,10 @@ class SimulatedCamera:
 
     def _move(self, names: Any, positions: Any, seconds: float) -> None:
         joints = self.spec.settings.joints
-        told = {**joints.positions(self.head.look), **joints.heard(names, positions)}
-        to = joints.look(told)
+        told = {**joints.positions(self.gimbal.ptz), **joints.read(names, positions)}
+        to = joints.ptz(told)
         if to is not None:
-            self.head.move(to, seconds)
+            self.gimbal.move(to, seconds)
 
     def _switch(self, message: Any) -> None:
         if message.data in FAULTS:
@@ -106,14 +107,14 @@ class SimulatedCamera:
 
     def _joint_state(self) -> Any:
         joints = self.spec.settings.joints
-        positions = joints.positions(self.head.look)
+        positions = joints.positions(self.gimbal.ptz)
         names = [joints.names[axis] for axis in positions]
         message = JointState(name=["wheel", *names], position=[0.0, *positions.values()])
         self._stamp(message)
         return message
 
     def _image(self) -> Any:
-        content = picture(self.head.look, self.spec.reach.view_rad)
+        content = picture(self.gimbal.ptz, self.spec.reach.view_rad)
         if self.fault == "garbled":
             content = b"GIF89a" + content
         message = CompressedImage(format="jpeg", data=content)

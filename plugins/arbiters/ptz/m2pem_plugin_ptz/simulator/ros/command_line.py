@@ -1,4 +1,4 @@
-"""`m2pem sim ros-cameras`: simulated cameras on pan-tilt heads, until Ctrl-C."""
+"""The command `m2pem sim ros-cameras`: simulated cameras on pan-tilt units, until Ctrl-C."""
 
 import asyncio
 import signal

@@ -1,5 +1,5 @@
-"""The cameras of a fleet file that are to be simulated, on vehicles marked `sitl: true`: of arbiter
-`ptz` and driver `ros`, and payloads of arbiter `ros` that have an m2pem node of their own."""
+"""The simulated cameras of a fleet file, on vehicles with `sitl: true`: of arbiter `ptz` and driver
+`ros`, and payloads of arbiter `ros` with an m2pem node of their own."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -17,7 +17,7 @@ ARBITER, NODES = "ptz", "ros"
 
 
 def read_specs(fleet: Fleet) -> Iterator[CameraSpec]:
-    """What to simulate, so that an executive with the same file finds it.
+    """Yield the specifications, as an executive with the same file expects them.
 
     Raises:
         PluginError: a connection is wrong; the text names the resource and the key.
@@ -70,7 +70,7 @@ def _with_nodes(fleet: Fleet) -> Iterator[CameraSpec]:
 def _simulated(
     resource: ResourceId, connections: Mapping[ResourceId, Connection]
 ) -> Mapping[str, Any]:
-    """What its `sim` says: what the arbiter `ptz` would be told of the camera."""
+    """Return the settings `sim`: those of the arbiter `ptz` for the camera on board."""
     said = connections[resource].settings.get("sim", {})
     vehicle = connections.get(ResourceId(resource.partition("/")[0]))
     if vehicle is not None and said == vehicle.settings.get("sim"):

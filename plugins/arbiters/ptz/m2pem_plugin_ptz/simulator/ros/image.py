@@ -1,42 +1,44 @@
-"""What a simulated camera shows: a mosaic of the world around it, as a JPEG that anybody can open.
+"""The picture of a simulated camera: a mosaic of the world around it, as a JPEG.
 
-It is a baseline JPEG (ITU-T T.81) of one component in which each block of 8 by 8 has one grey, so
-that it needs no library. A comment in it says where the camera looked.
+It is a baseline JPEG (ITU-T T.81) of one component, in which each block of 8 by 8 has one grey
+value, so that it needs no library. A comment in it has the direction of the camera.
 """
 
 import math
 from collections.abc import Iterable, Iterator
 from struct import pack
 
-from m2pem_plugin_ptz.gimbal import Look
+from m2pem_plugin_ptz.gimbal import PanTiltZoom
 
 WIDTH, HEIGHT = 320, 176
 BLOCK = 8
 QUANTUM = 8
-"""With it, the grey of a block is what is coded: 8 times its distance from 128, divided by 8."""
+"""With it, the coded value is the grey of a block: 8 times its difference from 128, divided by
+8."""
 
 DC_LENGTHS = (0, 1, 5, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0)
-"""How many codes have 1 bit, 2 bits and so on, for differences that need 0, 1, 2, ... bits."""
+"""Number of codes with 1 bit, 2 bits and so on, for differences of 0, 1, 2, ... bits."""
 
 END_OF_BLOCK = "0"
 SKY, GROUND, STRIPE = 200, 90, 40
 STRIPE_RAD, STRIPE_EVERY_RAD = math.radians(2.0), math.radians(10.0)
 
 
-def picture(look: Look, view_rad: tuple[float, float]) -> bytes:
-    """A JPEG. Sky is light and ground is dark, with a stripe every ten degrees of pan."""
+def picture(ptz: PanTiltZoom, view_rad: tuple[float, float]) -> bytes:
+    """Return a JPEG. The sky is light and the ground is dark, with a stripe every ten degrees of
+    pan."""
     columns, rows = WIDTH // BLOCK, HEIGHT // BLOCK
-    wide, high = (angle / look.zoom for angle in view_rad)
+    wide, high = (angle / ptz.zoom for angle in view_rad)
     greys = (
         _grey(
-            look.pan_rad + wide * ((column + 0.5) / columns - 0.5),
-            look.tilt_rad + high * (0.5 - (row + 0.5) / rows),
+            ptz.pan_rad + wide * ((column + 0.5) / columns - 0.5),
+            ptz.tilt_rad + high * (0.5 - (row + 0.5) / rows),
         )
         for row in range(rows)
         for column in range(columns)
     )
-    told = f"pan {math.degrees(look.pan_rad):.2f} tilt {math.degrees(look.tilt_rad):.2f}"
-    return _jpeg(greys, f"{told} zoom {look.zoom:.2f}")
+    told = f"pan {math.degrees(ptz.pan_rad):.2f} tilt {math.degrees(ptz.tilt_rad):.2f}"
+    return _jpeg(greys, f"{told} zoom {ptz.zoom:.2f}")
 
 
 def _grey(pan_rad: float, tilt_rad: float) -> int:
@@ -75,7 +77,7 @@ def _blocks(greys: Iterable[int]) -> Iterator[str]:
 
 
 def _codes() -> list[str]:
-    """The Huffman codes of differences, by how many bits they need."""
+    """Return the Huffman codes of differences, by their number of bits."""
     codes, code = [], 0
     for length, count in enumerate(DC_LENGTHS, 1):
         for _ in range(count):
@@ -86,7 +88,7 @@ def _codes() -> list[str]:
 
 
 def _bytes(bits: str) -> bytes:
-    """Filled up with ones; a byte that looks like a marker is followed by a zero."""
+    """Fill up with ones. A byte 0xFF is followed by a zero."""
     bits += "1" * (-len(bits) % 8)
     made = int(bits, 2).to_bytes(len(bits) // 8, "big")
     return made.replace(b"\xff", b"\xff\x00")

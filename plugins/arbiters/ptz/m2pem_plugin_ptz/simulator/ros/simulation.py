@@ -1,4 +1,4 @@
-"""All simulated cameras of a process: time passes for them."""
+"""Runs all simulated cameras of a process."""
 
 import asyncio
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ NODE = "m2pem_sim_cameras"
 async def simulate(
     specs: Sequence[CameraSpec], clock: Clock, domain_id: int | None, ready: asyncio.Event
 ) -> None:
-    """Simulate them until it is cancelled. `ready` is set when they listen. `domain_id`: of those
-    whose fleet does not say; None takes ROS_DOMAIN_ID."""
+    """Simulate until cancelled. `ready` is set when all cameras are subscribed. `domain_id`: for
+    cameras whose fleet has none; None takes ROS_DOMAIN_ID."""
     runtimes: dict[int | None, RosRuntime] = {}
     nodes: list[CameraNode] = []
     moving: asyncio.Task[None] | None = None

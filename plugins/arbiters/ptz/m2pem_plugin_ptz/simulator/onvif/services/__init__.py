@@ -1,4 +1,4 @@
-"""What all services are made of."""
+"""The services of the simulated camera, one module for each."""
 
 from collections.abc import Callable, Mapping
 from typing import TypeAlias
@@ -12,13 +12,13 @@ NODE = "node_1"
 SOURCE = "video_1"
 
 Operation: TypeAlias = Callable[[Camera, Element, str], str]
-"""Of the camera, the request, and the camera's own URL: what to answer."""
+"""Returns the answer for the camera, the request, and the camera's own URL."""
 
 Operations: TypeAlias = Mapping[str, Operation]
 
 
 def know(asked: str, *tokens: str, what: str = "profile") -> None:
-    """See that a token is one of the camera's.
+    """Check that a token is known.
 
     Raises:
         FaultError: it is not.

@@ -1,4 +1,4 @@
-"""The device service: time, services, what the camera is."""
+"""The device service: time, services, and device information."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -12,7 +12,7 @@ from m2pem_plugin_ptz.simulator.onvif.soap import Element
 FREE = frozenset(
     {"GetSystemDateAndTime", "GetServices", "GetCapabilities", "GetServiceCapabilities"}
 )
-"""What is answered without a password, as the specification has it."""
+"""Operations without a password, by the specification."""
 
 PATHS = {
     soap.DEVICE: "/onvif/device_service",
@@ -24,7 +24,7 @@ PATHS = {
 
 
 def offered(camera: Camera) -> Iterator[str]:
-    """The namespaces of its services."""
+    """Yield the namespaces of its services."""
     yield soap.DEVICE
     if camera.spec.media:
         yield soap.MEDIA

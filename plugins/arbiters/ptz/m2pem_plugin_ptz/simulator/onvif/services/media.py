@@ -1,4 +1,4 @@
-"""The media services: one profile, and where its pictures are. There is no stream."""
+"""The media services: one profile, and the URL of its pictures. There is no stream."""
 
 from m2pem_plugin_ptz.simulator.onvif.camera import Camera
 from m2pem_plugin_ptz.simulator.onvif.services import PROFILE, SOURCE, Operations, know

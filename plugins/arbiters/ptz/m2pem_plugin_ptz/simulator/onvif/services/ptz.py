@@ -1,4 +1,4 @@
-"""The coordinate spaces of the simulated camera: what it says of them, and what they mean."""
+"""The PTZ service: coordinate spaces, status and moves."""
 
 import math
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """A kind of space as a PTZ node lists it."""
+    """A space in the list of a PTZ node."""
 
     kind: str
     uri: str
@@ -36,7 +36,6 @@ class Space:
     y: Range | None = None
 
     def xml(self) -> str:
-        """Its description."""
         ranges = _range("XRange", self.x) + ("" if self.y is None else _range("YRange", self.y))
         return f"<tt:{self.kind}><tt:URI>{self.uri}</tt:URI>{ranges}</tt:{self.kind}>"
 
@@ -46,7 +45,7 @@ def _range(name: str, ends: Range) -> str:
 
 
 def spaces(spec: CameraSpec) -> Iterator[Space]:
-    """All of a camera, in the order of the schema."""
+    """Yield all spaces of a camera, in the order of the schema."""
     both, rate = (-1.0, 1.0), spec.rate_deg_s
     if spec.turns:
         yield Space("AbsolutePanTiltPositionSpace", GENERIC, both, both)
@@ -69,7 +68,7 @@ def spaces(spec: CameraSpec) -> Iterator[Space]:
 
 
 def meaning(spec: CameraSpec, uri: str, x: float, axis: str) -> float:
-    """A number of a space in rad, rad/s or as a zoom factor. `axis`: "pan", "tilt" or "zoom".
+    """Convert a number of a space to rad, rad/s or a zoom factor. `axis`: "pan", "tilt" or "zoom".
 
     Raises:
         FaultError: there is no such space, or the number is outside.
@@ -89,13 +88,13 @@ def meaning(spec: CameraSpec, uri: str, x: float, axis: str) -> float:
     if uri in (VELOCITY, SPEED):
         return x * math.radians(spec.rate_deg_s)
     if uri in (ZOOM_VELOCITY, ZOOM_SPEED):
-        return x * spec.head().zoom.rate
+        return x * spec.gimbal().zoom.rate
     ends = spec.tilt_deg if axis == "tilt" else spec.pan_deg
     return math.radians(ends[0] + (x + 1.0) / 2 * (ends[1] - ends[0]))
 
 
 def share(spec: CameraSpec, value: float, axis: str) -> float:
-    """An angle in rad, or a zoom factor, in the generic space."""
+    """Convert an angle in rad, or a zoom factor, to the generic space."""
     if axis == "zoom":
         return (value - 1.0) / max(spec.zoom_max - 1.0, 1e-9)
     ends = spec.tilt_deg if axis == "tilt" else spec.pan_deg
@@ -106,7 +105,7 @@ DEFAULT_TIMEOUT_S = 10.0
 
 
 def configuration(camera: Camera, tag: str) -> str:
-    """The PTZ configuration of the profile."""
+    """Return the PTZ configuration of the profile."""
     spec = camera.spec
     defaults = ""
     if spec.turns:
@@ -154,14 +153,14 @@ def _one_configuration(camera: Camera, asked: Element, _base: str) -> str:
 
 def _status(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
-    spec, (pan, tilt, zoom) = camera.spec, camera.look
+    spec, (pan, tilt, zoom) = camera.spec, camera.ptz
     if spec.degrees:
         x, y, uri = math.degrees(pan), math.degrees(tilt), DEGREES
     else:
         x, y, uri = share(spec, pan, "pan"), share(spec, tilt, "tilt"), GENERIC
-    head = camera.head
-    turning = "MOVING" if head.pan.moving or head.tilt.moving else "IDLE"
-    zooming = "MOVING" if head.zoom.moving else "IDLE"
+    gimbal = camera.gimbal
+    turning = "MOVING" if gimbal.pan.moving or gimbal.tilt.moving else "IDLE"
+    zooming = "MOVING" if gimbal.zoom.moving else "IDLE"
     position = (
         f'<tt:Position><tt:PanTilt x="{x:.4f}" y="{y:.4f}" space="{uri}"/>'
         f'<tt:Zoom x="{share(spec, zoom, "zoom"):.5f}" space="{ZOOM}"/></tt:Position>'
@@ -185,14 +184,14 @@ def _number(element: Element, name: str) -> float:
 
 
 def _see_that_it_moves(camera: Camera) -> None:
-    if camera.troubles.fault:
-        raise FaultError(camera.troubles.fault, "Action", "MovingPTZ", receiver=True)
+    if camera.fault_state.fault:
+        raise FaultError(camera.fault_state.fault, "Action", "MovingPTZ", receiver=True)
 
 
 def _absolute(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
     _see_that_it_moves(camera)
-    spec, head = camera.spec, camera.head
+    spec, gimbal = camera.spec, camera.gimbal
     place, zoom = asked.child("Position", "PanTilt"), asked.child("Position", "Zoom")
     speed = asked.child("Speed", "PanTilt")
     rate = None
@@ -206,19 +205,19 @@ def _absolute(camera: Camera, asked: Element, _base: str) -> str:
         uri = place.attribute("space") or (DEGREES if spec.degrees else GENERIC)
         pan = meaning(spec, uri, _number(place, "x"), "pan")
         tilt = meaning(spec, uri, _number(place, "y"), "tilt")
-        head.pan.go(pan, rate)
-        head.tilt.go(tilt, rate)
+        gimbal.pan.go(pan, rate)
+        gimbal.tilt.go(tilt, rate)
         camera.moves += 1
     if zoom is not None:
         uri = zoom.attribute("space") or ZOOM
-        head.zoom.go(meaning(spec, uri, _number(zoom, "x"), "zoom"))
+        gimbal.zoom.go(meaning(spec, uri, _number(zoom, "x"), "zoom"))
     return "<tptz:AbsoluteMoveResponse/>"
 
 
 def _continuous(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
     _see_that_it_moves(camera)
-    spec, head = camera.spec, camera.head
+    spec, gimbal = camera.spec, camera.gimbal
     if not spec.drives:
         raise FaultError("no velocities", "ActionNotSupported", receiver=True)
     said = asked.says("Timeout")
@@ -230,12 +229,12 @@ def _continuous(camera: Camera, asked: Element, _base: str) -> str:
         uri = turn.attribute("space") or VELOCITY
         pan = meaning(spec, uri, _number(turn, "x"), "pan")
         tilt = meaning(spec, uri, _number(turn, "y"), "tilt")
-        head.pan.run(pan, until_s)
-        head.tilt.run(tilt, until_s)
+        gimbal.pan.run(pan, until_s)
+        gimbal.tilt.run(tilt, until_s)
         camera.moves += 1
     if zoom is not None:
         uri = zoom.attribute("space") or ZOOM_VELOCITY
-        head.zoom.run(meaning(spec, uri, _number(zoom, "x"), "zoom"), until_s)
+        gimbal.zoom.run(meaning(spec, uri, _number(zoom, "x"), "zoom"), until_s)
     return "<tptz:ContinuousMoveResponse/>"
 
 
@@ -243,10 +242,10 @@ def _stop(camera: Camera, asked: Element, _base: str) -> str:
     know(asked.says("ProfileToken"), PROFILE)
     camera.advance()
     if asked.says("PanTilt") not in ("false", "0"):
-        camera.head.pan.stop()
-        camera.head.tilt.stop()
+        camera.gimbal.pan.stop()
+        camera.gimbal.tilt.stop()
     if asked.says("Zoom") not in ("false", "0"):
-        camera.head.zoom.stop()
+        camera.gimbal.zoom.stop()
     return "<tptz:StopResponse/>"
 
 

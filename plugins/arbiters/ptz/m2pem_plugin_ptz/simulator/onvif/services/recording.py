@@ -1,4 +1,4 @@
-"""The recording control service: one recording, and the jobs that fill it."""
+"""The recording control service: one recording, and its jobs."""
 
 from m2pem_plugin_ptz.simulator.onvif.camera import Camera, Job
 from m2pem_plugin_ptz.simulator.onvif.services import PROFILE, Operations, know
@@ -8,7 +8,7 @@ RECORDING = "recording_1"
 MOST_JOBS = 2
 
 
-def _abilities(_camera: Camera, _asked: Element, _base: str) -> str:
+def _capabilities(_camera: Camera, _asked: Element, _base: str) -> str:
     return (
         "<trc:GetServiceCapabilitiesResponse>"
         '<trc:Capabilities DynamicRecordings="false" MaxRecordings="1" '
@@ -56,7 +56,7 @@ def _create(camera: Camera, asked: Element, _base: str) -> str:
     if source:
         know(source, PROFILE)
     active = _mode(asked.says("JobConfiguration", "Mode"))
-    if camera.troubles.full:
+    if camera.fault_state.full:
         raise FaultError("the storage is full", "Action", "StorageFull", receiver=True)
     if len(camera.jobs) >= MOST_JOBS:
         raise FaultError("there are too many jobs", "Action", "MaxRecordingJobs", receiver=True)
@@ -99,7 +99,7 @@ def _state(camera: Camera, asked: Element, _base: str) -> str:
 
 
 OPERATIONS: Operations = {
-    "GetServiceCapabilities": _abilities,
+    "GetServiceCapabilities": _capabilities,
     "GetRecordings": _recordings,
     "GetRecordingJobs": _jobs,
     "CreateRecordingJob": _create,

@@ -13,7 +13,13 @@ from m2pem.api import BehaviorState, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError
-from m2pem_plugin_ros.drivers.nav2.goal_client import ACTIVE, GoalResult, GoalClient, number_of, numbered
+from m2pem_plugin_ros.drivers.nav2.goal_client import (
+    ACTIVE,
+    GoalClient,
+    GoalResult,
+    number_of,
+    numbered,
+)
 from m2pem_plugin_ros.drivers.nav2.parameters import LocalParameters
 from m2pem_plugin_ros.frames import quaternion_of_yaw
 from m2pem_plugin_ros.pose import Pose
