@@ -193,6 +193,16 @@ def test_a_long_search_is_compiled_again_and_counts_the_same(
     assert commands[:3] == ["pan", Path(quick).name, "pan2"]
 
 
+def test_a_search_reads_no_trail_of_the_search_before_it(folders: Path) -> None:
+    with programs.CheckerFolder() as folder:
+        folder.generate("active proctype one() { assert(true) }")
+        stale = folder.folder / f"{folder.MODEL}1.trail"
+        stale.write_text("0:0:0\n", encoding="utf-8")  # of a checker that was ended too early
+        found = folder.search([], [], lambda _printed, _seconds: "")
+        assert read(found.text).errors == 0
+        assert folder.trail(1) == ""
+
+
 def test_ctrl_c_ends_the_checker_and_tells_what_was_seen(folders: Path) -> None:
     began = time.monotonic()
 

@@ -144,7 +144,7 @@ class CheckerFolder:
     ) -> CheckerOutput:
         began = time.monotonic()
         printed = self.folder / "printed"
-        checker = self._start(["./pan", *arguments], printed)
+        checker = self._start_checker(["./pan", *arguments], printed)
         running.append(checker)
         compiler: subprocess.Popen[bytes] | None = None
         try:
@@ -164,7 +164,7 @@ class CheckerFolder:
                 elif compiler is not None and compiler.poll() == 0 and better:
                     better = None
                     _end(checker)
-                    checker = self._start(["./pan2", *arguments], printed)
+                    checker = self._start_checker(["./pan2", *arguments], printed)
                     running.append(checker)
         except KeyboardInterrupt:
             return self._sum_up(checker, printed, INTERRUPTED)
@@ -209,6 +209,13 @@ class CheckerFolder:
             name = Path(command[0]).name
             raise TooLongError(f"{name} takes longer than {_COMPILE_S:.0f} s") from None
         return done.stdout.decode(errors="replace")
+
+    def _start_checker(self, command: Sequence[str], printed: Path) -> "subprocess.Popen[bytes]":
+        """Start a checker without the trails of the one before, which may have been ended while it
+        wrote one of them."""
+        for old in self.folder.glob("*.trail"):
+            old.unlink()
+        return self._start(command, printed)
 
     def _start(self, command: Sequence[str], printed: Path) -> "subprocess.Popen[bytes]":
         """Start a program in a session of its own: Ctrl-C reaches only this process, which then
