@@ -28,7 +28,7 @@ class GoalArbiter:
     """Keeps every promise of `Arbiter` for subclasses that only speak to their vehicles.
 
     A subclass has `behaviors` and `bounds`, and writes `listen`, `begin`, `end`, `hold` and
-    `resume`. What a vehicle says goes to `heard`. A goal is a text, unique for ever, that stands
+    `resume`. What a vehicle says goes to `receive`. A goal is a text, unique for ever, that stands
     for a behavior on the vehicle: after a restart the behavior is found again by it. Silence of
     a vehicle ends its behavior as LOST. All seconds are those of the clock that was lent.
     """
@@ -52,7 +52,7 @@ class GoalArbiter:
     # --- what a subclass writes -----------------------------------------------------------------
 
     async def listen(self, resource: ResourceId) -> None:
-        """Connect to a resource and hand what it says to `heard`, as long as the link lasts.
+        """Connect to a resource and hand what it says to `receive`, as long as the link lasts.
 
         It is called again a while after it returns or raises OSError.
         """
@@ -85,7 +85,7 @@ class GoalArbiter:
 
     # --- what a subclass calls ------------------------------------------------------------------
 
-    def heard(
+    def receive(
         self,
         state: VehicleState | PayloadState,
         goal: str = "",

@@ -223,7 +223,7 @@ class BehaviorReader:
 
     def _children(self, element: etree._Element) -> Iterator[etree._Element]:
         for child in element:
-            if _is_ours(child.tag):
+            if _is_in_own_namespace(child.tag):
                 yield child
 
     def refuse_repeated(self, items: list[Named], rule: Rule) -> None:
@@ -254,10 +254,10 @@ class BehaviorReader:
 
 def is_behavior(element: etree._Element) -> bool:
     """Whether an element is a `<behavior>`, of no namespace, BPMN's or m2pem's."""
-    return local(element.tag) == "behavior" and _is_ours(element.tag)
+    return local(element.tag) == "behavior" and _is_in_own_namespace(element.tag)
 
 
-def _is_ours(tag: str) -> bool:
+def _is_in_own_namespace(tag: str) -> bool:
     return not tag.startswith("{") or tag.startswith((BPMN, M2PEM))
 
 

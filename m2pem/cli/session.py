@@ -70,10 +70,10 @@ async def driving(
     loop = asyncio.get_running_loop()
     with Interruption(executive) as interruption:
 
-        def nobody_reads() -> None:
+        def stop_output() -> None:
             loop.call_soon_threadsafe(interruption.stop, "nobody reads its output any more")
 
-        output.writer.when_broken(nobody_reads)
+        output.writer.when_broken(stop_output)
         # First, as nothing may come between connecting and taking up a run: reports would be lost.
         async with (
             ControlSocket(executive.control, journal),

@@ -46,7 +46,7 @@ def ask_driver(journal: Path, run: str, method: str, **params: Any) -> Any:
             elsewhere.append(str(error))
     if elsewhere:
         raise NotDrivenError("; ".join(elsewhere))
-    raise _nobody(journal)
+    raise _not_driven(journal)
 
 
 def ask_all(journal: Path, method: str, **params: Any) -> list[Any]:
@@ -57,7 +57,7 @@ def ask_all(journal: Path, method: str, **params: Any) -> list[Any]:
     """
     paths = list(live_sockets(journal))
     if not paths:
-        raise _nobody(journal)
+        raise _not_driven(journal)
     answers: list[Any] = []
     problems: list[str] = []
     with ThreadPoolExecutor(len(paths)) as pool:
@@ -81,7 +81,7 @@ def find_executive(journal: Path, run: str | None) -> Path:
     """
     paths = list(live_sockets(journal))
     if not paths:
-        raise _nobody(journal)
+        raise _not_driven(journal)
     if run is None:
         if len(paths) > 1:
             raise OperatorError(
@@ -101,7 +101,7 @@ def find_executive(journal: Path, run: str | None) -> Path:
     raise OperatorError("; ".join(elsewhere))
 
 
-def _nobody(journal: Path) -> NotDrivenError:
+def _not_driven(journal: Path) -> NotDrivenError:
     return NotDrivenError(
         f"no executive with the journal {journal} is running here; "
         "name the journal of the one you mean with --journal"

@@ -218,10 +218,10 @@ def _behavior_of(script: Element) -> Element | None:
             found = parse_xml((script.text or "").strip().encode(), declared=False).root
         except XmlError:
             return None
-    return _ours(found) if is_behavior(found) else None
+    return _in_own_namespace(found) if is_behavior(found) else None
 
 
-def _ours(element: Element) -> Element:
+def _in_own_namespace(element: Element) -> Element:
     """Copy an element; those of BPMN's or no namespace get m2pem's."""
     name = element.tag
     if not name.startswith("{") or name.startswith(_OURS):
@@ -231,7 +231,7 @@ def _ours(element: Element) -> Element:
         made.set(str(key).removeprefix(M2PEM), value)
     made.text = element.text
     for child in element:
-        made.append(_ours(child))
+        made.append(_in_own_namespace(child))
     return made
 
 

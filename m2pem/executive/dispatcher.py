@@ -183,7 +183,7 @@ class Dispatcher:
     def reported(self, report: BehaviorReport) -> None:
         """An arbiter's report passes through here, so that numbers go on rising; that of a team's
         part goes to its team."""
-        if self._arbiters.teams.heard(report):
+        if self._arbiters.teams.report_received(report):
             return
         active = self._active.get(report.id)
         if active is not None:

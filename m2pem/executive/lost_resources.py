@@ -108,7 +108,7 @@ class LostResources:
 
     async def _stop(self, resource: ResourceId) -> None:
         before, times = "", 0
-        while why := await self._told(resource):
+        while why := await self._end_command(resource):
             self._explain(resource, why)
             times = times + 1 if why == before else 0
             if times % SAY_EVERY == 0:
@@ -123,7 +123,7 @@ class LostResources:
         now = self._availability.reason(resource) or "free"
         log.warning("%s is heard again, has ended what it did before, and is %s", resource, now)
 
-    async def _told(self, resource: ResourceId) -> str:
+    async def _end_command(self, resource: ResourceId) -> str:
         """Have it stop; returns "" when it has acknowledged, else why it is not free."""
         arbiter = self._arbiters.of(resource)
         try:

@@ -74,11 +74,11 @@ async def verify_in_subprocess(
         limits,
     )
 
-    def told(content: bytes) -> None:
+    def report_progress(content: bytes) -> None:
         if on_progress is not None:
             on_progress(msgspec.msgpack.decode(content, type=SearchProgress))
 
-    answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order), told)
+    answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order), report_progress)
     found: dict[str, Any] = msgspec.json.decode(answer)
     return found
 

@@ -48,14 +48,18 @@ class Fence:
         if start is not None and levels:
             began = self._frame.to_local(start)
             if self._outside_m(began) <= MARGIN_M and (out := self._worst(began, levels[0])):
-                return f"the way to {name(0)} leaves the fleet's fence {self._told(*out)}"
+                return (
+                    f"the way to {name(0)} leaves the fleet's fence {self._describe_breach(*out)}"
+                )
         for index, (a, b) in enumerate(pairwise(levels)):
             if out := self._worst(a, b):
                 ends = f"{name(index)} and {name(index + 1)}"
-                return f"the way between {ends} leaves the fleet's fence {self._told(*out)}"
+                return (
+                    f"the way between {ends} leaves the fleet's fence {self._describe_breach(*out)}"
+                )
         return ""
 
-    def _told(self, level: EastNorth, by_m: float) -> str:
+    def _describe_breach(self, level: EastNorth, by_m: float) -> str:
         return f"by {_by(by_m)} at {_text(self._frame.to_latlon(level))}"
 
     def _outside_m(self, level: EastNorth) -> float:

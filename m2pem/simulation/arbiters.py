@@ -423,7 +423,7 @@ class SimArbiter:
     async def _listen(self) -> None:
         async for state in self._context.bus.subscribe():
             if isinstance(state, VehicleState) and state.position is not None:
-                self._detectors.heard(state.resource, state.position, self._clock.now_us())
+                self._detectors.vehicle_moved(state.resource, state.position, self._clock.now_us())
 
     # --- state files ----------------------------------------------------------------------------
 

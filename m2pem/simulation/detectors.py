@@ -69,8 +69,8 @@ class Detectors:
             if detector.payload.carrier == vehicle:
                 self._look(detector, now_us)
 
-    def heard(self, vehicle: ResourceId, position: GeoPosition, now_us: int) -> None:
-        """A vehicle that is not simulated was heard: its simulated detector may find something."""
+    def vehicle_moved(self, vehicle: ResourceId, position: GeoPosition, now_us: int) -> None:
+        """A vehicle that is not simulated has moved: its detector may find something."""
         for detector in self._detectors:
             if detector.payload.carrier == vehicle and detector.carrier is None:
                 place = self._frame.to_place(position.latlon)

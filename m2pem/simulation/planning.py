@@ -100,7 +100,7 @@ class Planner:
         self._frame = frame
         self._bodies = bodies
 
-    def whereabouts(self, vehicle: str, now_us: int) -> Pose | None:
+    def pose_of(self, vehicle: str, now_us: int) -> Pose | None:
         """How a vehicle stands: a simulated one, or as it was heard on the bus."""
         body = self._bodies.get(ResourceId(vehicle))
         if isinstance(body, SimVehicle):
@@ -120,7 +120,7 @@ class Planner:
 
     def payload_position(self, payload: ResourceId, now_us: int) -> GeoPosition | None:
         """Where a payload is; None: where its vehicle is, is not known."""
-        pose = self.whereabouts(carrier_of(payload), now_us)
+        pose = self.pose_of(carrier_of(payload), now_us)
         if pose is None:
             return None
         east, north, up = pose.place
@@ -144,7 +144,7 @@ class Planner:
             if problem:
                 raise RefusedError(problem)
         parameters = LocalParameters(
-            request.parameters, self._frame, lambda vehicle: self.whereabouts(vehicle, now_us)
+            request.parameters, self._frame, lambda vehicle: self.pose_of(vehicle, now_us)
         )
         idle = [Assignment(body) for body in bodies if body not in acting]
         if type_ is BehaviorType.PAYLOAD:
@@ -188,7 +188,7 @@ class Planner:
         self, body: SimPayload, request: BehaviorRequest, parameters: LocalParameters, now_us: int
     ) -> Assignment:
         carrier = self._bodies.get(body.carrier)
-        pose = self.whereabouts(body.carrier, now_us)
+        pose = self.pose_of(body.carrier, now_us)
         ground = carrier.home[2] if isinstance(carrier, SimVehicle) else 0.0
         gaze = GAZES[request.behavior](body.mount(now_us, pose, ground), parameters)
         chase = None

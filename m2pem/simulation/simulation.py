@@ -68,7 +68,7 @@ def next_step(part: Part, planner: Planner, now_us: int) -> None:
         pose = body.pose(now_us)
         chase = part.chase
         station, velocity = pose.place, (0.0, 0.0, 0.0)
-        if (target := planner.whereabouts(chase.target, now_us)) is not None:
+        if (target := planner.pose_of(chase.target, now_us)) is not None:
             station, velocity = chase.station(target), target.velocity
         phase = steer(
             body.kinematics,
@@ -80,10 +80,10 @@ def next_step(part: Part, planner: Planner, now_us: int) -> None:
         )
         body.take(Plan([phase]), now_us)
     elif isinstance(body, SimPayload) and isinstance(part.chase, Aim):
-        carrier = planner.whereabouts(body.carrier, now_us)
+        carrier = planner.pose_of(body.carrier, now_us)
         place = part.chase.place
         if part.chase.vehicle:
-            target = planner.whereabouts(part.chase.vehicle, now_us)
+            target = planner.pose_of(part.chase.vehicle, now_us)
             place = target.place if target is not None else place
             carrier = carrier if target is not None else None
         if carrier is None:

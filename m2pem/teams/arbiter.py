@@ -48,7 +48,7 @@ class Teams:
 
     `arbiter_of`: the arbiter of a vehicle. Parts of a behavior are named after it and their member:
     "r1.b3.evsg1" is what evsg1 does of r1.b3; who reads the arbiters' reports hands those of parts
-    to `heard`, and faults of members to `fault`.
+    to `report_received`, and faults of members to `fault`.
     """
 
     def __init__(
@@ -205,7 +205,7 @@ class Teams:
 
     # --- what the executive tells ---------------------------------------------------------------
 
-    def heard(self, report: BehaviorReport) -> bool:
+    def report_received(self, report: BehaviorReport) -> bool:
         """Take a report if it is of a part; False: it is a behavior's of its own."""
         name, _, part = report.id.partition(".")
         name, part = f"{name}.{part.partition('.')[0]}", part.partition(".")[2]
@@ -215,7 +215,7 @@ class Teams:
         if behavior is None:
             _log.info("a report for %s, of a team behavior that is not known here", report.id)
         else:
-            behavior.heard(report)
+            behavior.report_received(report)
         return True
 
     def fault(self, resource: ResourceId, code: str, reason: str) -> bool:

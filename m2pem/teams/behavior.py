@@ -87,7 +87,7 @@ class TeamBehavior:
         """Begin, or go on after a restart."""
         self._ticking = asyncio.get_running_loop().create_task(self._tick())
         for report in self._ended_meanwhile:
-            self.heard(report)
+            self.report_received(report)
         self._review()
 
     def cancel(self, epoch: int) -> None:
@@ -145,7 +145,7 @@ class TeamBehavior:
 
     # --- what happens to members ----------------------------------------------------------------
 
-    def heard(self, report: BehaviorReport) -> None:
+    def report_received(self, report: BehaviorReport) -> None:
         """A member's arbiter has reported of its part."""
         member = next((each for each in self.members.values() if each.part == report.id), None)
         if member is None or not member.active:
@@ -267,10 +267,12 @@ class TeamBehavior:
             self._end_well()
 
     def _send_off(self) -> None:
-        for errand in self._shares.errands(self.members, self.epoch):
-            part = f"{self.id}.{errand.part}"
-            preempts = self._request.preempts if errand.own else ()
-            errand.member.begin(part, errand.leg, self.epoch, preempts, self._clock.now_us())
+        for assignment in self._shares.assignments(self.members, self.epoch):
+            part = f"{self.id}.{assignment.part}"
+            preempts = self._request.preempts if assignment.own else ()
+            assignment.member.begin(
+                part, assignment.leg, self.epoch, preempts, self._clock.now_us()
+            )
 
     def _parts(self) -> dict[str, str | None]:
         """The parts that have begun, with their references."""
@@ -385,5 +387,5 @@ class TeamBehavior:
             abs(now - then) > STIR_M for now, then in zip(controller.marks_m, before, strict=True)
         ):
             self._stirred_us = self._clock.now_us()
-        if any(member.told_of for member in self.members.values()):
+        if any(member.publishes_position for member in self.members.values()):
             self._show(controller.kept(), controller.spacing_m)

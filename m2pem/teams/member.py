@@ -68,14 +68,14 @@ class Member:
         return self._adjusting is not None
 
     @property
-    def told_of(self) -> bool:
+    def publishes_position(self) -> bool:
         """Whether it tells where it is all the time."""
         return math.isfinite(self.limits.lost_after_s)
 
     @property
     def in_sight(self) -> bool:
         """Whether it is known all the time where it is, so that it can be marshalled."""
-        return self._sighted or self.told_of
+        return self._sighted or self.publishes_position
 
     @property
     def active(self) -> bool:

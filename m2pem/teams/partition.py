@@ -25,7 +25,7 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
-class Errand:
+class Assignment:
     """A share that a member can begin now, as that part."""
 
     member: Member
@@ -81,7 +81,7 @@ class Partition:
                 share.by, share.part = None, ""
                 share.given_up = not self._plan.shared
 
-    def errands(self, members: Mapping[ResourceId, Member], epoch: int) -> Iterator[Errand]:
+    def assignments(self, members: Mapping[ResourceId, Member], epoch: int) -> Iterator[Assignment]:
         """What can begin now. Each is marked as begun when it is handed out."""
         for origin, share in self._shares.items():
             if share.over or share.by is not None:
@@ -94,7 +94,9 @@ class Partition:
             if not own and not self.again:
                 part = f"{taker.id}/{origin}"
             share.by, share.part = taker.id, part
-            yield Errand(taker, share.leg if own else self._fitted(share.leg, taker.id), part, own)
+            yield Assignment(
+                taker, share.leg if own else self._fitted(share.leg, taker.id), part, own
+            )
 
     def _taker(
         self, origin: ResourceId, share: Share, members: Mapping[ResourceId, Member]

@@ -130,10 +130,10 @@ class TeamSituation:
     def _state(self, vehicle: ResourceId) -> VehicleState | None:
         sighted = self._sighted.get(vehicle)
         state = sighted.sight(vehicle) if sighted is not None else None
-        state = state or self._heard(vehicle)
+        state = state or self._wait_for_state(vehicle)
         return state if state is not None and state.position is not None else None
 
-    def _heard(self, vehicle: ResourceId) -> VehicleState | None:
+    def _wait_for_state(self, vehicle: ResourceId) -> VehicleState | None:
         state = self._bus.latest(vehicle)
         return state if isinstance(state, VehicleState) else None
 

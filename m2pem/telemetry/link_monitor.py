@@ -73,7 +73,7 @@ class LinkMonitor:
         """When `check` must be called next; None: never."""
         return self._next_check_us
 
-    def heard(self, state: VehicleState | PayloadState, now_us: int) -> list[ResourceFault]:
+    def received(self, state: VehicleState | PayloadState, now_us: int) -> list[ResourceFault]:
         """A state came in at `now_us`; its own `time_us` is another machine's and not trusted."""
         faults: list[ResourceFault] = []
         link = self._links.get(state.resource)
@@ -137,7 +137,7 @@ class LinkMonitor:
 
     def _first_due(self, now_us: int) -> int | None:
         # A lost resource may recover and fall silent before its next check: look at it at least
-        # once in its bound. Hearing somebody only puts off what is due, so `heard` need not ask.
+        # once in its bound. Hearing somebody only puts off what is due, so `received` need not ask.
         due = (
             (now_us if link.lost else link.heard_us) + link.bound_us + 1
             for link in self._links.values()
@@ -169,6 +169,6 @@ async def monitor_links(
         async for state in states:
             if isinstance(state, TeamState):
                 continue
-            for fault in rules.heard(state, clock.now_us()):
+            for fault in rules.received(state, clock.now_us()):
                 sink(fault)
         checking.cancel()

@@ -34,7 +34,7 @@ class Boats(GoalArbiter):
                 raise self.breaks
             if resource not in self.silent:
                 now_us = self.context.clock.now_us()
-                self.heard(VehicleState(resource, now_us), self.goals.get(resource, ""))
+                self.receive(VehicleState(resource, now_us), self.goals.get(resource, ""))
             await self.context.clock.sleep(0.5)
 
     def refusal(self, request: BehaviorRequest) -> str:
@@ -83,7 +83,7 @@ def test_an_old_goal_of_a_vehicle_says_nothing_of_a_new_behavior_of_the_same_id(
     async def main(clock):
         boats = Boats(clock)
         async with ArbiterHarness(boats, clock) as bench:
-            boats.heard(VehicleState(FIRST, 0), "goal-of-last-year", BehaviorState.SUCCEEDED)
+            boats.receive(VehicleState(FIRST, 0), "goal-of-last-year", BehaviorState.SUCCEEDED)
             return await boats.query("r1.b1", "goal-of-another-run"), bench.reports
 
     found, reports = virtual(main)

@@ -133,7 +133,7 @@ class CartArbiter(GoalArbiter):
                     yaw_rad=cart.yaw_rad,
                     battery_fraction=driven.battery,
                 )
-                self.heard(state, driven.goal, driven.became, driven.code)
+                self.receive(state, driven.goal, driven.became, driven.code)
             await self.context.clock.sleep(STEP_S)
 
     def refusal(self, request: BehaviorRequest) -> str:

@@ -46,7 +46,7 @@ class Crew(Teams):
             self._hand_over(report)
 
     def _hand_over(self, report: BehaviorReport) -> None:
-        assert self.heard(report)
+        assert self.report_received(report)
 
     async def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:  # type: ignore[override]
         async for state in self.carts.telemetry():

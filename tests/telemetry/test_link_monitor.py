@@ -39,7 +39,7 @@ def run_checks(rules: LinkMonitor, until_us: int) -> list[ResourceFault]:
 
 def test_silence_beyond_the_bound_is_one_fault() -> None:
     rules = LinkMonitor({UGV: 3.0}, since_us=0)
-    rules.heard(vehicle(), 10 * S)
+    rules.received(vehicle(), 10 * S)
     assert run_checks(rules, 13 * S) == []
     assert run_checks(rules, 60 * S) == [lost(UGV, "not heard for 3.0 s")]
 
@@ -59,19 +59,19 @@ def test_each_resource_has_its_own_bound_and_faults_come_in_the_fleets_order() -
 
 def test_hearing_a_vehicle_is_not_hearing_its_payload() -> None:
     rules = LinkMonitor({UGV: 1.0, PTZ: 1.0}, since_us=0)
-    rules.heard(vehicle(), 1 * S)
+    rules.received(vehicle(), 1 * S)
     assert [fault.resource for fault in run_checks(rules, 1 * S + 1)] == [PTZ]
-    assert rules.heard(PayloadState(PTZ, time_us=0), 2 * S) == []
+    assert rules.received(PayloadState(PTZ, time_us=0), 2 * S) == []
 
 
 def test_the_same_loss_is_said_again_only_after_it_was_heard_for_its_bound() -> None:
     rules = LinkMonitor({UGV: 2.0}, since_us=0)
     assert len(run_checks(rules, 3 * S)) == 1
     for second in (10, 11):  # heard for 1 s only
-        rules.heard(vehicle(), second * S)
+        rules.received(vehicle(), second * S)
     assert run_checks(rules, 19 * S) == []
     for second in (20, 21, 22):
-        rules.heard(vehicle(), second * S)
+        rules.received(vehicle(), second * S)
     assert run_checks(rules, 40 * S) == [lost(UGV, "not heard for 2.0 s")]
 
 
@@ -79,22 +79,22 @@ def test_a_gap_begins_the_recovery_anew() -> None:
     rules = LinkMonitor({UGV: 2.0}, since_us=0)
     assert len(run_checks(rules, 3 * S)) == 1
     for second in (10, 11, 14, 15):
-        rules.heard(vehicle(), second * S)
+        rules.received(vehicle(), second * S)
     assert run_checks(rules, 40 * S) == []
 
 
 def test_an_arbiter_that_lost_the_link_is_believed_at_once_and_once() -> None:
     rules = LinkMonitor({UGV: 30.0}, since_us=0)
-    rules.heard(vehicle(), 1 * S)
+    rules.received(vehicle(), 1 * S)
     gone = vehicle(link=LinkState.LOST)
-    assert rules.heard(gone, 2 * S) == [lost(UGV, "its arbiter lost the link")]
-    assert rules.heard(gone, 3 * S) == []
+    assert rules.received(gone, 2 * S) == [lost(UGV, "its arbiter lost the link")]
+    assert rules.received(gone, 3 * S) == []
     assert run_checks(rules, 90 * S) == []
 
 
 def test_a_degraded_link_is_no_fault() -> None:
     rules = LinkMonitor({UGV: 3.0}, since_us=0)
-    assert rules.heard(vehicle(link=LinkState.DEGRADED), 2 * S) == []
+    assert rules.received(vehicle(link=LinkState.DEGRADED), 2 * S) == []
     assert run_checks(rules, 5 * S) == []
 
 
@@ -102,13 +102,13 @@ def test_a_resource_without_a_bound_may_be_silent_for_ever() -> None:
     rules = LinkMonitor({UGV: math.inf}, since_us=0)
     assert rules.next_check_us is None
     assert rules.check(1000 * S) == []
-    assert rules.heard(vehicle(UAV), 1 * S) == []
+    assert rules.received(vehicle(UAV), 1 * S) == []
 
 
 def test_a_check_that_comes_late_first_lets_the_waiting_states_be_heard() -> None:
     rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=0)
     assert rules.check(20 * S) == []
-    rules.heard(vehicle(UGV), 20 * S)
+    rules.received(vehicle(UGV), 20 * S)
     assert [fault.resource for fault in run_checks(rules, 21 * S)] == [UAV]
 
 
@@ -129,24 +129,24 @@ def test_a_check_before_its_time_changes_nothing() -> None:
 
 def test_a_low_battery_is_one_fault_of_a_vehicle_that_can_still_be_reached() -> None:
     rules = LinkMonitor({}, since_us=0)
-    assert rules.heard(vehicle(battery=0.15), S) == []
-    assert rules.heard(vehicle(battery=0.14), S) == [
+    assert rules.received(vehicle(battery=0.15), S) == []
+    assert rules.received(vehicle(battery=0.14), S) == [
         ResourceFault(UGV, "BATTERY_LOW", "battery at 14%, below 15%", reachable=True)
     ]
-    assert rules.heard(vehicle(battery=0.10), S) == []
+    assert rules.received(vehicle(battery=0.10), S) == []
 
 
 def test_a_battery_is_low_again_only_after_it_rose_above_the_upper_level() -> None:
     rules = LinkMonitor({}, since_us=0, critical=0.3, recovered=0.5)
     levels = [0.29, 0.31, 0.29, 0.5, 0.29, None, 0.29, 0.51, 0.29]
-    faults = [len(rules.heard(vehicle(battery=level), S)) for level in levels]
+    faults = [len(rules.received(vehicle(battery=level), S)) for level in levels]
     assert faults == [1, 0, 0, 0, 0, 0, 0, 0, 1]
 
 
 def test_batteries_of_two_vehicles_are_apart() -> None:
     rules = LinkMonitor({}, since_us=0)
-    assert len(rules.heard(vehicle(UGV, battery=0.1), S)) == 1
-    assert len(rules.heard(vehicle(UAV, battery=0.1), S)) == 1
+    assert len(rules.received(vehicle(UGV, battery=0.1), S)) == 1
+    assert len(rules.received(vehicle(UAV, battery=0.1), S)) == 1
 
 
 @pytest.mark.parametrize(("critical", "recovered"), [(0.3, 0.2), (-0.1, 0.2), (0.5, 1.5)])

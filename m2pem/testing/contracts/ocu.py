@@ -126,7 +126,7 @@ class OcuContract(Contract):
 
         with_ocu(main)
 
-    def test_is_told_that_another_operator_answered_first(
+    def test_shows_that_another_operator_answered_first(
         self, with_ocu: Callable[[Main], None]
     ) -> None:
         """It shows who it was."""

@@ -97,7 +97,7 @@ def findings_of(
     run_step = []
     for result in report.results:
         net = report.transitions_of(result)
-        run_step += [_told(net, element_names, result, each) for each in result.violations]
+        run_step += [_describe(net, element_names, result, each) for each in result.violations]
     run_step.sort(key=lambda each: (each.answer.warning, _follows(each.answer)))
     found = report.found
     stopped = found.stopped.value if found.stopped is not None else ""
@@ -161,7 +161,7 @@ def marks_of(violation: DescribedViolation, unreached: frozenset[str] = frozense
     return Overlays(steps, wrong, waiting, tokens, frozenset(violation.missing), unreached)
 
 
-def _told(
+def _describe(
     net: PetriNet, element_names: ElementNames, answer: Result, found: Violation
 ) -> DescribedViolation:
     if not found.run and not found.cycle:

@@ -163,7 +163,7 @@ def describe_run(
             continue
         if any(each.steps for each in waiting):
             run_step.append(
-                _told(begin + len(run_step) + 1, waiting, element_names, encoding, state)
+                _run_step(begin + len(run_step) + 1, waiting, element_names, encoding, state)
             )
             waiting = []
     return tuple(run_step), state
@@ -261,7 +261,7 @@ def _same_step(transition: Transition, following: Transition) -> bool:
     return again and following.trigger is None
 
 
-def _told(
+def _run_step(
     number: int,
     transitions: Sequence[Transition],
     element_names: ElementNames,

@@ -97,11 +97,11 @@ class PtzArbiter:
         for resource, settings in self._settings.items():
             connection = self._connections[resource]
 
-            def heard(resource: ResourceId = resource) -> None:
+            def on_telemetry(resource: ResourceId = resource) -> None:
                 if resource in cameras:
                     cameras[resource].last_contact_us = context.clock.now_us()
 
-            driver = self._make_driver(DriverSetup(connection, settings, context, heard))
+            driver = self._make_driver(DriverSetup(connection, settings, context, on_telemetry))
             self._drivers.append(driver)
             model = CameraModel(resource, connection.domain, driver, settings, context)
             limits = self.limits(resource)

@@ -63,7 +63,7 @@ class Dynamics:
 
     def step(self, now_s: float, dt_s: float) -> None:
         """Advance by `dt_s` to `now_s`."""
-        told = self._told(now_s)
+        told = self._requested_twist(now_s)
         if self._stands:
             if not _moves(told):
                 return
@@ -74,7 +74,7 @@ class Dynamics:
         if not (_moves(told) or _moves(self._twist) or _moves(self._wanted)):
             self._stands, self._twist, self._wanted = True, Twist(), Twist()
 
-    def _told(self, now_s: float) -> Twist:
+    def _requested_twist(self, now_s: float) -> Twist:
         """Return the bounded command; zero if it is old, or the wheels are stuck."""
         chassis, command = self.chassis, self._command
         if self.stuck or now_s - self._commanded_s > chassis.command_timeout_s:

@@ -76,7 +76,7 @@ class MavlinkDriver:
         if own.gimbal:
             self._gimbal = GimbalDriver(camera_context)
             self._gimbal.open()
-        self._camera = CameraComponent(replace(camera_context, heard=self._camera_heard))
+        self._camera = CameraComponent(replace(camera_context, heard=self._camera_received))
         self._camera.open()
 
     async def close(self) -> None:
@@ -161,8 +161,8 @@ class MavlinkDriver:
             raise CameraError(NOT_OPEN)
         return self._camera
 
-    def _camera_heard(self) -> None:
+    def _camera_received(self) -> None:
         """Report a message of the camera, unless there is a gimbal, whose silence must not be
         hidden."""
-        if self._gimbal is None or not self._gimbal.is_heard:
+        if self._gimbal is None or not self._gimbal.is_received:
             self._setup.heard()

@@ -50,7 +50,7 @@ class GimbalControl:
             "and must release it first"
         )
 
-    def told(self, controller: Address | None) -> None:
+    def control_changed(self, controller: Address | None) -> None:
         """Process the controller that the manager reports."""
         if controller is None:
             return
@@ -160,7 +160,7 @@ class GimbalDriver:
         return self._context.attitude.to_mount((yaw_rad, attitude.pitch_rad))
 
     @property
-    def is_heard(self) -> bool:
+    def is_received(self) -> bool:
         """Whether the gimbal has ever reported its direction."""
         return bool(self._status.attitudes)
 
@@ -218,7 +218,9 @@ class GimbalDriver:
                 self._context.heard()
         elif self._found is not None:
             known = self._found.gimbal
-            self._found.control.told(self._status.controller(known.manager, known.device))
+            self._found.control.control_changed(
+                self._status.controller(known.manager, known.device)
+            )
 
     @property
     def _attitude(self) -> gimbal_status.GimbalAttitude | None:

@@ -120,7 +120,7 @@ class Nav2:
         """Return the action that Nav2 executes for another client; "" if there is none."""
         return self._other_client((self.waypoints, self.through_poses, self.to_pose))
 
-    def ours(self) -> set[UUID]:
+    def own_goals(self) -> set[UUID]:
         """Return the goals of this client that go on."""
         return {goal for client in self._clients() for goal in client.active & self._ours}
 
@@ -185,7 +185,7 @@ class Nav2:
         """
         await self._all([client for client in self._clients() if client.there or client.active])
 
-    async def stop_ours(self, which: Callable[[UUID], bool] = lambda _: True) -> None:
+    async def stop_own_goals(self, which: Callable[[UUID], bool] = lambda _: True) -> None:
         """Cancel goals of this client, and leave the others.
 
         Raises:

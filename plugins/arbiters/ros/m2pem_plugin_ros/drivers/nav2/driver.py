@@ -118,7 +118,9 @@ class Nav2Driver:
                 self._replace(lambda: self._stop_for(drive))
             return
         outcome = self._ended.get(goal, Outcome(BehaviorState.CANCELLED))
-        active = nav2 is not None and any(number_of(goal, each) is not None for each in nav2.ours())
+        active = nav2 is not None and any(
+            number_of(goal, each) is not None for each in nav2.own_goals()
+        )
         if nav2 is None or not (active or (self._was_lost and goal not in self._ended)):
             self._events.ended(goal, outcome)
             return
@@ -262,7 +264,7 @@ class Nav2Driver:
         """Cancel the goals of a failed order. Goals of other clients go on."""
         if outcome.code != "TAKEN_OVER" and self._nav2 is not None:
             try:
-                await self._nav2.stop_ours()
+                await self._nav2.stop_own_goals()
             except RosError as error:
                 self._logger.error("%s: does not stop: %s", self._name, error)
         self._end_drive(drive, outcome)
@@ -275,7 +277,7 @@ class Nav2Driver:
                     # What it does may have been told while it was not heard: all is cancelled.
                     await nav2.stop()
                 else:
-                    await nav2.stop_ours(lambda active: number_of(goal, active) is not None)
+                    await nav2.stop_own_goals(lambda active: number_of(goal, active) is not None)
             except RosError as error:
                 self._logger.error("%s: %s does not end: %s", self._name, goal, error)
                 await self._setup.context.clock.sleep(AGAIN_S)
@@ -330,8 +332,8 @@ class Nav2Driver:
     async def _check_drive(self, nav2: Nav2) -> None:
         """Cancel goals without an order, and fail the order if Nav2 has ended."""
         drive = self._drive
-        if drive is None and not self._work and not self._was_lost and nav2.ours():
-            await nav2.stop_ours()
+        if drive is None and not self._work and not self._was_lost and nav2.own_goals():
+            await nav2.stop_own_goals()
         elif (
             drive is not None
             and drive.task.needs_nav2
