@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import UnionType
-from typing import Any, TypeAlias, get_args, get_origin
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
@@ -15,6 +14,9 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from m2pem.findings import Finding, Severity, unreadable_remedy
 from m2pem.mission.values import MAX_DEPTH, Value
 from m2pem.suggestions import did_you_mean, suggest
+
+if TYPE_CHECKING:  # a spec file of requirements needs no pydantic
+    from pydantic import BaseModel, ValidationError
 
 MAX_BYTES = 2_000_000
 MAX_VALUES = 200_000
@@ -222,7 +224,9 @@ _REMEDY = {
 }
 
 
-def note_shape_findings(source: YamlSource, error: ValidationError, root: type[BaseModel]) -> None:
+def note_shape_findings(
+    source: YamlSource, error: "ValidationError", root: "type[BaseModel]"
+) -> None:
     """Add a finding to `source` for everything in `error`; `root` is the model of the file."""
     for detail in error.errors():
         path: KeyPath = tuple(part for part in detail["loc"] if part != "[key]")
@@ -230,7 +234,7 @@ def note_shape_findings(source: YamlSource, error: ValidationError, root: type[B
 
 
 def _note(
-    source: YamlSource, kind: str, path: KeyPath, detail: Mapping[str, Any], root: type[BaseModel]
+    source: YamlSource, kind: str, path: KeyPath, detail: Mapping[str, Any], root: "type[BaseModel]"
 ) -> None:
     last = str(path[-1]) if path else ""
     if kind == "extra_forbidden":
@@ -255,15 +259,19 @@ def _note(
         source.error(path, "bad-value", f"{shown} {message}", _REMEDY.get(kind, ""))
 
 
-def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel]:
+def _model_at(model: "type[BaseModel]", path: KeyPath) -> "type[BaseModel]":
     """The model of the map at `path` below one of `model`."""
     here: Any = model
     for part in path:
-        if isinstance(here, type) and issubclass(here, BaseModel):
+        if _is_model(here):
             here = _unwrapped(here.model_fields[str(part)].annotation)
         elif get_origin(here) in (dict, list):
             here = _unwrapped(get_args(here)[-1])
-    return here if isinstance(here, type) and issubclass(here, BaseModel) else model
+    return here if _is_model(here) else model
+
+
+def _is_model(here: Any) -> bool:
+    return isinstance(here, type) and hasattr(here, "model_fields")
 
 
 def _unwrapped(annotation: Any) -> Any:

@@ -14,7 +14,7 @@ from fastapi import APIRouter
 from fastapi import Path as InPath
 from fastapi.responses import Response
 
-from m2pem_plugin_web.access.roles import Viewer
+from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.settings import TILES, SettingError
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import httpx
 from fastapi import FastAPI
-from m2pem_plugin_web.access.roles import SCOPE_KEY, Person, Role
+from m2pem_plugin_web.access.permissions import SCOPE_KEY
+from m2pem_plugin_web.access.roles import Person, Role
 from m2pem_plugin_web.problems import handle_problems
 from m2pem_plugin_web.rest import (
     catalogue,

@@ -6,8 +6,8 @@ from typing import Any
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from m2pem_plugin_web.access.permissions import SCOPE_KEY
 from m2pem_plugin_web.access.requests import SAFE_METHODS, foreign, wrong_host
-from m2pem_plugin_web.access.roles import SCOPE_KEY
 from m2pem_plugin_web.access.sign_in import KEY_HEADER, Entry, key_of
 from m2pem_plugin_web.problems import problem
 from m2pem_plugin_web.server import Slots

@@ -10,7 +10,7 @@ from fastapi import APIRouter, WebSocket
 from starlette.websockets import WebSocketDisconnect, WebSocketDisconnected
 
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.roles import person_of
+from m2pem_plugin_web.access.permissions import person_of
 from m2pem_plugin_web.access.sign_in import SUBPROTOCOL, Entry, key_of
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub

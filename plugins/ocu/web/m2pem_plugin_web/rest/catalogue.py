@@ -17,7 +17,7 @@ from m2pem.api import (
     ResourceId,
     as_geojson,
 )
-from m2pem_plugin_web.access.roles import Viewer
+from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES
 
 _UNITS = {

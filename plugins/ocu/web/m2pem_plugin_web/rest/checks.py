@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from m2pem.api import Draft, MissionControl, Outline
 from m2pem.errors import MissionError
-from m2pem_plugin_web.access.roles import Viewer
+from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.missions.names import PathNames
 from m2pem_plugin_web.problems import RESPONSES

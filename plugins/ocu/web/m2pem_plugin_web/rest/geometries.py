@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from m2pem.api import Area, MissionControl, Point, Route, as_geojson, parse_geojson
 from m2pem.errors import M2pemError
-from m2pem_plugin_web.access.roles import Operator, Viewer
+from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.missions.names import LONGEST, PATTERN
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import Body, Name, find_run

@@ -8,7 +8,7 @@ from fastapi import Path as InPath
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem_plugin_web.access.roles import Commander, Viewer
+from m2pem_plugin_web.access.permissions import Commander, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder, Saved, Summaries
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.drafts import MissionName, of_folder, source_of

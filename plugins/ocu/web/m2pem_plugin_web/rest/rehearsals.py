@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import AwareDatetime, BaseModel, Field
 
 from m2pem.api import MissionControl, MissionFile, SimulationResult
-from m2pem_plugin_web.access.roles import Operator, Viewer
+from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.jobs import Job, Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES, ProblemError

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from m2pem.api import Draft, MissionControl, MissionFile, RunStatus, RunSummary
 from m2pem.errors import M2pemError, MissionError
-from m2pem_plugin_web.access.roles import Commander, Viewer
+from m2pem_plugin_web.access.permissions import Commander, Viewer
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
 from m2pem_plugin_web.rest.drafts import WrittenName, of_folder

@@ -9,7 +9,8 @@ from pydantic import BaseModel, Field
 
 from m2pem.api import MissionControl
 from m2pem_plugin_web.access.passwords import LONGEST
-from m2pem_plugin_web.access.roles import Person, Role, Viewer
+from m2pem_plugin_web.access.permissions import Viewer
+from m2pem_plugin_web.access.roles import Person, Role
 from m2pem_plugin_web.access.sessions import Secrets
 from m2pem_plugin_web.access.sign_in import Entry, ThrottledError
 from m2pem_plugin_web.problems import RESPONSES, ProblemError

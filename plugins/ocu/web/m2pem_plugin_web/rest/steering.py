@@ -5,8 +5,9 @@ from pydantic import BaseModel
 
 from m2pem.api import MissionControl
 from m2pem.errors import NotDrivenError
+from m2pem_plugin_web.access.permissions import Operator, Stopper, Viewer
 from m2pem_plugin_web.access.requests import LATEST_S, age_s
-from m2pem_plugin_web.access.roles import Operator, Person, Stopper, Viewer
+from m2pem_plugin_web.access.roles import Person
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem_plugin_web.access.roles import Viewer
+from m2pem_plugin_web.access.permissions import Viewer
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
 from m2pem_plugin_web.rest.models import find_run
 from m2pem_plugin_web.rest.rehearsals import SampleModel

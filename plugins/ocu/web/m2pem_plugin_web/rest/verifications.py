@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from m2pem.api import MissionControl, SearchLimits, SearchProgress
-from m2pem_plugin_web.access.roles import Operator, Viewer
+from m2pem_plugin_web.access.permissions import Operator, Viewer
 from m2pem_plugin_web.jobs import Jobs, JobState
 from m2pem_plugin_web.missions.folder import MissionFolder
 from m2pem_plugin_web.problems import RESPONSES
