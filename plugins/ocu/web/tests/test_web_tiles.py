@@ -69,7 +69,7 @@ def test_what_is_no_file_of_pictures_is_refused_by_name(tmp_path: Path) -> None:
     text.write_text("no database, but a text that is long enough to be taken for one" * 20)
     with pytest.raises(SettingError, match=r"text\.mbtiles is no MBTiles file"):
         Tiles(text)
-    with pytest.raises(SettingError, match=r"'pbf': the map shows pictures alone"):
+    with pytest.raises(SettingError, match=r"'pbf': the map shows images only"):
         Tiles(mbtiles(tmp_path / "shapes.mbtiles", format_="pbf"))
 
 
