@@ -125,6 +125,8 @@ def _store_a_landing(s: Station) -> None:
     s.forget()
 
 
+FINAL = 6
+"""The item of the stored landing that lands, behind home and the two of the takeoff."""
 GLIDING = _phases(
     Phase("on the ground", (UP,), lambda s: s.located, before=True),
     Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
@@ -137,7 +139,7 @@ GLIDING = _phases(
     Phase(
         "landing",
         (UP, DRIVE, ("land", {})),
-        lambda s: s.mode == "AUTO" and s.height_m < 24.0 and s.distance_m() < 480.0,
+        lambda s: s.mode == "AUTO" and s.height_m < 24.0 and int(s.known["current"]) >= FINAL,
     ),
 )
 
