@@ -129,7 +129,7 @@ FINAL = 6
 """The item of the stored landing that lands, behind home and the two of the takeoff."""
 GLIDING = _phases(
     Phase("on the ground", (UP,), lambda s: s.located, before=True),
-    Phase("taking off", (("takeoff", {"altitude": "90 m"}),), lambda s: s.height_m > HIGH_M),
+    Phase("taking off", (("takeoff", {"altitude": "150 m"}),), lambda s: s.height_m > HIGH_M),
     Phase(
         "in a survey",
         (UP, SURVEY),
@@ -236,7 +236,13 @@ PLANE = Vehicle(
     resource="uav1",
     failsafe="return_to_launch",
     speed=4,
-    parameters={"FS_GCS_ENABL": 1, "FS_LONG_ACTN": 1, "FS_LONG_TIMEOUT": 8, "RTL_AUTOLAND": 3},
+    parameters={
+        "FS_GCS_ENABL": 1,
+        "FS_LONG_ACTN": 1,
+        "FS_LONG_TIMEOUT": 8,
+        "RTL_AUTOLAND": 3,
+        "BATT_LOW_VOLT": 10.5,
+    },
     phases=GLIDING,
     prepare=_store_a_landing,
     circles=True,

@@ -17,11 +17,11 @@ rules are in [MAVLink vehicles](mavlink.md#when-the-link-is-lost-and-other-fails
 interrupts no RTL and no LAND that it has not asked for, arms no vehicle that is not ready, and says
 what it sees.
 
-In the missions of aircraft the first task takes off to 30 m (90 m in "taking off"); the fleet says
-`lost_after: 10 s`. No boundary event catches an error, so that a behavior that fails ends the
-mission; a mission of yours can catch the error and go on. When the mission is over, m2pem ends, and
-with it the heartbeats of the ground station: a vehicle that stays in the air then returns by its
-own ground station failsafe.
+In the missions of aircraft the first task takes off to 30 m (90 m in "taking off", planes 150 m);
+the fleet says `lost_after: 10 s`. No boundary event catches an error, so that a behavior that fails
+ends the mission; a mission of yours can catch the error and go on. When the mission is over, m2pem
+ends, and with it the heartbeats of the ground station: a vehicle that stays in the air then returns
+by its own ground station failsafe.
 
 Of PX4, not every failsafe was played yet. Rovers say "Radio Failsafe" when it is the ground station
 that they have lost. m2pem commands heights above terrain only where a mission says

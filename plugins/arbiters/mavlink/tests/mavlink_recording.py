@@ -24,6 +24,9 @@ ARDUPILOT_MODES = {
     "plane": mavutil.mode_mapping_apm,
 }
 
+PX4_DESCEND = 4 << 16 | 20 << 24
+"""AUTO.DESCEND, which pymavlink does not name."""
+
 _BANNER = re.compile(
     r"^(ArduCopter|ArduRover|ArduPlane|Ardu|ChibiOS|SITL|Frame|RCOut|GPS \d|EKF3 (IMU|lane)|AHRS"
     r"|Barometer|Calibrating|IMU\d|RC Protocol|Airspeed|Logging|Init |Ground start|EKF variance"
@@ -135,6 +138,8 @@ class Recording:
                 self._text(m)
 
     def _mode(self, heartbeat: Any) -> str:
+        if self._modes is None and heartbeat.custom_mode == PX4_DESCEND:
+            return "DESCEND"
         if self._modes is None:
             return str(mavutil.interpret_px4_mode(heartbeat.base_mode, heartbeat.custom_mode))
         return str(self._modes.get(heartbeat.custom_mode, heartbeat.custom_mode))
