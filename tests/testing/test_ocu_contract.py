@@ -184,7 +184,7 @@ FINDS = [
     (OneAtATime, "shows_several_questions_at_once"),
     (Nameless, "an_answer_reaches_the_mission"),
     (AnswersTheFirst, "several_questions_are_answered_in_any_order"),
-    (Discreet, "is_told_that_another_operator_answered_first"),
+    (Discreet, "shows_that_another_operator_answered_first"),
     (Brittle, "a_late_answer_does_no_harm"),
     (Guesses, "an_unknown_decision_is_not_an_answer"),
     (Brittle, "of_two_units_the_first_answer_wins"),
