@@ -23,9 +23,9 @@ ends the mission; a mission of yours can catch the error and go on. When the mis
 ends, and with it the heartbeats of the ground station: a vehicle that stays in the air then returns
 by its own ground station failsafe.
 
-Rovers say "Radio Failsafe" when it is the ground station that they have lost. m2pem commands heights above terrain only where a mission says
-`altitude_frame: terrain`, and serves no terrain data: a vehicle that has none does not move. Planes
-circle where copters stand.
+Rovers say "Radio Failsafe" when it is the ground station that they have lost. m2pem commands
+heights above terrain only where a mission says `altitude_frame: terrain`, and serves no terrain
+data: a vehicle that has none does not move. Planes circle where copters stand.
 """
 
 SET = """
