@@ -196,6 +196,15 @@ PROGRAMS = (
         ),
     ),
     Program(
+        "without the start-up",
+        ("command_line", "32000", "16000", "5"),
+        ("command_line", "1000", "500", "1"),
+        (
+            Goal("row_per_s", "m2pem run, 32,000 tasks in a row", "elements/s", 25_000, True),
+            Goal("branches_per_s", "m2pem run, 16,000 branches", "elements/s", 15_000, True),
+        ),
+    ),
+    Program(
         "1,000 tokens waiting",
         ("idle", "1000", "10"),
         ("idle", "20", "0.2"),

@@ -42,6 +42,19 @@ SHOWN = frozenset(
 )
 """Records that are printed; the others matter to programs only."""
 
+NAMING = frozenset(
+    (
+        r.BehaviorRequested,
+        r.BehaviorEnded,
+        r.PromptOpened,
+        r.PromptAnswered,
+        r.PromptWithdrawn,
+    )
+)
+"""Records that a view is told of here: lines name behaviors and prompts by what came before."""
+
+_READ = SHOWN | NAMING
+
 REMEMBERED_RUNS = 1000
 """Runs of which names are known; the oldest are forgotten."""
 
@@ -84,11 +97,15 @@ class LineFormatter:
 
     def format(self, stamped: StampedRecord) -> str | None:
         """Return one line for a record; None for one that is not shown."""
+        record = stamped.record
+        if type(record) not in _READ:
+            return None
         if self._main is None:
             self._main = stamped.run
         view = self._view(stamped.run)
-        view.apply(stamped)
-        if not self._is_shown(view, stamped.record):
+        if type(record) in NAMING:
+            view.apply(stamped)
+        if not self._is_shown(view, record):
             return None
         description = describe(stamped, view)
         run = "" if stamped.run == self._main else f"{stamped.run:<4} "
@@ -107,18 +124,14 @@ class LineFormatter:
         return view
 
     def _is_shown(self, view: RunView, record: r.Record) -> bool:
-        if type(record) not in SHOWN:
-            return False
-        match record:
-            case r.PromptOpened():
-                return self._asks
-            case r.TokenEntered(element=element):
-                return _is_activity_or_event(view, element)
-            case r.TokenLeft(element=element, outcome=r.TokenOutcome.INTERRUPTED):
-                return _is_activity_or_event(view, element)
-            case r.TokenLeft():
-                return False
-        return True
+        if isinstance(record, r.TokenEntered):
+            return _is_activity_or_event(view, record.element)
+        if isinstance(record, r.TokenLeft):
+            interrupted = record.outcome is r.TokenOutcome.INTERRUPTED
+            return interrupted and _is_activity_or_event(view, record.element)
+        if isinstance(record, r.PromptOpened):
+            return self._asks
+        return type(record) in SHOWN
 
 
 def _is_activity_or_event(view: RunView, element: str) -> bool:

@@ -153,12 +153,16 @@ def _immediate(tree: Tree) -> None:
 
 
 def _listed(tree: Tree) -> None:
-    known = {flow.get("id", ""): flow for flow in tree.flows}
+    known: dict[str, etree._Element] = {}
     for tag, end in (_INCOMING, "targetRef"), (_OUTGOING, "sourceRef"):
+        listed = list(tree.root.iter(tag))
+        if not listed:
+            continue
+        known = known or {flow.get("id", ""): flow for flow in tree.flows}
         # The ends of flows that are still to be listed, as (id of the element, id of the flow).
         ends = {(named(flow.get(end, "")), name): flow for name, flow in known.items()}
         listing: dict[str, etree._Element] = {}
-        for element in tree.root.iter(tag):
+        for element in listed:
             name = (element.text or "").strip()
             holder = parent(element)
             owner = holder.get("id", "")

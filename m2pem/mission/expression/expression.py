@@ -1,5 +1,6 @@
 """A parsed expression, and the ways to get one from text."""
 
+import re
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NoReturn
@@ -13,6 +14,9 @@ from m2pem.mission.expression.operators import truth
 from m2pem.mission.expression.parser import Parser
 from m2pem.mission.expression.tree import Join, Literal, Node, names
 from m2pem.mission.values import ReadValue, Value
+
+_BARE = (None, Dialect.BARE.value)
+_INTEGER = re.compile(r"-?[0-9]{1,18}")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -86,6 +90,8 @@ def parse(text: str, language: str | None = None) -> Expression:
     Raises:
         ExpressionSyntaxError: it is none, is beyond the limits, or is in another language.
     """
+    if language in _BARE and _INTEGER.fullmatch(text):  # what scripts assign most
+        return Expression(text, Dialect.BARE, Literal(int(text)))
     dialect, span = locate(text, language)
     return Expression(text, dialect, _tree(text, span, dialect))
 

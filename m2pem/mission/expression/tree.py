@@ -210,8 +210,13 @@ def walk(node: Node) -> Iterator[tuple[Node, int]]:
             waiting += [(child, depth + 1) for child in reversed(below)]
 
 
+_NO_NAMES: frozenset[str] = frozenset()
+
+
 def names(node: Node) -> frozenset[str]:
     """The dotted names that the tree reads from the store."""
+    if isinstance(node, Literal):
+        return _NO_NAMES
     found: set[str] = set()
     waiting = [node]
     while waiting:
