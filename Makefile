@@ -155,7 +155,7 @@ test-long: lint ros ## check everything: fuzzing, large random counts, foreign c
 FUZZ_S := 600
 
 fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
-	@$(BIN)/python -m tests.foreign.fuzz --seconds $(FUZZ_S) $(M2PEM_CORPORA)
+	@$(BIN)/python -m tools.fuzzer.fuzz --seconds $(FUZZ_S) $(M2PEM_CORPORA)
 
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
@@ -163,13 +163,13 @@ docs: python-packages ## build the documentation into site/
 pictures: npm-packages page ## draw the missions and examples, and the web page, for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
-	@$(BIN)/python -m tests.broken
+	@$(BIN)/python -m tools.broken_mission_pictures
 	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet plugins/ocu/web/tests/test_web_mission_drawn.py
 
 PEERS := .conformance
 
 conformance: setup $(PEERS)/installed ## compare with other BPMN engines, and write the table into the docs
-	@$(BIN)/python -m tests.conformance --spiffworkflow $(PEERS)/bin/python
+	@$(BIN)/python -m tools.conformance --spiffworkflow $(PEERS)/bin/python
 
 bench: setup ros $(PEERS)/installed ## measure m2pem and other BPMN engines, and write bench/results (about half an hour)
 	@$(BIN)/python -m bench
@@ -177,7 +177,7 @@ bench: setup ros $(PEERS)/installed ## measure m2pem and other BPMN engines, and
 bench-quick: setup ## see that what `make bench` runs does run, and rightly
 	@$(BIN)/python -m bench --quick
 
-$(PEERS)/installed: tests/conformance/spiffworkflow.txt
+$(PEERS)/installed: tools/conformance/spiffworkflow.txt
 	@echo "Installing SpiffWorkflow into $(PEERS)"
 	@$(PYTHON) -m venv --clear $(PEERS)
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --requirement $<

@@ -11,8 +11,8 @@ from lxml import etree
 
 from m2pem.bpmn import parse_mission
 from m2pem.cli.group import run_command_line
-from tests.broken.__main__ import drawn
 from tests.broken.expected import BROKEN, EXPECTED, REPOSITORY, Expected
+from tools.broken_mission_pictures import drawn
 
 SCHEMA = json.loads((REPOSITORY / "docs" / "verification.schema.json").read_bytes())
 PAGE = (REPOSITORY / "docs" / "verification.md").read_text(encoding="utf-8")

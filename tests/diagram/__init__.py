@@ -1,5 +1,0 @@
-"""Draws BPMN files: a diagram for a model that has none, so that it opens in an editor."""
-
-from tests.diagram.diagram import draw
-
-__all__ = ["draw"]

@@ -1,8 +1,8 @@
 """The table of docs/bpmn-support.md says of m2pem what the cases show."""
 
 from tests.cases import read_cases
-from tests.conformance.own import verdicts
-from tests.conformance.table import PAGE, own_column, read_own_column
+from tools.conformance.own import verdicts
+from tools.conformance.table import PAGE, own_column, read_own_column
 
 
 def test_the_page_has_every_case_and_what_m2pem_does_in_it() -> None:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.foreign.models import models
-from tests.verify.foreign.counting import Counts
-from tests.verify.foreign.judging import Terms
-from tests.verify.foreign.measuring import measure_all
-from tests.verify.foreign.sketches import read_sketch
+from tools.corpora.models import models
+from tools.corpora_verification.counting import Counts
+from tools.corpora_verification.judging import Terms
+from tools.corpora_verification.measuring import measure_all
+from tools.corpora_verification.sketches import read_sketch
 
 ROOT = Path(__file__).parents[2]
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
@@ -95,7 +95,7 @@ def test_a_crash_costs_one_file_and_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: Callable[..., object], said: str
 ) -> None:
     (tmp_path / "sketch.bpmn").write_bytes(SKETCH)
-    monkeypatch.setattr("tests.verify.foreign.measuring.judge", does)
+    monkeypatch.setattr("tools.corpora_verification.measuring.judge", does)
     counts = checked(tmp_path, Terms(seconds=0.02 if said == "it hangs" else 5.0))
     assert counts.kinds == {"crashed": 1}
     assert said in counts.wrong[0]

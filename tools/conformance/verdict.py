@@ -9,7 +9,7 @@ from lxml import etree
 from m2pem.mission.values import Value
 from tests.cases import Case
 from tests.cases.playing import play_case
-from tests.conformance.peers import VERBS, Played
+from tools.conformance.peers import VERBS, Played
 
 _BPMN = "{http://www.omg.org/spec/BPMN/20100524/MODEL}"
 _MARKERS = ("standardLoopCharacteristics", "multiInstanceLoopCharacteristics")

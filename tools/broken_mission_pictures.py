@@ -1,4 +1,4 @@
-"""`python -m tests.broken` draws what is found in each broken mission, for the docs."""
+"""Draws what is found in each broken mission: `python -m tools.broken_mission_pictures`."""
 
 from hashlib import sha256
 

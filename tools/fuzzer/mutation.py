@@ -8,8 +8,8 @@ from random import Random
 from lxml import etree
 
 from m2pem.bpmn.schema import FLOW_ELEMENT_NAMES, ROOT_NAMES, SHAPES
-from tests.foreign.bytes_mutation import damaged, encoded
-from tests.foreign.oddities import ATTRIBUTES, TEXTS
+from tools.fuzzer.bytes_mutation import damaged, encoded
+from tools.fuzzer.oddities import ATTRIBUTES, TEXTS
 
 _BPMN = "http://www.omg.org/spec/BPMN/20100524/MODEL"
 _NAMES = sorted({*FLOW_ELEMENT_NAMES, *ROOT_NAMES, *(tag.rpartition("}")[2] for tag in SHAPES)})

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tests.cases import Case
-from tests.conformance.verdict import Verdict
+from tools.conformance.verdict import Verdict
 
 PAGE = Path(__file__).parents[2] / "docs" / "bpmn-support.md"
 _BEGIN, _END = "<!-- begin: make conformance -->", "<!-- end: make conformance -->"

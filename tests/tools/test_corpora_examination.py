@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.foreign.examination import Outcome, examine
-from tests.foreign.models import models
+from tools.corpora.examination import Outcome, examine
+from tools.corpora.models import models
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = [ROOT / "tests/data", ROOT / "missions"]
@@ -43,6 +43,6 @@ def test_an_exception_is_a_problem_and_not_the_end(
 
     file = tmp_path / "m.bpmn"
     file.write_text("<x/>")
-    monkeypatch.setattr("tests.foreign.examination.load_source", broken)
+    monkeypatch.setattr("tools.corpora.examination.load_source", broken)
     (problem,) = examine(file).problems
     assert "RecursionError: m.bpmn" in problem

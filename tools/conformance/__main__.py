@@ -1,4 +1,4 @@
-"""`python -m tests.conformance`: play each case with each engine, print the table, write the page.
+"""`python -m tools.conformance`: play each case with each engine, print the table, write the page.
 
 `make conformance` installs the other engines first.
 """
@@ -10,16 +10,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.cases import Case, read_cases
-from tests.conformance import own
-from tests.conformance.peers import REPOSITORY, Peer, bpmn_elements, spiffworkflow
-from tests.conformance.table import PAGE, render, write
-from tests.conformance.verdict import Verdict, judge, not_asked
+from tools.conformance import own
+from tools.conformance.peers import REPOSITORY, Peer, bpmn_elements, spiffworkflow
+from tools.conformance.table import PAGE, render, write
+from tools.conformance.verdict import Verdict, judge, not_asked
 
 AT_ONCE = 2
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.conformance", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.conformance", description=__doc__)
     parser.add_argument(
         "--spiffworkflow",
         type=Path,

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from m2pem.bpmn import parse_mission
-from tests.foreign.fuzz import ROOT, case, seeds, survive
-from tests.foreign.models import models
+from tools.corpora.models import models
+from tools.fuzzer.fuzz import ROOT, case, seeds, survive
 
 CASES = 250
 MANY_CASES = 6_000

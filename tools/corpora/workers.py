@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from tests.foreign.examination import Examination, Outcome, examine
+from tools.corpora.examination import Examination, Outcome, examine
 
 LIMIT_S = 120.0
 """How long one file may take before it counts as a hang. Most take milliseconds."""

@@ -4,8 +4,8 @@ import os
 import time
 from pathlib import Path
 
-from tests.foreign.examination import Examination, Outcome
-from tests.foreign.workers import examine_all
+from tools.corpora.examination import Examination, Outcome
+from tools.corpora.workers import examine_all
 
 FINE = Examination(Outcome.LOADED, ends=("completed",))
 

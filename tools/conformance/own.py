@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from tests.cases import Case
 from tests.cases.playing import differences
-from tests.conformance.verdict import Verdict
+from tools.conformance.verdict import Verdict
 
 
 def verdicts(cases: Iterable[Case]) -> list[Verdict]:

@@ -1,4 +1,4 @@
-"""`python -m tests.foreign.fuzz --seconds 600 [FOLDER...]`: strange files, until the time is up.
+"""`python -m tools.fuzzer.fuzz --seconds 600 [FOLDER...]`: strange files, until the time is up.
 
 Each case is a number: it chooses a mutation of sound files, and what happens to the run of what
 still loads. A case that breaks m2pem is kept as a file, and named; `--case N` plays it again.
@@ -24,10 +24,10 @@ from m2pem.mission.mission import Mission
 from m2pem.rehearsal.rehearsal import rehearse
 from tests.engine.kit import Play
 from tests.engine.random_play import RandomPlay
-from tests.foreign.examination import plugins
-from tests.foreign.flaws import flaws
-from tests.foreign.models import models
-from tests.foreign.mutation import mutate
+from tools.corpora.examination import plugins
+from tools.corpora.flaws import flaws
+from tools.corpora.models import models
+from tools.fuzzer.mutation import mutate
 
 ROOT = Path(__file__).parents[2]
 OWN = ("tests/data", "missions", "examples")
@@ -111,7 +111,7 @@ def _play(mission: Mission, dice: Random) -> None:
 
 def main() -> int:
     """Play cases until the time is up; the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tests.foreign.fuzz", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.fuzzer.fuzz", description=__doc__)
     parser.add_argument("folders", nargs="*", type=Path, help="more sound files")
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--first", type=int, default=0, help="the number of the first case")

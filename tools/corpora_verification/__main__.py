@@ -1,4 +1,4 @@
-"""`python -m tests.verify.foreign FOLDER...`: checks each model in the folders within limits.
+"""`python -m tools.corpora_verification FOLDER...`: checks each model in the folders within limits.
 
 Prints how many were decided, left undecided, refused and crashed, and what they took; ends with 1
 if any crashed or took too much. `--jsonl FILE` writes a line for each file.
@@ -12,15 +12,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TextIO
 
-from tests.foreign.models import models
-from tests.verify.foreign.counting import Counts
-from tests.verify.foreign.judging import Terms
-from tests.verify.foreign.measuring import Measured, measure_all
+from tools.corpora.models import models
+from tools.corpora_verification.counting import Counts
+from tools.corpora_verification.judging import Terms
+from tools.corpora_verification.measuring import Measured, measure_all
 
 
 def main() -> int:
     """Check folders; the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tests.verify.foreign", description=__doc__)
+    program = "python -m tools.corpora_verification"
+    parser = argparse.ArgumentParser(prog=program, description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--seconds", type=float, default=2.0, help="for a file")
     parser.add_argument("--memory", type=float, default=500.0, help="MB for a file")

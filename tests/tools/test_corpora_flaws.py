@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from m2pem.findings import MAX_SHOWN, Finding, Severity
-from tests.foreign.flaws import flaws
+from tools.corpora.flaws import flaws
 
 DATA = b'<a id="A">\n<b id="B"/>\n<c/><c/>\n</a>'
 GOOD = Finding(Severity.ERROR, "m.bpmn", 2, "B", "some-rule", "it is wrong", "correct it")

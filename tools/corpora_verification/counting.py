@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from tests.verify.foreign.judging import Terms
-from tests.verify.foreign.measuring import Measured
+from tools.corpora_verification.judging import Terms
+from tools.corpora_verification.measuring import Measured
 
 _SHOWN = 10
 """Files of which one is told by name, of each kind."""

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.foreign.examination import Examination, Outcome
+from tools.corpora.examination import Examination, Outcome
 
 
 @dataclass(slots=True)

@@ -15,7 +15,7 @@ from m2pem.verify.check import Report, check
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.search.explore import Limits
 from m2pem.verify.translate import Options
-from tests.verify.foreign.sketches import UNREACHABLE, WORK, read_sketch
+from tools.corpora_verification.sketches import UNREACHABLE, WORK, read_sketch
 
 FOR_THE_CHECK = 0.9
 """Of the time for a file: the check is told so much, and all that is done has the rest."""

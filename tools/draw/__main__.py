@@ -1,4 +1,4 @@
-"""`python -m tests.diagram FILE` writes the notation on standard input as a drawn BPMN file.
+"""`python -m tools.draw FILE` writes the notation on standard input as a drawn BPMN file.
 
 `--again FILE...` lays out files anew that are there: after elements were added by hand.
 """
@@ -9,12 +9,12 @@ from pathlib import Path
 
 from lxml import etree
 
-from tests.diagram.diagram import draw
 from tests.engine.notation import xml
+from tools.draw.diagram import draw
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.diagram", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.draw", description=__doc__)
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE")
     parser.add_argument("--again", action="store_true", help="draw files anew that are there")
     asked = parser.parse_args()

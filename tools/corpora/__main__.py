@@ -1,4 +1,4 @@
-"""`python -m tests.foreign FOLDER...`: what m2pem says of each model in the folders.
+"""`python -m tools.corpora FOLDER...`: what m2pem says of each model in the folders.
 
 Prints the counts of each folder, and what m2pem did wrong; ends with 1 if that is anything.
 `--every N` takes every Nth file, `--examples` prints a message of each rule with a file.
@@ -8,15 +8,15 @@ import argparse
 import sys
 from pathlib import Path
 
-from tests.foreign.examination import Examination
-from tests.foreign.models import models
-from tests.foreign.summary import Summary
-from tests.foreign.workers import LIMIT_S, examine_all
+from tools.corpora.examination import Examination
+from tools.corpora.models import models
+from tools.corpora.summary import Summary
+from tools.corpora.workers import LIMIT_S, examine_all
 
 
 def main() -> int:
     """Examine folders; the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tests.foreign", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tools.corpora", description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--every", type=int, default=1, help="take every Nth file")
     parser.add_argument("--limit", type=float, default=LIMIT_S, help="seconds for a file")

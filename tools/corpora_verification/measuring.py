@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from tests.verify.foreign.judging import Judgement, Terms, judge
+from tools.corpora_verification.judging import Judgement, Terms, judge
 
 _GRACE = 15.0
 """How many times its seconds a file may take before it counts as a hang."""

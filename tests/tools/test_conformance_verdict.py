@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from tests.cases import DATA, Case, read_topic
-from tests.conformance.peers import Played
-from tests.conformance.rewrite import for_bpmn_elements, for_spiffworkflow
-from tests.conformance.verdict import Verdict, judge, not_asked
+from tools.conformance.peers import Played
+from tools.conformance.rewrite import for_bpmn_elements, for_spiffworkflow
+from tools.conformance.verdict import Verdict, judge, not_asked
 
 
 def case(topic: str, file: str) -> Case:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.cases import Case
-from tests.conformance.rewrite import (
+from tools.conformance.rewrite import (
     for_bpmn_elements,
     for_spiffworkflow,
     main_process,

@@ -17,7 +17,7 @@ from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
-from tests.foreign.flaws import flaws
+from tools.corpora.flaws import flaws
 
 MAX_STEPS = 5_000
 """Of a rehearsal. Most models that end do so in far fewer; many others draw endless loops."""

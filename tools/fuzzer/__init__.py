@@ -1,0 +1,1 @@
+"""Strange BPMN files, made of good ones: m2pem refuses each with findings, or runs it."""
