@@ -212,7 +212,7 @@ def test_two_behaviors_are_refused() -> None:
 
 
 @pytest.mark.parametrize("form", ["", ' scriptFormat="m2pem"'])
-def test_statements(form: str) -> None:
+def test_statements_of_a_script_are_read(form: str) -> None:
     found = task(in_cdata("\nmission.speed = 2 * base\nthrow error NO_FUEL\n", form))
     assert found.behavior is None
     assert found.script is not None

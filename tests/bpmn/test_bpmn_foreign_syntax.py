@@ -88,7 +88,7 @@ def test_a_line_of_a_script_in_no_language_in_particular() -> None:
         ("timeCycle", "500ms###1m", "write R/PT1M"),
     ],
 )
-def test_a_time(kind: str, text: str, remedy: str) -> None:
+def test_a_foreign_time_has_a_remedy(kind: str, text: str, remedy: str) -> None:
     assert time_remedy(kind, text) == remedy
 
 

@@ -47,7 +47,7 @@ def test_an_event_subprocess_belongs_to_its_container_and_is_no_entry_of_it() ->
     assert not mission.warnings
 
 
-def test_it_is_no_entry_of_a_container_without_start_events() -> None:
+def test_a_compensation_handler_is_no_entry_of_a_container_without_start_events() -> None:
     mission = load(
         process(
             f'<subProcess id="X">{handler(on_signal())}{TASK}</subProcess>{line_of("X")}', SIGNAL
@@ -118,7 +118,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_it_is_refused(case: str) -> None:
+def test_handlers_that_bpmn_forbids_are_refused(case: str) -> None:
     data, expected = REFUSED[case]
     assert summary(data) == expected
 

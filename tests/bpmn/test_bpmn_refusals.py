@@ -277,7 +277,9 @@ ERRORS = {
 
 
 @pytest.mark.parametrize(("data", "expected"), ERRORS.values(), ids=ERRORS.keys())
-def test_refuses(data: bytes, expected: list[tuple[str, int, str]]) -> None:
+def test_a_mission_with_an_error_is_refused(
+    data: bytes, expected: list[tuple[str, int, str]]
+) -> None:
     with pytest.raises(MissionError) as caught:
         load(data)
     errors = [each for each in caught.value.findings if each.severity is Severity.ERROR]

@@ -68,7 +68,7 @@ def test_an_undeclared_entity_is_not_well_formed() -> None:
 @pytest.mark.parametrize(
     "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "iso-8859-1", "cp1252"]
 )
-def test_encodings(encoding: str) -> None:
+def test_a_file_is_read_in_its_encoding(encoding: str) -> None:
     name = encoding.removesuffix("-sig").removesuffix("-le").removesuffix("-be")
     text = f'<?xml version="1.0" encoding="{name}"?>\n' + GOOD.decode()
     mission = load(text.encode(encoding))

@@ -118,7 +118,7 @@ CATCH = f'<intermediateCatchEvent id="W">{TIMER}</intermediateCatchEvent>'
         '<adHocSubProcess id="W"><task id="w"/></adHocSubProcess>',
     ],
 )
-def test_what_waits(waits: str) -> None:
+def test_a_loop_that_waits_is_no_busy_loop(waits: str) -> None:
     text = ring(waits).decode().removesuffix("</definitions>")
     called = '<process id="Q"><userTask id="q"/></process><message id="m"/></definitions>'
     assert rules(f"{text}{called}".encode()) == []

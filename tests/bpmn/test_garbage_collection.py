@@ -16,14 +16,14 @@ def _on_again() -> Iterator[None]:
     gc.collect()
 
 
-def test_it_is_off_meanwhile_and_on_again_after_an_error() -> None:
+def test_the_collector_is_off_meanwhile_and_on_again_after_an_error() -> None:
     with pytest.raises(KeyError), garbage_collection.paused():
         assert not gc.isenabled()
         raise KeyError
     assert gc.isenabled()
 
 
-def test_it_stays_off_where_it_was_off() -> None:
+def test_the_collector_stays_off_where_it_was_off() -> None:
     gc.disable()
     with garbage_collection.paused():
         pass

@@ -87,7 +87,7 @@ def test_no_fleet_is_needed_by_a_mission_that_commands_nothing(invoke: Invoke, w
 @pytest.mark.parametrize(
     "start", ["2026-03-01T00:00:00Z", "2026-03-01T01:00:00+01:00", "2026-03-01"]
 )
-def test_it_begins_at_a_date(invoke: Invoke, wait: Path, start: str) -> None:
+def test_a_rehearsal_begins_at_a_date(invoke: Invoke, wait: Path, start: str) -> None:
     _, out, _ = invoke("simulate", wait, "--start", start, "--format", "json")
     assert json.loads(out.splitlines()[-1])["t"] == 10
 

@@ -52,7 +52,7 @@ async def test_a_mission_comes_with_the_files_that_it_calls(
         assert "s:Look" in (await remote.mission(run)).elements
 
 
-async def test_it_follows_a_run_to_its_end(served: Served) -> None:
+async def test_the_remote_control_follows_a_run_to_its_end(served: Served) -> None:
     run, prompt = await served.asked()
     async with RemoteControl(served.path) as remote:
         notices = remote.subscribe(run)

@@ -107,7 +107,7 @@ async def test_a_process_of_another_user_is_turned_away(
         assert await exchange(served.path, call("runs")) == []
 
 
-def test_this_user_is_recognised_by_the_kernels_word() -> None:
+def test_the_user_is_recognised_by_what_the_kernel_says() -> None:
     ours, theirs = socket.socketpair()
     with ours, theirs:
         assert server.is_same_user(ours)

@@ -139,7 +139,7 @@ def test_who_hovers_somewhat_beside_its_height_is_taken_to_be_there() -> None:
     assert over(sky, "two", 30.0)
 
 
-def test_one_whose_position_is_not_known_may_not_begin() -> None:
+def test_a_vehicle_whose_position_is_not_known_may_not_begin() -> None:
     sky = airspace("one", "two")
     assert "the position of one is not known" in claim(sky, request("takeoff", "one", altitude=5.0))
 
@@ -168,7 +168,7 @@ def test_vehicles_that_do_the_same_are_kept_from_each_other() -> None:
     assert not claim(sky, request("change_altitude", "one", "two", altitude=30.0))
 
 
-def test_one_that_takes_its_own_behavior_over_is_not_in_its_own_way() -> None:
+def test_a_vehicle_that_takes_its_own_behavior_over_is_not_in_its_own_way() -> None:
     sky = airspace("one", "two")
     sky.received(state("one", 0, 0, 20))
     assert not claim(sky, request("orbit", "one", target=point(0, 0)))

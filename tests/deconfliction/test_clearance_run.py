@@ -26,7 +26,9 @@ def to(name: str, target: str, **more: str) -> tuple[str, str]:
     return task(f"To{name}", "goto", name, target=target, **more)
 
 
-def test_one_in_the_way_is_named_with_what_it_does_and_what_would_be_right(play: Play) -> None:
+def test_a_vehicle_in_the_way_is_named_with_what_it_does_and_what_would_be_right(
+    play: Play,
+) -> None:
     async def story(world: World) -> str:
         run = await world.begin(
             up("one", "20 m"), task("Round", "orbit", "one", target=WEST, duration="900 s")
@@ -43,7 +45,7 @@ def test_one_in_the_way_is_named_with_what_it_does_and_what_would_be_right(play:
     )
 
 
-def test_one_that_is_sent_elsewhere_on_its_way_sets_out_from_where_it_is(play: Play) -> None:
+def test_a_vehicle_that_is_sent_elsewhere_on_its_way_sets_out_from_where_it_is(play: Play) -> None:
     far = f"[{', '.join(map(str, place(1000, 0)[:2]))}]"
     aside = f"[{', '.join(map(str, place(500, 300)[:2]))}]"
     body = (

@@ -63,7 +63,9 @@ def test_its_condition_reads_the_process_that_the_run_began_with() -> None:
     assert instance.data == {}
 
 
-def test_it_is_awaited_as_long_as_that_process_lasts_even_when_that_is_interrupted() -> None:
+def test_a_condition_is_awaited_as_long_as_that_process_lasts_even_when_that_is_interrupted() -> (
+    None
+):
     body = writing("y = 1") + handler(
         "y > 0",
         "",
@@ -76,7 +78,7 @@ def test_it_is_awaited_as_long_as_that_process_lasts_even_when_that_is_interrupt
     assert play.answer(prompt="o").ended == "completed"
 
 
-def test_one_that_waits_keeps_no_stuck_run_alive() -> None:
+def test_a_condition_that_waits_keeps_no_stuck_run_alive() -> None:
     play = Play(two(ON, CATCH.replace("x > 3", "y > 3"))).start()
     assert play.ended == "failed"
 

@@ -47,17 +47,17 @@ def test_a_catch_event_goes_on_as_soon_as_its_condition_becomes_true() -> None:
     assert play.answer().entered() == "again third after"
 
 
-def test_one_whose_condition_is_true_already_goes_on_at_once() -> None:
+def test_a_catch_event_whose_condition_is_true_already_goes_on_at_once() -> None:
     assert Play(CATCH).start({"x": 4}).ended == "completed"
 
 
-def test_it_goes_on_once_however_often_the_condition_is_written() -> None:
+def test_a_catch_event_goes_on_once_however_often_the_condition_is_written() -> None:
     play = Play(CATCH + writing("x = 4; x = 5", "x = 6")).start()
     play.answer().answer()
     assert play.entered().split().count("after") == 1
 
 
-def test_it_goes_on_before_the_next_step_of_another_branch() -> None:
+def test_a_catch_event_goes_on_before_the_next_step_of_another_branch() -> None:
     play = Play("""<startEvent id="start"/> <startEvent id="w"/>
         <intermediateCatchEvent id="catch">conditional x > 3</intermediateCatchEvent>
         <scriptTask id="seen">seen = x</scriptTask>
@@ -187,13 +187,15 @@ def test_the_inside_of_a_subprocess_is_cut_before_its_next_step() -> None:
     assert "ran" not in play.data
 
 
-def test_one_that_does_not_interrupt_fires_whenever_the_condition_becomes_true() -> None:
+def test_a_boundary_event_that_does_not_interrupt_fires_whenever_the_condition_becomes_true() -> (
+    None
+):
     play = Play(on_work(NOT) + writing("low = 10", "low = 5")).start()
     assert play.answer(prompt="first").at == "work second then"
     assert play.answer(prompt="second").at == "work then third"  # it has been true all the time
 
 
-def test_it_must_be_seen_false_before_it_fires_again() -> None:
+def test_a_condition_must_be_false_before_it_fires_again() -> None:
     play = Play(
         on_work(NOT)
         + writing("low = 10", "low = 30")
@@ -208,7 +210,7 @@ def test_it_must_be_seen_false_before_it_fires_again() -> None:
     assert play.answer(prompt="third").at == "work then then"
 
 
-def test_one_that_is_true_already_fires_once_beside_the_work() -> None:
+def test_a_boundary_event_that_is_true_already_fires_once_beside_the_work() -> None:
     play = Play(on_work(NOT)).start({"low": 10})
     assert play.at == "work then"
     assert play.answer(prompt="work").entered().split().count("on") == 1
@@ -235,12 +237,14 @@ def test_an_event_subprocess_interrupts_before_the_next_step_of_its_scope() -> N
     assert "ran" not in play.data
 
 
-def test_one_whose_condition_is_true_when_its_scope_begins_interrupts_at_once() -> None:
+def test_an_event_subprocess_whose_condition_is_true_when_its_scope_begins_interrupts_at_once() -> (
+    None
+):
     play = Play(writing() + handler("x > 3")).start({"x": 4})
     assert play.entered() == "w h hs hu"
 
 
-def test_one_that_does_not_interrupt_begins_on_each_change_to_true() -> None:
+def test_an_event_subprocess_that_does_not_interrupt_begins_on_each_change_to_true() -> None:
     play = Play(writing("x = 4", "x = 0") + handler("x > 3", 'isInterrupting="false"')).start()
     assert play.answer(prompt="first").at == "second hu"
     assert play.answer(prompt="second").at == "hu third"

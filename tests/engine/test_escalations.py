@@ -44,7 +44,7 @@ def test_a_boundary_that_does_not_interrupt_lets_the_inside_run_on() -> None:
     assert play.answer(prompt="other").at == "after"
 
 
-def test_it_catches_as_often_as_it_is_thrown() -> None:
+def test_a_boundary_event_catches_as_often_as_it_is_thrown() -> None:
     play = Play(
         INSIDE.format(throw=THROW.replace("next\n", "next\n s -> throw\n"), interrupting=NOT)
     ).start()

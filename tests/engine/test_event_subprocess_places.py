@@ -24,7 +24,7 @@ WORK = """<startEvent id="s"/> <userTask id="a"/> <userTask id="b"/>
 """
 
 
-def test_one_of_the_process_that_the_run_began_with_ends_with_the_run() -> None:
+def test_an_event_subprocess_of_the_process_that_the_run_began_with_ends_with_the_run() -> None:
     play = Play(WORK + handler("signal go", NOT)).start()
     assert play.signal("go").at == "a hu"
     play.answer(prompt="a").answer(prompt="b")
@@ -37,7 +37,7 @@ def test_an_interrupting_one_of_that_process_ends_the_run_with_it() -> None:
     assert play.signal("go").answer().ended == "completed"
 
 
-def test_one_of_a_called_process_is_armed_in_each_of_its_instances() -> None:
+def test_an_event_subprocess_of_a_called_process_is_armed_in_each_of_its_instances() -> None:
     play = Play(f"""
         <process id="MAIN" isExecutable="true"> <startEvent id="start"/>
           <callActivity id="one" calledElement="P"/> <callActivity id="two" calledElement="P"/>
@@ -50,7 +50,7 @@ def test_one_of_a_called_process_is_armed_in_each_of_its_instances() -> None:
     assert play.signal("go").at == "hu hu"
 
 
-def test_one_of_a_process_that_a_trigger_began_is_armed_in_the_instance() -> None:
+def test_an_event_subprocess_of_a_process_that_a_trigger_began_is_armed_in_the_instance() -> None:
     play = Play(f"""
         <process id="MAIN" isExecutable="true"> <startEvent id="start"/> <userTask id="main"/>
           start -> main
@@ -64,7 +64,7 @@ def test_one_of_a_process_that_a_trigger_began_is_armed_in_the_instance() -> Non
     assert play.advance(7).at == "main hu"
 
 
-def test_one_within_another_is_armed_while_that_one_runs() -> None:
+def test_an_event_subprocess_within_another_is_armed_while_that_one_runs() -> None:
     inside = '<userTask id="hu"/>\nhs -> hu\n' + handler("signal deep", name="i")
     play = Play(around(WORK + handler("signal go", NOT, inside))).start()
     assert play.signal("deep").at == "a"
@@ -90,7 +90,7 @@ AD_HOC = """<startEvent id="start"/> <userTask id="wait"/>
 """
 
 
-def test_one_in_an_ad_hoc_subprocess_is_no_choice_and_ends_the_choosing() -> None:
+def test_an_event_subprocess_in_an_ad_hoc_subprocess_is_no_choice_and_ends_the_choosing() -> None:
     play = Play(AD_HOC.format(handler=handler("signal go"))).start().answer()
     [prompt] = play.run.state.prompts.values()
     assert [each["value"] for each in prompt.decisions] == ["a", "b", "complete"]
@@ -100,7 +100,7 @@ def test_one_in_an_ad_hoc_subprocess_is_no_choice_and_ends_the_choosing() -> Non
     assert play.answer().ended == "completed"
 
 
-def test_one_beside_the_choices_does_not_count_as_one() -> None:
+def test_an_event_subprocess_beside_the_choices_does_not_count_as_one() -> None:
     inside = handler("message go", NOT) + "<completionCondition>true</completionCondition>"
     play = Play(AD_HOC.format(handler=inside)).start()
     play.message("go").answer(prompt="wait")
@@ -109,7 +109,7 @@ def test_one_beside_the_choices_does_not_count_as_one() -> None:
     assert play.answer(prompt="a").ended == "completed"
 
 
-def test_one_in_a_multi_instance_subprocess_ends_each_instance_by_itself() -> None:
+def test_an_event_subprocess_in_a_multi_instance_subprocess_ends_each_instance_by_itself() -> None:
     play = Play(f"""<startEvent id="start"/> <task id="done"/>
         <subProcess id="sub">
           <multiInstanceLoopCharacteristics><loopCardinality>2</loopCardinality>

@@ -50,7 +50,7 @@ def test_an_interrupting_one_ends_all_in_its_scope_and_the_scope_ends_with_it(tr
 
 
 @pytest.mark.parametrize("trigger", TRIGGERS)
-def test_it_happens_once(trigger: str) -> None:
+def test_an_interrupting_event_subprocess_happens_once(trigger: str) -> None:
     play = Play(around(WORK + handler(trigger))).start()
     TRIGGERS[trigger](play)
     before = play.at
@@ -102,7 +102,7 @@ def test_of_two_that_wait_for_the_same_signal_the_first_that_interrupts_is_the_o
     assert play.signal("go").at == "hu"
 
 
-def test_one_that_does_not_interrupt_goes_down_with_the_scope_that_another_interrupts() -> None:
+def test_an_event_subprocess_goes_down_with_the_scope_that_another_interrupts() -> None:
     play = Play(
         around(WORK + handler("signal more", NOT) + handler("signal stop", name="i"))
     ).start()
@@ -134,7 +134,9 @@ def test_boundary_events_of_the_activity_stay_armed_while_its_handler_runs() -> 
 
 
 @pytest.mark.parametrize("trigger", ["message go", "signal go"])
-def test_one_that_does_not_interrupt_begins_as_often_as_it_is_triggered(trigger: str) -> None:
+def test_an_event_subprocess_that_does_not_interrupt_begins_as_often_as_it_is_triggered(
+    trigger: str,
+) -> None:
     play = Play(around(WORK + handler(trigger, NOT))).start()
     for _ in range(3):
         TRIGGERS[trigger](play)
@@ -181,7 +183,7 @@ def test_nothing_of_it_is_armed_before_its_scope_begins_or_after_it_has_ended() 
 # --- data ---------------------------------------------------------------------------------------
 
 
-def test_it_reads_and_writes_what_its_scope_does() -> None:
+def test_an_event_subprocess_reads_and_writes_what_its_scope_does() -> None:
     inside = """<scriptTask id="calc">mine = x; local = seen + 1</scriptTask>
         hs -> calc
     """
@@ -224,7 +226,7 @@ def test_a_message_that_came_before_begins_it_as_soon_as_its_scope_begins() -> N
     assert "a" not in play.entered().split()
 
 
-def test_one_that_does_not_interrupt_takes_every_message_that_was_kept() -> None:
+def test_an_event_subprocess_that_does_not_interrupt_takes_every_message_that_was_kept() -> None:
     play = Play(KEPT.format(inside=WORK + handler("message go", NOT))).start()
     play.message("go")
     assert play.answer().at == "a hu hu"
@@ -262,7 +264,7 @@ def test_a_terminate_end_event_in_it_ends_the_handler_only() -> None:
     assert play.answer(prompt="hu").at == "a"
 
 
-def test_one_that_was_begun_as_the_last_token_ended_still_runs() -> None:
+def test_an_event_subprocess_that_was_begun_as_the_last_token_ended_still_runs() -> None:
     # In one step of the run: `end` throws the signal, and its scope has no other token.
     play = Play(
         around(
@@ -292,7 +294,7 @@ def test_a_stuck_scope_with_one_armed_for_the_outside_is_not_a_deadlock() -> Non
     assert play.signal("go").answer().ended == "completed"
 
 
-def test_one_armed_for_errors_only_cannot_free_a_stuck_scope() -> None:
+def test_an_event_subprocess_armed_for_errors_only_cannot_free_a_stuck_scope() -> None:
     play = Play(STUCK + handler("error")).start()
     assert play.ended == "failed"
     assert "join" in play.detail

@@ -17,7 +17,7 @@ def test_a_token_goes_from_the_source_to_the_target_of_its_name() -> None:
     assert play.ended == "completed"
 
 
-def test_it_stays_the_same_token() -> None:
+def test_a_token_that_passes_a_link_stays_the_same() -> None:
     play = Play(LINKED).start().answer()
     tokens = {record.token for record in play.records() if hasattr(record, "token")}
     assert tokens - {0, None} == {1}

@@ -33,7 +33,7 @@ def waiting(marker: str, boundary: str = "", behind: str = "") -> Play:
 # --- how often ----------------------------------------------------------------------------------
 
 
-def test_it_repeats_while_the_condition_is_true_and_asks_after_each_round() -> None:
+def test_a_loop_repeats_while_the_condition_is_true_and_asks_after_each_round() -> None:
     assert counted("<loop>n < 3</loop>").data == {"n": 3, "last": 2}
     assert counted("<loop>false</loop>").data == {"n": 1, "last": 0}
 

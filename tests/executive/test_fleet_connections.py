@@ -60,7 +60,7 @@ def test_an_arbiter_is_told_the_failsafe_and_the_fence(fence: str, lent: Area | 
         ("ros", False, False, False),
     ],
 )
-def test_it_is_known_whether_anything_real_moves(
+def test_a_fleet_says_whether_anything_real_moves(
     arbiter: str, sitl: bool, simulated: bool, nothing_is_real: bool
 ) -> None:
     vehicles = {UAV1: Vehicle(UAV1, Domain.AIR, arbiter, {}, sitl=sitl)}

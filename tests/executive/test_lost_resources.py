@@ -33,7 +33,7 @@ def latest(world: World) -> VehicleState:
     return state
 
 
-def test_it_is_told_to_stop_before_it_is_free(play):
+def test_a_vehicle_that_returns_is_told_to_stop_before_it_is_free(play):
     async def story(world: World):
         await lose(world)
         calls = len(world.fake.calls)
@@ -59,7 +59,7 @@ def test_it_is_told_to_stop_before_it_is_free(play):
     )
 
 
-def test_one_that_cannot_be_told_is_told_again_and_not_free(play, caplog):
+def test_a_vehicle_that_cannot_be_told_is_told_again_and_not_free(play, caplog):
     async def story(world: World):
         await lose(world)
         world.fake.raises["hold"] = RuntimeError("the radio is broken")
@@ -76,7 +76,7 @@ def test_one_that_cannot_be_told_is_told_again_and_not_free(play, caplog):
     assert "ugv1 is heard again, has ended what it did before, and is free" in caplog.text
 
 
-def test_one_that_is_lost_again_meanwhile_is_told_when_it_returns(play):
+def test_a_vehicle_that_is_lost_again_meanwhile_is_told_when_it_returns(play):
     async def story(world: World):
         await lose(world)
         world.fake.hangs.add("hold")
@@ -113,7 +113,7 @@ def test_an_operator_who_took_it_meanwhile_is_not_held_up(play):
     assert "ugv1 is with anna" in play(story, "ugv1", watch_links=True)
 
 
-def test_one_that_is_given_back_while_it_is_lost_is_not_free(play):
+def test_a_vehicle_that_is_given_back_while_it_is_lost_is_not_free(play):
     async def story(world: World):
         await lose(world)
         await world.executive.control.take("ugv1", by="anna")

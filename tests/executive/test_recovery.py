@@ -309,7 +309,7 @@ def test_an_arbiter_that_cannot_be_asked_is_a_lost_vehicle(play):
     assert "LINK_LOST" in summary.detail
 
 
-def test_one_that_could_not_be_asked_must_stop_when_it_returns_before_it_is_free(play):
+def test_a_vehicle_that_could_not_be_asked_must_stop_when_it_returns_before_it_is_free(play):
     async def story(world: World):
         control = world.executive.control
         world.fake.raises["query"] = OSError("no route to host")

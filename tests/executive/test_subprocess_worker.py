@@ -217,7 +217,7 @@ def test_the_process_ends_with_an_executive_that_is_killed(endless: str) -> None
         os.sched_yield()
 
 
-def test_one_that_breaks_off_is_an_error_with_its_last_words(
+def test_a_worker_that_breaks_off_is_an_error_with_its_last_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "broken_work.py").write_text("raise SystemExit('no room')", encoding="utf-8")

@@ -19,7 +19,7 @@ def graph(tmp_path: Path) -> ResourceGraph:
     return ResourceGraph(patrol(tmp_path), everything)
 
 
-def test_it_knows_what_each_name_is(graph: ResourceGraph) -> None:
+def test_the_graph_knows_what_each_name_is(graph: ResourceGraph) -> None:
     names = ("evsg1", "evsg3/ptz", "section", "evsg9")
     assert [graph.kind(name) for name in names] == [VEHICLE, PAYLOAD, TEAM, None]
 

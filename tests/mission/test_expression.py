@@ -196,7 +196,7 @@ def value(text):
         ("is_empty(no)", False),
     ],
 )
-def test_value(text, expected):
+def test_an_expression_has_its_value(text, expected):
     assert repr(value(text)) == repr(expected)
 
 
@@ -396,7 +396,7 @@ def test_a_literal_is_its_value(given):
         ("PT${i * 2}S", Dialect.TEMPLATE, "PT6S"),
     ],
 )
-def test_template(text, dialect, expected):
+def test_a_template_has_its_dialect_and_value(text, dialect, expected):
     expression = template(text)
     assert expression.text == text
     assert expression.dialect is dialect

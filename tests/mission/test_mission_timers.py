@@ -38,7 +38,7 @@ START_2026_US = 1_767_225_600 * SECOND_US
         ("P100000DT0.000001S", 100_000 * DAY_US + 1),
     ],
 )
-def test_duration(text, expected_us):
+def test_a_duration_is_read(text, expected_us):
     assert duration_us(text, START_2026_US) == expected_us
     assert duration_us(text, 0) == expected_us
 
@@ -76,7 +76,7 @@ def test_years_and_months_are_those_of_the_calendar(text, start, end):
         ("9999-12-31T23:00:00-14:00", 253_402_347_600 * SECOND_US),
     ],
 )
-def test_date(text, expected_us):
+def test_a_date_is_read(text, expected_us):
     assert date_us(text) == expected_us
 
 
@@ -327,7 +327,7 @@ def at(hour):
         ("0 0/5 * * * ?", Cycle(None, None, "0 0/5 * * * ?")),
     ],
 )
-def test_cycle(text, expected):
+def test_a_cycle_is_read(text, expected):
     assert cycle(text) == expected
 
 

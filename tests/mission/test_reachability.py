@@ -47,7 +47,7 @@ def test_an_activity_reaches_what_its_boundary_events_reach() -> None:
     """) == {"b": "b", "late": "late", "a": "b late", "s": "b late"}
 
 
-def test_it_agrees_with_a_walk_from_each_node() -> None:
+def test_reachability_agrees_with_a_walk_from_each_node() -> None:
     for seed in range(200):
         for join in mission(graph(Random(seed))).nodes:
             if isinstance(join, InclusiveGateway):

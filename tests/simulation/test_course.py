@@ -31,7 +31,7 @@ def test_arrival_is_distance_by_speed_and_half_of_each_ramp() -> None:
     assert plan.duration_s == pytest.approx(100 / speed + ramps / 2)
 
 
-def test_it_turns_on_the_spot_before_it_sets_off() -> None:
+def test_a_vehicle_turns_on_the_spot_before_it_sets_off() -> None:
     plan = Course(craft()).through([(0.0, 100.0, 0.0)]).plan()
     turning_s = (math.pi / 2) / GROUND.turn_rate_rad_s
     assert plan.at(turning_s / 2).yaw == pytest.approx(math.pi / 4)

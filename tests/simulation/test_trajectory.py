@@ -115,7 +115,7 @@ def east(bench: ArbiterHarness) -> float:
     return local(state.position)[0]
 
 
-def test_it_is_an_arbiter_that_adjusts() -> None:
+def test_the_simulated_arbiter_adjusts_behaviors() -> None:
     assert issubclass(SimArbiter, AdjustingArbiter)
 
 

@@ -43,7 +43,7 @@ def test_each_vehicle_does_it_and_it_is_one_behavior(play: Play, arbiter: Any) -
     assert {name for _, name in yard.commands} == set(carts)
 
 
-def test_it_needs_no_position_of_anybody(play: Play) -> None:
+def test_a_team_that_acts_alike_needs_no_positions(play: Play) -> None:
     async def story(world: World) -> Any:
         run = await world.executive.control.start(all_do("drive_stop", "a", "b"))
         await world.until(lambda: yard.count("drive_stop") == 2, within_s=1.0)

@@ -71,7 +71,7 @@ def test_what_the_fleet_says_of_a_members_speed_counts() -> None:
     assert way_m(plan, "v1") == pytest.approx(3 * way_m(plan, "v0"))
 
 
-def test_one_that_does_not_last_surveys_less_and_the_others_more() -> None:
+def test_a_member_that_does_not_last_surveys_less_and_the_others_more() -> None:
     wished = setting("air", "air", area=FIELD, spacing=5.0)
     even = PLANS["area_survey"](wished)
     tired = replace(wished, lasts_s={ResourceId("v0"): 60.0})

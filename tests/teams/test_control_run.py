@@ -232,7 +232,7 @@ def test_others_survey_what_a_lost_member_has_left(play: Play) -> None:
     assert yard.count("single_vehicle_routing") == 4
 
 
-def test_one_who_is_slow_is_waited_for(play: Play) -> None:
+def test_a_member_who_is_slow_is_waited_for(play: Play) -> None:
     async def story(world: World) -> Any:
         world.yard["b"].max_m_s = 1.5
         run = await world.executive.control.start(MARCH)

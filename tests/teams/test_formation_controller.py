@@ -225,7 +225,7 @@ def test_who_is_abreast_stays_so_though_one_is_slow(
     raise AssertionError("they have not arrived")
 
 
-def test_it_tells_how_well_each_keeps_its_place() -> None:
+def test_the_formation_controller_tells_how_well_each_keeps_its_place() -> None:
     starts = [(0.0, 0.0), (-20.0, 0.0), (-40.0, 0.0), (-60.0, 0.0)]
     field = Field([(0, 0), (500, 0)], starts, "column", 20.0, 4.0, frozenset(), 0.0, [2.0] * 4)
     names = list(field.carts)

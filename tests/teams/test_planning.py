@@ -198,7 +198,7 @@ def test_the_frame_of_an_altitude_goes_with_it(offered: tuple[str, ...]) -> None
         assert set(high) <= plan.takes[leg.member]
 
 
-def test_one_who_cannot_survey_itself_has_all_move_along_the_passes() -> None:
+def test_a_member_who_cannot_survey_itself_has_all_move_along_the_passes() -> None:
     wished = setting("ground", "air", area=FIELD, offered=(*OFFERED, "area_survey"))
     less = {name: SHARED[name, BehaviorType.VEHICLE] for name in OFFERED}
     wished = replace(wished, offered={**wished.offered, ResourceId("v1"): less})

@@ -151,7 +151,7 @@ async def failed(world: Rehearsed, names: str) -> tuple[BehaviorEnded, list[floa
     raise AssertionError(f"no end was recorded; {world.seen[-5:]}")
 
 
-def test_one_that_refuses_to_begin_fails_the_team_when_the_others_stand() -> None:
+def test_a_member_that_refuses_to_begin_fails_the_team_when_the_others_stand() -> None:
     SlowArbiter.refuses = {("start", "e")}
     SlowArbiter.slow = {("start", "e"): 2.0}  # when the others are well under way
 
@@ -170,7 +170,7 @@ def test_one_that_refuses_to_begin_fails_the_team_when_the_others_stand() -> Non
 
 @pytest.mark.parametrize("how", ["raises", "hangs"])
 @pytest.mark.parametrize("call", ["hold", "resume"])
-def test_one_that_is_not_held_or_let_go_fails_the_team_when_the_others_stand(
+def test_a_member_that_is_not_held_or_let_go_fails_the_team_when_the_others_stand(
     call: str, how: str
 ) -> None:
     others = TEN.replace("e", "")
@@ -203,7 +203,9 @@ def test_one_that_is_not_held_or_let_go_fails_the_team_when_the_others_stand(
     assert set(others) <= set(cancelled)
 
 
-def test_one_that_hangs_at_its_start_fails_the_team_and_the_others_have_stood_meanwhile() -> None:
+def test_a_member_that_hangs_at_its_start_fails_the_team_and_the_others_have_stood_meanwhile() -> (
+    None
+):
     SlowArbiter.slow = {("start", "e"): FOR_EVER_S}
 
     async def story(world: Rehearsed) -> Any:

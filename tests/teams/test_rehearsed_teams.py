@@ -52,7 +52,7 @@ def test_the_same_rehearsal_has_the_same_records_to_the_microsecond() -> None:
     assert one.records == two.records
 
 
-def test_one_who_is_slow_is_waited_for_and_nobody_comes_too_near() -> None:
+def test_a_member_who_is_slow_is_waited_for_and_nobody_comes_too_near() -> None:
     async def story(world: Rehearsed) -> Any:
         await world.executive.control.start(MARCH)
         gaps: list[tuple[float, float]] = []

@@ -80,7 +80,7 @@ def test_messages_that_nobody_reads_keep_no_mission_undecided() -> None:
     assert not_held(report) == set()
 
 
-def test_it_is_said_that_only_so_many_messages_are_kept() -> None:
+def test_a_report_says_that_only_so_many_messages_are_kept() -> None:
     bounded = [a.what for a in translate(CHATTY).approximations if a.exactness is Exactness.BOUNDED]
     assert "up to three copies of message News are kept" in bounded
 

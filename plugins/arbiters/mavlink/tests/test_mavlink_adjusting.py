@@ -31,7 +31,7 @@ def speeds(bench: Any) -> list[float]:
     return [call[1] for call in bench.body.calls if call[0] == "set_speed"]
 
 
-def test_it_is_an_arbiter_that_adjusts() -> None:
+def test_the_arbiter_adjusts_behaviors() -> None:
     assert issubclass(MavlinkArbiter, AdjustingArbiter)
 
 

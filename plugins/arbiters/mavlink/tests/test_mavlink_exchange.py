@@ -99,7 +99,7 @@ class Stage:
         return self.transaction.outcome()
 
 
-async def test_it_may_be_done_when_it_begins() -> None:
+async def test_an_exchange_may_be_done_when_it_begins() -> None:
     stage = Stage((None, True))
     assert await stage.ended() == ["begin 0"]
     assert [each.seq for each in stage.link.sent] == [1]
@@ -168,7 +168,7 @@ async def test_what_the_transaction_raises_is_raised(after: int) -> None:
         await stage.ended()
 
 
-async def test_one_that_is_cancelled_hears_and_says_no_more() -> None:
+async def test_an_exchange_that_is_cancelled_hears_and_says_no_more() -> None:
     stage = Stage((1.0, False))
     await ticks()
     stage.running.cancel()

@@ -42,7 +42,7 @@ async def drives(bench, seconds: float, speed: float = 2.0) -> float:
         ({"offset": 0.0}, (0.0, 0.0)),
     ],
 )
-def test_it_keeps_its_station_at_a_vehicle_that_drives(asked, station) -> None:
+def test_a_copter_keeps_its_station_at_a_vehicle_that_drives(asked, station) -> None:
     async def main(bench) -> None:
         says(bench, 50.0, 0.0)
         await bench.start("r1.b1", "follow", "v", target=VehiclePosition("w"), **asked)
@@ -107,7 +107,7 @@ def test_a_target_that_is_heard_a_little_later_is_followed() -> None:
     play(Body().fly(), main)
 
 
-def test_it_cannot_follow_itself() -> None:
+def test_a_copter_cannot_follow_itself() -> None:
     async def main(bench) -> None:
         end = await bench.do("follow", target=VehiclePosition("v"))
         assert end.state is BehaviorState.REJECTED

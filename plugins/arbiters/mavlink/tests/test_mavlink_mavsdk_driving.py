@@ -34,12 +34,12 @@ def north_m(flown):
     return (flown.real.location.latitude_deg - HOME.latitude_deg) * 111_195
 
 
-async def test_it_is_found_as_an_ardupilot_rover(rover):
+async def test_a_rover_is_found_as_an_ardupilot_rover(rover):
     assert await rover.system.autopilot_type() is Autopilot.ARDUPILOT
     assert await rover.system.vehicle_type() is Vehicle.ROVER
 
 
-async def test_it_tells_where_it_is(rover):
+async def test_a_rover_tells_where_it_is(rover):
     await rover.ready()
     await rover.telemetry.set_rate_position(10.0)
     position = await first(rover.telemetry.subscribe_position())
@@ -52,7 +52,7 @@ async def test_health_is_told_once_sys_status_is_streamed(rover):
     assert await first(rover.telemetry.subscribe_health(), lambda each: each.is_armable)
 
 
-async def test_it_is_armed_and_disarmed(rover):
+async def test_a_rover_is_armed_and_disarmed(rover):
     await to_go(rover)
     assert rover.real.armed
     assert await first(rover.telemetry.subscribe_armed(), bool)
@@ -60,13 +60,13 @@ async def test_it_is_armed_and_disarmed(rover):
     assert not rover.real.armed
 
 
-async def test_it_does_not_take_off(rover):
+async def test_a_rover_does_not_take_off(rover):
     await to_go(rover)
     with pytest.raises(ActionError):
         await rover.action.takeoff()
 
 
-async def test_it_goes_where_it_is_told_and_holds(rover):
+async def test_a_rover_goes_where_it_is_told_and_holds(rover):
     await to_go(rover)
     await rover.action.goto_location(
         HOME.latitude_deg + 0.0002, HOME.longitude_deg, 488.0, math.nan
@@ -79,7 +79,7 @@ async def test_it_goes_where_it_is_told_and_holds(rover):
     assert north_m(rover) - stopped < 3.0
 
 
-async def test_it_drives_home(rover):
+async def test_a_rover_drives_home(rover):
     await to_go(rover)
     await rover.action.goto_location(
         HOME.latitude_deg + 0.0002, HOME.longitude_deg, 488.0, math.nan

@@ -36,7 +36,7 @@ def distance_to_m(flown):
 # --- connect and telemetry ------------------------------------------------------------------------
 
 
-async def test_it_is_found_as_an_ardupilot_copter(copter):
+async def test_a_copter_is_found_as_an_ardupilot_copter(copter):
     assert await copter.system.is_connected()
     assert await copter.system.autopilot_type() is Autopilot.ARDUPILOT
     assert await copter.system.vehicle_type() is Vehicle.MULTICOPTER
@@ -47,7 +47,7 @@ async def test_its_version_can_be_asked_for(copter):
     assert (version.flight_sw_major, version.flight_sw_minor) >= (4, 0)
 
 
-async def test_it_tells_where_it_is_when_it_is_asked_to(copter):
+async def test_a_copter_tells_where_it_is_when_it_is_asked_to(copter):
     await copter.ready()
     await copter.telemetry.set_rate_position(10.0)
     position = await first(copter.telemetry.subscribe_position())
@@ -57,7 +57,7 @@ async def test_it_tells_where_it_is_when_it_is_asked_to(copter):
     assert position.relative_altitude_m == pytest.approx(0.0, abs=1.0)
 
 
-async def test_it_tells_its_attitude_heading_and_velocity(copter):
+async def test_a_copter_tells_its_attitude_heading_and_velocity(copter):
     await copter.ready()
     await copter.telemetry.set_rate_attitude_euler(10.0)
     await copter.telemetry.set_rate_position(10.0)
@@ -69,7 +69,7 @@ async def test_it_tells_its_attitude_heading_and_velocity(copter):
     assert velocity.north_m_s == pytest.approx(0.0, abs=0.3)
 
 
-async def test_it_tells_of_battery_gps_and_home(copter):
+async def test_a_copter_tells_of_battery_gps_and_home(copter):
     await copter.ready()
     await copter.telemetry.set_rate_battery(5.0)
     await copter.telemetry.set_rate_gps_info(5.0)
@@ -101,7 +101,7 @@ async def test_health_is_told_once_sys_status_is_streamed(copter):
     assert health.is_magnetometer_calibration_ok
 
 
-async def test_it_is_not_armed_in_guided_before_it_knows_where_it_is():
+async def test_a_copter_is_not_armed_in_guided_before_it_knows_where_it_is():
     async with flying(VehicleSpec(estimator_s=1000.0)) as found:
         copter, said = found[1], []
 
@@ -129,7 +129,7 @@ async def test_arming_is_told(copter):
     assert not copter.real.armed
 
 
-async def test_it_is_not_disarmed_in_flight(copter):
+async def test_a_copter_is_not_disarmed_in_flight(copter):
     await copter.up(10.0)
     with pytest.raises(ActionError, match="FAILED"):
         await copter.action.disarm()
@@ -139,7 +139,7 @@ async def test_it_is_not_disarmed_in_flight(copter):
 # --- flying ---------------------------------------------------------------------------------------
 
 
-async def test_it_takes_off_to_the_altitude_that_was_set(copter):
+async def test_a_copter_takes_off_to_the_altitude_that_was_set(copter):
     await copter.telemetry.set_rate_position(10.0)
     await copter.telemetry.set_rate_landed_state(5.0)
     await copter.up(12.0)
@@ -152,7 +152,7 @@ async def test_it_takes_off_to_the_altitude_that_was_set(copter):
     assert copter.real.takeoffs == 1
 
 
-async def test_it_goes_where_it_is_told(copter):
+async def test_a_copter_goes_where_it_is_told(copter):
     await copter.up(10.0)
     there = (HOME.latitude_deg + 0.0003, HOME.longitude_deg + 0.0004)
     await copter.action.goto_location(*there, 508.0, math.nan)
@@ -169,7 +169,7 @@ def _near(flown, latitude_deg, longitude_deg, up_m):
     )
 
 
-async def test_it_holds(copter):
+async def test_a_copter_holds(copter):
     await copter.up(10.0)
     await copter.action.goto_location(HOME.latitude_deg + 0.01, HOME.longitude_deg, 500.0, 0.0)
     await really(lambda: distance_to_m(copter)[0] > 5.0)
@@ -189,7 +189,7 @@ async def test_its_speed_can_be_set(copter):
     await first(copter.telemetry.subscribe_velocity_ned(), lambda each: 2.8 < each.north_m_s < 3.2)
 
 
-async def test_it_returns_lands_and_disarms(copter):
+async def test_a_copter_returns_lands_and_disarms(copter):
     await copter.up(10.0)
     await copter.action.goto_location(HOME.latitude_deg + 0.0002, HOME.longitude_deg, 498.0, 0.0)
     await really(lambda: distance_to_m(copter)[0] > 15.0)
@@ -200,7 +200,7 @@ async def test_it_returns_lands_and_disarms(copter):
     assert abs(copter.real.up_m) < 0.3
 
 
-async def test_it_lands_where_it_is(copter):
+async def test_a_copter_lands_where_it_is(copter):
     await copter.telemetry.set_rate_landed_state(5.0)
     await copter.up(5.0)
     await copter.action.land()

@@ -64,33 +64,33 @@ async def test_control_is_taken_and_given_back(copter):
     await first(status(), lambda each: each.sysid_primary_control == 0)
 
 
-async def test_it_points_to_angles_from_the_bow(copter):
+async def test_a_gimbal_points_to_angles_from_the_bow(copter):
     gimbal = await gimbal_of(copter)
     await copter.gimbal.set_angles(gimbal, 0, -45, 30, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
     await really(lambda: points(copter) == pytest.approx((-45.0, 30.0), abs=1.0))
     await angles_told(copter, "euler_angle_forward", -45.0, 30.0)
 
 
-async def test_it_points_to_angles_from_north(copter):
+async def test_a_gimbal_points_to_angles_from_north(copter):
     gimbal = await gimbal_of(copter)
     await copter.gimbal.set_angles(gimbal, 0, -20, 120, GimbalMode.YAW_LOCK, SendMode.ONCE)
     await angles_told(copter, "euler_angle_north", -20.0, 120.0)
     assert points(copter)[1] == pytest.approx(30.0, abs=1.0)  # its bow points to the east
 
 
-async def test_it_follows_angles_that_are_streamed(copter):
+async def test_a_gimbal_follows_angles_that_are_streamed(copter):
     gimbal = await gimbal_of(copter)
     await copter.gimbal.set_angles(gimbal, 0, -30, -40, GimbalMode.YAW_FOLLOW, SendMode.STREAM)
     await really(lambda: points(copter) == pytest.approx((-30.0, -40.0), abs=1.0))
 
 
-async def test_it_turns_at_rates(copter):
+async def test_a_gimbal_turns_at_rates(copter):
     gimbal = await gimbal_of(copter)
     await copter.gimbal.set_angular_rates(gimbal, 0, -5, 0, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
     await really(lambda: points(copter)[0] < -20.0)
 
 
-async def test_it_watches_a_place(copter):
+async def test_a_gimbal_watches_a_place(copter):
     await copter.up(20.0)
     gimbal = await gimbal_of(copter)
     east = HOME.longitude_deg + 20.0 / (111_195 * math.cos(math.radians(HOME.latitude_deg)))

@@ -47,7 +47,7 @@ async def test_a_vehicle_that_was_heard_before_anybody_asked_for_it_is_reached()
         await until(lambda: len(heard) > before)  # the first goes on without the second
 
 
-async def test_it_sends_heartbeats_of_a_ground_station():
+async def test_the_driver_sends_heartbeats_of_a_ground_station():
     port = free_port()
     async with linked(f"udpin://127.0.0.1:{port}"), scripted(port) as vehicle:
         beat = await vehicle.hears(lambda each: each.get_type() == "HEARTBEAT")

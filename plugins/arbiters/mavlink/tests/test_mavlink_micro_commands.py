@@ -225,7 +225,7 @@ def test_the_other_form_is_tried_once_if_the_vehicle_wants_it() -> None:
     assert len(played.sent) == 1
 
 
-def test_one_is_in_flight_for_each_target_and_command() -> None:
+def test_one_command_is_in_flight_for_each_target_and_command() -> None:
     gimbal = Address(VEHICLE.system, 154)
     assert Command(VEHICLE, ARM).key == Command(VEHICLE, ARM, (1,)).key
     assert Command(VEHICLE, ARM).key != Command(VEHICLE, TAKEOFF).key

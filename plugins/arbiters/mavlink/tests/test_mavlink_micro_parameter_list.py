@@ -55,7 +55,7 @@ def test_silence_ends_it() -> None:
     assert played.ended_s == LIST_PATIENCE.bound_s
 
 
-def test_one_that_never_comes_ends_it() -> None:
+def test_a_parameter_that_never_comes_ends_it() -> None:
     class Withholds(Parameters):
         def _value(self, name: str) -> Message:
             return super()._value("P_0" if name == "P_4" else name)

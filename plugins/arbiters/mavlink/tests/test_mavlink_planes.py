@@ -48,7 +48,7 @@ async def circles(bench, place: tuple[float, float], radius_m: float = CIRCLE_M)
             await bench.simulator.until(lambda: flown.now_s > looked_s + 0.5)  # noqa: B023
 
 
-def test_it_takes_off_and_circles_at_its_height() -> None:
+def test_a_plane_takes_off_and_circles_at_its_height() -> None:
     async def main(bench) -> None:
         assert bench.truth().takeoffs == 1
         assert bench.truth().up_m == pytest.approx(60, abs=6)
@@ -58,7 +58,7 @@ def test_it_takes_off_and_circles_at_its_height() -> None:
     with_a_plane(main)
 
 
-def test_it_goes_to_a_place_and_circles_there() -> None:
+def test_a_plane_goes_to_a_place_and_circles_there() -> None:
     async def main(bench) -> None:
         await bench.do("r1.b1", "goto", target=point(400, 300, 80.0), heading=1.0, tolerance=2.0)
         assert math.dist(bench.level(), (400, 300)) < CIRCLE_M + 20
@@ -102,7 +102,7 @@ def test_held_it_circles_and_goes_on_when_resumed() -> None:
     with_a_plane(main)
 
 
-def test_it_comes_home_and_circles_there() -> None:
+def test_a_plane_comes_home_and_circles_there() -> None:
     async def main(bench) -> None:
         await bench.do("r1.b1", "goto", target=point(500, 0))
         await bench.do("r1.b2", "return_to_launch")
@@ -112,7 +112,7 @@ def test_it_comes_home_and_circles_there() -> None:
     with_a_plane(main)
 
 
-def test_it_flies_a_route_and_circles_at_its_end() -> None:
+def test_a_plane_flies_a_route_and_circles_at_its_end() -> None:
     async def main(bench) -> None:
         way = [(400.0, 0.0), (400.0, 400.0), (0.0, 400.0)]
         places = tuple((*at(*place), 80.0) for place in way)
@@ -134,7 +134,7 @@ def test_it_flies_a_route_and_circles_at_its_end() -> None:
     with_a_plane(main)
 
 
-def test_it_surveys_an_area() -> None:
+def test_a_plane_surveys_an_area() -> None:
     async def main(bench) -> None:
         corners = [(0, 200), (600, 200), (600, 700), (0, 700), (0, 200)]
         area = Area((tuple((*at(*corner), None) for corner in corners),))
@@ -194,7 +194,7 @@ def test_without_a_landing_stored_it_says_what_it_needs() -> None:
     with_a_plane(main)
 
 
-def test_it_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -> None:
+def test_a_plane_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -> None:
     async def main(bench) -> None:
         vehicle = bench.arbiter._controllers["v1"].vehicle
         assert await vehicle.identified(AMPLE_S)

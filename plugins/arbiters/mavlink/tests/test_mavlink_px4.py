@@ -73,7 +73,9 @@ def test_a_mission_that_was_just_uploaded_is_tried_again_while_it_is_denied(virt
     virtual(main)
 
 
-def test_it_arms_in_a_mode_that_holds_and_takes_off_to_a_height_above_the_sea(virtual: Run) -> None:
+def test_a_px4_copter_arms_in_a_mode_that_holds_and_takes_off_to_a_height_above_the_sea(
+    virtual: Run,
+) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(px4(clock)) as (link, vehicle):
             link.obey[TAKEOFF] = enters(link, AUTO_TAKEOFF)
@@ -127,7 +129,7 @@ def test_a_refused_place_is_a_refusal_although_the_mode_is_right_already(virtual
     virtual(main)
 
 
-def test_it_orbits_by_command_where_it_can(virtual: Run) -> None:
+def test_a_px4_copter_orbits_by_command_where_it_can(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(px4(clock)) as (link, vehicle):
             await in_the_air(link, vehicle)

@@ -45,7 +45,7 @@ def asked(bench: Bench, id_: int) -> Any:
     return next(each for each in to_camera(bench, 512, id_) if each.get_msgId() == id_)
 
 
-def test_it_has_a_heartbeat_of_its_own(bench: Bench) -> None:
+def test_a_simulated_camera_has_a_heartbeat_of_its_own(bench: Bench) -> None:
     bench.run(5)
     beats = [each for each in bench.received if each.get_msgId() == 0]
     cameras = [each for each in beats if each.get_srcComponent() == CAMERA]
@@ -58,7 +58,7 @@ def test_without_one_nobody_answers() -> None:
     assert Bench().tell(message) == []
 
 
-def test_it_tells_what_it_is(bench: Bench) -> None:
+def test_a_simulated_camera_tells_what_it_is(bench: Bench) -> None:
     information = asked(bench, 259)
     assert bytes(information.vendor_name).rstrip(b"\0") == b"m2pem"
     assert information.flags & dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
@@ -110,7 +110,7 @@ def test_a_video_is_recorded(bench: Bench) -> None:
     assert asked(bench, STATUS).video_status == 0
 
 
-def test_it_zooms_by_steps_on_and_on_and_to_a_place(bench: Bench) -> None:
+def test_a_simulated_camera_zooms_by_steps_on_and_on_and_to_a_place(bench: Bench) -> None:
     zoom = dialect.MAV_CMD_SET_CAMERA_ZOOM
     assert result(bench, zoom, 2, 40) == 0
     assert asked(bench, 260).zoomLevel == 40
@@ -143,7 +143,7 @@ def test_a_picture_with_a_number_is_taken_once(bench: Bench) -> None:
     assert [each.image_index for each in pictures(bench)] == [0, 1]
 
 
-def test_it_tells_of_a_picture_again_if_it_is_asked(bench: Bench) -> None:
+def test_a_simulated_camera_tells_of_a_picture_again_if_it_is_asked(bench: Bench) -> None:
     camera(bench).untold = 1
     assert result(bench, 2000, 0, 0, 1) == 0
     bench.run(1)

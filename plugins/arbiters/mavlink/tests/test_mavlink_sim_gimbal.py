@@ -45,7 +45,7 @@ def test_its_attitude_is_told_only_when_it_is_asked_for() -> None:
     assert len([each for each in bench.received if each.get_msgId() == ATTITUDE]) >= 9
 
 
-def test_it_turns_no_faster_than_it_can() -> None:
+def test_a_simulated_gimbal_turns_no_faster_than_it_can() -> None:
     bench = Bench()
     assert bench.command(PITCH_YAW, -60, 90, NAN, NAN, 0) == 0
     bench.run(0.5)
@@ -54,7 +54,7 @@ def test_it_turns_no_faster_than_it_can() -> None:
     assert angles(bench) == pytest.approx((-60, 90), abs=0.5)
 
 
-def test_it_stops_at_its_limits() -> None:
+def test_a_simulated_gimbal_stops_at_its_limits() -> None:
     bench = Bench()
     assert bench.command(PITCH_YAW, 80, 179, NAN, NAN, 0) == 0
     bench.run(5)
@@ -108,7 +108,7 @@ def test_messages_without_acknowledgement_move_it_too() -> None:
     assert angles(bench) == pytest.approx((-11.5, 0), abs=0.5)
 
 
-def test_it_looks_at_a_place_and_follows_it() -> None:
+def test_a_simulated_gimbal_looks_at_a_place_and_follows_it() -> None:
     bench = Bench().airborne(20)
     place = (*bench.offset(20, 20), 0.0)
     assert bench.command_int(dialect.MAV_CMD_DO_SET_ROI_LOCATION, at=place) == 0

@@ -159,7 +159,9 @@ def test_a_copters_start_begins_a_completed_mission() -> None:
     assert progress(bench) == (1, 3, 1)
 
 
-def test_it_is_begun_in_its_mode_by_what_is_not_armed_too_and_forgotten_when_disarmed() -> None:
+def test_a_mission_is_begun_in_its_mode_by_what_is_not_armed_too_and_forgotten_when_disarmed() -> (
+    None
+):
     bench = Bench()
     bench.run(10)
     bench.upload([HOME, item(1, 22, z=15.0), item(2, 20)])

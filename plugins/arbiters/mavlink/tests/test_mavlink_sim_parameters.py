@@ -18,7 +18,7 @@ def test_a_list_has_each_parameter_once() -> None:
     assert {m.param_count for m in told} == {len(told)}
 
 
-def test_one_is_read_by_name_or_number() -> None:
+def test_a_parameter_is_read_by_name_or_number() -> None:
     bench = Bench(system=1)
     (by_name,) = bench.tell(dialect.MAVLink_param_request_read_message(1, 1, b"RTL_ALT", -1))
     assert (by_name.param_id, by_name.param_value) == ("RTL_ALT", 1500)

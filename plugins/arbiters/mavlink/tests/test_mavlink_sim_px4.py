@@ -35,7 +35,7 @@ def test_its_heartbeat_is_that_of_px4() -> None:
     assert not heartbeat.base_mode & 128
 
 
-def test_it_streams_without_being_asked_but_not_what_ardupilot_alone_has() -> None:
+def test_a_simulated_px4_streams_without_being_asked_but_not_what_ardupilot_alone_has() -> None:
     bench = Px4Bench()
     bench.run(10)
     for id_ in (1, 24, 30, 32, 33, 42, 141, 147, 230, 242, 245):
@@ -72,7 +72,7 @@ def test_arming_without_a_position_is_rejected_with_texts() -> None:
     assert "Preflight Fail: No valid position estimate" in bench.texts()
 
 
-def test_it_takes_off_to_a_height_above_the_sea_and_then_holds() -> None:
+def test_a_simulated_px4_takes_off_to_a_height_above_the_sea_and_then_holds() -> None:
     bench = Px4Bench().ready()
     assert bench.command(TAKEOFF, *[NAN] * 6, GROUND_M + 12) == ACCEPTED
     assert bench.mode == "AUTO.TAKEOFF"
@@ -169,7 +169,7 @@ def test_a_place_without_a_change_of_mode_is_unsupported() -> None:
     assert not bench.autopilot.body.moving
 
 
-def test_it_orbits_a_place() -> None:
+def test_a_simulated_px4_orbits_a_place() -> None:
     bench = Px4Bench().airborne()
     place = (*bench.offset(40, 0), GROUND_M + 20)
     assert bench.command_int(ORBIT, 15, 4, 0, 0, at=place) == ACCEPTED
@@ -190,7 +190,7 @@ def _place(place: tuple[float, float, float]):
     return Location(*place)
 
 
-def test_it_returns_lands_and_disarms() -> None:
+def test_a_simulated_px4_returns_lands_and_disarms() -> None:
     bench = Px4Bench().airborne()
     bench.command_int(REPOSITION, -1, 1, 0, NAN, at=(*bench.offset(100, 0), GROUND_M + 20))
     bench.run(40)
@@ -211,7 +211,7 @@ def test_near_home_it_returns_without_the_full_climb() -> None:
     bench.run_until(lambda: not bench.autopilot.arming.armed)
 
 
-def test_it_lands_where_it_is() -> None:
+def test_a_simulated_px4_lands_where_it_is() -> None:
     bench = Px4Bench().airborne(8)
     assert bench.command(dialect.MAV_CMD_NAV_LAND) == ACCEPTED
     bench.run(1)

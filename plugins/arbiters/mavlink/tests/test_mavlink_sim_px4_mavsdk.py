@@ -103,7 +103,7 @@ def items(*places: tuple[float, float]) -> list[MissionItem]:
     ]
 
 
-async def test_it_is_found_as_px4_and_becomes_healthy(copter: Flown) -> None:
+async def test_a_simulated_px4_is_found_as_px4_and_becomes_healthy(copter: Flown) -> None:
     assert await copter.system.autopilot_type() is Autopilot.PX4
     health = await first(copter.telemetry.subscribe_health(), lambda each: each.is_armable)
     assert health.is_global_position_ok
@@ -118,14 +118,14 @@ async def test_parameters_that_are_whole_numbers_are_read_and_set(copter: Flown)
     assert await copter.param.get_param_float("RTL_RETURN_ALT") == 60.0
 
 
-async def test_it_is_not_armed_before_it_is_healthy(copter: Flown) -> None:
+async def test_a_simulated_px4_is_not_armed_before_it_is_healthy(copter: Flown) -> None:
     copter.real.faults.refuse_arming("Compass not calibrated")
     with pytest.raises(ActionError):
         await copter.action.arm()
     assert not copter.real.armed
 
 
-async def test_it_takes_off_goes_to_a_place_and_returns(copter: Flown) -> None:
+async def test_a_simulated_px4_takes_off_goes_to_a_place_and_returns(copter: Flown) -> None:
     await copter.up(10.0)
     assert copter.real.up_m == pytest.approx(10, abs=0.6)
     latitude, longitude = ZURICH.latitude_deg + 0.0003, ZURICH.longitude_deg + 0.0003
@@ -141,7 +141,7 @@ async def test_it_takes_off_goes_to_a_place_and_returns(copter: Flown) -> None:
     assert copter.real.location[:2] == pytest.approx(ZURICH[:2], abs=1e-5)
 
 
-async def test_it_lands_where_it_is(copter: Flown) -> None:
+async def test_a_simulated_px4_lands_where_it_is(copter: Flown) -> None:
     await copter.up(5.0)
     await copter.action.land()
     await copter.mode(FlightMode.LAND)
@@ -149,7 +149,7 @@ async def test_it_lands_where_it_is(copter: Flown) -> None:
     assert copter.real.up_m == pytest.approx(0, abs=0.1)
 
 
-async def test_it_orbits_and_holds(copter: Flown) -> None:
+async def test_a_simulated_px4_orbits_and_holds(copter: Flown) -> None:
     await copter.up(10.0)
     place = (ZURICH.latitude_deg, ZURICH.longitude_deg, 500.0)
     await copter.action.do_orbit(20.0, 5.0, OrbitYawBehavior.HOLD_FRONT_TO_CIRCLE_CENTER, *place)

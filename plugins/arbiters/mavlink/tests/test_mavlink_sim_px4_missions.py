@@ -24,7 +24,7 @@ def uploaded(wait_s: float = 3.0) -> Px4Bench:
     return bench
 
 
-def test_it_asks_for_items_as_int_and_has_no_home_item() -> None:
+def test_a_simulated_px4_asks_for_items_as_int_and_has_no_home_item() -> None:
     bench = Px4Bench()
     bench.run(10)
     bench.received.clear()
@@ -61,7 +61,7 @@ def test_without_a_mission_it_is_neither_started_nor_armed_to_fly_it() -> None:
     assert "Preflight Fail: No valid mission available" in bench.texts()
 
 
-def test_it_arms_flies_to_the_end_and_holds_there() -> None:
+def test_a_simulated_px4_arms_flies_to_the_end_and_holds_there() -> None:
     bench = uploaded()
     assert bench.command(START) == ACCEPTED
     assert bench.autopilot.arming.armed
@@ -82,7 +82,7 @@ def test_armed_in_the_mode_it_begins() -> None:
     bench.run_until(lambda: bench.autopilot.mission.current == 2)
 
 
-def test_it_begins_at_the_item_that_was_set() -> None:
+def test_a_simulated_px4_begins_at_the_item_that_was_set() -> None:
     bench = Px4Bench().airborne(10)
     bench.upload(plan(bench))
     bench.run(3)

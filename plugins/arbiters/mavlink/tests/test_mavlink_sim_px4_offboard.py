@@ -13,14 +13,14 @@ def stream(bench: Px4Bench, seconds: float, *velocity: float) -> None:
         bench.run(0.2)
 
 
-def test_it_is_not_entered_in_the_air_without_setpoints() -> None:
+def test_offboard_mode_is_not_entered_in_the_air_without_setpoints() -> None:
     bench = Px4Bench().airborne()
     assert bench.enter(OFFBOARD) == LATER
     assert bench.texts()[-1] == "Switching to Offboard is currently not available"
     assert bench.mode == "AUTO.LOITER"
 
 
-def test_it_flies_as_fast_as_setpoints_say_for_as_long_as_they_come() -> None:
+def test_offboard_mode_flies_as_fast_as_setpoints_say_for_as_long_as_they_come() -> None:
     bench = Px4Bench().airborne()
     stream(bench, 1, 3.0, 1.0)
     assert not bench.autopilot.body.moving
@@ -47,7 +47,7 @@ def test_without_setpoints_it_drops_out_into_the_mode_that_is_set(action: int, m
     assert bench.mode == mode
 
 
-def test_it_is_chosen_on_the_ground_without_setpoints_but_not_armed_in() -> None:
+def test_offboard_mode_is_chosen_on_the_ground_without_setpoints_but_not_armed_in() -> None:
     bench = Px4Bench()
     bench.run(10)
     assert bench.enter(OFFBOARD) == ACCEPTED

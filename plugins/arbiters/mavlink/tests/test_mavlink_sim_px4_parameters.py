@@ -44,7 +44,7 @@ def test_a_number_that_is_none_is_not_set() -> None:
     assert bench.autopilot.parameters["RTL_RETURN_ALT"] == 60.0
 
 
-def test_those_that_failsafes_are_checked_by_are_there() -> None:
+def test_parameters_of_failsafes_are_there() -> None:
     bench = Px4Bench()
     for name in ("NAV_DLL_ACT", "COM_LOW_BAT_ACT", "COM_DL_LOSS_T", "MIS_TAKEOFF_ALT"):
         assert read(bench, name).param_id == name

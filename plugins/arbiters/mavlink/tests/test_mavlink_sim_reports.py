@@ -105,7 +105,7 @@ def test_the_battery_drains_in_motion() -> None:
     assert bench.report(1).voltage_battery == after.voltages[0] < 12_600
 
 
-def test_it_says_who_it_is() -> None:
+def test_a_simulated_autopilot_says_who_it_is() -> None:
     bench = Bench(Kind.BOAT, system=1)
     bench.run(1.5)
     heartbeat = next(m for m in bench.received if m.get_type() == "HEARTBEAT")

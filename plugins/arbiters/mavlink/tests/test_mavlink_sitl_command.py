@@ -121,7 +121,7 @@ def test_the_port_is_the_executives_when_the_vehicles_are_ready(sitl: Sitl, port
             heard.add(executive.recv(300)[5])  # a MAVLink 2 frame's system id
 
 
-def test_one_that_dies_is_named_and_ends_the_others(sitl: Sitl) -> None:
+def test_an_autopilot_that_dies_is_named_and_ends_the_others(sitl: Sitl) -> None:
     process = sitl()
     uav1, rover1 = pids(until_ready(process))
     os.kill(rover1, signal.SIGKILL)
@@ -132,7 +132,7 @@ def test_one_that_dies_is_named_and_ends_the_others(sitl: Sitl) -> None:
     assert not runs(uav1)
 
 
-def test_one_that_dies_at_its_start_says_why(sitl: Sitl, programs: Path) -> None:
+def test_an_autopilot_that_dies_at_its_start_says_why(sitl: Sitl, programs: Path) -> None:
     write_standin(programs / "ardurover", "DIES 99\n")
     output, errors = sitl().communicate(timeout=WITHIN_S)
     assert "ready" not in output

@@ -63,7 +63,9 @@ async def test_a_connection_that_breaks_is_made_again() -> None:
     await server.close()
 
 
-async def test_it_is_tried_again_until_somebody_listens(caplog: pytest.LogCaptureFixture) -> None:
+async def test_a_connection_is_tried_again_until_somebody_listens(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     server = TcpServer()
     port = await server.open()
     await server.close()

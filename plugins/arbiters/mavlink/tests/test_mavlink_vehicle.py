@@ -124,7 +124,7 @@ def test_its_state_is_what_it_says(virtual: Run) -> None:
     virtual(main)
 
 
-def test_it_says_why_it_is_not_ready(virtual: Run) -> None:
+def test_a_vehicle_says_why_it_is_not_ready(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         link, vehicle = copter(clock)
         link.says["EKF_STATUS_REPORT"] = {"flags": 0xA7}

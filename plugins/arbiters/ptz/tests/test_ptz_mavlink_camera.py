@@ -140,7 +140,7 @@ async def test_a_camera_that_does_not_record_says_why() -> None:
             await it.driver.start_recording()
 
 
-async def test_it_zooms_to_a_factor_and_says_so() -> None:
+async def test_a_camera_zooms_to_a_factor_and_says_so() -> None:
     async with world() as it:
         await it.ready()
         await it.ready("zoom")

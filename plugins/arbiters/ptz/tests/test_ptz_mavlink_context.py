@@ -28,7 +28,7 @@ def seen(direction):
 
 
 @given(PAN, TILT, LEAN, LEAN)
-def test_it_is_the_same_direction(pan, tilt, roll, pitch):
+def test_angles_of_the_mount_and_of_the_mission_are_the_same_direction(pan, tilt, roll, pitch):
     turned = about((0, 1, 0), pitch) @ about((1, 0, 0), roll) @ seen((pan, tilt))
     assert seen(deck_to_horizon((pan, tilt), roll, pitch)) == pytest.approx(turned, abs=1e-9)
 

@@ -22,7 +22,7 @@ PITCHYAW = 1000
     ("kind", "firmware"),
     [(Kind.COPTER, "ardupilot"), (Kind.ROVER, "ardupilot"), (Kind.COPTER, "px4")],
 )
-async def test_it_points_from_the_bow_and_says_so(kind: Kind, firmware: str) -> None:
+async def test_a_gimbal_points_from_the_bow_and_says_so(kind: Kind, firmware: str) -> None:
     async with world(kind, spec={"firmware": firmware}) as it:
         await it.ready()
         it.point(40.0, -25.0)
@@ -32,7 +32,7 @@ async def test_it_points_from_the_bow_and_says_so(kind: Kind, firmware: str) -> 
         assert it.gimbal.primary == OURS
 
 
-async def test_it_reaches_no_farther_than_its_gimbal() -> None:
+async def test_a_gimbal_reaches_no_farther_than_its_gimbal() -> None:
     async with world() as it:
         assert it.driver.reach == REACH
         await it.ready()
@@ -68,7 +68,7 @@ async def test_an_order_whose_message_is_lost_is_given_again() -> None:
             it.gimbal.autopilot._handlers[1, "GIMBAL_MANAGER_SET_PITCHYAW"] = lost
 
 
-async def test_it_turns_no_faster_than_asked() -> None:
+async def test_a_gimbal_turns_no_faster_than_asked() -> None:
     async with world() as it:
         await it.ready()
         began_s = it.clock.now_us() / 1e6
@@ -180,7 +180,7 @@ async def test_control_is_taken_again_when_the_other_station_has_released_it() -
         assert it.gimbal.primary == OURS
 
 
-async def test_it_is_left_to_others_in_the_end() -> None:
+async def test_a_gimbal_is_left_to_others_in_the_end() -> None:
     async with world() as it:
         await it.ready()
         it.point(30.0, -5.0)
@@ -190,7 +190,7 @@ async def test_it_is_left_to_others_in_the_end() -> None:
     assert math.degrees(gimbal.pointing.wanted_yaw_rad) == pytest.approx(30.0, abs=0.5)
 
 
-async def test_it_is_heard_as_long_as_it_says_where_it_points() -> None:
+async def test_a_gimbal_is_connected_as_long_as_it_says_where_it_points() -> None:
     async with world() as it:
         await it.ready()
         before = len(it.heard)

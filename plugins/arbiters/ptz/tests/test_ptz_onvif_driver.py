@@ -13,7 +13,7 @@ from onvif_bench import ACCOUNT, camera, driven, until
 rad = math.radians
 
 
-async def test_it_points_zooms_and_says_where_it_looks(tmp_path):
+async def test_a_camera_points_zooms_and_says_where_it_looks(tmp_path):
     async with camera(account=ACCOUNT) as server, driven(server, tmp_path) as bench:
         await bench.ready()
         driver = bench.driver

@@ -10,7 +10,9 @@ COMMANDS = ["trajectory", "positions"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-async def test_it_points_clockwise_and_up_and_says_so(ros_domain, tmp_path, command) -> None:
+async def test_a_ptz_head_points_clockwise_and_up_and_says_so(
+    ros_domain, tmp_path, command
+) -> None:
     async with world(ros_domain, tmp_path, command=command) as it:
         await it.ready()
         it.point(40.0, 20.0)
@@ -22,7 +24,7 @@ async def test_it_points_clockwise_and_up_and_says_so(ros_domain, tmp_path, comm
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-async def test_it_turns_no_faster_than_asked_and_the_last_order_counts(
+async def test_a_ptz_head_turns_no_faster_than_asked_and_the_last_order_counts(
     ros_domain, tmp_path, command
 ) -> None:
     async with world(ros_domain, tmp_path, command=command) as it:
@@ -65,7 +67,7 @@ async def test_halt_stops_it_on_its_way(ros_domain, tmp_path, command) -> None:
         assert stood > -140.0
 
 
-async def test_it_zooms_while_it_turns(ros_domain, tmp_path) -> None:
+async def test_a_ptz_head_zooms_while_it_turns(ros_domain, tmp_path) -> None:
     joints = {"pan": "pan_joint", "tilt": "tilt_joint", "zoom": "zoom_joint"}
     async with world(ros_domain, tmp_path, joints=joints) as it:
         await it.ready()

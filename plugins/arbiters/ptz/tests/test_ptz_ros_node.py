@@ -31,7 +31,9 @@ async def test_pictures_come_back_to_the_mission(via: str, tmp_path: Path, ros_d
         assert "picture.time" in report.outputs
 
 
-async def test_it_points_zooms_and_tells_where_it_looks(tmp_path: Path, ros_domain: int) -> None:
+async def test_a_ptz_head_points_zooms_and_tells_where_it_looks(
+    tmp_path: Path, ros_domain: int
+) -> None:
     async with world(ros_domain, tmp_path) as it:
         east = Point((38.1075, -77.3180, 60.0), "amsl")
         await it.bench.start("r1.b1", "ptz_point_at", CAMERA, target=east)

@@ -75,7 +75,9 @@ def test_a_fleet_without_such_cameras_is_refused(tmp_path: Path) -> None:
     assert "no payload of a vehicle with `sitl: true`" in result.output
 
 
-async def test_it_speaks_on_the_topics_of_the_fleet(tmp_path: Path, ros_domain: int) -> None:
+async def test_a_simulated_ptz_head_speaks_on_the_topics_of_the_fleet(
+    tmp_path: Path, ros_domain: int
+) -> None:
     with Peer(COMMAND, ros_domain, ["ros-cameras", "--fleet", str(fleet_file(tmp_path))]):
         async with RosRuntime("watching", domain_id=ros_domain) as ros:
             heard: list[JointState] = []

@@ -29,7 +29,7 @@ async def judged_us(count: int, *sleeps_s: float) -> list[int]:
     return found
 
 
-async def test_it_is_judged_every_round() -> None:
+async def test_telemetry_is_judged_every_round() -> None:
     assert await judged_us(2, 1.0, 1.1) == [1_000_000, 2_100_000]
 
 

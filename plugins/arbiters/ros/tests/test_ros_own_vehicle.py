@@ -136,7 +136,7 @@ def _is_heard(publisher: Any) -> bool:
     return int(publisher.get_subscription_count()) > 0
 
 
-async def test_it_sweeps_and_says_so(ros_domain: int) -> None:
+async def test_a_vehicle_sweeps_and_says_so(ros_domain: int) -> None:
     async with commanded(ros_domain, "faster:=5.0") as sweeper:
         sweeper.say(START, "b1", "sweep_street", route=east(2, 12), passes=2, speed=3.0)
         await sweeper.until(lambda: any(each.behavior == "b1" for each in sweeper.states))
@@ -215,7 +215,7 @@ async def test_a_busy_vehicle_takes_over_only_from_what_it_is_told_to(ros_domain
         assert (await sweeper.ended("b3")).state == SUCCEEDED
 
 
-async def test_it_stands_while_it_is_held_and_then_goes_on(ros_domain: int) -> None:
+async def test_a_vehicle_stands_while_it_is_held_and_then_goes_on(ros_domain: int) -> None:
     async with commanded(ros_domain) as sweeper:
         sweeper.say(START, "b1", "goto", target=east(200))
         await sweeper.until(lambda: sweeper.speed_m_s > 1.0)
@@ -246,7 +246,7 @@ async def test_cancelled_it_has_come_to_a_stand(ros_domain: int) -> None:
         assert sweeper.speed_m_s == 0.0
 
 
-async def test_it_goes_on_at_another_speed(ros_domain: int) -> None:
+async def test_a_vehicle_goes_on_at_another_speed(ros_domain: int) -> None:
     async with commanded(ros_domain) as sweeper:
         sweeper.say(START, "b1", "goto", target=east(500), speed=1.0)
         await sweeper.until(lambda: sweeper.speed_m_s > 0.99)

@@ -41,12 +41,12 @@ def test_a_node_is_commanded_in_a_namespace_of_its_own() -> None:
     assert read(NODE) == Settings("/evsg2/ptz", hardware_id="")
 
 
-def test_it_may_be_on_a_vehicle_of_another_arbiter_whose_settings_are_not_ours() -> None:
+def test_a_payload_may_be_on_a_vehicle_of_another_arbiter_whose_settings_are_not_ours() -> None:
     said = {**NODE, "url": "udpin://127.0.0.1:14550", "system_id": 1}
     assert read(said).namespace == "/evsg2/ptz"
 
 
-def test_it_inherits_how_its_vehicle_is_commanded_but_not_what_that_can_do() -> None:
+def test_a_payload_inherits_how_its_vehicle_is_commanded_but_not_what_that_can_do() -> None:
     vehicle = {
         "namespace": "/evsg2",
         "domain_id": 7,

@@ -173,7 +173,9 @@ async def test_two_vehicles_in_one_namespace_are_both_named_and_not_commanded(
             assert truth.begun() == 0
 
 
-async def test_one_that_appears_later_is_told_of_and_was_not_restarted(ros_domain: int) -> None:
+async def test_a_vehicle_that_appears_later_is_told_of_and_was_not_restarted(
+    ros_domain: int,
+) -> None:
     arguments = ["/ugv1", "node", "map"]
     with Peer(PEER, ros_domain, arguments):
         async with connected(ros_domain) as (bench, truth):

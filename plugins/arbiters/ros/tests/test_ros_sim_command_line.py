@@ -61,7 +61,7 @@ def test_each_vehicle_is_named_and_then_all_are_ready(ros_domain: int) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_it_ends_cleanly_by_a_signal(number: int, ros_domain: int) -> None:
+def test_the_simulator_ends_cleanly_by_a_signal(number: int, ros_domain: int) -> None:
     with program(BASE, ros_domain) as process:
         lines_until(process, "ready")
         process.send_signal(number)
@@ -97,7 +97,7 @@ def addresses_of(pid: int) -> set[str]:
     return addresses
 
 
-def test_it_keeps_to_this_machine_whatever_the_environment_says(ros_domain: int) -> None:
+def test_the_simulator_keeps_to_this_machine_whatever_the_environment_says(ros_domain: int) -> None:
     with program(BASE, ros_domain) as process:
         lines_until(process, "ready")
         listening = addresses_of(process.pid)

@@ -75,7 +75,7 @@ def test_without_commands_it_comes_to_a_stand(chassis: Chassis, forward: float, 
     assert body.twist == Twist()
 
 
-def test_it_drives_as_far_as_speed_and_acceleration_say() -> None:
+def test_a_base_drives_as_far_as_speed_and_acceleration_say() -> None:
     body = Dynamics(Chassis(lag_s=0.0), Pose(0, 0, 0))
     driven(body, Twist(2.0), 6.0)
     assert body.twist.forward_m_s == pytest.approx(2.0)
@@ -84,7 +84,7 @@ def test_it_drives_as_far_as_speed_and_acceleration_say() -> None:
     assert body.driven_m == pytest.approx(body.pose.east_m)
 
 
-def test_it_drives_a_circle() -> None:
+def test_a_base_drives_a_circle() -> None:
     body = Dynamics(
         Chassis(lag_s=0.0, acceleration_m_s2=100, yaw_acceleration_rad_s2=100), Pose(0, 0, 0)
     )

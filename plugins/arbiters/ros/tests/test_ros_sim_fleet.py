@@ -133,7 +133,9 @@ def test_a_fleet_without_such_vehicles_is_refused(tmp_path: Path) -> None:
     assert "no vehicle has `arbiter: ros` and `sitl: true`" in result.output
 
 
-async def test_it_speaks_on_the_topics_of_the_fleet(tmp_path: Path, ros_domain: int) -> None:
+async def test_the_simulator_speaks_on_the_topics_of_the_fleet(
+    tmp_path: Path, ros_domain: int
+) -> None:
     words = ["sim", "ros", "--fleet", str(fleet_file(tmp_path))]
     with Peer(COMMAND, ros_domain, words):
         async with RosRuntime("watching", domain_id=ros_domain) as ros:

@@ -41,7 +41,7 @@ async def go(ros: RosRuntime, east_m: float, north_m: float) -> Any:
     return await ros.send_goal(client, goal, AMPLE_S, goal_id=uuid4())
 
 
-async def test_it_goes_where_it_is_sent(ros: RosRuntime) -> None:
+async def test_a_nav2_server_goes_where_it_is_sent(ros: RosRuntime) -> None:
     odometry = Heard(ros, Odometry, "/ugv1/odom")
     handle = await go(ros, 4.0, 3.0)
     assert handle.accepted
@@ -51,7 +51,7 @@ async def test_it_goes_where_it_is_sent(ros: RosRuntime) -> None:
     assert (place.x, place.y) == pytest.approx((4, 3), abs=1.5)
 
 
-async def test_it_rejects_on_request(ros: RosRuntime) -> None:
+async def test_a_nav2_server_rejects_on_request(ros: RosRuntime) -> None:
     await switch(ros, "ugv1: nav2 reject")
     assert not (await go(ros, 0.0, 0.0)).accepted
     await switch(ros, "ugv1: kill node for 20 s")
@@ -60,7 +60,7 @@ async def test_it_rejects_on_request(ros: RosRuntime) -> None:
     assert (await go(ros, 0.0, 0.0)).accepted  # a new one, and a good one
 
 
-async def test_it_aborts_on_request(ros: RosRuntime) -> None:
+async def test_a_nav2_server_aborts_on_request(ros: RosRuntime) -> None:
     await switch(ros, "ugv1: nav2 abort 208 for 60 s")
     handle = await go(ros, 30.0, 0.0)
     answer = await ros.wait(handle.get_result_async(), AMPLE_S)

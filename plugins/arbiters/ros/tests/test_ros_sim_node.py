@@ -94,7 +94,9 @@ def stands(message: Any) -> bool:
     return message.twist.twist.linear.x == 0 == message.twist.twist.angular.z
 
 
-async def test_it_does_what_it_is_commanded_and_counts_the_motion(vehicle: Vehicle) -> None:
+async def test_a_simulated_vehicle_does_what_it_is_commanded_and_counts_the_motion(
+    vehicle: Vehicle,
+) -> None:
     await vehicle.odometry.next(stands)
     before, place = vehicle.motions.last.data, vehicle.odometry.last.pose.pose.position.y
     name = await vehicle.start("reverse", distance=3.0)
@@ -112,7 +114,7 @@ async def test_it_does_what_it_is_commanded_and_counts_the_motion(vehicle: Vehic
     assert vehicle.states.last.battery == pytest.approx(0.7, abs=0.01)
 
 
-async def test_it_refuses_with_the_reason_that_it_was_told(
+async def test_a_simulated_vehicle_refuses_with_the_reason_that_it_was_told(
     vehicle: Vehicle, ros: RosRuntime
 ) -> None:
     await switch(ros, 'ugv1: refuse "too wet" for 30 s')
@@ -126,7 +128,7 @@ async def test_it_refuses_with_the_reason_that_it_was_told(
         done = vehicle.of(name)
 
 
-async def test_it_may_not_hear_of_what_is_new(vehicle: Vehicle, ros: RosRuntime) -> None:
+async def test_a_simulated_vehicle_may_miss_new_commands(vehicle: Vehicle, ros: RosRuntime) -> None:
     await switch(ros, "ugv1: never accept for 20 s")
     name = f"b{next(ids)}"
     state = vehicle.states.last
@@ -137,7 +139,7 @@ async def test_it_may_not_hear_of_what_is_new(vehicle: Vehicle, ros: RosRuntime)
     await vehicle.insist(said, BehaviorCommand.START, name, "reverse", distance=1.0)
 
 
-async def test_it_may_lie(vehicle: Vehicle, ros: RosRuntime) -> None:
+async def test_a_simulated_vehicle_may_lie(vehicle: Vehicle, ros: RosRuntime) -> None:
     await switch(ros, "ugv1: lie for 30 s")
     await vehicle.statuses.next(lambda m: m.id.startswith("never-given-"))
     name = await vehicle.start("reverse", distance=1.0)
@@ -147,7 +149,7 @@ async def test_it_may_lie(vehicle: Vehicle, ros: RosRuntime) -> None:
     await vehicle.statuses.silence(QUIET_S)  # the next test is to find an honest vehicle
 
 
-async def test_it_may_flood(vehicle: Vehicle, ros: RosRuntime) -> None:
+async def test_a_simulated_vehicle_may_flood(vehicle: Vehicle, ros: RosRuntime) -> None:
     before = len(vehicle.statuses)
     await switch(ros, "ugv1: flood 2000 for 15 s")
     await until(lambda: len(vehicle.statuses) > before + 200)
@@ -171,7 +173,7 @@ async def test_its_node_may_die_alone_and_forgets_what_it_did(
     await until(lambda: BehaviorStatus.SUCCEEDED in vehicle.of(again))
 
 
-async def test_it_stops_and_gives_up_when_its_odometry_is_no_number(
+async def test_a_simulated_vehicle_stops_and_gives_up_when_its_odometry_is_no_number(
     vehicle: Vehicle, ros: RosRuntime
 ) -> None:
     name = await vehicle.start("reverse", distance=30.0)

@@ -41,7 +41,7 @@ def stamp_s(message: Odometry) -> float:
     return float(message.header.stamp.sec + message.header.stamp.nanosec / 1e9)
 
 
-async def test_it_stands_where_it_was_put(ros: RosRuntime) -> None:
+async def test_a_simulated_base_stands_where_it_was_put(ros: RosRuntime) -> None:
     first = await Heard(ros, Odometry, "/ugv1/odom").next()
     second = await Heard(ros, Odometry, "/ugv2/odom").next()
     assert (first.header.frame_id, first.child_frame_id) == ("map", "ugv1/base_link")
@@ -49,7 +49,9 @@ async def test_it_stands_where_it_was_put(ros: RosRuntime) -> None:
     assert (second.pose.pose.position.x, second.pose.pose.position.y) == pytest.approx((5, 0))
 
 
-async def test_it_drives_as_it_is_commanded_and_stops_without(ros: RosRuntime) -> None:
+async def test_a_simulated_base_drives_as_it_is_commanded_and_stops_without(
+    ros: RosRuntime,
+) -> None:
     odometry = Heard(ros, Odometry, "/ugv2/odom")
     motions = Heard(ros, UInt32, "/ugv2/motions", qos.STATUS)
     await until(lambda: odometry.last and motions.last)

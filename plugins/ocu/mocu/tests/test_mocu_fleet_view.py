@@ -113,7 +113,7 @@ async def test_operators_hear_how_a_team_marches_and_that_it_does_no_more(
     await client.hears("teams", lambda each: each["teams"] == [], since=since)
 
 
-def test_that_a_payload_is_lost_is_told_to_operators_and_by_no_node() -> None:
+def test_a_lost_payload_is_said_to_operators_and_by_no_node() -> None:
     state = PayloadState(CAMERA, 0, link=LinkState.LOST, behavior="zoom")
     told = write_payload_status(msg, state, to_operators=True)
     assert (told.link, told.behavior) == (msg.PayloadStatus.LOST, "zoom")

@@ -40,7 +40,7 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-def test_it_uses_only_what_is_open_to_plugins() -> None:
+def test_the_terminal_unit_uses_only_what_is_open_to_plugins() -> None:
     modules = list(Path(m2pem_plugin_terminal.__file__).parent.glob("*.py"))
     assert modules
     used = {name for module in modules for name in imported(module)}
@@ -48,7 +48,7 @@ def test_it_uses_only_what_is_open_to_plugins() -> None:
     assert [name for name in sorted(used) if not name.startswith(OPEN_TO_PLUGINS)] == []
 
 
-def test_it_is_found_as_a_plugin_and_takes_the_terminal() -> None:
+def test_the_terminal_unit_is_found_as_a_plugin_and_takes_the_terminal() -> None:
     assert "terminal" in {entry.name for entry in entry_points(group="m2pem")}
     factory = PluginManager().ocu("terminal")
     assert factory is TerminalOcu

@@ -6,7 +6,7 @@ import pytest
 from m2pem_plugin_web.settings import LOCAL_NAMES, SettingError, Settings, read_settings
 
 
-def test_it_serves_this_machine_alone_unless_told_otherwise() -> None:
+def test_the_page_serves_this_machine_alone_unless_told_otherwise() -> None:
     settings = read_settings({})
     assert settings == Settings()
     assert settings.host == "127.0.0.1"

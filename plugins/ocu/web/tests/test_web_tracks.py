@@ -279,7 +279,7 @@ def test_a_link_is_not_followed(folder: FolderStore, tmp_path: Path) -> None:
     assert precious.read_text() == "do not touch"
 
 
-def test_one_writes_a_track_and_others_leave_it(folder: FolderStore) -> None:
+def test_one_executive_writes_a_track_and_others_leave_it(folder: FolderStore) -> None:
     first = written(folder, sample(0.0, 0.0))
     with pytest.raises(HeldError):
         Track(folder, HEAD, 0.0)
