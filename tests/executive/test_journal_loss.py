@@ -105,7 +105,6 @@ def test_a_behavior_that_goes_on_is_held_until_the_operator_lets_it_go(play):
         assert world.fake.count("resume", "ugv1") == 0
         await control.answer("r1", asked[0].prompt, "resume", by="anna")
         await world.fake.until_called("resume", "ugv1")
-        world.fake._numbers["r1.b1"] = 2
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         return (await control.wait("r1")).status, world.fake.count("start")
 

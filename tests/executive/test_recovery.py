@@ -79,7 +79,6 @@ def resumed(play, journal, story, **options):
 def test_a_behavior_that_still_runs_is_reattached_and_not_started_again(play):
     async def story(world: World):
         await world.fake.until_called("query", "r1.b1")
-        world.fake._numbers["r1.b1"] = 2
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         summary = await world.executive.control.wait("r1")
         return summary, world.fake.count("start")
@@ -219,7 +218,6 @@ def test_an_outage_beyond_the_fleets_bound_holds_what_still_runs_and_asks(play, 
         assert "59 s" in prompt.text
         await control.answer("r1", prompt.prompt, "resume", by="anna")
         await world.fake.until_called("resume", "ugv1")
-        world.fake._numbers["r1.b1"] = 2
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         summary = await control.wait("r1")
         return summary.status, world.fake.count("start")
@@ -238,7 +236,6 @@ def test_a_vehicle_that_is_held_for_no_reason_in_the_journal_stands_until_an_ope
         assert world.fake.count("resume") == 0
         await control.answer("r1", prompt.prompt, "resume", by="anna")
         await world.fake.until_called("resume", "ugv1")
-        world.fake._numbers["r1.b1"] = 2
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         summary = await control.wait("r1")
         return summary.status, world.fake.count("start")
@@ -255,7 +252,6 @@ def test_a_vehicle_of_a_paused_run_is_held_as_the_journal_says_and_nothing_is_as
         assert (control.prompts(), world.fake.count("resume")) == ([], 0)
         await control.resume("r1", by="anna")
         await world.fake.until_called("resume", "ugv1")
-        world.fake._numbers["r1.b1"] = 2
         world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
         return (await control.wait("r1")).status
 
