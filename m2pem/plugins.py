@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from m2pem.api.capabilities import arbiter_problem, ocu_problem
 from m2pem.errors import InternalError, PluginError
 from m2pem.findings import Finding, Severity
 from m2pem.plugin_loading import (
@@ -51,6 +52,13 @@ _HOOKS = {
     "service": "m2pem_register_services",
     "command": "m2pem_register_commands",
 }
+_PROBLEM_OF: Mapping[str, Callable[[object], str]] = {
+    "arbiter": arbiter_problem,
+    "ocu": ocu_problem,
+    "service": lambda _: "",
+}
+"""What is wrong in the capabilities that a factory declares, by the kind of what it makes."""
+
 _CHECK = "m2pem_check_mission"
 _OBSERVE = "m2pem_records_committed"
 PUBLISHED = ("mavlink", "mocu", "ptz", "ros", "terminal", "web")
@@ -266,6 +274,8 @@ class PluginManager:
                 raise PluginError(f"{name!r} is no name for a plugin's {kind}")
             if not callable(factory):
                 raise PluginError(f"{kind} {name!r}: {factory!r} cannot be called to make one")
+            if problem := _PROBLEM_OF[kind](factory):
+                raise PluginError(f"{kind} {name!r}: {problem}")
             if other := {**before, **offered}.get(name):
                 raise PluginError(f"{kind} {name!r} is registered by {other.origin.name!r} already")
             offered[name] = _Offer(factory, plugin.origin)

@@ -337,6 +337,67 @@ def test_of_two_plugins_of_one_name_the_second_is_reported(install: Install) -> 
     assert "another plugin has the same name" in only_failure(plugins).error
 
 
+@pytest.mark.parametrize(
+    ("declaration", "problem"),
+    [
+        (
+            "capabilities = ArbiterCapabilities(adjusts=True)",
+            "adjusts=True, but it has no `adjust`",
+        ),
+        ("capabilities = {'adjusts'}", "not an m2pem.api.ArbiterCapabilities"),
+        ("takes_one_vehicle = True", "`capabilities = ArbiterCapabilities(one_vehicle=...)`"),
+    ],
+)
+def test_an_arbiter_that_declares_what_it_does_not_have_is_refused_with_its_plugin(
+    install: Install, declaration: str, problem: str
+) -> None:
+    install(
+        "boat",
+        f"""
+        from m2pem.api import ArbiterCapabilities
+
+        class BoatArbiter:
+            {declaration}
+
+        @hookimpl
+        def m2pem_register_arbiters(register):
+            register("boat", BoatArbiter)
+        """,
+    )
+    plugins = manager()
+    with pytest.raises(PluginError, match=r"plugin 'boat' \(m2pem-plugin-boat 1\.2\)"):
+        plugins.arbiter("boat")
+    assert problem in only_failure(plugins).error
+
+
+@pytest.mark.parametrize(
+    ("declaration", "problem"),
+    [
+        ("takes_terminal = True", "`capabilities = OcuCapabilities(takes_terminal=...)`"),
+        ("imports = ('wave',)", "`capabilities = OcuCapabilities(imports=...)`"),
+        ("capabilities = True", "not an m2pem.api.OcuCapabilities"),
+    ],
+)
+def test_an_operator_unit_that_declares_nothing_that_counts_is_refused_with_its_plugin(
+    install: Install, declaration: str, problem: str
+) -> None:
+    install(
+        "bridge",
+        f"""
+        class BridgeOcu:
+            {declaration}
+
+        @hookimpl
+        def m2pem_register_ocus(register):
+            register("bridge", BridgeOcu)
+        """,
+    )
+    plugins = manager()
+    with pytest.raises(PluginError, match="plugin 'bridge'"):
+        plugins.ocu("bridge")
+    assert problem in only_failure(plugins).error
+
+
 def test_a_command_that_would_replace_another_is_refused_with_its_plugin(install: Install) -> None:
     install(
         "boat",

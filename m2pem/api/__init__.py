@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         ReclaimingArbiter,
         ResolvedValue,
         SightedArbiter,
+        adjusts,
     )
     from m2pem.api.async_queue import AsyncQueue
     from m2pem.api.authoring import (
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from m2pem.api.behavior_parameters import BehaviorParameters
     from m2pem.api.behavior_tracker import BehaviorTracker
     from m2pem.api.bus import FleetBus
+    from m2pem.api.capabilities import ArbiterCapabilities, OcuCapabilities
     from m2pem.api.clock import Clock
     from m2pem.api.control import (
         Alert,
@@ -98,13 +100,14 @@ _MODULES = {
     "m2pem.api.arbiter": (
         "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
         " BehaviorRequest Connection DetectingArbiter Limits ReclaimingArbiter ResolvedValue"
-        " SightedArbiter"
+        " SightedArbiter adjusts"
     ),
     "m2pem.api.authoring": (
         "DataName Draft Editable MissionSource Outline OutlineElement"
         " OutlineProcess OutlineTrigger SearchLimits SearchProgress"
     ),
     "m2pem.api.bus": "FleetBus",
+    "m2pem.api.capabilities": "ArbiterCapabilities OcuCapabilities",
     "m2pem.api.clock": "Clock",
     "m2pem.api.control": (
         "Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
@@ -150,6 +153,7 @@ __all__ = [
     "AdjustingArbiter",
     "Alert",
     "Arbiter",
+    "ArbiterCapabilities",
     "ArbiterContext",
     "Area",
     "BehaviorId",
@@ -193,6 +197,7 @@ __all__ = [
     "MissionSource",
     "ControlEvent",
     "Ocu",
+    "OcuCapabilities",
     "OpenPrompt",
     "Outline",
     "OutlineElement",
@@ -230,6 +235,7 @@ __all__ = [
     "Value",
     "VehiclePosition",
     "VehicleState",
+    "adjusts",
     "as_geojson",
     "describe",
     "distance_m",

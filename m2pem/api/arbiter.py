@@ -6,9 +6,10 @@ checks every promise made here.
 
 from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard
 from uuid import UUID, uuid4
 
+from m2pem.api.capabilities import ArbiterCapabilities, arbiter_capabilities
 from m2pem.api.telemetry import Telemetry, VehicleState
 from m2pem.fleet import parameters
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
@@ -125,11 +126,12 @@ class BehaviorReport:
 
 
 class Arbiter(Protocol):
-    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`.
+    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`."""
 
-    A class attribute `takes_one_vehicle = True` says that no request may be for several vehicles:
-    where a mission has several do the same, each of them is asked for its own then.
-    """
+    @property
+    def capabilities(self) -> ArbiterCapabilities:
+        """What it can do beyond this protocol: a class attribute, which may be missing."""
+        return ArbiterCapabilities()
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """What the resource can do. Needs no connection and no transport library."""
@@ -180,7 +182,6 @@ class Arbiter(Protocol):
         ...
 
 
-@runtime_checkable
 class AdjustingArbiter(Protocol):
     """An arbiter that can also change a behavior which goes on. Teams keep their spacing by it."""
 
@@ -194,7 +195,6 @@ class AdjustingArbiter(Protocol):
         ...
 
 
-@runtime_checkable
 class SightedArbiter(Protocol):
     """An arbiter that can tell at any moment where a vehicle is, not only when the vehicle tells of
     itself. Teams look through it where it is offered."""
@@ -205,7 +205,6 @@ class SightedArbiter(Protocol):
         ...
 
 
-@runtime_checkable
 class AddressedArbiter(Protocol):
     """An arbiter that says what it connects to. On one host, one executive commands an address; of
     an arbiter without this, all settings of a connection together count as the address."""
@@ -216,7 +215,6 @@ class AddressedArbiter(Protocol):
         ...
 
 
-@runtime_checkable
 class ReclaimingArbiter(Protocol):
     """An arbiter that ends what a vehicle goes on with after its link was lost. Without this, a
     vehicle that is heard again is told to `hold`, and its lost behavior to `cancel`."""
@@ -231,7 +229,6 @@ class ReclaimingArbiter(Protocol):
         ...
 
 
-@runtime_checkable
 class DetectingArbiter(Protocol):
     """An arbiter that knows by their connections which payloads detect, beside those that the fleet
     marks with `detector: true`."""
@@ -240,3 +237,28 @@ class DetectingArbiter(Protocol):
     def detectors(self) -> Collection[ResourceId]:
         """Payloads whose detections complete the service `Detector`."""
         ...
+
+
+def adjusts(arbiter: Arbiter) -> TypeGuard[AdjustingArbiter]:
+    """Whether an arbiter declares that it can change a behavior which goes on."""
+    return arbiter_capabilities(arbiter).adjusts
+
+
+def sights(arbiter: Arbiter) -> TypeGuard[SightedArbiter]:
+    """Whether an arbiter declares that it can tell at any moment where a vehicle is."""
+    return arbiter_capabilities(arbiter).sights
+
+
+def names_addresses(arbiter: Arbiter) -> TypeGuard[AddressedArbiter]:
+    """Whether an arbiter declares that it says what it connects to."""
+    return arbiter_capabilities(arbiter).addresses
+
+
+def reclaims(arbiter: Arbiter) -> TypeGuard[ReclaimingArbiter]:
+    """Whether an arbiter declares that it ends what a vehicle goes on with after a lost link."""
+    return arbiter_capabilities(arbiter).reclaims
+
+
+def detects(arbiter: Arbiter) -> TypeGuard[DetectingArbiter]:
+    """Whether an arbiter declares that it knows which of its payloads detect."""
+    return arbiter_capabilities(arbiter).detects

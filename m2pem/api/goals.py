@@ -16,6 +16,7 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.behavior_tracker import BehaviorTracker
+from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 
@@ -33,6 +34,7 @@ class GoalArbiter:
     a vehicle ends its behavior as LOST. All seconds are those of the clock that was lent.
     """
 
+    capabilities: ClassVar[ArbiterCapabilities] = ArbiterCapabilities()
     behaviors: ClassVar[Sequence[BehaviorSpec]] = ()
     bounds: ClassVar[Limits] = Limits()
 

@@ -9,10 +9,8 @@ if TYPE_CHECKING:
 class Ocu(Protocol):
     """Constructed as `Ocu(control)`; several may serve at once, all in the same manner.
 
-    A class attribute `takes_terminal = True` says that it draws on the whole terminal: then the
-    command line prints nothing while it serves, and uses `plain` instead where there is none.
-    A class attribute `imports` names modules that take long to import: they are imported before an
-    executive exists, as an import in its event loop would delay STOP.
+    What the command line must know before it makes one, the class declares in its attribute
+    `capabilities`, an `m2pem.api.OcuCapabilities`, which may be missing.
     """
 
     def __init__(self, control: "MissionControl") -> None: ...

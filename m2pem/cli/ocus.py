@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable, Sequence
 
 import click
 
+from m2pem.api.capabilities import ocu_capabilities
 from m2pem.api.control import MissionControl
 from m2pem.errors import PluginError
 from m2pem.plugins import PluginManager
@@ -41,18 +42,13 @@ def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
             factory = plugins.ocu(name)
         except PluginError as error:
             raise click.UsageError(str(error)) from error
-        if takes_terminal(factory) and not on_terminal:
+        if ocu_capabilities(factory).takes_terminal and not on_terminal:
             click.echo(f"m2pem: no terminal here for --ocu {name}; using {PLAIN}", err=True)
             name = PLAIN  # noqa: PLW2901
         found[name] = None
-    if sum(takes_terminal(plugins.ocu(name)) for name in found) > 1:
+    if sum(ocu_capabilities(plugins.ocu(name)).takes_terminal for name in found) > 1:
         raise click.UsageError(f"--ocu {names!r}: only one of them can have the terminal")
     return tuple(found)
-
-
-def takes_terminal(factory: object) -> bool:
-    """Whether a unit draws on the whole terminal (`m2pem.api.ocu.Ocu`)."""
-    return bool(getattr(factory, "takes_terminal", False))
 
 
 class Operators:
@@ -62,20 +58,20 @@ class Operators:
         self.names = tuple(names)
         self._factories = {name: plugins.ocu(name) for name in names}
         for factory in self._factories.values():
-            for module in getattr(factory, "imports", ()):
+            for module in ocu_capabilities(factory).imports:
                 importlib.import_module(module)
         self._tasks: list[asyncio.Task[None]] = []
 
     @property
     def take_terminal(self) -> bool:
         """Whether one of them draws on the whole terminal."""
-        return any(map(takes_terminal, self._factories.values()))
+        return any(ocu_capabilities(each).takes_terminal for each in self._factories.values())
 
     def begin(self, control: MissionControl, freed: Callable[[], None]) -> None:
         """Let them serve. `freed` is called when one has given the terminal back."""
         for name, factory in self._factories.items():
             task = asyncio.create_task(self._serve(name, factory(control).serve()), name=name)
-            if takes_terminal(factory):
+            if ocu_capabilities(factory).takes_terminal:
                 task.add_done_callback(lambda _: freed())
             self._tasks.append(task)
 

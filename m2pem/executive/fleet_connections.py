@@ -7,13 +7,14 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 from m2pem.api.arbiter import (
-    AddressedArbiter,
     Arbiter,
     ArbiterContext,
     BehaviorReport,
     Connection,
-    DetectingArbiter,
+    detects,
+    names_addresses,
 )
+from m2pem.api.capabilities import arbiter_capabilities, arbiter_problem
 from m2pem.api.telemetry import Telemetry
 from m2pem.errors import FleetError, PluginError
 from m2pem.findings import Finding
@@ -55,7 +56,8 @@ class FleetArbiters:
     connection of every resource.
 
     Raises:
-        PluginError: the fleet names an arbiter that no plugin provides.
+        PluginError: the fleet names an arbiter that no plugin provides, or one that declares
+            capabilities which it does not have.
         FleetError: an arbiter cannot use the settings of a resource.
     """
 
@@ -113,6 +115,9 @@ class FleetArbiters:
         except FleetError as error:
             found = [_located(finding, fleet) for finding in error.findings]
             raise FleetError(error.what, found) from error
+        for name, arbiter in self.by_name.items():
+            if problem := arbiter_problem(arbiter):
+                raise PluginError(f"arbiter {name!r}: {problem}")
         self._of: dict[ResourceId, Arbiter] = {
             resource: self.by_name[name]
             for name, group in connections.items()
@@ -133,7 +138,7 @@ class FleetArbiters:
     @property
     def all(self) -> Mapping[str, Arbiter]:
         """Those of the fleet, and the one of teams whose members they serve."""
-        apart = len(self.by_name) > 1 or any(map(_takes_one_vehicle, self.by_name.values()))
+        apart = len(self.by_name) > 1 or any(map(_one_vehicle, self.by_name.values()))
         together = self.fleet.teams or (apart and len(self.fleet.vehicles) > 1)
         return {"teams": self.teams, **self.by_name} if together else self.by_name
 
@@ -150,7 +155,7 @@ class FleetArbiters:
         only = next(iter(arbiters)) if len(arbiters) == 1 else None
         if type_ is not BehaviorType.TEAM:
             together = len(resources) > 1 and all(each in self.fleet.vehicles for each in resources)
-            apart = only is None or _takes_one_vehicle(only)
+            apart = only is None or _one_vehicle(only)
             return self.teams if together and apart else only
         offers = only is not None and all(
             _has(only.catalogue(resource), behavior) for resource in resources
@@ -186,7 +191,7 @@ class FleetArbiters:
         connection."""
         known = set(self.fleet.detectors)
         for arbiter in self.by_name.values():
-            if isinstance(arbiter, DetectingArbiter):
+            if detects(arbiter):
                 known.update(arbiter.detectors)
         return tuple(payload for payload in self.fleet.payloads if payload in known)
 
@@ -265,11 +270,11 @@ def _has(specs: Sequence[BehaviorSpec], team_behavior: str) -> bool:
 
 
 def _addresses(arbiter: Arbiter, connection: Connection) -> Sequence[str]:
-    if isinstance(arbiter, AddressedArbiter):
+    if names_addresses(arbiter):
         return arbiter.addresses(connection.resource)
     settings = connection.settings
     return [json.dumps(dict(settings), sort_keys=True, default=str)] if settings else []
 
 
-def _takes_one_vehicle(arbiter: Arbiter) -> bool:
-    return bool(getattr(arbiter, "takes_one_vehicle", False))
+def _one_vehicle(arbiter: Arbiter) -> bool:
+    return arbiter_capabilities(arbiter).one_vehicle

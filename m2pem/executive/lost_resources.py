@@ -12,7 +12,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
-from m2pem.api.arbiter import BehaviorId, ReclaimingArbiter
+from m2pem.api.arbiter import BehaviorId, reclaims
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.executive.fleet_connections import FleetArbiters
@@ -128,7 +128,7 @@ class LostResources:
         arbiter = self._arbiters.of(resource)
         try:
             async with asyncio.timeout(ONCE_WITHIN_S):
-                if isinstance(arbiter, ReclaimingArbiter):
+                if reclaims(arbiter):
                     return await arbiter.reclaim(resource)
                 behavior = self._lost[resource]
                 if behavior is not None:

@@ -16,6 +16,7 @@ from m2pem.api.arbiter import (
     Limits,
     ResolvedValue,
 )
+from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.epoch_fence import EpochFence
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
@@ -91,7 +92,7 @@ LOST_AFTER_S = 3.0
 
 
 class SimArbiter:
-    """Implements `m2pem.api.AdjustingArbiter` and `SightedArbiter`; settings: docs/simulation.md.
+    """Implements `m2pem.api.Arbiter`; its settings in a fleet file: docs/simulation.md.
 
     `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
@@ -99,6 +100,8 @@ class SimArbiter:
     Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching` and
     `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
     """
+
+    capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True)
 
     def __init__(
         self,

@@ -14,6 +14,7 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.async_queue import AsyncQueue
 from m2pem.api.behavior_tracker import BehaviorTracker
+from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.telemetry import TeamMemberState, TeamState
 from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet, LostMemberPolicy
@@ -50,6 +51,8 @@ class Teams:
     "r1.b3.evsg1" is what evsg1 does of r1.b3; who reads the arbiters' reports hands those of parts
     to `report_received`, and faults of members to `fault`.
     """
+
+    capabilities = ArbiterCapabilities()
 
     def __init__(
         self,

@@ -5,13 +5,7 @@ import logging
 import math
 from collections.abc import Awaitable, Callable
 
-from m2pem.api.arbiter import (
-    AdjustingArbiter,
-    Arbiter,
-    BehaviorReport,
-    BehaviorRequest,
-    SightedArbiter,
-)
+from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest, adjusts, sights
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Leg
 
@@ -53,9 +47,8 @@ class Member:
         self.lost = ""
         self._arbiter = arbiter
         self._failed = failed
-        # Asked for at each look at a march; finding out is slow.
-        self._sighted = isinstance(arbiter, SightedArbiter)
-        self._adjusting = arbiter if isinstance(arbiter, AdjustingArbiter) else None
+        self._sighted = sights(arbiter)
+        self._adjusting = arbiter if adjusts(arbiter) else None
         self._speed_m_s: float | None = None
         self._cancelled = ""
         self._starting: asyncio.Task[None] | None = None

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from m2pem.api.arbiter import Arbiter, BehaviorRequest, SightedArbiter
+from m2pem.api.arbiter import Arbiter, BehaviorRequest, sights
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
@@ -65,9 +65,7 @@ class TeamSituation:
         self._bus = bus
         arbiters = {vehicle: arbiter_of(vehicle) for vehicle in fleet.vehicles}
         self._sighted = {
-            vehicle: arbiter
-            for vehicle, arbiter in arbiters.items()
-            if isinstance(arbiter, SightedArbiter)
+            vehicle: arbiter for vehicle, arbiter in arbiters.items() if sights(arbiter)
         }
 
     def scheme(

@@ -15,6 +15,7 @@ from m2pem.api.arbiter import (
     Connection,
     Limits,
 )
+from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.telemetry import Telemetry
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
@@ -35,6 +36,8 @@ class FakeArbiter:
     `known`: the answers of `query`, by behavior. `raises`: exceptions by method ("start").
     `hangs`: methods that never return.
     """
+
+    capabilities = ArbiterCapabilities()
 
     def __init__(
         self, connections: Mapping[ResourceId, Connection], context: ArbiterContext

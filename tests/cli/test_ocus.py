@@ -7,6 +7,7 @@ from typing import Any, cast
 import click
 import pytest
 
+from m2pem.api.capabilities import OcuCapabilities
 from m2pem.api.control import MissionControl
 from m2pem.cli.ocus import Operators, chosen
 from m2pem.errors import PluginError
@@ -91,7 +92,7 @@ def test_what_a_unit_imports_is_imported_before_it_is_made(monkeypatch: pytest.M
     module = "wave"  # any that nothing here needs
 
     class Heavy(Unit):
-        imports = (module,)
+        capabilities = OcuCapabilities(imports=(module,))
 
     monkeypatch.delitem(sys.modules, module, raising=False)
     Operators(["heavy"], plugins(heavy=Heavy))

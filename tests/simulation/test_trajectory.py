@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conftest import Fleet, Simulate, area, local, place, route
-from m2pem.api.arbiter import AdjustingArbiter
 from m2pem.api.telemetry import VehicleState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point
@@ -113,10 +112,6 @@ def east(bench: ArbiterHarness) -> float:
     state = bench.latest("ugv")
     assert isinstance(state, VehicleState)
     return local(state.position)[0]
-
-
-def test_the_simulated_arbiter_adjusts_behaviors() -> None:
-    assert issubclass(SimArbiter, AdjustingArbiter)
 
 
 @pytest.mark.parametrize("new", [2.0, 9.0])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorRequest, Connection, ResolvedValue
+from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.goals import GoalArbiter
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
@@ -101,7 +102,7 @@ class Yard:
 class CartArbiter(GoalArbiter):
     """Commands carts of a yard; they can go and stop."""
 
-    takes_one_vehicle = True
+    capabilities = ArbiterCapabilities(one_vehicle=True)
     names: ClassVar[tuple[str, ...]] = ("single_vehicle_routing", "goto", "follow", "drive_stop")
     behaviors: ClassVar[tuple[BehaviorSpec, ...]] = tuple(
         SHARED[name, BehaviorType.VEHICLE] for name in names
@@ -210,6 +211,8 @@ class CartArbiter(GoalArbiter):
 
 class WillingCartArbiter(CartArbiter):
     """Commands carts that take another speed on the way."""
+
+    capabilities = ArbiterCapabilities(one_vehicle=True, adjusts=True)
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]

@@ -17,6 +17,7 @@ from m2pem.api.arbiter import (
     Connection,
     Limits,
 )
+from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.executive.clock import run_virtual
@@ -246,7 +247,21 @@ class StaysHeld(SimArbiter):
             await super().start(request)
 
 
+class Undeclared(SimArbiter):
+    """Has methods of which the executive knows nothing."""
+
+    capabilities = ArbiterCapabilities()
+
+
+class Boastful(SimArbiter):
+    """Declares what it does not have."""
+
+    capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True, reclaims=True)
+
+
 FINDS = [
+    (Undeclared, "the_arbiter_declares_what_it_can_do_beyond_its_protocol"),
+    (Boastful, "the_arbiter_declares_what_it_can_do_beyond_its_protocol"),
     (TwiceReported, "accepted_comes_before_running_and_one_terminal_report_last"),
     (NeverAccepted, "accepted_comes_before_running_and_one_terminal_report_last"),
     (Unnumbered, "report_numbers_rise_from_one"),

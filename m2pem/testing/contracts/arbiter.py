@@ -6,6 +6,7 @@ The tests of queries, epochs, holds and links are in `m2pem.testing.contracts.ar
 from collections.abc import Callable
 from itertools import pairwise
 
+from m2pem.api.capabilities import ARBITER_METHODS, arbiter_capabilities, arbiter_problem
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_harness import (
     ArbiterCase,
@@ -35,6 +36,24 @@ class ArbiterContract(ArbiterLinks):
 
     Those tests are skipped, and the summary at the end lists them. All others must pass.
     """
+
+    def test_the_arbiter_declares_what_it_can_do_beyond_its_protocol(
+        self, make_arbiter: MakeArbiter, run: Callable[[Main], None]
+    ) -> None:
+        """`capabilities` names what is there, and nothing else: the executive asks for no more."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            problem = arbiter_problem(harness.arbiter)
+            assert not problem, problem
+            declared = arbiter_capabilities(harness.arbiter)
+            silent = [
+                f"it has `{member}`, but its `capabilities` do not say {capability}=True"
+                for capability, member in ARBITER_METHODS.items()
+                if hasattr(harness.arbiter, member) and not getattr(declared, capability)
+            ]
+            assert not silent, silent
+
+        with_harness(make_arbiter, run, main)
 
     def test_accepted_comes_before_running_and_one_terminal_report_last(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]

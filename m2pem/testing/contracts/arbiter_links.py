@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from m2pem.api.arbiter import ReclaimingArbiter
+from m2pem.api.arbiter import reclaims
 from m2pem.api.clock import Clock
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_harness import (
@@ -244,7 +244,7 @@ class ArbiterLinks(ArbiterFixtures):
                 "its link is up again"
             )
             arbiter = harness.arbiter
-            if isinstance(arbiter, ReclaimingArbiter):
+            if reclaims(arbiter):
                 limit = harness.clock.now_us() + round(1e6 * limits.cancel_timeout_s)
                 while why := await arbiter.reclaim(case.vehicle):
                     assert harness.clock.now_us() < limit, why

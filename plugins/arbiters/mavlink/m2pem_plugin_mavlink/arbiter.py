@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api import (
+    ArbiterCapabilities,
     ArbiterContext,
     AsyncQueue,
     BehaviorId,
@@ -94,13 +95,15 @@ def _make_connections(
 
 
 class MavlinkArbiter:
-    """Implements `m2pem.api.AdjustingArbiter`. Its settings in a fleet file: docs/mavlink.md.
+    """Implements `m2pem.api.Arbiter`. Its settings in a fleet file: docs/mavlink.md.
 
     Raises:
         PluginError: a connection cannot be used; the text names the resource and the key.
     """
 
-    takes_one_vehicle = True
+    capabilities = ArbiterCapabilities(
+        one_vehicle=True, adjusts=True, addresses=True, reclaims=True
+    )
 
     def __init__(
         self,

@@ -5,14 +5,13 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_double import Body, at
 from mavlink_play import V, play
 from mavlink_simulated import at as place
 from mavlink_simulated import fly
 
-from m2pem.api import AdjustingArbiter, BehaviorState, Point, Route
+from m2pem.api import BehaviorState, Point, Route
 
 FAR = Point((*at(800, 0), 20.0))
 WAY = Route(((*at(600, 0), 20.0), (*at(600, 300), 20.0)))
@@ -29,10 +28,6 @@ GOING = pytest.mark.parametrize(
 def speeds(bench: Any) -> list[float]:
     """What the vehicle was told with `set_speed`."""
     return [call[1] for call in bench.body.calls if call[0] == "set_speed"]
-
-
-def test_the_arbiter_adjusts_behaviors() -> None:
-    assert issubclass(MavlinkArbiter, AdjustingArbiter)
 
 
 @GOING

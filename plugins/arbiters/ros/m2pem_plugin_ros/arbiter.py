@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequen
 from dataclasses import replace
 
 from m2pem.api import (
+    ArbiterCapabilities,
     ArbiterContext,
     AsyncQueue,
     BehaviorId,
@@ -60,8 +61,7 @@ def _vehicle_connections(installation: ConnectionsSetup) -> VehicleConnections:
 
 
 class RosArbiter:
-    """The arbiter `ros` (docs/ros.md): an `AdjustingArbiter`, `ReclaimingArbiter` and
-    `DetectingArbiter` of `m2pem.api`.
+    """The arbiter `ros` (docs/ros.md).
 
     `make_driver` and `make_connections` are replaced in tests without ROS.
 
@@ -69,7 +69,9 @@ class RosArbiter:
         PluginError: a connection cannot be used; the text names the resource and the key.
     """
 
-    takes_one_vehicle = True
+    capabilities = ArbiterCapabilities(
+        one_vehicle=True, adjusts=True, addresses=True, reclaims=True, detects=True
+    )
 
     def __init__(
         self,

@@ -11,7 +11,6 @@ from ros_double import DoubleDriver, Dynamics, at
 from ros_play import FAR, JOURNAL, NEAR, A, B, play
 
 from m2pem.api import (
-    AdjustingArbiter,
     BehaviorState,
     GeoPosition,
     LinkState,
@@ -60,7 +59,7 @@ def test_what_preempts_names_the_goals_that_it_takes_over_from() -> None:
 def test_a_behavior_is_adjusted_on_the_way() -> None:
     async def main(world) -> None:
         async with world.connected() as bench:
-            assert isinstance(bench.arbiter, AdjustingArbiter)
+            assert bench.arbiter.capabilities.adjusts
             await bench.start("r1.b1", "goto", A, target=at(1000.0, 0.0), speed=1.0)
             await bench.running("r1.b1")
             await bench.arbiter.adjust("r1.b1", 1, {"speed": float("nan")})

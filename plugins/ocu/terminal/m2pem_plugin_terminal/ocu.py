@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from m2pem.api import OcuCapabilities
 from m2pem.errors import OperatorError, PluginError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ LINGERS_FOR_S = 2.0
 class TerminalOcu:
     """Takes the whole terminal while it serves, and gives it back as it was."""
 
-    takes_terminal = True
+    capabilities = OcuCapabilities(takes_terminal=True)
     """The command line prints nothing meanwhile."""
 
     def __init__(self, control: "MissionControl") -> None:

@@ -52,7 +52,7 @@ def test_the_terminal_unit_is_found_as_a_plugin_and_takes_the_terminal() -> None
     assert "terminal" in {entry.name for entry in entry_points(group="m2pem")}
     factory = PluginManager().ocu("terminal")
     assert factory is TerminalOcu
-    assert TerminalOcu.takes_terminal
+    assert TerminalOcu.capabilities.takes_terminal
 
 
 async def test_without_a_terminal_it_says_what_to_use(

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from m2pem.api import OcuCapabilities
 from m2pem_plugin_web.settings import Settings, read_settings
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class WebOcu:
             of secrets are not what they ought to be.
     """
 
-    imports = ("m2pem_plugin_web.app",)
+    capabilities = OcuCapabilities(imports=("m2pem_plugin_web.app",))
 
     def __init__(
         self, control: "MissionControl", *, environment: Mapping[str, str] = os.environ

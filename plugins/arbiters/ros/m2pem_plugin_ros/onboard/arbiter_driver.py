@@ -11,7 +11,6 @@ from typing import Any
 from uuid import UUID
 
 from m2pem.api import (
-    AdjustingArbiter,
     Arbiter,
     BehaviorReport,
     BehaviorRequest,
@@ -23,6 +22,7 @@ from m2pem.api import (
     ResourceId,
     VehiclePosition,
     VehicleState,
+    adjusts,
 )
 from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome
 
@@ -109,7 +109,7 @@ class ArbiterDriver:
         self._calls.put_nowait(self._arbiter.cancel(str(goal), EPOCH))
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
-        if isinstance(self._arbiter, AdjustingArbiter):
+        if adjusts(self._arbiter):
             self._calls.put_nowait(self._arbiter.adjust(str(goal), EPOCH, parameters))
 
     def hold(self) -> None:
