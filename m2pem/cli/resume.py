@@ -57,9 +57,8 @@ async def _resume(
     from m2pem.cli.session import drive_run, make_executive, tidy_up
     from m2pem.engine.state import RunStatus
     from m2pem.executive.clock import SystemClock
-    from m2pem.fleet.fleet import restore
     from m2pem.journal import file_of
-    from m2pem.journal.mission import mission_of
+    from m2pem.journal.mission import fleet_of, mission_of
     from m2pem.plugins import PluginManager
 
     plugins = PluginManager()
@@ -76,11 +75,10 @@ async def _resume(
         # Simulated time may have run ahead of the wall clock; it never goes back.
         start_us = max(time.time_ns() // 1000, await last_decided_us(journal, line))
         executive = make_executive(
-            restore(header.fleet),
+            fleet_of(header),
             journal,
             plugins,
             SystemClock(header.speed, start_us),
-            simulated=header.simulated,
             answers=answers,
         )
         with output_of(output) as out:

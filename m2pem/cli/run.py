@@ -99,6 +99,7 @@ async def _run(
     from m2pem.cli.session import drive_run, make_executive, refuse_speed, tidy_up, with_own_state
     from m2pem.executive.clock import SystemClock
     from m2pem.executive.loading import load_source, without_effect
+    from m2pem.fleet.fleet import simulated_fleet
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
 
@@ -107,8 +108,9 @@ async def _run(
     url = url_of(journal_url)
     mission = load_source(mission_file, search_path)
     answers = get_answers(answers_file, mission)
-    fleet = with_own_state(get_fleet(fleet_name, mission), file_of(url), simulated=simulated)
-    refuse_speed(fleet, speed, simulated=simulated)
+    fleet = get_fleet(fleet_name, mission)
+    fleet = with_own_state(simulated_fleet(fleet) if simulated else fleet, file_of(url))
+    refuse_speed(fleet, speed)
     async with journal_at(url) as journal:
         clock = SystemClock(speed)
         executive = make_executive(
@@ -116,7 +118,6 @@ async def _run(
             journal,
             plugins,
             clock,
-            simulated=simulated,
             answers=answers,
             search_path=search_path,
         )

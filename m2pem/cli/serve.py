@@ -22,7 +22,7 @@ from m2pem.cli.options import (
 if TYPE_CHECKING:
     from m2pem.executive.executive import Executive
     from m2pem.fleet.fleet import Fleet
-    from m2pem.journal.base import Journal, RunInfo
+    from m2pem.journal.base import Journal, RunHeader, RunInfo
 
 
 @click.command(epilog=example("m2pem serve --fleet fleet_configs/vignette1.yaml --ocu plain"))
@@ -64,6 +64,7 @@ async def _serve(
     from m2pem.cli.output import output_of
     from m2pem.cli.session import driving, make_executive, refuse_speed, tidy_up, with_shared_state
     from m2pem.executive.clock import SystemClock
+    from m2pem.fleet.fleet import simulated_fleet
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
@@ -73,16 +74,17 @@ async def _serve(
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
     url = url_of(journal_url)
-    fleet = with_shared_state(load_fleet(fleet_file), file_of(url), simulated=simulated)
-    refuse_speed(fleet, speed, simulated=simulated)
+    written = load_fleet(fleet_file)
+    fleet = simulated_fleet(written) if simulated else written
+    fleet = with_shared_state(fleet, file_of(url), written)
+    refuse_speed(fleet, speed)
     async with journal_at(url) as journal:
-        mine, others = await _interrupted(journal, fleet, simulated, speed)
+        mine, others = await _interrupted(journal, fleet, speed)
         executive = make_executive(
             fleet,
             journal,
             plugins,
             SystemClock(speed, await _start_us(journal, mine)),
-            simulated=simulated,
             search_path=search_path,
         )
         with output_of(output) as out:
@@ -102,20 +104,27 @@ async def _serve(
 
 
 async def _interrupted(
-    journal: "Journal", fleet: "Fleet", simulated: bool, speed: float
+    journal: "Journal", fleet: "Fleet", speed: float
 ) -> "tuple[list[RunInfo], list[RunInfo]]":
     """The runs that nobody drives: those with this very fleet, and the others."""
-    from m2pem.fleet.fleet import dump
+    from m2pem.errors import JournalError
+    from m2pem.fleet.fleet import dump, restore
+    from m2pem.journal.mission import fleet_of
 
-    here = (dump(fleet), simulated, speed)
+    here = restore(dump(fleet))
+
+    def is_of_this_fleet(header: "RunHeader") -> bool:
+        try:
+            return header.speed == speed and fleet_of(header) == here
+        except JournalError:
+            return False
+
     mine: list[RunInfo] = []
     others: list[RunInfo] = []
     for line in await journal.runs():
         taken_up = line.loss is None or line.loss.resumable
         if line.outcome is None and not line.driven and taken_up:
-            header = line.header
-            same = (header.fleet, header.simulated, header.speed) == here
-            (mine if same else others).append(line)
+            (mine if is_of_this_fleet(line.header) else others).append(line)
     return mine, others
 
 

@@ -27,10 +27,9 @@ from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import PluginError
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
-from m2pem.executive.fleet_connections import SIMULATED
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.executive.script import Script
-from m2pem.fleet.fleet import Fleet, Payload, Vehicle, dump
+from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, dump
 from m2pem.journal.base import Journal
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
@@ -214,13 +213,13 @@ class Interruption:
         writer_for(sys.stderr).put(f"m2pem: {text}")
 
 
-def refuse_speed(fleet: Fleet, speed: float, *, simulated: bool) -> None:
+def refuse_speed(fleet: Fleet, speed: float) -> None:
     """Real vehicles keep real time.
 
     Raises:
         UsageError: the clock would not be theirs.
     """
-    if speed == 1.0 or simulated:
+    if speed == 1.0:
         return
     everything: list[Vehicle | Payload] = [*fleet.vehicles.values(), *fleet.payloads.values()]
     sitl = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.sitl}
@@ -242,7 +241,6 @@ def make_executive(
     plugins: PluginManager,
     clock: SystemClock,
     *,
-    simulated: bool,
     answers: Script | None = None,
     search_path: Sequence[Path] = (),
 ) -> Executive:
@@ -257,7 +255,6 @@ def make_executive(
             journal,
             plugins,
             clock,
-            simulated=simulated,
             script=answers,
             speed=clock.speed,
             rehearse=_rehearse,
@@ -277,25 +274,26 @@ STATE = "state"
 """The setting of a simulated resource that names its file."""
 
 
-def with_own_state(fleet: Fleet, journal: Path | None, *, simulated: bool) -> Fleet:
+def with_own_state(fleet: Fleet, journal: Path | None) -> Fleet:
     """The fleet, kept in a new file beside the journal: nobody else has these vehicles."""
-    return _with_state(fleet, journal, secrets.token_hex(4), simulated)
+    return _with_state(fleet, journal, secrets.token_hex(4))
 
 
-def with_shared_state(fleet: Fleet, journal: Path | None, *, simulated: bool) -> Fleet:
-    """The fleet, kept in the file that this fleet always has beside this journal."""
-    name = hashlib.sha256(dump(fleet)).hexdigest()[:8]
-    return _with_state(fleet, journal, name, simulated)
+def with_shared_state(fleet: Fleet, journal: Path | None, written: Fleet) -> Fleet:
+    """The fleet, kept in the file that it always has beside this journal. `written`: the fleet as
+    its own file says."""
+    name = hashlib.sha256(dump(written)).hexdigest()[:8]
+    return _with_state(fleet, journal, name)
 
 
-def _with_state(fleet: Fleet, journal: Path | None, name: str, simulated: bool) -> Fleet:
+def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
     if journal is None:
         return fleet
     path = f"{_prefix(journal)}{name}"
 
     def settings(arbiter: str, own: Mapping[str, Any]) -> Mapping[str, Any]:
         """What the fleet says itself goes first."""
-        return {STATE: path, **own} if simulated or arbiter == SIMULATED else own
+        return {STATE: path, **own} if arbiter == SIMULATED else own
 
     return replace(
         fleet,

@@ -8,16 +8,15 @@ from m2pem.cli.table import table
 from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
 from m2pem.executive.control import summary
-from m2pem.fleet.fleet import restore
 from m2pem.journal.base import RunInfo
-from m2pem.journal.mission import mission_of
+from m2pem.journal.mission import fleet_of, mission_of
 from m2pem.mission.values import Value
 
 
 def run_of(line: RunInfo) -> MissionRun:
     """The run of a journal before anything has happened in it."""
     header = line.header
-    return MissionRun(mission_of(header), restore(header.fleet) if header.fleet else None, line.run)
+    return MissionRun(mission_of(header), fleet_of(header) if header.fleet else None, line.run)
 
 
 class RunStatusView:

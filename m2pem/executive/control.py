@@ -292,7 +292,6 @@ class Control:
         except MissionError as error:
             return error.findings
         names, arbiters, plugins = tuple(data), supervisor.arbiters, supervisor.plugins
-        simulated = supervisor.settings.simulated
         return [
             *findings_for(
                 loaded,
@@ -300,7 +299,6 @@ class Control:
                 plugins,
                 names,
                 process,
-                simulated=simulated,
                 handed_over=supervisor.handed_over,
             ),
             *requirement_findings(loaded, arbiters, plugins, names),
@@ -335,7 +333,6 @@ class Control:
         return await verify_in_subprocess(
             mission,
             supervisor.fleet_now,
-            simulated=supervisor.settings.simulated,
             search_path=supervisor.settings.search_path,
             process=process,
             data=data or {},

@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock
@@ -42,7 +42,6 @@ log = logging.getLogger("m2pem.executive")
 class Executive:
     """Connects the parts of an executive: fleet connections, supervisor, monitors and control.
 
-    `simulated`: every arbiter is the simulated one, with `settings` for its connections.
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
     whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`. `observed`: whether
     plugins observe records. `rehearse`: what `MissionControl.simulate` awaits.
@@ -56,8 +55,6 @@ class Executive:
         plugins: PluginManager,
         clock: Clock,
         *,
-        simulated: bool = False,
-        settings: Mapping[str, Any] | None = None,
         script: Script | None = None,
         speed: float = 1.0,
         watch_links: bool = True,
@@ -83,8 +80,6 @@ class Executive:
                 journal.identity,
                 self._epoch_of,
             ),
-            simulated=simulated,
-            settings=settings,
         )
         self._observers = (
             RecordObservers(plugins.records_committed, self.events) if observed else None
@@ -96,7 +91,7 @@ class Executive:
             self.arbiters,
             self.bus,
             self.events,
-            RunSettings(simulated, speed, tuple(search_path), script, max_steps),
+            RunSettings(speed, tuple(search_path), script, max_steps),
             observers=self._observers,
         )
         self._connections = FleetConnections(

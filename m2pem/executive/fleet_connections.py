@@ -4,7 +4,7 @@ import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api.arbiter import (
     Arbiter,
@@ -18,7 +18,7 @@ from m2pem.api.capabilities import arbiter_capabilities, arbiter_problem
 from m2pem.api.telemetry import Telemetry
 from m2pem.errors import FleetError, PluginError
 from m2pem.findings import Finding
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
@@ -27,9 +27,6 @@ from m2pem.teams.capabilities import Capabilities
 
 if TYPE_CHECKING:
     from m2pem.teams.arbiter import Teams
-
-SIMULATED = "sim"
-"""The arbiter that serves everything in a simulated fleet."""
 
 
 class ArbiterPlugins(Protocol):
@@ -52,35 +49,22 @@ def _located(finding: Finding, fleet: Fleet) -> Finding:
 class FleetArbiters:
     """One object per registered name, built from the fleet. Building needs no connection.
 
-    `simulated`: every arbiter is replaced by the simulated one; `settings` are then added to the
-    connection of every resource.
-
     Raises:
         PluginError: the fleet names an arbiter that no plugin provides, or one that declares
             capabilities which it does not have.
         FleetError: an arbiter cannot use the settings of a resource.
     """
 
-    def __init__(
-        self,
-        fleet: Fleet,
-        plugins: ArbiterPlugins,
-        context: ArbiterContext,
-        *,
-        simulated: bool = False,
-        settings: Mapping[str, Any] | None = None,
-    ) -> None:
+    def __init__(self, fleet: Fleet, plugins: ArbiterPlugins, context: ArbiterContext) -> None:
         self.fleet = fleet
-        extra = dict(settings or {})
         area = fleet.geometries.get(fleet.fence)
         fence = area if isinstance(area, Area) else None
         connections: dict[str, dict[ResourceId, Connection]] = {}
         for vehicle in fleet.vehicles.values():
-            name = SIMULATED if simulated else vehicle.arbiter
-            connections.setdefault(name, {})[vehicle.id] = Connection(
+            connections.setdefault(vehicle.arbiter, {})[vehicle.id] = Connection(
                 vehicle.id,
                 vehicle.domain.value,
-                {**vehicle.settings, **extra},
+                vehicle.settings,
                 vehicle.behaviors,
                 lost_after_s=vehicle.lost_after_s,
                 failsafe=vehicle.failsafe,
@@ -90,12 +74,11 @@ class FleetArbiters:
                 endurance_s=vehicle.endurance_s,
             )
         for payload in fleet.payloads.values():
-            name = SIMULATED if simulated else payload.arbiter
             owner = fleet.vehicles[payload.vehicle]
-            connections.setdefault(name, {})[payload.id] = Connection(
+            connections.setdefault(payload.arbiter, {})[payload.id] = Connection(
                 payload.id,
                 owner.domain.value,
-                {**payload.settings, **extra},
+                payload.settings,
                 payload.behaviors,
                 detector=payload.detector,
                 lost_after_s=owner.lost_after_s,

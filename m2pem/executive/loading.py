@@ -98,7 +98,6 @@ def findings_for(
     data: Iterable[str] = (),
     process: str | None = None,
     *,
-    simulated: bool = False,
     handed_over: Container[str] = (),
 ) -> list[Finding]:
     """All findings of `m2pem check` for a mission that was read: its own, the fleet's, plugins'.
@@ -124,7 +123,7 @@ def findings_for(
     fleet = arbiters.fleet if arbiters is not None else None
     if arbiters is not None:
         offered = arbiters.offered
-        findings += check_mission(mission, arbiters.fleet, offered, simulated, handed_over)
+        findings += check_mission(mission, arbiters.fleet, offered, handed_over)
     else:
         findings += check_named(mission)
     findings += _unprovided(mission, writes)

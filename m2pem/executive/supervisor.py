@@ -64,12 +64,11 @@ STEPS_AT_ONCE = 1_000
 class RunSettings:
     """How an executive drives its runs.
 
-    `simulated`: every arbiter is the simulated one. `speed`: of the clock against the wall clock,
-    kept in the journal for a resume. `search_path`: folders of processes that missions call.
-    `script`, `max_steps`: of a rehearsal; see `Script` and `Runner`.
+    `speed`: of the clock against the wall clock, kept in the journal for a resume. `search_path`:
+    folders of processes that missions call. `script`, `max_steps`: of a rehearsal; see `Script` and
+    `Runner`.
     """
 
-    simulated: bool = False
     speed: float = 1.0
     search_path: tuple[Path, ...] = ()
     script: Script | None = None
@@ -186,7 +185,6 @@ class Supervisor:
             self.plugins,
             known_data(data),
             process,
-            simulated=self.settings.simulated,
             handed_over=self.handed_over,
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
@@ -233,7 +231,7 @@ class Supervisor:
             loaded.source,
             process_id,
             dump(self.fleet),
-            self.settings.simulated,
+            self.fleet.simulated,
             self.settings.speed,
             self.clock.now_us() if self.settings.speed == 1.0 else time.time_ns() // 1000,
             loaded.library,
@@ -309,7 +307,7 @@ class Supervisor:
             for each in every
             if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
         ]
-        if not self.settings.simulated and (text := describe_armed_vehicles(free, self._bus)):
+        if not self.fleet.simulated and (text := describe_armed_vehicles(free, self._bus)):
             self.events.publish(Alert(runner.id, "LEFT_ARMED", text))
         over = [each for each in self.runners.values() if each.done.is_set()]
         for oldest in over[:-REMEMBERED_RUNS]:

@@ -13,8 +13,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from m2pem.errors import M2pemError
-from m2pem.executive.fleet_connections import SIMULATED, FleetArbiters
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.runtime_directory import VARIABLE, runtime_directory
+from m2pem.fleet.fleet import SIMULATED
 from m2pem.mission.catalogue import ResourceId
 
 

@@ -55,7 +55,6 @@ def search_request(
     data: Mapping[str, Value],
     spec: Path | bytes | None = None,
     *,
-    simulated: bool = False,
     timers_in_order: bool = False,
 ) -> SearchRequest:
     """What is to be searched, if `m2pem check` finds no errors in it.
@@ -67,7 +66,7 @@ def search_request(
         MissionError: there are errors; tells them all.
         RequirementsError: requirements cannot be read, or do not fit; tells all that is wrong.
     """
-    wrong = findings_for(mission, arbiters, plugins, tuple(data), process, simulated=simulated)
+    wrong = findings_for(mission, arbiters, plugins, tuple(data), process)
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
     writes = plugins.service_writes()
     options = Options(data=data, service_writes=writes, timers_in_order=timers_in_order)

@@ -36,7 +36,6 @@ class Order(msgspec.Struct):
 
     mission: EncodedSource
     fleet: bytes
-    simulated: bool
     search_path: list[str]
     process: str | None
     data: dict[str, Any]
@@ -50,7 +49,6 @@ async def verify_in_subprocess(
     mission: MissionSource,
     fleet: Fleet,
     *,
-    simulated: bool,
     search_path: Iterable[Path],
     process: str | None,
     data: Mapping[str, Value],
@@ -64,7 +62,6 @@ async def verify_in_subprocess(
     order = Order(
         encode_source(mission),
         dump(fleet),
-        simulated,
         [str(each) for each in search_path],
         process,
         dict(data),
@@ -106,12 +103,11 @@ def _work(content: bytes, tell: SendProgress) -> bytes:
     plugins = PluginManager()
     asked = search_request(
         loaded,
-        _arbiters(restore(order.fleet), plugins, simulated=order.simulated),
+        _arbiters(restore(order.fleet), plugins),
         plugins,
         order.process,
         order.data,
         order.spec,
-        simulated=order.simulated,
         timers_in_order=order.timers_in_order,
     )
     limits = Limits(states=order.limits.states, seconds=order.limits.seconds, tokens=TOKENS)
@@ -121,7 +117,7 @@ def _work(content: bytes, tell: SendProgress) -> bytes:
     return msgspec.json.encode(as_data(found))
 
 
-def _arbiters(fleet: Fleet, plugins: Any, *, simulated: bool) -> FleetArbiters:
+def _arbiters(fleet: Fleet, plugins: Any) -> FleetArbiters:
     """Make the arbiters of a fleet to read their catalogues; they are not connected."""
     context = ArbiterContext(
         SystemClock(),
@@ -130,7 +126,7 @@ def _arbiters(fleet: Fleet, plugins: Any, *, simulated: bool) -> FleetArbiters:
         fleet.origin,
         {team.name: team.members for team in fleet.teams.values()},
     )
-    return FleetArbiters(fleet, plugins, context, simulated=simulated)
+    return FleetArbiters(fleet, plugins, context)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import Catalogue, ResourceGraph
 from m2pem.fleet.parameters import ParameterProblem, examine
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
@@ -199,18 +199,16 @@ def check_mission(
     mission: Mission,
     fleet: Fleet,
     catalogue: Catalogue,
-    simulated: bool = False,
     handed_over: Container[str] = (),
 ) -> list[Finding]:
     """Everything about a mission's roles, behaviors and parameters that does not fit the fleet.
 
-    `catalogue` is what the arbiter of a resource offers; with `simulated` it is that of the
-    simulated arbiter, which then stands in for all. Findings come in the order of the mission.
+    `catalogue` is what the arbiter of a resource offers. Findings come in the order of the mission.
     `handed_over`: names of geometries that operators have handed over already. Another one that the
     fleet lacks is a warning if the fleet says that operators hand it over, else an error.
     """
     graph = ResourceGraph(fleet, catalogue)
-    check = _Check(mission, fleet, graph, catalogue, simulated, handed_over)
+    check = _Check(mission, fleet, graph, catalogue, handed_over)
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     return [*findings, *_returned(mission, fleet)]
 
@@ -281,7 +279,6 @@ class _Check:
     fleet: Fleet
     graph: ResourceGraph
     catalogue: Catalogue
-    simulated: bool
     handed_over: Container[str]
 
     def task(self, task: Activity) -> list[Finding]:
@@ -395,7 +392,8 @@ class _Check:
             other = sorted(types)[0]
             message = f"'{name}' is {article(f'{other} behavior')}, not {article(wanted)} behavior"
             return message, f'set type="{other}" and name a {other}', "wrong-type"
-        arbiter = "the simulated arbiter" if self.simulated else f"arbiter '{holder.arbiter}'"
+        simulated = holder.arbiter == SIMULATED
+        arbiter = "the simulated arbiter" if simulated else f"arbiter '{holder.arbiter}'"
         message = f"{arbiter} of {place(self.fleet, resource)} offers no {wanted} behavior '{name}'"
         if wanted is BehaviorType.TEAM and (
             remedy := _member_lacks(name, offered, holder.behaviors)

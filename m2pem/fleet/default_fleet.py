@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import DETECTOR_SERVICE
-from m2pem.fleet.fleet import Domain, Fleet, Payload, Team, Vehicle
+from m2pem.fleet.fleet import SIMULATED, Domain, Fleet, Payload, Team, Vehicle
 from m2pem.geo.positions import is_local
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
@@ -19,7 +19,6 @@ from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.mission.mission import Mission
 
 ORIGIN = (38.1075, -77.3192, 60.0)
-ARBITER = "sim"
 TEAM_SIZE = 3
 SPACING_M = 10.0
 
@@ -131,7 +130,11 @@ class _Draft:
     def fleet(self) -> Fleet:
         payloads = {
             ResourceId(name): Payload(
-                ResourceId(name), ResourceId(name.partition("/")[0]), ARBITER, {}, detector=detector
+                ResourceId(name),
+                ResourceId(name.partition("/")[0]),
+                SIMULATED,
+                {},
+                detector=detector,
             )
             for name, detector in self.payloads.items()
         }
@@ -142,7 +145,7 @@ class _Draft:
             vehicles[vehicle] = Vehicle(
                 vehicle,
                 domain,
-                ARBITER,
+                SIMULATED,
                 {"home": [latitude_deg, longitude_deg]},
                 payloads=tuple(p.id for p in payloads.values() if p.vehicle == vehicle),
             )

@@ -1,7 +1,7 @@
 """The fleet: vehicles, payloads, teams and named geometries, also as self-contained JSON."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, get_type_hints
 
@@ -11,6 +11,9 @@ from m2pem.errors import JournalError
 from m2pem.geo.geojson import kind_of
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Geometry, Point, Route, VehiclePosition
+
+SIMULATED = "sim"
+"""The name of the arbiter that simulates vehicles and payloads."""
 
 
 class Domain(StrEnum):
@@ -104,6 +107,29 @@ class Fleet:
     def detectors(self) -> tuple[ResourceId, ...]:
         """The payloads marked `detector: true`, in the file's order."""
         return tuple(payload.id for payload in self.payloads.values() if payload.detector)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether every vehicle and payload is of the simulated arbiter."""
+        everything: list[Vehicle | Payload] = [*self.vehicles.values(), *self.payloads.values()]
+        return all(each.arbiter == SIMULATED for each in everything)
+
+
+def simulated_fleet(fleet: Fleet, settings: Mapping[str, Any] | None = None) -> Fleet:
+    """The fleet with the simulated arbiter in place of every other; `settings` are added to the
+    connection of every resource, in place of its own of the same names."""
+    extra = settings or {}
+    return replace(
+        fleet,
+        vehicles={
+            id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra})
+            for id_, each in fleet.vehicles.items()
+        },
+        payloads={
+            id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra})
+            for id_, each in fleet.payloads.items()
+        },
+    )
 
 
 VERSION = 1

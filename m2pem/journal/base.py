@@ -20,8 +20,9 @@ class RunHeader:
 
     `mission_name` is the file's name, `mission` its bytes, `library` the other files
     that it uses; `fleet` is `m2pem.fleet.fleet.dump(fleet)`, or b"" without one.
-    `simulated`: every arbiter was replaced by the simulated one; `speed`: of the clock against
-    the wall clock. `created_us`: by the wall clock, also where the executive's runs ahead of it.
+    `simulated`: every arbiter is the simulated one, or was replaced by it. `speed`: of the clock
+    against the wall clock. `created_us`: by the wall clock, also where the executive's runs ahead
+    of it.
     """
 
     mission_name: str

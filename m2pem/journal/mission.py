@@ -1,9 +1,10 @@
-"""The mission of a run, as it was when the run began, read from the journal alone.
+"""The mission and the fleet of a run, as they were when the run began, read from the journal alone.
 
 It is apart from the rest of the journal, which needs no parser of BPMN.
 """
 
 from m2pem.bpmn import parse_mission
+from m2pem.fleet.fleet import Fleet, restore, simulated_fleet
 from m2pem.journal.base import RunHeader
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
@@ -20,3 +21,14 @@ def mission_of(header: RunHeader) -> Mission:
     """
     library = KeptLibrary(header.library)
     return parse_mission(header.mission, header.mission_name, library, accepted=True)
+
+
+def fleet_of(header: RunHeader) -> Fleet:
+    """Read the fleet that a run commands again. That of a simulated run is simulated, also where a
+    journal of 0.1.0 keeps the fleet as it was before.
+
+    Raises:
+        JournalError: it is of a newer version.
+    """
+    fleet = restore(header.fleet)
+    return simulated_fleet(fleet) if header.simulated else fleet

@@ -28,7 +28,7 @@ from m2pem.executive.runner import Runner
 from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.check import DETECTOR_SERVICE
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
 from m2pem.mission.behavior import Behavior, ServiceCall
@@ -260,12 +260,10 @@ class _Rehearsal:
     ) -> RunSummary:
         journal = _TellingJournal(self._on_record)
         executive = Executive(
-            self._fleet,
+            simulated_fleet(self._fleet, SETTINGS),
             journal,
             self._plugins,
             clock,
-            simulated=True,
-            settings=SETTINGS,
             script=self._script,
             watch_links=False,
             max_steps=self._max_steps,

@@ -11,7 +11,7 @@ from m2pem.api.control import MissionControl, OpenPrompt, RunSummary, StampedRec
 from m2pem.engine.records import Record, TokenEntered
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 
@@ -53,11 +53,10 @@ async def run_executive(
         PluginError: the fleet names an arbiter that no plugin offers, or one cannot connect.
     """
     executive = Executive(
-        fleet,
+        simulated_fleet(fleet) if simulated else fleet,
         MemoryJournal(),
         _WithMore(arbiters or {}, services or {}),
         clock or SystemClock(speed),
-        simulated=simulated,
         speed=speed,
     )
     async with executive:

@@ -9,7 +9,7 @@ import pytest
 from m2pem.cli.session import refuse_speed, tidy_up, with_own_state, with_shared_state
 from m2pem.engine.state import RunStatus
 from m2pem.executive.executive import Executive
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from tests.command_line import FLEET
 
@@ -26,15 +26,15 @@ def test_what_is_neither_simulated_nor_software_in_the_loop_keeps_real_time(tmp_
     file = tmp_path / "fleet.yaml"
     file.write_text(MIXED_FLEET.format(uav1=""), encoding="utf-8")
     with pytest.raises(click.UsageError, match=r"--speed 10: uav1, uav1/cam of .* `sitl: true`"):
-        refuse_speed(load_fleet(file), 10.0, simulated=False)
-    refuse_speed(load_fleet(file), 1.0, simulated=False)
-    refuse_speed(load_fleet(file), 10.0, simulated=True)
+        refuse_speed(load_fleet(file), 10.0)
+    refuse_speed(load_fleet(file), 1.0)
+    refuse_speed(simulated_fleet(load_fleet(file)), 10.0)
 
 
 def test_software_in_the_loop_runs_as_fast_as_it_is_told_with_its_payloads(tmp_path: Path) -> None:
     file = tmp_path / "fleet.yaml"
     file.write_text(MIXED_FLEET.format(uav1="sitl: true, "), encoding="utf-8")
-    refuse_speed(load_fleet(file), 10.0, simulated=False)
+    refuse_speed(load_fleet(file), 10.0)
 
 
 @pytest.fixture
@@ -55,41 +55,40 @@ def states(fleet: Fleet) -> dict[str, Any]:
 def test_simulated_resources_share_one_file_beside_the_journal(
     fleet: Fleet, tmp_path: Path
 ) -> None:
-    kept = states(with_own_state(fleet, tmp_path / "journal.db", simulated=False))
+    kept = states(with_own_state(fleet, tmp_path / "journal.db"))
     assert set(kept) == {"evsg1", "evsg1/gpr", "evsg2/ptz", "evsg3", "lead"}
     (path,) = set(kept.values())
     assert path.startswith(f"{tmp_path}/journal.db-sim-")
 
 
 def test_all_are_simulated_if_that_is_asked(fleet: Fleet, tmp_path: Path) -> None:
-    kept = states(with_own_state(fleet, tmp_path / "journal.db", simulated=True))
+    kept = states(with_own_state(simulated_fleet(fleet), tmp_path / "journal.db"))
     assert len(kept) == len(fleet.vehicles) + len(fleet.payloads)
 
 
 def test_each_run_has_a_file_of_its_own(fleet: Fleet, tmp_path: Path) -> None:
     journal = tmp_path / "journal.db"
-    assert with_own_state(fleet, journal, simulated=True) != with_own_state(
-        fleet, journal, simulated=True
-    )
+    assert with_own_state(fleet, journal) != with_own_state(fleet, journal)
 
 
 def test_a_service_has_the_same_file_again(fleet: Fleet, tmp_path: Path) -> None:
     journal = tmp_path / "journal.db"
-    first = with_shared_state(fleet, journal, simulated=True)
-    assert first == with_shared_state(fleet, journal, simulated=True)
+    simulated = simulated_fleet(fleet)
+    first = with_shared_state(simulated, journal, fleet)
+    assert first == with_shared_state(simulated, journal, fleet)
     other = replace(fleet, name="other")
-    assert states(first) != states(with_shared_state(other, journal, simulated=True))
+    assert states(first) != states(with_shared_state(simulated_fleet(other), journal, other))
 
 
 def test_a_journal_in_memory_has_no_file(fleet: Fleet) -> None:
-    assert with_own_state(fleet, None, simulated=True) == fleet
+    assert with_own_state(fleet, None) == fleet
 
 
 def test_what_the_fleet_says_itself_is_kept(fleet: Fleet, tmp_path: Path) -> None:
     lead = next(each for each in fleet.vehicles.values() if each.id == "lead")
     own = replace(lead, settings={**lead.settings, "state": "/srv/lead"})
     fleet = replace(fleet, vehicles={**fleet.vehicles, own.id: own})
-    kept = with_own_state(fleet, tmp_path / "journal.db", simulated=True)
+    kept = with_own_state(simulated_fleet(fleet), tmp_path / "journal.db")
     assert states(kept)["lead"] == "/srv/lead"
 
 
@@ -105,7 +104,7 @@ def test_the_file_goes_when_no_run_needs_it(
     fleet: Fleet, tmp_path: Path, status: RunStatus, failure: Exception | None, kept: bool
 ) -> None:
     journal = tmp_path / "journal.db"
-    fleet = with_own_state(fleet, journal, simulated=True)
+    fleet = with_own_state(simulated_fleet(fleet), journal)
     (state,) = set(states(fleet).values())
     for name in (journal, Path(state), Path(f"{state}-wal")):
         name.touch()

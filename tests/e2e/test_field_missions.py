@@ -263,7 +263,7 @@ def outer_ends(story: Story, result: RehearsalResult) -> list[str]:
 def test_nothing_is_to_be_found_wrong_with_the_mission_and_its_fleet(number: int) -> None:
     async def findings(clock: VirtualClock) -> list[Finding]:
         context = ArbiterContext(clock, Bus(), logging.getLogger("test"), fleet().origin)
-        arbiters = FleetArbiters(fleet(), plugins(), context, simulated=False, settings=None)
+        arbiters = FleetArbiters(fleet(), plugins(), context)
         path = MISSIONS / f"mehds_vignette_{number}.bpmn"
         return findings_for(mission(path), arbiters, plugins())
 

@@ -5,7 +5,7 @@ import pytest
 
 from m2pem.api import Arbiter, ArbiterContext, Area, Connection, Route
 from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
-from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, simulated_fleet
 from m2pem.mission.catalogue import ResourceId
 
 FIELD = Area((((47.0, 8.0, None), (47.0, 8.1, None), (47.1, 8.1, None), (47.0, 8.0, None)),))
@@ -64,10 +64,10 @@ def test_a_fleet_says_whether_anything_real_moves(
     arbiter: str, sitl: bool, simulated: bool, nothing_is_real: bool
 ) -> None:
     vehicles = {UAV1: Vehicle(UAV1, Domain.AIR, arbiter, {}, sitl=sitl)}
+    fleet = Fleet("fleet", "fleet.yaml", vehicles)
     arbiters = FleetArbiters(
-        Fleet("fleet", "fleet.yaml", vehicles),
+        simulated_fleet(fleet) if simulated else fleet,
         cast("ArbiterPlugins", Plugins()),
         cast("ArbiterContext", object()),
-        simulated=simulated,
     )
     assert arbiters.nothing_is_real is nothing_is_real

@@ -20,6 +20,7 @@ from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
 from m2pem.executive.subprocess_worker import run_in_subprocess
+from m2pem.fleet.fleet import simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
@@ -45,11 +46,10 @@ serve(work)
 def with_control(story: Callable[[Control], Awaitable[T]]) -> T:
     async def tell() -> T:
         executive = Executive(
-            load_fleet(FLEET),
+            simulated_fleet(load_fleet(FLEET)),
             MemoryJournal(),
             PluginManager(),
             SystemClock(),
-            simulated=True,
             rehearse=rehearse_in_subprocess,
         )
         async with executive:

@@ -9,7 +9,7 @@ import pytest
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import TaskFindings, check_mission, check_roles, place
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 
@@ -118,7 +118,7 @@ def test_a_behavior_that_another_resource_offers_says_which(fleet: Fleet) -> Non
 
 def test_a_simulated_check_speaks_of_the_simulated_arbiter(fleet: Fleet) -> None:
     tasks = mission(behavior("somersault", vehicle("evsg1")))
-    finding = only(check_mission(tasks, fleet, everything, simulated=True))
+    finding = only(check_mission(tasks, simulated_fleet(fleet), everything))
     assert "the simulated arbiter of evsg1" in finding.message
 
 

@@ -30,7 +30,7 @@ from m2pem.engine.records import (
 from m2pem.errors import AnswersError, MissionError, OperatorError
 from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
-from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.memory import MemoryJournal
 from m2pem.mission.catalogue import ResourceId
@@ -633,11 +633,10 @@ def test_an_executive_rehearses_a_mission_with_its_fleet(tmp_path: Path) -> None
 
     async def main(clock: Any) -> tuple[RehearsalResult, list[Any]]:
         executive = Executive(
-            fleet(),
+            simulated_fleet(fleet()),
             MemoryJournal(),
             plugins,
             clock,
-            simulated=True,
             rehearse=rehearse_in_subprocess,
         )
         async with executive:

@@ -8,7 +8,15 @@ from typing import Any
 from m2pem.engine.records import BehaviorEnded, Record
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
-from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
+from m2pem.fleet.fleet import (
+    Domain,
+    Fleet,
+    LostMemberPolicy,
+    Payload,
+    Team,
+    Vehicle,
+    simulated_fleet,
+)
 from m2pem.journal import MemoryJournal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Geometry
@@ -124,12 +132,10 @@ def rehearsed(
             at_us.extend(clock.now_us() for _ in records)
 
         executive = Executive(
-            fleet,
+            simulated_fleet(fleet, settings),
             MemoryJournal(),
             _Plugins(told, kind),
             clock,
-            simulated=True,
-            settings=settings,
             watch_links=False,
         )
         async with executive:

@@ -26,6 +26,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
@@ -110,11 +111,10 @@ class Rest:
 async def rest_world(folder: Path) -> AsyncIterator[Rest]:
     """Everything, with the missions in `folder`."""
     executive = Executive(
-        load_fleet(FLEET),
+        simulated_fleet(load_fleet(FLEET)),
         MemoryJournal(),
         PluginManager(),
         SystemClock(20.0),
-        simulated=True,
         speed=20.0,
         rehearse=rehearse_in_subprocess,
     )

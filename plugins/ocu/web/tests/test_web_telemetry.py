@@ -77,7 +77,6 @@ async def begun(stack: AsyncExitStack, folder: Path) -> World:
             PluginManager(),
             SystemClock(SPEED, max([time.time_ns() // 1000, *decided_us])),
             speed=SPEED,
-            simulated=True,
         )
     )
     for line in open_ones:

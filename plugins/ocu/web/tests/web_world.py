@@ -277,7 +277,6 @@ def executive(journal: Journal, plugins: PluginManager | None = None) -> Executi
         plugins or PluginManager(),
         SystemClock(SPEED),
         speed=SPEED,
-        simulated=True,
         rehearse=rehearse_in_subprocess,
     )
 
