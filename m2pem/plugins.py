@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from m2pem.api.capabilities import arbiter_problem, ocu_problem
 from m2pem.errors import InternalError, PluginError
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
     from m2pem.mission.mission import Mission
 
-__all__ = ["DEFAULT_PLUGINS", "PluginFailure", "PluginInfo", "PluginManager"]
+__all__ = ["DEFAULT_PLUGINS", "PluginFailure", "PluginInfo", "PluginManager", "Plugins"]
 
 T = TypeVar("T")
 
@@ -90,6 +90,20 @@ class _Offer:
 
     factory: Any
     origin: Origin
+
+
+class Plugins(Protocol):
+    """What an executive asks plugins for; `PluginManager` describes each method."""
+
+    def arbiter(self, name: str) -> "Callable[..., Arbiter]": ...
+
+    def service(self, name: str) -> "Callable[[], Service]": ...
+
+    def service_writes(self) -> dict[str, tuple[str, ...]]: ...
+
+    def check_mission(self, mission: "Mission", fleet: "Fleet | None") -> list[Finding]: ...
+
+    def records_committed(self, run_id: str, records: "Sequence[Record]") -> None: ...
 
 
 class PluginManager:

@@ -26,12 +26,19 @@ class ServiceError(M2pemError):
 
 @dataclass(frozen=True, slots=True)
 class ServiceContext:
-    """What the executive lends to a service. `detectors`: the fleet's detector payloads."""
+    """What the executive lends to a service. `detectors`: the fleet's detector payloads.
+
+    `run`, `element`: the run and the service task that it runs for. `service`: names this execution
+    of the task, unique in the run; after a restart of the executive it is the same.
+    """
 
     clock: "Clock"
     bus: "FleetBus"
     logger: "logging.Logger"
     detectors: tuple[ResourceId, ...] = ()
+    run: str = ""
+    element: str = ""
+    service: str = ""
 
 
 class Service(Protocol):

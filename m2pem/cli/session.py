@@ -28,11 +28,10 @@ from m2pem.errors import PluginError
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.executive.process_monitors import LoopMonitor
-from m2pem.executive.script import Script
 from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, dump
 from m2pem.journal.base import Journal
 from m2pem.mission.mission import Mission
-from m2pem.plugins import PluginManager
+from m2pem.plugins import PluginManager, Plugins
 
 if TYPE_CHECKING:
     from m2pem.rehearsal.answers import Answers
@@ -241,7 +240,7 @@ def make_executive(
     plugins: PluginManager,
     clock: SystemClock,
     *,
-    answers: Script | None = None,
+    answers: "Answers | None" = None,
     search_path: Sequence[Path] = (),
 ) -> Executive:
     """An executive that has not connected yet.
@@ -253,15 +252,21 @@ def make_executive(
         return Executive(
             fleet,
             journal,
-            plugins,
+            plugins if answers is None else _scripted(plugins, answers),
             clock,
-            script=answers,
             speed=clock.speed,
-            rehearse=_rehearse,
             search_path=search_path,
+            on_records=None if answers is None else answers.seen,
+            rehearse=_rehearse,
         )
     except PluginError as error:
         raise UnusableError(f"{fleet.file}: {error}") from error
+
+
+def _scripted(plugins: PluginManager, answers: "Answers") -> Plugins:
+    from m2pem.rehearsal.scripted import ScriptedPlugins
+
+    return ScriptedPlugins(plugins, answers)
 
 
 async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:

@@ -1,9 +1,9 @@
 """`MissionControl` over an executive: what OCUs, scripts and the command line call."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
@@ -47,8 +47,15 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
 from m2pem.telemetry.bus import Bus
 
-REHEARSED_STEPS = 100_000
-"""Engine steps after which a rehearsal beside live missions is given up, unless said otherwise."""
+
+class Rehearse(Protocol):
+    """Rehearses missions for an executive, with the options of `MissionControl.simulate`."""
+
+    async def __call__(
+        self, mission: MissionSource, fleet: Fleet, *, search_path: Sequence[Path], **options: Any
+    ) -> SimulationResult:
+        """Rehearse a mission with a fleet. `search_path`: folders of processes that it calls."""
+        ...
 
 
 class Control:
@@ -58,7 +65,7 @@ class Control:
         self,
         supervisor: Supervisor,
         bus: Bus,
-        rehearse: Callable[..., Awaitable[SimulationResult]] | None = None,
+        rehearse: Rehearse | None = None,
     ) -> None:
         self._supervisor = supervisor
         self._bus = bus
@@ -309,11 +316,7 @@ class Control:
         supervisor = self._supervisor
         if self._rehearse is None:
             raise OperatorError("this executive cannot rehearse missions")
-        settings = {
-            "max_steps": REHEARSED_STEPS,
-            "search_path": supervisor.settings.search_path,
-            **options,
-        }
+        settings = {"search_path": supervisor.settings.search_path, **options}
         return await self._rehearse(mission, supervisor.fleet_now, **settings)
 
     async def verify(

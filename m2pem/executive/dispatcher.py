@@ -14,7 +14,6 @@ from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.executive.fleet_connections import FleetArbiters
-from m2pem.executive.script import Script
 from m2pem.executive.separation import AircraftSeparation
 from m2pem.fleet.allocation import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
@@ -65,7 +64,6 @@ class Dispatcher:
         clock: Clock,
         geometries: Geometries,
         post: Callable[[BehaviorReport], None],
-        script: Script | None = None,
         clearance: AircraftSeparation | None = None,
     ) -> None:
         self._arbiters = arbiters
@@ -73,13 +71,11 @@ class Dispatcher:
         self._clock = clock
         self._geometries = geometries
         self._post = post
-        self._script = script
         self._clearance = clearance
         self._active: dict[str, _Active] = {}
         self._tails: dict[str, asyncio.Task[None]] = {}
         self._starts: dict[str, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._unscriptable: set[str] = set()
         self._barred: set[str] = set()
 
     # --- commands -------------------------------------------------------------------------------
@@ -305,7 +301,6 @@ class Dispatcher:
         if self._is_barred(command):
             del self._active[command.behavior]
             return
-        self._apply_script(command, arbiter)
         wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
         if wrong and self._active.get(command.behavior) is active:
             self._refuse(command.behavior, "REJECTED", wrong)
@@ -354,20 +349,6 @@ class Dispatcher:
         if kind is BehaviorType.TEAM and not all(specs):
             return None
         return next((spec for spec in specs if spec is not None), None)
-
-    def _apply_script(self, command: StartBehavior, arbiter: Arbiter) -> None:
-        if self._script is None:
-            return
-        run = command.behavior.partition(".")[0]
-        scripted = self._script.behavior(run, command.element, command.behavior)
-        if scripted is None:
-            return
-        script = getattr(arbiter, "script", None)
-        if script is not None:
-            script(command.behavior, scripted.after_s, scripted.end, scripted.error)
-        elif command.element not in self._unscriptable:
-            self._unscriptable.add(command.element)
-            log.warning("answers for %s act on simulated arbiters only", command.element)
 
     async def _cancel(self, command: CancelBehavior) -> None:
         active = self._active.get(command.behavior)

@@ -17,14 +17,13 @@ from typing import Self
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock
-from m2pem.api.control import RunId, SimulationResult
+from m2pem.api.control import RunId
 from m2pem.executive.clock import SystemClock
-from m2pem.executive.control import Control
+from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.process_monitors import watch_space
-from m2pem.executive.runner import Runner
-from m2pem.executive.script import Script
+from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.supervisor import RunSettings, Supervisor
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.fleet.allocation import Availability, spelled_out
@@ -32,7 +31,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
-from m2pem.plugins import PluginManager
+from m2pem.plugins import Plugins
 from m2pem.telemetry.bus import Bus
 from m2pem.telemetry.link_monitor import LinkMonitor, monitor_links
 
@@ -43,25 +42,25 @@ class Executive:
     """Connects the parts of an executive: fleet connections, supervisor, monitors and control.
 
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
-    whether silence of a vehicle ends its behaviors. `max_steps` as in `Runner`. `observed`: whether
-    plugins observe records. `rehearse`: what `MissionControl.simulate` awaits.
-    `search_path`: folders of processes that missions call.
+    whether silence of a vehicle ends its behaviors. `observed`: whether plugins observe records.
+    `search_path`, `limit`, `on_records`: as in `RunSettings`. `rehearse`: what
+    `MissionControl.simulate` awaits; None: it is refused.
     """
 
     def __init__(
         self,
         fleet: Fleet,
         journal: Journal,
-        plugins: PluginManager,
+        plugins: Plugins,
         clock: Clock,
         *,
-        script: Script | None = None,
         speed: float = 1.0,
         watch_links: bool = True,
-        max_steps: int | None = None,
         observed: bool = True,
         search_path: Sequence[Path] = (),
-        rehearse: Callable[..., Awaitable[SimulationResult]] | None = None,
+        limit: RunLimit | None = None,
+        on_records: OnRecords | None = None,
+        rehearse: Rehearse | None = None,
     ) -> None:
         self.fleet = fleet
         self.journal = journal
@@ -91,7 +90,7 @@ class Executive:
             self.arbiters,
             self.bus,
             self.events,
-            RunSettings(speed, tuple(search_path), script, max_steps),
+            RunSettings(speed, tuple(search_path), limit, on_records),
             observers=self._observers,
         )
         self._connections = FleetConnections(

@@ -26,7 +26,7 @@ from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or
 
 if TYPE_CHECKING:
-    from m2pem.plugins import PluginManager
+    from m2pem.plugins import Plugins
 
 FETCH_TIMEOUT_S = 10.0
 
@@ -94,7 +94,7 @@ def _unreadable(name: str, why: str, remedy: str = "check the path") -> MissionE
 def findings_for(
     mission: Mission,
     arbiters: FleetArbiters | None,
-    plugins: "PluginManager",
+    plugins: "Plugins",
     data: Iterable[str] = (),
     process: str | None = None,
     *,
@@ -188,7 +188,7 @@ _ELEMENT = b"requirement"
 def requirement_findings(
     mission: Mission,
     arbiters: FleetArbiters | None,
-    plugins: "PluginManager",
+    plugins: "Plugins",
     data: Iterable[str] = (),
 ) -> list[Finding]:
     """All of them. `data`: names given at start; `arbiters` None: a fleet is made up."""

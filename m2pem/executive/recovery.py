@@ -18,8 +18,7 @@ from m2pem.executive.behavior_reports import reported, spec_of
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.journal_loss import doubted, paused_by
-from m2pem.executive.runner import Runner
-from m2pem.executive.script import Script
+from m2pem.executive.runner import OnRecords, Runner
 from m2pem.fleet.parameters import ParameterError
 from m2pem.journal.base import Journal, Loss
 from m2pem.mission.behavior import BehaviorType
@@ -34,13 +33,16 @@ UNASKED = "its arbiter could not be asked after a restart"
 """Why a resource counts as lost after a restart."""
 
 
-async def replay(journal: Journal, run: MissionRun, script: Script | None) -> int:
-    """Fold all of a run's records; returns when the last was decided (us since the Unix epoch)."""
+async def replay(journal: Journal, run: MissionRun, on_records: OnRecords | None) -> int:
+    """Fold all of a run's records; returns when the last was decided (us since the Unix epoch).
+
+    `on_records` is called with the records of each entry.
+    """
     last_us = 0
     async for entry in journal.read(run.state.run):
         run.replay(entry.records)
-        if script is not None:
-            script.seen(run.state.run, entry.records)
+        if on_records is not None:
+            on_records(run.state.run, entry.records)
         last_us = max(last_us, entry.at_us)
     return last_us
 

@@ -9,6 +9,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from m2pem.api.clock import Clock
 from m2pem.api.control import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
@@ -48,6 +49,23 @@ STALLED_AFTER_S = 2.0
 """A commit that takes longer is worth an alert."""
 
 
+OnRecords = Callable[[RunId, Sequence[r.Record]], None]
+"""Is called with the records of a run when they are committed, before their commands go out."""
+
+
+class RunLimit(Protocol):
+    """A bound beyond which every run is given up. Missions that command real vehicles have none."""
+
+    @property
+    def steps_at_once(self) -> int:
+        """Engine steps of one input after which the bound is looked at, at most."""
+        ...
+
+    def exceeded(self, run: MissionRun) -> str:
+        """Return why the run is to be given up now; "" if it is not."""
+        ...
+
+
 @dataclass(slots=True)
 class RunContext:
     """What a run works with: where its commands go, and where its records are published."""
@@ -57,14 +75,15 @@ class RunContext:
     dispatcher: Dispatcher
     services: Services
     events: ControlEvents
-    observe: Callable[[RunId, Sequence[r.Record]], None]
+    observe: OnRecords
+    limit: RunLimit | None = None
 
 
 class Runner:
     """One run and its task. `epoch` is the claim under which entries are written.
 
-    `max_steps`: engine steps after which a run is given up (rehearsals). `steps_between_waits`:
-    those after which a run that never waits is paused; None: there is no bound.
+    `steps_between_waits`: engine steps after which a run that never waits is paused; None: there is
+    no bound.
     """
 
     def __init__(
@@ -72,7 +91,6 @@ class Runner:
         run: MissionRun,
         epoch: int,
         context: RunContext,
-        max_steps: int | None = None,
         steps_between_waits: int | None = None,
     ) -> None:
         self.run = run
@@ -81,7 +99,6 @@ class Runner:
         self.failure: M2pemError | None = None
         self.prompts: dict[str, OpenPrompt] = {}
         self._context = context
-        self._max_steps = max_steps
         self._steps_between_waits = steps_between_waits
         self._steps_at_wait = 0
         self._stopping = False
@@ -185,8 +202,8 @@ class Runner:
         Waits when there is none.
         """
         while True:
-            if self._exhausted():
-                return [GiveUp(f"it has taken the {self._max_steps} steps that are allowed")]
+            if why := self._exceeds_limit():
+                return [GiveUp(why)]
             if self._inbox:
                 batch, self._inbox = self._inbox[:MAX_BATCH], self._inbox[MAX_BATCH:]
                 return batch
@@ -205,12 +222,11 @@ class Runner:
             else:
                 await self._wait_until(due_us)
 
-    def _exhausted(self) -> bool:
-        return (
-            self._max_steps is not None
-            and self.run.steps_done >= self._max_steps
-            and self.run.state.status is RunStatus.RUNNING
-        )
+    def _exceeds_limit(self) -> str:
+        limit = self._context.limit
+        if limit is None or self.run.state.status is not RunStatus.RUNNING:
+            return ""
+        return limit.exceeded(self.run)
 
     def _never_waits(self) -> bool:
         allowed = self._steps_between_waits
@@ -243,7 +259,7 @@ class Runner:
         begun = self.run.steps_done
         while self.run.wants_continue and self.run.steps_done - begun < STEPS_A_COMMIT:
             await asyncio.sleep(0)
-            if self._inbox or self._exhausted() or self._never_waits():
+            if self._inbox or self._exceeds_limit() or self._never_waits():
                 break
             steps.append(self._decide(Continue()))
         await self._commit(steps)

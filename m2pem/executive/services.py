@@ -3,13 +3,13 @@
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.engine.commands import RunService
 from m2pem.engine.inputs import Input, ServiceCompleted, ServiceFailed
 from m2pem.errors import PluginError
-from m2pem.executive.script import Script, ScriptedService
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
 
@@ -36,20 +36,15 @@ class Services:
         self,
         find: Callable[[str], Callable[[], Service]],
         context: ServiceContext,
-        script: Script | None = None,
     ) -> None:
         self._find = find
         self._context = context
-        self._script = script
         self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
 
     def run(self, run: Poster, command: RunService) -> None:
         """Run a service; what comes of it is posted to the run."""
-        scripted = None
-        if self._script is not None:
-            scripted = self._script.service(run.id, command.element, command.name, command.service)
         key = (run.id, command.service)
-        task = asyncio.create_task(self._serve(run, command, scripted))
+        task = asyncio.create_task(self._serve(run, command))
         self._tasks[key] = task
         task.add_done_callback(lambda _: self._tasks.pop(key, None))
 
@@ -66,11 +61,9 @@ class Services:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _serve(
-        self, run: Poster, command: RunService, scripted: ScriptedService | None
-    ) -> None:
+    async def _serve(self, run: Poster, command: RunService) -> None:
         try:
-            written = await self._written(command, scripted)
+            written = await self._written(run.id, command)
         except ServiceError as error:
             run.post(ServiceFailed(command.service, error.code, error.reason))
         except PluginError as error:
@@ -82,17 +75,11 @@ class Services:
         else:
             run.post(ServiceCompleted(command.service, dict(written)))
 
-    async def _written(
-        self, command: RunService, scripted: ScriptedService | None
-    ) -> Mapping[str, Value]:
-        if scripted is not None:
-            await self._context.clock.sleep(scripted.after_s)
-            if scripted.error:
-                raise ServiceError(scripted.error, "as scripted")
-            return scripted.write or {}
+    async def _written(self, run: str, command: RunService) -> Mapping[str, Value]:
         service = self._find(command.name)()
         roles = {role: ResourceId(names[0]) for role, names in command.roles.items() if names}
-        written = await service.run(self._context, roles, command.properties)
+        context = replace(self._context, run=run, element=command.element, service=command.service)
+        written = await service.run(context, roles, command.properties)
         undeclared = [key for key in written if not _declared(key, service.writes)]
         if undeclared:
             raise PluginError(

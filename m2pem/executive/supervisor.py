@@ -33,8 +33,7 @@ from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.recovery import replay, take_over
-from m2pem.executive.runner import RunContext, Runner
-from m2pem.executive.script import Script
+from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.findings import Severity
@@ -48,7 +47,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Geometry
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
-from m2pem.plugins import PluginManager
+from m2pem.plugins import Plugins
 from m2pem.telemetry.bus import Bus
 
 log = logging.getLogger("m2pem.executive")
@@ -65,14 +64,20 @@ class RunSettings:
     """How an executive drives its runs.
 
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `search_path`:
-    folders of processes that missions call. `script`, `max_steps`: of a rehearsal; see `Script` and
-    `Runner`.
+    folders of processes that missions call. `limit`: see `RunLimit`. `on_records`: is called with
+    the records of each run in their order, those of before a resume too, before their commands go
+    out.
     """
 
     speed: float = 1.0
     search_path: tuple[Path, ...] = ()
-    script: Script | None = None
-    max_steps: int | None = None
+    limit: RunLimit | None = None
+    on_records: OnRecords | None = None
+
+    @property
+    def steps_at_once(self) -> int:
+        """Engine steps after which a run that does not wait lets others run."""
+        return STEPS_AT_ONCE if self.limit is None else min(STEPS_AT_ONCE, self.limit.steps_at_once)
 
 
 class Supervisor:
@@ -84,7 +89,7 @@ class Supervisor:
     def __init__(
         self,
         journal: Journal,
-        plugins: PluginManager,
+        plugins: Plugins,
         clock: Clock,
         arbiters: FleetArbiters,
         bus: Bus,
@@ -116,7 +121,6 @@ class Supervisor:
             clock,
             self._geometry,
             self._post_report,
-            settings.script,
             self._separation,
         )
         self.emergency = EmergencyCommands(self.dispatcher, events, self._marks)
@@ -136,7 +140,6 @@ class Supervisor:
         self._services = Services(
             plugins.service,
             ServiceContext(clock, bus, logging.getLogger("m2pem.service"), arbiters.detectors),
-            settings.script,
         )
 
     # --- life -----------------------------------------------------------------------------------
@@ -237,8 +240,8 @@ class Supervisor:
             loaded.library,
         )
         number = await self.journal.create(header)
-        batch = min(STEPS_AT_ONCE, self.settings.max_steps or STEPS_AT_ONCE)
-        runner = self._runner(MissionRun(loaded, self.fleet, number, batch), 1)
+        run = MissionRun(loaded, self.fleet, number, self.settings.steps_at_once)
+        runner = self._runner(run, 1)
         begun = runner.tell(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
         for name, given in self.handed_over.items():
             runner.post(GeometrySet(name, dict(given.geometry), given.by))
@@ -271,8 +274,8 @@ class Supervisor:
                 log.warning(
                     "%s goes on as it was begun, but would not begin now: %s", number, finding
                 )
-        run = MissionRun(mission, self.fleet, number, STEPS_AT_ONCE)
-        last_us = await replay(self.journal, run, self.settings.script)
+        run = MissionRun(mission, self.fleet, number, self.settings.steps_at_once)
+        last_us = await replay(self.journal, run, self.settings.on_records)
         runner = self._runner(run, epoch)
         self.handover.take_up(run.state.taken)
         outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
@@ -287,10 +290,15 @@ class Supervisor:
 
     def _runner(self, run: MissionRun, epoch: int) -> Runner:
         context = RunContext(
-            self.journal, self.clock, self.dispatcher, self._services, self.events, self._observe
+            self.journal,
+            self.clock,
+            self.dispatcher,
+            self._services,
+            self.events,
+            self._observe,
+            self.settings.limit,
         )
-        bound = self.fleet.steps_between_waits
-        runner = Runner(run, epoch, context, self.settings.max_steps, bound)
+        runner = Runner(run, epoch, context, self.fleet.steps_between_waits)
         self.runners[runner.id] = runner
         return runner
 
@@ -320,8 +328,8 @@ class Supervisor:
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.losses.on_records(run, records)
-        if self.settings.script is not None:
-            self.settings.script.seen(run, records)
+        if self.settings.on_records is not None:
+            self.settings.on_records(run, records)
         if self._observers is not None:
             self._observers.put(run, records)
         if any(isinstance(record, RunEnded) for record in records[-3:]):

@@ -20,7 +20,7 @@ from m2pem.verify.spin.queries import Storage
 from m2pem.verify.translate.options import Options
 
 if TYPE_CHECKING:
-    from m2pem.plugins import PluginManager
+    from m2pem.plugins import Plugins
 
 IN_ORDER = "timers that begin to run together come in the order of their times (--timers in-order)"
 """The note in reports whose answers assume that order."""
@@ -50,7 +50,7 @@ class SearchEngine:
 def search_request(
     mission: Mission,
     arbiters: FleetArbiters | None,
-    plugins: "PluginManager",
+    plugins: "Plugins",
     process: str | None,
     data: Mapping[str, Value],
     spec: Path | bytes | None = None,

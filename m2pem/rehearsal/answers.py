@@ -26,11 +26,17 @@ from m2pem.engine.records import (
     SignalThrown,
 )
 from m2pem.errors import OperatorError
-from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import Finding
 from m2pem.fleet.yaml_source import YamlSource
 from m2pem.mission.mission import Mission
-from m2pem.rehearsal.answers_file import AnswersModel, TimedEntry, check, read_answers
+from m2pem.rehearsal.answers_file import (
+    AnswersModel,
+    BehaviorEntry,
+    ServiceEntry,
+    TimedEntry,
+    check,
+    read_answers,
+)
 
 log = logging.getLogger("m2pem.answers")
 
@@ -44,9 +50,10 @@ US_PER_S = 1_000_000
 
 
 class Answers:
-    """Implements `m2pem.executive.script.Script`; made by `load_answers`.
+    """What an answers file says of each visit; made by `load_answers`.
 
-    Each run counts its own visits.
+    Each run counts its own visits. Asked again for the same visit, such as after a restart, it says
+    the same again.
     """
 
     def __init__(self, model: AnswersModel | None = None, source: YamlSource | None = None) -> None:
@@ -85,22 +92,19 @@ class Answers:
                 case _:
                     pass
 
-    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
-        """What a service task does on this visit; see `Script`."""
+    def service(self, run: str, element: str, name: str, service: str) -> ServiceEntry | None:
+        """What a service task does on this visit; None: nothing is scripted (any more)."""
         key = self._service(element, name)
         place = self._visit(run, "services", key, service)
-        if place is None:
-            return None
-        entry = self.model.services[key][place]
-        return ScriptedService(entry.after, entry.write, entry.error or "")
+        return None if place is None else self.model.services[key][place]
 
-    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
-        """How a behavior ends on this visit; see `Script`."""
-        place = self._visit(run, "behaviors", element, behavior)
-        if place is None:
-            return None
-        entry = self.model.behaviors[element][place]
-        return ScriptedBehavior(entry.after, entry.end, entry.error or "")
+    def behavior(self, run: str, behavior: str) -> tuple[str, BehaviorEntry] | None:
+        """The element that a behavior was requested for, and how it ends; None as for `service`."""
+        for element, entries in self.model.behaviors.items():
+            place = self._visits.get((run, "behaviors", element), {}).get(behavior)
+            if place is not None:
+                return element, entries[place]
+        return None
 
     def answer(self, run: str, element: str, prompt: str) -> str | None:
         """The decision for a prompt of an element; None: nothing is scripted (any more)."""

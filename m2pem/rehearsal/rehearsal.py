@@ -17,7 +17,7 @@ from m2pem.api.control import (
 )
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.inputs import GiveUp
-from m2pem.engine.records import Record, ServiceEnded, ServiceWithdrawn
+from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError, MissionError
@@ -25,7 +25,6 @@ from m2pem.executive.clock import US_PER_S, VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.executive.loading import load_source
 from m2pem.executive.runner import Runner
-from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import Fleet, simulated_fleet
@@ -42,7 +41,8 @@ from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, check_answers, load_answers
-from m2pem.simulation.arbiters import SimArbiter
+from m2pem.rehearsal.answers_file import ServiceEntry
+from m2pem.rehearsal.scripted import ScriptedPlugins
 
 NO_FLEET = Fleet("", "no fleet", {})
 
@@ -247,10 +247,9 @@ class _Rehearsal:
         self._every_s = telemetry_every_s
         self._mission = mission
         self._fleet = fleet
-        self._plugins = plugins
         self._answers = answers
-        self._script = _Script(answers)
-        self._max_steps = max_steps
+        self._scripted = ScriptedPlugins(plugins, answers, _unscripted)
+        self._limit = StepLimit(max_steps)
         self._observed = observed
         self._on_record = on_record
         self._quiet_since_us: int | None = None
@@ -262,18 +261,18 @@ class _Rehearsal:
         executive = Executive(
             simulated_fleet(self._fleet, SETTINGS),
             journal,
-            self._plugins,
+            self._scripted,
             clock,
-            script=self._script,
             watch_links=False,
-            max_steps=self._max_steps,
             observed=self._observed,
+            limit=self._limit,
+            on_records=self._answers.seen,
         )
         process_id = executive.admit(self._mission, process, data)
         async with executive:
             run = await executive.begin(self._mission, process_id, data, "")
             runner = executive.runner(run)
-            sampler = self._sampler(executive, clock)
+            sampler = self._sampler(clock)
 
             def before_a_jump(ahead_s: float | None) -> bool:
                 if self._give_up(executive, runner, ahead_s):
@@ -303,13 +302,13 @@ class _Rehearsal:
                 acting.cancel()
                 ending.cancel()
 
-    def _sampler(self, executive: Executive, clock: VirtualClock) -> Sampler | None:
+    def _sampler(self, clock: VirtualClock) -> Sampler | None:
         if self._every_s is None:
             return None
 
         def states_at(time_us: int) -> Iterator[VehicleState | PayloadState]:
             return chain.from_iterable(
-                each.broadcast.all_at(time_us) for each in _arbiters(executive)
+                each.broadcast.all_at(time_us) for each in self._scripted.simulated
             )
 
         return Sampler(self._every_s, clock.now_us(), states_at)
@@ -323,7 +322,7 @@ class _Rehearsal:
         if self._expects(executive, runner):
             self._quiet_since_us = None
             return False
-        if ahead_s is not None and any(arbiter.searching for arbiter in _arbiters(executive)):
+        if ahead_s is not None and any(arbiter.searching for arbiter in self._scripted.simulated):
             now_us = executive.clock.now_us()
             if self._quiet_since_us is None:
                 self._quiet_since_us = now_us
@@ -337,45 +336,35 @@ class _Rehearsal:
         return (
             runner.run.next_due_us is not None
             or self._answers.to_send > 0
-            or bool(self._script.ending)
+            or self._scripted.ending > 0
             or any(
                 behavior.phase is BehaviorPhase.CANCELLING for behavior in state.behaviors.values()
             )
             or executive.arbiters.teams.expects
-            or any(arbiter.expects for arbiter in _arbiters(executive))
+            or any(arbiter.expects for arbiter in self._scripted.simulated)
         )
 
 
-def _arbiters(executive: Executive) -> list[SimArbiter]:
-    return [each for each in executive.arbiters.by_name.values() if isinstance(each, SimArbiter)]
+def _unscripted(service: str) -> ServiceEntry | None:
+    """A service without an answer completes at once, except a Detector, which waits."""
+    return None if service == DETECTOR_SERVICE else ServiceEntry()
 
 
-class _Script:
-    """The answers; and a service without one completes, except a Detector, which waits.
+@dataclass(frozen=True, slots=True)
+class StepLimit:
+    """Implements `RunLimit`: a run is given up after `max_steps` engine steps."""
 
-    `ending`: the services under way that will end by themselves.
-    """
+    max_steps: int
 
-    def __init__(self, answers: Answers) -> None:
-        self._answers = answers
-        self.ending: set[str] = set()
+    @property
+    def steps_at_once(self) -> int:
+        """Not more than are allowed."""
+        return self.max_steps
 
-    def seen(self, run: str, records: Sequence[Record]) -> None:
-        self._answers.seen(run, records)
-        for record in records:
-            if isinstance(record, ServiceEnded | ServiceWithdrawn):
-                self.ending.discard(record.service)
-
-    def service(self, run: str, element: str, name: str, service: str) -> ScriptedService | None:
-        scripted = self._answers.service(run, element, name, service)
-        if scripted is None and name != DETECTOR_SERVICE:
-            scripted = ScriptedService()
-        if scripted is not None:
-            self.ending.add(service)
-        return scripted
-
-    def behavior(self, run: str, element: str, behavior: str) -> ScriptedBehavior | None:
-        return self._answers.behavior(run, element, behavior)
+    def exceeded(self, run: MissionRun) -> str:
+        """Return that it has taken its steps; "" if it has not."""
+        done = run.steps_done >= self.max_steps
+        return f"it has taken the {self.max_steps} steps that are allowed" if done else ""
 
 
 class _TellingJournal(MemoryJournal):

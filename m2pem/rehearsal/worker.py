@@ -20,6 +20,9 @@ from m2pem.fleet.fleet import Fleet, dump, restore
 from m2pem.mission.library import MissionFile
 from m2pem.mission.values import Value
 
+MAX_STEPS = 100_000
+"""Engine steps after which a rehearsal beside live missions is given up, unless said otherwise."""
+
 
 class Order(msgspec.Struct):
     """What is to be rehearsed."""
@@ -49,8 +52,8 @@ async def rehearse_in_subprocess(
     mission: MissionSource,
     fleet: Fleet,
     *,
-    max_steps: int,
     search_path: Sequence[Path],
+    max_steps: int = MAX_STEPS,
     process: str | None = None,
     data: Mapping[str, Value] | None = None,
     answers: Path | str | bytes | None = None,

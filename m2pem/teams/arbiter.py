@@ -70,7 +70,6 @@ class Teams:
         self._behaviors: dict[BehaviorId, TeamBehavior] = {}
         self._requests: dict[BehaviorId, BehaviorRequest] = {}
         self._remains: dict[BehaviorId, _Remains] = {}
-        self._scripts: dict[BehaviorId, tuple[float, str, str]] = {}
         self._states: AsyncQueue[TeamState] = AsyncQueue(STATES_WAITING)
 
     # --- what can be done -----------------------------------------------------------------------
@@ -131,7 +130,6 @@ class Teams:
             if name in self._behaviors:
                 self._behaviors[name].leave(request.resources)
         behavior = self._make(replace(request, preempts=parts), made[0])
-        self._script_parts(request)
         remains = self._remains.pop(request.id, None)
         if remains is not None:
             behavior.take_up(remains.found.good, remains.kept)
@@ -233,10 +231,6 @@ class Teams:
         """After a restart: what a behavior was that `query` will ask for."""
         self._requests[request.id] = request
 
-    def script(self, behavior: BehaviorId, after_s: float, end: str, error: str = "") -> None:
-        """For rehearsals: say, before it starts, how every part of a behavior ends."""
-        self._scripts[behavior] = (after_s, end, error)
-
     @property
     def expects(self) -> bool:
         """For rehearsals: whether a team may yet do something by itself."""
@@ -289,17 +283,6 @@ class Teams:
         for team in self._fleet.teams.values():
             policies.setdefault(spelled_out(team), set()).add(team.on_lost_member)
         return all(policies.get(tuple(crew)) == {LostMemberPolicy.CONTINUE} for crew in crews)
-
-    def _script_parts(self, request: BehaviorRequest) -> None:
-        scripted = self._scripts.pop(request.id, None)
-        if scripted is None:
-            return
-        for member in request.resources:
-            script = getattr(self._arbiter_of(member), "script", None)
-            if script is not None:
-                script(f"{request.id}.{member}", *scripted)
-            else:
-                _log.warning("%s: answers do not act on %s", request.id, member)
 
     def _forget(self) -> None:
         """Let go of the oldest that is over."""

@@ -13,6 +13,7 @@ from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.elements import EndEvent
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import load_answers
+from m2pem.rehearsal.scripted import ScriptedPlugins
 
 from .test_field_missions import ANSWERS, STORIES, Story, fleet, mission
 
@@ -38,7 +39,8 @@ def test_the_vignette_is_run_with_teams_made_of_single_vehicles(story: Story) ->
     answers = load_answers(ANSWERS / f"{story.answers}.yaml")
 
     async def main(clock: VirtualClock) -> tuple[Any, list[str]]:
-        executive = Executive(fleet(), MemoryJournal(), SeeingPlugins(seen), clock, script=answers)
+        plugins = ScriptedPlugins(SeeingPlugins(seen), answers)
+        executive = Executive(fleet(), MemoryJournal(), plugins, clock, on_records=answers.seen)
         async with executive:
             run = await executive.control.start(story.mission)
             act = answers.act(executive.control, run, clock, default_first_decision=True)

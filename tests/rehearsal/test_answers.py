@@ -25,7 +25,6 @@ from m2pem.engine.records import (
 from m2pem.errors import AnswersError, OperatorError
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
-from m2pem.executive.script import ScriptedBehavior, ScriptedService
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Entry, RunHeader
@@ -34,6 +33,8 @@ from m2pem.mission.behavior import Decision
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import BY_DEFAULT, BY_SCRIPT, Answers, check_answers, load_answers
+from m2pem.rehearsal.answers_file import BehaviorEntry, ServiceEntry
+from m2pem.rehearsal.scripted import ScriptedPlugins
 
 START_US = 1_767_225_600_000_000
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -195,6 +196,10 @@ def test_what_to_do_with_a_behavior_after_a_restart_can_be_answered(
 # --- visits -------------------------------------------------------------------------------------
 
 
+def requested(element: str, behavior: str) -> BehaviorRequested:
+    return BehaviorRequested(1, "P", element, 1, behavior, "goto", "vehicle", ("a",), {}, {})
+
+
 def test_a_list_is_used_visit_by_visit_and_then_used_up(
     answers: Callable[[str], Answers],
 ) -> None:
@@ -205,23 +210,28 @@ def test_a_list_is_used_visit_by_visit_and_then_used_up(
     )
     assert [script.answer("r1", "Ask", f"p{n}") for n in range(3)] == ["one", "two", None]
     assert [script.service("r1", "Look", "Camera", f"s{n}") for n in range(3)] == [
-        ScriptedService(120.0, {"a.b": 1}),
-        ScriptedService(0.0, {}, "BROKEN"),
+        ServiceEntry(after=120.0, write={"a.b": 1}),
+        ServiceEntry(error="BROKEN"),
         None,
     ]
-    assert [script.behavior("r1", "Drive", f"r1.b{n}") for n in range(3)] == [
-        ScriptedBehavior(1.5, "lost"),
-        ScriptedBehavior(0.0, "failed", "E"),
+    script.seen("r1", [requested("Drive", f"r1.b{n}") for n in range(3)])
+    assert [script.behavior("r1", f"r1.b{n}") for n in range(3)] == [
+        ("Drive", BehaviorEntry(after=1.5, end="lost")),
+        ("Drive", BehaviorEntry(after=0.0, end="failed", error="E")),
         None,
     ]
-    assert script.behavior("r1", "Other", "r1.b9") is None
+    script.seen("r1", [requested("Other", "r1.b9")])
+    assert script.behavior("r1", "r1.b9") is None
 
 
 def test_the_same_visit_gets_the_same_entry_again(answers: Callable[[str], Answers]) -> None:
     script = answers("behaviors: {Drive: [{after: 1 s, end: lost}, {after: 2 s, end: lost}]}")
-    first = script.behavior("r1", "Drive", "r1.b1")
-    assert script.behavior("r1", "Drive", "r1.b2") == ScriptedBehavior(2.0, "lost")
-    assert script.behavior("r1", "Drive", "r1.b1") == first == ScriptedBehavior(1.0, "lost")
+    script.seen("r1", [requested("Drive", "r1.b1"), requested("Drive", "r1.b2")])
+    first = script.behavior("r1", "r1.b1")
+    assert script.behavior("r1", "r1.b2") == ("Drive", BehaviorEntry(after=2.0, end="lost"))
+    script.seen("r1", [requested("Drive", "r1.b1")])
+    assert script.behavior("r1", "r1.b1") == first
+    assert first == ("Drive", BehaviorEntry(after=1.0, end="lost"))
 
 
 def test_each_run_counts_its_own_visits(answers: Callable[[str], Answers]) -> None:
@@ -234,10 +244,10 @@ def test_a_service_is_scripted_by_its_element_else_by_its_class(
     answers: Callable[[str], Answers],
 ) -> None:
     script = answers("services: {Near: [{after: 1}], Detector: [{after: 2}, {after: 3}]}")
-    assert script.service("r1", "Near", "Detector", "s1") == ScriptedService(1.0, {})
-    assert script.service("r1", "Far", "Detector", "s2") == ScriptedService(2.0, {})
+    assert script.service("r1", "Near", "Detector", "s1") == ServiceEntry(after=1.0)
+    assert script.service("r1", "Far", "Detector", "s2") == ServiceEntry(after=2.0)
     assert script.service("r1", "Near", "Detector", "s3") is None
-    assert script.service("r1", "Wide", "Detector", "s4") == ScriptedService(3.0, {})
+    assert script.service("r1", "Wide", "Detector", "s4") == ServiceEntry(after=3.0)
 
 
 PLACE = (1, "P", "Ask", 1)
@@ -268,14 +278,15 @@ def test_after_a_restart_the_count_goes_on_and_open_visits_keep_their_entry(
             PromptAnswered(*PLACE, "p1", "one", "somebody else"),
             opened("p2"),
             ServiceRequested(*PLACE, "s1", "Detector", {}, {}),
-            BehaviorRequested(*PLACE, "r1.b1", "goto", "vehicle", ("a",), {}, {}),
+            requested("Ask", "r1.b1"),
         ],
     )
     assert script.answer("r1", "Ask", "p3") == "three"
     assert script.answer("r1", "Ask", "p2") == "two"
-    assert script.service("r1", "Ask", "Detector", "s2") == ScriptedService(2.0, {})
-    assert script.behavior("r1", "Ask", "r1.b2") == ScriptedBehavior(2.0, "lost")
-    assert script.behavior("r1", "Ask", "r1.b1") == ScriptedBehavior(1.0, "lost")
+    assert script.service("r1", "Ask", "Detector", "s2") == ServiceEntry(after=2.0)
+    script.seen("r1", [requested("Ask", "r1.b2")])
+    assert script.behavior("r1", "r1.b2") == ("Ask", BehaviorEntry(after=2.0, end="lost"))
+    assert script.behavior("r1", "r1.b1") == ("Ask", BehaviorEntry(after=1.0, end="lost"))
 
 
 # --- the operator and the world outside ---------------------------------------------------------
@@ -462,7 +473,8 @@ async def journaled(
         await journal.release("r1")
     nobody = Fleet("none", "none", {})
     plugins = PluginManager(block=("all",))
-    async with Executive(nobody, journal, plugins, clock, script=script) as executive:
+    scripted = ScriptedPlugins(plugins, script)
+    async with Executive(nobody, journal, scripted, clock, on_records=script.seen) as executive:
         if begun is None:
             await executive.control.start(ROUNDS)
         else:

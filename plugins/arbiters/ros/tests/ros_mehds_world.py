@@ -25,6 +25,7 @@ from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, load_answers
+from m2pem.rehearsal.scripted import ScriptedPlugins
 
 log = logging.getLogger("mehds")
 
@@ -206,9 +207,9 @@ class Play:
         executive = Executive(
             load_fleet(self._world.fleet),
             MemoryJournal(),
-            PluginManager(),
+            ScriptedPlugins(PluginManager(), self._script),
             self._clock,
-            script=self._script,
+            on_records=self._script.seen,
         )
         async with executive, asyncio.timeout(within_s):
             self._executive = executive
