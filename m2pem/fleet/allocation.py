@@ -77,12 +77,16 @@ MANNED = "manned"
 
 
 class Availability:
-    """The one ledger of an executive, across all its runs. Behavior ids are unique in it."""
+    """The one ledger of an executive, across all its runs. Behavior ids are unique in it.
+
+    A behavior that took a resource over from one which is being cancelled may end first: the
+    resource is then held by the one before again.
+    """
 
     def __init__(self, fleet: Fleet) -> None:
         self._resources = frozenset({*fleet.vehicles, *fleet.payloads})
         self._unavailable = {v.id: MANNED for v in fleet.vehicles.values() if v.manned}
-        self._holders: dict[ResourceId, str] = {}
+        self._holders: dict[ResourceId, list[str]] = {}  # the last one holds it
 
     def withdraw(self, resource: ResourceId, reason: str) -> None:
         """No behavior gets the resource until `restore`. Its holder, if any, keeps holding it.
@@ -106,11 +110,12 @@ class Availability:
 
     def holder(self, resource: ResourceId) -> str | None:
         """The behavior that holds a resource."""
-        return self._holders.get(resource)
+        holders = self._holders.get(resource)
+        return holders[-1] if holders else None
 
     def held_by(self, behavior: str) -> tuple[ResourceId, ...]:
         """What a behavior holds."""
-        return tuple(r for r, holder in self._holders.items() if holder == behavior)
+        return tuple(r for r, holders in self._holders.items() if holders[-1] == behavior)
 
     def acquire(
         self, resources: Iterable[ResourceId], behavior: str, preempts: Collection[str] = ()
@@ -124,19 +129,30 @@ class Availability:
         refusals = [self._refusal(resource, behavior, preempts) for resource in wanted]
         if any(refusals):
             return "; ".join(refusal for refusal in refusals if refusal)
-        self._holders.update((resource, behavior) for resource in wanted)
+        self.adopt(wanted, behavior)
         return None
+
+    def adopt(self, resources: Iterable[ResourceId], behavior: str) -> None:
+        """Note that a behavior has resources, which is not to be refused: its arbiter has it."""
+        for resource in resources:
+            holders = self._holders.setdefault(resource, [])
+            if behavior in holders:
+                holders.remove(behavior)
+            holders.append(behavior)
 
     def _refusal(self, resource: ResourceId, behavior: str, preempts: Collection[str]) -> str:
         reason = self.reason(resource)
         if reason:
             return f"{resource} is unavailable: {reason}"
-        holder = self._holders.get(resource, behavior)
-        if holder != behavior and holder not in preempts:
+        holder = self.holder(resource)
+        if holder not in (None, behavior) and holder not in preempts:
             return f"{resource} is held by behavior {holder}"
         return ""
 
     def release(self, behavior: str) -> None:
         """The behavior has ended. What passed on to another one stays with that."""
-        for resource in self.held_by(behavior):
-            del self._holders[resource]
+        for resource, holders in list(self._holders.items()):
+            if behavior in holders:
+                holders.remove(behavior)
+            if not holders:
+                del self._holders[resource]

@@ -99,6 +99,25 @@ def test_what_is_being_cancelled_gives_way_and_its_release_takes_nothing_back(
     assert (ledger.holder(EVSG1), ledger.holder(EVSG3)) == ("r1.b2", None)
 
 
+def test_what_gave_way_has_its_vehicle_again_if_the_one_that_took_over_ends_first(
+    ledger: Availability,
+) -> None:
+    ledger.acquire([EVSG1], "r1.b1")
+    ledger.acquire([EVSG1], "r1.b2", preempts=["r1.b1"])
+    ledger.release("r1.b2")
+    assert ledger.holder(EVSG1) == "r1.b1"
+    assert ledger.acquire([EVSG1], "r2.b1") == "evsg1 is held by behavior r1.b1"
+    ledger.release("r1.b1")
+    assert ledger.acquire([EVSG1], "r2.b1") is None
+
+
+def test_what_an_arbiter_has_already_is_not_refused(ledger: Availability) -> None:
+    ledger.withdraw(EVSG1, "with ann")
+    ledger.adopt([EVSG1], "r1.b1")
+    ledger.adopt([EVSG1], "r1.b2")
+    assert ledger.holder(EVSG1) == "r1.b2"
+
+
 def test_a_withdrawn_resource_is_refused_until_restored(ledger: Availability) -> None:
     ledger.acquire([EVSG1], "r1.b1")
     ledger.withdraw(EVSG1, "taken over by operator A")
@@ -135,15 +154,18 @@ steps = st.one_of(
 @given(st.lists(steps, max_size=30))
 def test_a_resource_changes_hands_only_by_release_or_preemption(history: list) -> None:
     ledger = Availability(FLEET)
-    expected: dict[ResourceId, str] = {}
+    expected: dict[ResourceId, list[str]] = {resource: [] for resource in FOUR}
     for step in history:
         if step[0] == "release":
             ledger.release(step[1])
-            expected = {r: holder for r, holder in expected.items() if holder != step[1]}
+            expected = {r: [b for b in stack if b != step[1]] for r, stack in expected.items()}
         else:
             _, wanted, behavior, preempts = step
-            free = all(expected.get(r, behavior) in {behavior, *preempts} for r in wanted)
+            free = all({*expected[r][-1:]} <= {behavior, *preempts} for r in wanted)
             assert (ledger.acquire(sorted(wanted), behavior, preempts) is None) is free
-            if free:
-                expected.update(dict.fromkeys(wanted, behavior))
-        assert {r: ledger.holder(r) for r in FOUR if ledger.holder(r)} == expected
+            for resource in wanted if free else ():
+                before = [b for b in expected[resource] if b != behavior]
+                expected[resource] = [*before, behavior]
+        assert {r: ledger.holder(r) for r in FOUR} == {
+            r: stack[-1] if stack else None for r, stack in expected.items()
+        }
