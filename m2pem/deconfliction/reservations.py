@@ -125,6 +125,10 @@ class Airspace:
         if request.behavior not in BY_HAND:
             self._reservations[request.id] = _Reservation(request, kind)
 
+    def has_reserved(self, behavior: BehaviorId) -> bool:
+        """Whether volumes are reserved for a behavior."""
+        return behavior in self._reservations
+
     def delay(self, vehicle: ResourceId) -> None:
         """A vehicle is held: the times of its volumes do not hold any more."""
         for reservation in self._reservations.values():

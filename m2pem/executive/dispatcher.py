@@ -13,6 +13,7 @@ from functools import partial
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.engine.commands import CancelBehavior, StartBehavior
+from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.separation import AircraftSeparation
 from m2pem.fleet.allocation import Availability
@@ -199,7 +200,7 @@ class Dispatcher:
         """After a restart: the arbiter has it already."""
         ids = [ResourceId(resource) for resource in resources]
         self._active[behavior] = _Active(arbiter, tuple(ids), number)
-        self._availability.acquire(ids, behavior)
+        self._availability.adopt(ids, behavior)
 
     def occupy(self, command: StartBehavior) -> None:
         """After a restart: the room that a behavior takes up which an arbiter has already."""
@@ -209,6 +210,14 @@ class Dispatcher:
         spec = self.spec(ids, command.name, kind)
         if spec is not None:
             self._clearance.airspace.adopt(self.request(command, spec), kind)
+
+    def view(self, behavior: str) -> DispatcherView:
+        """Return what is commanded of a behavior that has not ended."""
+        active = self._active.get(behavior)
+        if active is None:
+            return DispatcherView.NONE
+        ending = active.deadline is not None
+        return DispatcherView.CANCELLED if ending else DispatcherView.COMMANDED
 
     async def close(self) -> None:
         """Let calls under way end, drop what waits for a limit."""

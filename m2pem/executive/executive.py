@@ -18,6 +18,7 @@ from typing import Self
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock
 from m2pem.api.control import RunId
+from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
@@ -29,6 +30,7 @@ from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.fleet.allocation import Availability, spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
+from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
@@ -182,6 +184,10 @@ class Executive:
     def runner(self, run: RunId) -> Runner:
         """The runner of a run; raises NotDrivenError when it is not driven here."""
         return self._supervisor.runner(run)
+
+    def views(self, behavior: BehaviorId, resources: Sequence[ResourceId]) -> ExecutiveViews:
+        """What the owners of a behavior's state say of it now; see `behavior_lifecycle`."""
+        return self._supervisor.views(behavior, resources)
 
     def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
         """Check a mission; returns the id of the process to begin with.

@@ -23,6 +23,12 @@ from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError
 from m2pem.executive.armed_vehicles import describe_armed_vehicles
+from m2pem.executive.behavior_lifecycle import (
+    AirspaceView,
+    ExecutiveViews,
+    availability_view,
+    engine_view,
+)
 from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
 from m2pem.executive.dispatcher import Dispatcher
@@ -408,6 +414,18 @@ class Supervisor:
             known = ", ".join(self.runners) or "none"
             raise NotDrivenError(f"{run} is not driven by this executive; it drives: {known}")
         return runner
+
+    def views(self, behavior: BehaviorId, resources: Sequence[ResourceId]) -> ExecutiveViews:
+        """Return what the owners of a behavior's state say of it now, whatever run it is of."""
+        runner = self.runners.get(behavior.partition(".")[0])
+        known = runner.run.state.behaviors.get(behavior) if runner is not None else None
+        reserved = self._separation and self._separation.airspace.has_reserved(behavior)
+        return ExecutiveViews(
+            engine_view(known),
+            self.dispatcher.view(behavior),
+            availability_view(self.availability, behavior, resources),
+            AirspaceView.RESERVED if reserved else AirspaceView.NONE,
+        )
 
     def epoch_of(self, behavior: BehaviorId) -> int:
         """With which epoch the run of a behavior is driven here; 0: it is not."""

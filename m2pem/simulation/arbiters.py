@@ -261,8 +261,12 @@ class SimArbiter:
             )
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """The report that holds now; UNKNOWN, with number 0, if the behavior is not known."""
+        """The report that holds now; UNKNOWN, with number 0, if the behavior is not known.
+
+        Commands of an executive that drove the run before are refused from now on.
+        """
         self._catch_up()
+        self._epochs.admit(behavior, self._context.epoch_of(behavior))
         execution = self._memory.executions.get(behavior)
         if execution is None or execution.last is None:
             reason = "the simulation knows no such behavior"
@@ -324,6 +328,10 @@ class SimArbiter:
     def searching(self) -> bool:
         """Whether a vehicle at work may yet come near something that its detector finds."""
         return self._detectors.searching
+
+    def doing(self, resource: ResourceId) -> BehaviorId:
+        """Return the behavior that a resource does now, whatever was reported; "": none."""
+        return self._bodies[resource].behavior
 
     def script(self, behavior: BehaviorId, after_s: float, end: str, error: str = "") -> None:
         """Say, before it starts, how a behavior ends, instead of by its motion.
