@@ -79,6 +79,24 @@ def test_a_vehicle_that_was_switched_on_again_may_use_an_id_anew() -> None:
     assert said(texts, LATE_S) == [LONG, LONG]
 
 
+def test_the_first_text_of_a_px4_is_long_and_has_the_id_of_short_ones() -> None:
+    texts = StatusTexts()
+    denied = "Arming denied: Resolve system health failures first"
+    for each in chunks(denied, 0):
+        texts.take(over_the_wire(each), VEHICLE, 0.0)
+    assert said(texts) == [denied]
+    texts.take(text("Preflight Fail: heading estimate not stable"), VEHICLE, 0.1)
+    assert said(texts, 0.1) == [denied, "Preflight Fail: heading estimate not stable"]
+
+
+def test_a_text_that_fills_one_message_has_come_whole() -> None:
+    texts = StatusTexts()
+    full, other = "PreArm: ".ljust(50, "x"), "PreArm: ".ljust(50, "y")
+    texts.take(over_the_wire(text(full)), VEHICLE, 0.0)
+    texts.take(over_the_wire(text(other)), VEHICLE, 0.1)
+    assert said(texts, GIVE_UP_S + 0.1) == [full, other]
+
+
 def test_components_are_told_apart() -> None:
     texts = StatusTexts()
     camera = Address(VEHICLE.system, 100)

@@ -67,6 +67,8 @@ def test_arming_without_a_position_is_rejected_with_texts() -> None:
     assert bench.command(ARM, 1) == LATER
     denied = "Arming denied: Resolve system health failures first"  # longer than a message
     assert f"{denied}Preflight Fail: Sensors are still calibrating" in "".join(bench.texts())
+    first, second, third = [m for m in bench.received if m.get_type() == "STATUSTEXT"][:3]
+    assert [(m.id, m.chunk_seq) for m in (first, second, third)] == [(0, 0), (0, 1), (1, 0)]
     bench.run(10)
     assert bench.command(ARM, 1) == LATER
     assert "Preflight Fail: No valid position estimate" in bench.texts()

@@ -296,6 +296,26 @@ def test_operators_read_what_an_autopilot_warns_of_and_not_every_half_minute(
     assert warned == ["uav1 says: Battery 1 is low 10.2V"] * 2
 
 
+def test_operators_read_a_warning_in_several_messages_once_also_where_its_end_is_lost(
+    virtual: Run, caplog: pytest.LogCaptureFixture
+) -> None:
+    denied = "Arming denied: Resolve system health failures first"
+    lost = "Preflight Fail: the sensors of this vehicle disagree, and its end is lost"
+
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, _):
+            for text, id_, chunks in ((denied, 0, 2), (lost, 1, 1)):
+                for n in range(chunks):
+                    chunk = text[50 * n : 50 * n + 50].encode()
+                    fields = {"text": chunk, "severity": dialect.MAV_SEVERITY_WARNING}
+                    link.hear(make("STATUSTEXT", id=id_, chunk_seq=n, **fields))
+                await clock.sleep(5.0)
+
+    virtual(main)
+    warned = [each.getMessage() for each in caplog.records if each.levelno == logging.WARNING]
+    assert warned == [f"uav1 says: {denied}", f"uav1 says: {lost[:50].strip()}..."]
+
+
 def test_operators_read_what_a_vehicle_waits_for_before_it_is_armed(
     virtual: Run, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -1,7 +1,9 @@
 """What a vehicle says in words (STATUSTEXT; mavlink.io, "STATUSTEXT", messages/common.html).
 
 Long texts come in chunks with an id of their own, which may be lost, doubled or out of order. What
-is not whole after `GIVE_UP_S` is shown with "..." where something is missing.
+is not whole after `GIVE_UP_S` is shown with "..." where something is missing. The id 0 says that a
+text has one chunk; but PX4 numbers its texts from 0 on (streams/STATUSTEXT.hpp), so that its first
+text may be long and have the id 0, too.
 """
 
 from collections import deque
@@ -42,6 +44,7 @@ class Text:
 class _Pieces:
     severity: int
     at_s: float
+    may_be_one_chunk: bool
     chunks: dict[int, bytes] = field(default_factory=dict)
 
     def end(self) -> int | None:
@@ -54,7 +57,7 @@ class _Pieces:
 
     def text(self) -> str:
         """All that has come, with "..." for what has not."""
-        end = self.end()
+        end = len(self.chunks) if self.may_be_one_chunk and list(self.chunks) == [0] else self.end()
         said, expected = b"", 0
         for n in sorted(self.chunks):
             said += (b"" if n == expected else GAP.encode()) + self.chunks[n]
@@ -75,16 +78,16 @@ class StatusTexts:
     def take(self, message: Message, sender: Address, now_s: float) -> None:
         """A STATUSTEXT has come."""
         self.give_up(now_s - GIVE_UP_S)
-        if message.id == 0:
-            self._add(Text(_decoded(message.text), message.severity, sender, now_s))
-            return
         key = sender, message.id
-        if message.chunk_seq >= MOST_CHUNKS or now_s - self._closed_s.get(key, -inf) < LATE_S:
+        if message.id == 0 and message.chunk_seq == 0 and key in self._coming:
+            self._close(key)
+        late = message.id != 0 and now_s - self._closed_s.get(key, -inf) < LATE_S
+        if message.chunk_seq >= MOST_CHUNKS or late:
             return
         if key not in self._coming:
             if len(self._coming) >= AT_ONCE:
                 self._close(next(iter(self._coming)))
-            self._coming[key] = _Pieces(message.severity, now_s)
+            self._coming[key] = _Pieces(message.severity, now_s, message.id == 0)
         pieces = self._coming[key]
         pieces.chunks.setdefault(message.chunk_seq, message.text)
         if pieces.whole():

@@ -293,8 +293,6 @@ class Firmware(ABC):
     """Ids of messages that other firmwares make and this one does not."""
     capacity: ClassVar[str]
     """The parameter that has the battery's capacity in mAh."""
-    texts_need_heartbeats: ClassVar[bool] = False
-    """Only links on which a ground station sent a heartbeat a moment ago get texts."""
     gimbal_needs_control: ClassVar[bool] = False
     """Only a ground station that has taken control of the gimbal may move it."""
     reason_home: str

@@ -1,7 +1,8 @@
 """Telemetry of position, attitude and health, and texts for people (STATUSTEXT)."""
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -22,12 +23,13 @@ RECENT_S = 2.5
 
 
 class Texts(Component):
-    """Says texts to all peers, or to those with a ground station, as the firmware does."""
+    """Says texts, as the firmware does."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         super().__init__(autopilot)
         self._next_id = 1
         self._received_s: dict[Peer, float] = {}
+        self._said_to: Counter[Peer] = Counter()
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Heartbeats of ground stations."""
@@ -38,23 +40,29 @@ class Texts(Component):
             self._received_s[sender.peer] = self.autopilot.now_s
 
     def say(self, text: str, severity: int) -> None:
-        """A text; one that fits into a message has id 0."""
+        """A text. ArduPilot gives ids from 1 on to texts that do not fit into one message. PX4
+        says them only on links where it has heard a ground station, and numbers all texts of a
+        link from 0 on."""
         data = text.encode("ascii", "replace")
-        if len(data) < CHUNK:
-            self._send(severity, data, 0, 0)
+        if not self.autopilot.firmware.is_ardupilot:
+            for peer, heard_s in self._received_s.items():
+                if self.autopilot.now_s - heard_s <= RECENT_S:
+                    for message in _chunks(data, severity, self._said_to[peer]):
+                        self.autopilot.send(message, peer)
+                    self._said_to[peer] += 1
             return
-        for number, start in enumerate(range(0, len(data) + 1, CHUNK)):
-            self._send(severity, data[start : start + CHUNK], self._next_id, number)
-        self._next_id = self._next_id % 0xFFFF + 1
-
-    def _send(self, severity: int, data: bytes, id_: int, number: int) -> None:
-        message = dialect.MAVLink_statustext_message(severity, data, id_, number)
-        if not self.autopilot.firmware.texts_need_heartbeats:
+        id_ = 0
+        if len(data) >= CHUNK:
+            id_, self._next_id = self._next_id, self._next_id % 0xFFFF + 1
+        for message in _chunks(data, severity, id_):
             self.autopilot.send(message)
-            return
-        for peer, heard_s in self._received_s.items():
-            if self.autopilot.now_s - heard_s <= RECENT_S:
-                self.autopilot.send(message, peer)
+
+
+def _chunks(data: bytes, severity: int, id_: int) -> Iterator[Any]:
+    """The messages of a text; the last one is not full."""
+    for number, start in enumerate(range(0, len(data) + 1, CHUNK)):
+        chunk = data[start : start + CHUNK]
+        yield dialect.MAVLink_statustext_message(severity, chunk, id_ & 0xFFFF, number)
 
 
 SENSORS = (

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Clock, LinkState, ResourceId, VehicleState
 from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
-from m2pem_plugin_mavlink.microservices.texts import StatusTexts, Text
+from m2pem_plugin_mavlink.microservices.texts import GIVE_UP_S, StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges, fixed_wing
@@ -268,6 +268,7 @@ class Vehicle:
             self._streams.forget()
         if message.TYPE.id == _HEARTBEAT:
             self._ask_for_streams()
+            self.texts.give_up(self.link.now_s() - GIVE_UP_S)
         self._tell()
 
     def _read_text(self, message: Message, sender: Address) -> None:

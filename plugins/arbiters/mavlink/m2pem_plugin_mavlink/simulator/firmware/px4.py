@@ -126,7 +126,6 @@ class Px4(Firmware):
         {dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT, dialect.MAVLINK_MSG_ID_FENCE_STATUS}
     )
     gimbal_needs_control = True
-    texts_need_heartbeats = True
     armed_text, disarmed_text = "Armed by {}", "Disarmed by {}"
     capacity = "BAT1_CAPACITY"
     reason_position = "No valid position estimate"
