@@ -322,3 +322,18 @@ def test_what_it_says_to_another_station_about_its_mission_is_overheard(
             assert (watched.watch.takeover(ROUTING) is not None) is noticed
 
     virtual(main)
+
+
+def test_a_text_that_comes_before_the_first_heartbeat_does_no_harm(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        vehicle.open()
+        monitor = TakeoverMonitor(vehicle, OWN)
+        monitor.open()
+        link.hear(make("STATUSTEXT", text=b"GCS Failsafe Cleared", severity=4))
+        assert vehicle.recent_texts() == ("GCS Failsafe Cleared",)
+        assert monitor.takeover(FLYING) is None
+        await monitor.close()
+        await vehicle.close()
+
+    virtual(main)

@@ -256,8 +256,10 @@ class TakeoverMonitor:
 
     def _lands_unasked(self) -> bool:
         state, commanded = self.vehicle.state, self.vehicle.commanded
+        if commanded.mission is None or commanded.exchanging or commanded.changing:
+            return False
         item = self.vehicle.driver.current_item
-        if commanded.mission is None or item is None or commanded.exchanging or commanded.changing:
+        if item is None:
             return False
         begins = landing_start(commanded.mission)
         if begins is None or state.loiter_radius_m is None:
