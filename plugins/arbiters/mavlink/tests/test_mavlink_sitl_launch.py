@@ -127,8 +127,9 @@ def test_the_fleet_says_where_it_stands_what_it_is_and_its_parameters(
 @pytest.mark.parametrize(
     ("domain", "failsafe", "expected"),
     [
-        ("air", "return_to_launch", {"FS_GCS_ENABLE": "1"}),
-        ("air", "land", {"FS_GCS_ENABLE": "5"}),
+        ("air", "return_to_launch", {"FS_GCS_ENABLE": "1", "FS_OPTIONS": "0"}),
+        ("air", "land", {"FS_GCS_ENABLE": "5", "FS_OPTIONS": "0"}),
+        ("air", "hold", {"FS_GCS_ENABLE": "7"}),
         ("ground", "return_to_launch", {"FS_GCS_ENABLE": "1", "FS_ACTION": "1"}),
         ("ground", "hold", {"FS_GCS_ENABLE": "1", "FS_ACTION": "2"}),
         ("ground", "continue", {"FS_GCS_ENABLE": "0"}),

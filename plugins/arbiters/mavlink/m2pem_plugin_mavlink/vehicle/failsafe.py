@@ -164,6 +164,8 @@ def link_parameters(word: str, identity: Identity, own_system: int) -> dict[str,
             break
     if parameters and identity.firmware is Firmware.ARDUPILOT:
         parameters.update(dict.fromkeys(_OUR_STATION, float(own_system)))
+        if identity.kind is Kind.COPTER and word in (RETURN, LAND):
+            parameters["FS_OPTIONS"] = 0.0  # also while it is held
     return parameters
 
 
