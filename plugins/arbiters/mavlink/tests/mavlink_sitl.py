@@ -77,7 +77,13 @@ def ardupilot(
     )
 
 
-def px4(binary: Path, instance: int, folder: Path, model: str = "sihsim_quadx") -> Launch:
+def px4(
+    binary: Path,
+    instance: int,
+    folder: Path,
+    model: str = "sihsim_quadx",
+    speed: float = SPEED,
+) -> Launch:
     """A model of PX4's own simulation, to be run in `folder`; the `etc` folder of its build is
     beside the `bin` folder of the program."""
     name = f"px4-{instance}"
@@ -85,7 +91,7 @@ def px4(binary: Path, instance: int, folder: Path, model: str = "sihsim_quadx") 
         name,
         find_px4(binary.parent.parent),
         model,
-        _start(instance),
+        _start(instance, speed),
         instance=instance,
         folder=folder / name,
     )
@@ -102,6 +108,6 @@ def until_ready(process: subprocess.Popen[str]) -> list[str]:
     raise AssertionError((lines, process.communicate()))
 
 
-def _start(instance: int) -> Start:
+def _start(instance: int, speed: float = SPEED) -> Start:
     latitude, longitude, altitude = HOME
-    return Start(latitude, longitude + 0.0003 * instance, altitude, speed=SPEED)
+    return Start(latitude, longitude + 0.0003 * instance, altitude, speed=speed)
