@@ -22,9 +22,9 @@ _EVERYWHERE = frozenset(
     }
 )
 _BY_DOMAIN: Mapping[str, frozenset[str]] = {
-    "ground": _EVERYWHERE | {"reverse"},
+    "ground": _EVERYWHERE | {"reverse", "teleop"},
     "air": _EVERYWHERE | {"takeoff", "land", "change_altitude"},
-    "surface": _EVERYWHERE | {"reverse"},
+    "surface": _EVERYWHERE | {"reverse", "teleop"},
     "subsurface": _EVERYWHERE | {"change_altitude"},
 }
 

@@ -22,7 +22,7 @@ from m2pem.api import (
 )
 
 COPTER, ROVER = Kind.COPTER, Kind.ROVER
-DO_SET_MODE, LAND_MODE, ACCEPTED = 176, 9, 0
+DO_SET_MODE, LAND_MODE, MANUAL_MODE, ACCEPTED = 176, 9, 0, 0
 
 
 def point(east: float, north: float, altitude: float | None = None, frame="relative") -> Point:
@@ -341,6 +341,24 @@ def test_another_ground_station_that_changes_the_mode_is_reported_and_not_fought
         assert bench.truth().mode == "LAND"
 
     fly(main, COPTER)
+
+
+def test_a_person_drives_a_rover_from_another_ground_station() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "goto", "v1", target=point(300, 0))
+        await bench.running("r1.b1")
+        await bench.start("r1.b2", "teleop", "v1", preempts=("r1.b1",))
+        await bench.running("r1.b2")
+        async with another_station(bench) as other:
+            assert await asyncio.to_thread(other.command, DO_SET_MODE, 1, MANUAL_MODE) == ACCEPTED
+            assert await bench.until(lambda: bench.truth().mode == "MANUAL", AMPLE_S)
+            await bench.clock.sleep(10)
+        assert bench.states_of("r1.b2")[-1] is BehaviorState.RUNNING
+        await bench.arbiter.cancel("r1.b2", 1)
+        assert (await bench.ended("r1.b2", AMPLE_S)).state is BehaviorState.CANCELLED
+        assert bench.truth().mode == "HOLD"
+
+    fly(main, ROVER)
 
 
 @asynccontextmanager

@@ -34,6 +34,7 @@ def test_the_autopilots_of_a_fleet_can_be_started(fleet: str, frames: dict[str, 
 @pytest.mark.parametrize(
     ("mission", "answers"),
     [
+        ("mehds_vignette_1", "mehds_vignette_1_swept"),
         ("mehds_vignette_2", "mehds_vignette_2_rejoined"),
         ("mehds_vignette_3", "mehds_vignette_3_crossed"),
         ("mehds_vignette_4", "mehds_vignette_4_route_driven"),

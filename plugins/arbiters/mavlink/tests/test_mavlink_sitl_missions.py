@@ -98,6 +98,7 @@ def test_two_copters_survey_a_field_and_a_rover_drives_to_its_gate(fly: Fly) -> 
     ("mission", "answers", "outcome", "last"),
     [
         ("vignette1", "vignette1_route", "terminated", "single_vehicle_routing"),
+        ("mehds_vignette_1", "mehds_vignette_1_swept", "completed", "road_sweep"),
         ("mehds_vignette_2", "mehds_vignette_2_rejoined", "completed", "formation"),
         ("mehds_vignette_3", "mehds_vignette_3_crossed", "completed", "bridge_crossing"),
         ("mehds_vignette_4", "mehds_vignette_4_route_driven", "completed", "return_to_launch"),

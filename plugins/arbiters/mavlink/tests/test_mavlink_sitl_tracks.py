@@ -100,6 +100,7 @@ WEDGE: tuple[At, At] = ((1.0, 1.0), (1.0, -1.0))
     ("mission", "answers"),
     [
         ("vignette1", "vignette1_route"),
+        ("mehds_vignette_1", "mehds_vignette_1_swept"),
         ("mehds_vignette_2", "mehds_vignette_2_rejoined"),
         ("mehds_vignette_3", "mehds_vignette_3_crossed"),
         ("mehds_vignette_4", "mehds_vignette_4_route_driven"),

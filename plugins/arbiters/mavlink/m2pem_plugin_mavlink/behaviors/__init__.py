@@ -6,7 +6,7 @@ from m2pem_plugin_mavlink.behaviors.area_observe import ObserveFromAbove, Observ
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorContext
 from m2pem_plugin_mavlink.behaviors.deploy import Deploy
 from m2pem_plugin_mavlink.behaviors.follow import Follow
-from m2pem_plugin_mavlink.behaviors.goto import DriveStop, Goto, Hold
+from m2pem_plugin_mavlink.behaviors.goto import DriveStop, Goto, Hold, Teleop
 from m2pem_plugin_mavlink.behaviors.mission import Routing, RunOnboardMission, Survey
 from m2pem_plugin_mavlink.behaviors.orbit import Orbit
 from m2pem_plugin_mavlink.behaviors.reverse import Reverse
@@ -41,6 +41,7 @@ BEHAVIORS: Mapping[str, Callable[[BehaviorContext], Behavior]] = {
     "orbit": Orbit,
     "area_observe": _observe,
     "follow": Follow,
+    "teleop": Teleop,
     "set_speed": SetSpeed,
     "deploy": Deploy,
     "run_onboard_mission": RunOnboardMission,

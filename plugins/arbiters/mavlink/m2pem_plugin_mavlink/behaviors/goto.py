@@ -1,4 +1,4 @@
-"""The behaviors `goto`, `hold` and `drive_stop`."""
+"""The behaviors `goto`, `hold`, `drive_stop` and `teleop`."""
 
 import math
 from dataclasses import replace
@@ -220,3 +220,64 @@ class Hold(Behavior):
 
 class DriveStop(Hold):
     name = "drive_stop"
+
+
+class Teleop(Behavior):
+    """Stop, and let a person drive, by remote control or another ground station, until cancelled or
+    for `timeout`. The person chooses the mode: m2pem commands none in which a person steers. RTL
+    ends the behavior: a failsafe began it, or somebody who has taken over."""
+
+    name = "teleop"
+    modes = frozenset({FlightMode.HOLD, FlightMode.MANUAL, FlightMode.GUIDED})
+
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self._left_s = VehicleParameters(context).timeout_s
+        self._since_s = context.now_s()
+        self._over = False
+
+    async def begin(self) -> None:
+        await self.vehicle.driver.stop()
+        self._since_s = self.context.now_s()
+
+    def paused(self) -> None:
+        """Exclude the pause from the timeout."""
+        self._left_s = self._remaining_s()
+
+    async def resume(self) -> None:
+        """Wait for the person to drive on: a hold has stopped the vehicle."""
+        self._since_s = self.context.now_s()
+
+    async def run_in_background(self) -> None:
+        """Stop the vehicle after the timeout."""
+        if (left_s := self._remaining_s()) is not None:
+            await self.vehicle.sleep(left_s)
+            await self.vehicle.driver.stop()
+            self._over = True
+
+    def finished(self) -> bool:
+        """Return whether the timeout is over. The person's mode counts as commanded."""
+        state, commanded = self.vehicle.state, self.vehicle.commanded
+        if state.mode in self.modes and not commanded.changing:
+            commanded.custom_mode = state.custom_mode
+        return self._over
+
+    async def reattach(self) -> BehaviorState:
+        """Return RUNNING: the person goes on, or has not begun."""
+        driven = self.vehicle.state.mode in self.modes
+        return BehaviorState.RUNNING if driven else BehaviorState.UNKNOWN
+
+    def checkpoint(self) -> CheckpointState:
+        """Return when the timeout is over."""
+        left_s = self._remaining_s()
+        return {} if left_s is None else {"until_s": self.context.now_s() + left_s}
+
+    def restore(self, checkpoint: CheckpointState) -> None:
+        until_s = checkpoint.get("until_s")
+        if isinstance(until_s, int | float):
+            self._left_s = max(0.0, until_s - self.context.now_s())
+
+    def _remaining_s(self) -> float | None:
+        if self._left_s is None:
+            return None
+        return max(0.0, self._left_s - (self.context.now_s() - self._since_s))
