@@ -307,7 +307,8 @@ def _look(stations: dict[str, Station]) -> None:
 def _answer(text: str, stations: dict[str, Station], patient: bool) -> Answer | None:
     """A patient operator lets an aircraft that returns or lands by itself come down, and then
     aborts; others have the vehicle go on."""
-    (name,) = (name for name in stations if name in text)
+    name = next((name for name in stations if name in text), "")
+    assert name, f"what vehicle is this about: {text!r}"
     station = stations[name]
     if name != "uav1" or (station.mode not in RETURNING and station.armed):
         return Answer(name, station.now_s, "resume")

@@ -192,6 +192,7 @@ class TestQuadPlane(_RealPlane):
 class TestPx4(_RealAutopilot):
     variable = "M2PEM_PX4"
     speed = 3.0  # two PX4s on two processors do not keep up with 5, and fall behind the clock
+    standing_m_s = 0.3  # in AUTO.LOITER it creeps back to its place, at up to 0.2 m/s for 12 s
     model = "sihsim_quadx"
 
     def commands(self, binary: Path, ports: list[int], folder: Path) -> list[sitl.Launch]:
@@ -206,7 +207,6 @@ class TestPx4(_RealAutopilot):
 class TestPx4Rover(TestPx4):
     model = "sihsim_rover_ackermann"
     domain = "ground"
-    standing_m_s = 0.3  # in AUTO.LOITER it creeps back to its place
 
 
 @pytest.mark.sitl("M2PEM_PX4")
