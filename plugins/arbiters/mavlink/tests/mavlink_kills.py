@@ -94,6 +94,9 @@ NOT_BEGUN = re.compile("there is no journal|has no run")
 """It was killed before it had written that there is a run."""
 
 PROMPT = re.compile(r"^\[(?P<id>\w+)\] (?P<text>.*)")
+CLOSED = re.compile("answered by |is not asked any more")
+"""A question that another answer, or the end of the run, has closed."""
+
 RETURNING = ("RTL", "LAND", "SMART_RTL")
 HOMEWARD = ("mode 6", "mode 9", "mode 11")
 """RTL and LAND of a copter, RTL of a rover. A rover that a failsafe holds may be sent on by the
@@ -274,7 +277,10 @@ def _play(
     while time.monotonic() < over_s:
         _look(stations)
         for match in filter(None, map(PROMPT.match, executive.news())):
-            questions[match["id"]] = match["text"]
+            if CLOSED.match(match["text"]):
+                questions.pop(match["id"], None)
+            else:
+                questions[match["id"]] = match["text"]
         if executive.status is not None and NOT_BEGUN.search(executive.lines[-1]):
             executive.start(*RUN)
         elif executive.status is not None:
