@@ -267,3 +267,32 @@ def test_a_fault_that_no_event_catches_fails_the_run() -> None:
     assert play.ended == "failed"
     assert "BATTERY_LOW" in play.detail
     assert play.trace("cancel") == ["cancel b1 BATTERY_LOW", "cancel b2"]
+
+
+COMES_DOWN = """
+    <startEvent id="start"/> <scriptTask id="down">do {behavior} evsg1</scriptTask>
+    <endEvent id="end"/> {more}
+    start -> down -> end
+"""
+CAUGHT = """
+    <boundaryEvent id="low" attachedToRef="down">error BATTERY_LOW</boundaryEvent>
+    <userTask id="u"/>
+    low -> u
+"""
+
+
+@pytest.mark.parametrize("behavior", ["return_to_launch", "land"])
+def test_a_low_battery_does_not_stop_what_brings_the_vehicle_down(behavior: str) -> None:
+    play = Play(COMES_DOWN.format(behavior=behavior, more="")).start()
+    play.orders()
+    ignored = play.fault("evsg1", "BATTERY_LOW").ignored()
+    assert ignored == f"BATTERY_LOW of evsg1, which {behavior} brings down"
+    assert play.orders() == []
+    assert play.report("b1").ended == "completed"
+
+
+def test_a_mission_may_have_a_return_ended_by_a_low_battery_and_other_faults_end_it() -> None:
+    play = Play(COMES_DOWN.format(behavior="return_to_launch", more=CAUGHT)).start()
+    assert play.fault("evsg1", "BATTERY_LOW").at == "u"
+    play = Play(COMES_DOWN.format(behavior="return_to_launch", more="")).start()
+    assert play.fault("evsg1", "LINK_LOST").ended == "failed"

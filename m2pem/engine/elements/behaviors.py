@@ -255,13 +255,24 @@ def recovery_answered(x: Execution, behavior: Behavior, answer: i.PromptAnswer) 
         end_run(x, RunOutcome.STOPPED, f"aborted by {answer.by}")
 
 
+BATTERY_LOW = "BATTERY_LOW"
+BRINGS_DOWN = frozenset({"return_to_launch", "land"})
+"""What a vehicle with a low battery is to do, as far as it can."""
+
+
 def resource_fault(x: Execution, item: i.ResourceFault) -> None:
-    """End the behaviors of a faulty resource with the fault's error (`ResourceFault`)."""
+    """End the behaviors of a faulty resource with the fault's error (`ResourceFault`).
+
+    A low battery ends a return or a landing only where an event of the mission catches it: else the
+    vehicle would be stopped in the air.
+    """
     ended = False
     for holder in list(x.state.held.get(item.resource, ())):
         behavior = x.state.behaviors[holder]
         if not item.reachable and len(behavior.resources) == 1:
             _ended(x, behavior, BehaviorState.LOST, item.code, item.reason)
+        elif item.code == BATTERY_LOW and _goes_on_to_come_down(x, behavior):
+            x.ignore(f"{item.code} of {item.resource}, which {behavior.name} brings down")
         elif behavior.phase is not BehaviorPhase.CANCELLING:
             fail_behavior(x, behavior, item.code, item.reason)
         else:
@@ -269,6 +280,11 @@ def resource_fault(x: Execution, item: i.ResourceFault) -> None:
         ended = True
     if not ended:
         x.ignore(f"{item.code} of {item.resource}, which does nothing for this run")
+
+
+def _goes_on_to_come_down(x: Execution, behavior: Behavior) -> bool:
+    catcher = catcher_of_error(x.state.tokens[behavior.token], BATTERY_LOW)
+    return behavior.name in BRINGS_DOWN and catcher is None
 
 
 def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str) -> None:
