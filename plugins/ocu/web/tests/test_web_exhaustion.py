@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from m2pem_plugin_web import server
 from m2pem_plugin_web.server import MOST_KNOWN, MOST_OF_AN_ADDRESS, MOST_STRANGERS, Slots
 from web_world import MakeWorld, World
 
@@ -61,6 +62,17 @@ async def test_every_stop_passes_a_flood_of_requests_that_never_come_whole(
             assert live.closed is None
         finally:
             flood.__exit__(None, None, None)
+
+
+@pytest.mark.parametrize("which", ["nothing", "half a head"])
+async def test_a_request_whose_head_does_not_come_is_ended(
+    world: MakeWorld, monkeypatch: pytest.MonkeyPatch, which: str
+) -> None:
+    monkeypatch.setattr(server, "HEADERS_S", 0.2)
+    async with world() as here:
+        with half_open(here, HALVES[which], 1) as (waits,):
+            received = await asyncio.to_thread(waits.recv, 100)  # its time limit is 10 s
+    assert received == b""
 
 
 class Dropped:
