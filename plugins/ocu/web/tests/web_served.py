@@ -13,7 +13,6 @@ from urllib.parse import urlsplit
 
 REPOSITORY = Path(__file__).parents[4]
 FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
-STARTS_WITHIN_S = 60
 ENDS_WITHIN_S = 30
 
 _URL = re.compile(r"https?://\S+")
@@ -80,7 +79,7 @@ def served(
     reading = threading.Thread(target=read, daemon=True)
     reading.start()
     try:
-        assert said.wait(STARTS_WITHIN_S), "".join(printed)
+        said.wait()  # for its address or its end: a busy machine may take minutes
         urls = _URL.findall("".join(printed))
         assert urls, "".join(printed)
         yield Served(process, urls[0], missions, printed)
