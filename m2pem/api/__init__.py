@@ -80,6 +80,8 @@ if TYPE_CHECKING:
     from m2pem.geo.geojson import as_geojson, parse_geojson
     from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
     from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
+    from m2pem.geo.polygon import edges_enclose, middle_of
+    from m2pem.geo.polyline import Polyline, Segment
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
         BehaviorSpec,
@@ -143,6 +145,8 @@ _MODULES = {
     "m2pem.geo.geojson": "as_geojson parse_geojson",
     "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw",
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
+    "m2pem.geo.polygon": "edges_enclose middle_of",
+    "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.units": "Dimension UnitError quantity",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
@@ -207,6 +211,7 @@ __all__ = [
     "ParameterSpec",
     "PayloadState",
     "Point",
+    "Polyline",
     "PromptClosed",
     "Record",
     "ReclaimingArbiter",
@@ -220,6 +225,7 @@ __all__ = [
     "RunView",
     "SearchLimits",
     "SearchProgress",
+    "Segment",
     "Service",
     "ServiceContext",
     "ServiceError",
@@ -239,9 +245,11 @@ __all__ = [
     "as_geojson",
     "describe",
     "distance_m",
+    "edges_enclose",
     "follow",
     "lawn_mower",
     "longest_edge_yaw",
+    "middle_of",
     "offset",
     "parse_geojson",
     "parse_mission",

@@ -12,7 +12,7 @@ from itertools import pairwise
 from m2pem.deconfliction.aircraft import FlightParameters, Span
 from m2pem.deconfliction.operational_volume import NOTHING_M, Piece, Volume
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polygon import Hull, buffered_hull, convex_hull
+from m2pem.geo.polygon import Hull, buffered_hull, convex_hull, middle_of
 
 BEND_M = 4.0
 """How far from a route's corner a bend may pass it."""
@@ -205,10 +205,7 @@ def observed(parameters: FlightParameters, reach_m: float) -> tuple[Hull | None,
         place, span = parameters.target_place()
         return None if place is None else buffered_hull([place], reach_m), span
     ring = parameters.ring(parameters.area)
-    centre = (
-        sum(east for east, _ in ring) / len(ring),
-        sum(north for _, north in ring) / len(ring),
-    )
+    centre = middle_of(ring)
     reach_m = max(reach_m, *(math.dist(centre, corner) for corner in ring))
     return buffered_hull([centre], reach_m), parameters.span()
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 
 from m2pem.deconfliction.aircraft import Aircraft, FlightParameters
 from m2pem.deconfliction.behavior_volumes import (
@@ -18,7 +17,8 @@ from m2pem.deconfliction.operational_volume import Piece, Volume
 from m2pem.fleet.parameters import read_offsets
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import buffered_hull, convex_hull
-from m2pem.teams.paths import SPACING_M, Vector, shifted, slot, trimmed
+from m2pem.geo.polyline import EastNorthUp, Polyline, shifted, trimmed
+from m2pem.teams.paths import SPACING_M, slot
 
 _SHAPES = {
     "formation": "wedge",
@@ -55,14 +55,14 @@ def _march(
             return way_to(parameters, None, parameters.span())
         around = buffered_hull(lead.stop, math.hypot(back_m, left_m))
         return way_to(parameters, around if index else parameters.aircraft.stop, parameters.span())
-    places: list[Vector] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
+    places: list[EastNorthUp] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
     spans = parameters.waypoint_spans(route)
     if len({place[:2] for place in places}) == 1:
         reach_m = 2 * math.hypot(back_m, left_m)
         return way_to(parameters, buffered_hull([places[0][:2], *_stop(lead)], reach_m), spans[0])
     moved = [place[:2] for place in shifted(places, left_m)]
     volume = along(parameters, moved, spans, BEND_M)
-    if back_m <= sum(math.dist(a, b) for a, b in pairwise(moved)):
+    if back_m <= Polyline(moved).length_m:
         return volume
     # Its place is before the route's beginning: it goes there at once, or by way of the route.
     end = trimmed([(*place, 0.0) for place in moved], back_m)[-1][:2]

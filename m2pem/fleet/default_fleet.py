@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import SIMULATED, Domain, Fleet, Payload, Team, Vehicle
+from m2pem.geo.local_frame import offset
 from m2pem.geo.positions import is_local
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
@@ -22,7 +23,6 @@ ORIGIN = (38.1075, -77.3192, 60.0)
 TEAM_SIZE = 3
 SPACING_M = 10.0
 
-_METRES_PER_DEGREE = 111_195.0
 _AIR_BEHAVIORS = frozenset({"takeoff", "land", "return_to_launch", "change_altitude", "orbit"})
 _KIND_BY_NAME = {
     "route": ParameterKind.ROUTE,
@@ -176,7 +176,5 @@ def _names(behavior: Behavior) -> Iterator[tuple[str, ParameterKind | None]]:
 
 
 def _at(east_m: float, north_m: float) -> Coordinate:
-    """A position near the origin; the earth is flat and round enough for a few hundred metres."""
-    latitude_deg = ORIGIN[0] + north_m / _METRES_PER_DEGREE
-    longitude_deg = ORIGIN[1] + east_m / (_METRES_PER_DEGREE * math.cos(math.radians(ORIGIN[0])))
+    latitude_deg, longitude_deg = offset(ORIGIN[:2], east_m, north_m)
     return (round(latitude_deg, 7), round(longitude_deg, 7), None)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame
-from m2pem.geo.polygon import Edge, contains, edge_distance_m
+from m2pem.geo.polygon import Edge, edge_distance_m, edges_enclose
 from m2pem.mission.geometry import Area
 
 MARGIN_M = 0.1
@@ -63,7 +63,7 @@ class Fence:
         return f"by {_by(by_m)} at {_text(self._frame.to_latlon(level))}"
 
     def _outside_m(self, level: EastNorth) -> float:
-        if contains(self._edges, level):
+        if edges_enclose(self._edges, level):
             return 0.0
         return min(edge_distance_m(level, edge) for edge in self._edges)
 
@@ -72,7 +72,7 @@ class Fence:
         worst: tuple[EastNorth, float] | None = None
         cuts = sorted({0.0, 1.0, *self._cuts(a, b)})
         for low, high in pairwise(cuts):
-            if contains(self._edges, _between(a, b, (low + high) / 2)):
+            if edges_enclose(self._edges, _between(a, b, (low + high) / 2)):
                 continue
             for look in range(_LOOKS + 1):
                 level = _between(a, b, low + (high - low) * look / _LOOKS)

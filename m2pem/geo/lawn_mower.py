@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import Edge
 
 Ring: TypeAlias = Sequence[EastNorth]
 """A closed ring; the first point is repeated last."""
@@ -87,17 +88,14 @@ def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[tuple[floa
     return list(_merged(sorted(spans)))
 
 
-_Edge: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
-
-
-def _edges_at(rings: Sequence[Ring], y: float) -> Iterator[_Edge]:
+def _edges_at(rings: Sequence[Ring], y: float) -> Iterator[Edge]:
     for ring in rings:
         for a, b in pairwise(ring):
             if (a[1] <= y) != (b[1] <= y):
                 yield a, b
 
 
-def _x(edge: _Edge, y: float) -> float:
+def _x(edge: Edge, y: float) -> float:
     (ax, ay), (bx, by) = edge
     part = min(1.0, max(0.0, (y - ay) / (by - ay)))
     return ax + (bx - ax) * part

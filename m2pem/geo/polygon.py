@@ -28,7 +28,7 @@ _ANGLES = tuple(math.tau * side / BUFFER_SIDES for side in range(BUFFER_SIDES))
 _CIRCLE = tuple((_OUTER * math.cos(angle), _OUTER * math.sin(angle)) for angle in _ANGLES)
 
 
-def contains(edges: Iterable[Edge], point: EastNorth) -> bool:
+def edges_enclose(edges: Iterable[Edge], point: EastNorth) -> bool:
     """Whether edges of closed rings enclose a point: of an outer ring, and of holes in it.
 
     The edges that a ray to the east crosses are counted. Coordinates are (east, north), or
@@ -50,6 +50,14 @@ def edge_distance_m(point: EastNorth, edge: Edge) -> float:
     part = ((point[0] - ae) * de + (point[1] - an) * dn) / length2 if length2 else 0.0
     part = min(1.0, max(0.0, part))
     return math.dist(point, (ae + de * part, an + dn * part))
+
+
+def middle_of(corners: Sequence[EastNorth]) -> EastNorth:
+    """Return the mean of the corners of a polygon, each given once."""
+    return (
+        sum(east for east, _ in corners) / len(corners),
+        sum(north for _, north in corners) / len(corners),
+    )
 
 
 def convex_hull(points: Iterable[EastNorth]) -> Hull:
@@ -196,7 +204,7 @@ def _any_inside(ring: Sequence[Coordinate], around: Sequence[Coordinate]) -> boo
     common = {corner[:2] for corner in around}
     own = [corner for corner in ring if corner[:2] not in common]
     corners = [(longitude, latitude) for latitude, longitude, _ in around]
-    return bool(own) and contains(pairwise(corners), (own[0][1], own[0][0]))
+    return bool(own) and edges_enclose(pairwise(corners), (own[0][1], own[0][0]))
 
 
 def _text(edge: Edge) -> str:

@@ -9,10 +9,11 @@ import msgspec
 
 from m2pem.api.arbiter import BehaviorId
 from m2pem.api.telemetry import GeoPosition
+from m2pem.geo.polyline import Polyline
 from m2pem.mission.values import Value
 from m2pem.simulation.course import turned
 from m2pem.simulation.local_parameters import LocalParameters, RefusedError
-from m2pem.simulation.manoeuvres import nearest_edge, yaw_of
+from m2pem.simulation.manoeuvres import yaw_of
 from m2pem.simulation.segments import Look, Pose, Slew, Vector
 from m2pem.simulation.settings import Gimbal
 from m2pem.simulation.trajectory import Plan
@@ -229,7 +230,7 @@ def _scan_polygon(mount: Mount, parameters: LocalParameters) -> Gaze:
     carrier = mount.pose()
     ring = parameters.rings(area)[0]
     # The steepest look down is to the nearest point, which need not be a corner.
-    points = [*ring, nearest_edge(ring, carrier.place)]
+    points = [*ring, Polyline(ring).nearest(carrier.place[:2])]
     seen = [direction(carrier, (east, north, mount.ground_up_m)) for east, north in points]
     middle = seen[0][0]
     pans = [middle + turned(middle, pan) for pan, _ in seen]

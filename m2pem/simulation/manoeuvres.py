@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
-from m2pem.mission.geometry import Area
+from m2pem.geo.polygon import middle_of
+from m2pem.geo.polyline import Polyline
 from m2pem.simulation.course import Course, Craft
 from m2pem.simulation.local_parameters import LocalParameters, RefusedError
 from m2pem.simulation.pursuit import Pursuit
@@ -170,7 +170,9 @@ def _observe(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     area = parameters.area
     seconds = parameters.duration_s
     centre = (
-        parameters.target_place(craft, up) if area is None else (*_middle(parameters, area), up)
+        parameters.target_place(craft, up)
+        if area is None
+        else (*middle_of(parameters.rings(area)[0][:-1]), up)
     )
     if craft.flies:
         course = _onto_circle(craft, centre, ORBIT_RADIUS_M, None)
@@ -180,29 +182,9 @@ def _observe(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
         course = _onto_circle(craft, centre, STANDOFF_M, None)
     else:
         course = Course(craft)
-        course.through([(*nearest_edge(parameters.rings(area)[0], course.place), up)])
+        course.through([(*Polyline(parameters.rings(area)[0]).nearest(course.place[:2]), up)])
     course.turn_to(math.atan2(centre[1] - course.place[1], centre[0] - course.place[0]))
     return Manoeuvre(course.stand(math.inf if seconds is None else seconds).plan())
-
-
-def _middle(parameters: LocalParameters, area: Area) -> tuple[float, float]:
-    corners = parameters.rings(area)[0][:-1]
-    return (
-        sum(east for east, _ in corners) / len(corners),
-        sum(north for _, north in corners) / len(corners),
-    )
-
-
-def nearest_edge(ring: list[tuple[float, float]], place: Vector) -> tuple[float, float]:
-    """The point of a ring's edges that is nearest to a place on the map."""
-    candidates = []
-    for (ae, an), (be, bn) in pairwise(ring):
-        de, dn = be - ae, bn - an
-        length2 = de * de + dn * dn
-        part = ((place[0] - ae) * de + (place[1] - an) * dn) / length2 if length2 else 0.0
-        part = max(0.0, min(1.0, part))
-        candidates.append((ae + de * part, an + dn * part))
-    return min(candidates, key=lambda point: math.dist(point, place[:2]))
 
 
 def _follow(craft: Craft, parameters: LocalParameters) -> Manoeuvre:

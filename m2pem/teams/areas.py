@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.geo.polygon import middle_of
 from m2pem.mission.geometry import Area, Route, VehiclePosition
 from m2pem.teams.paths import SPACING_M
 from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
@@ -237,11 +238,7 @@ def observe(context: PlanningContext) -> Plan:
             reach = FLYING_STANDOFF_M if flies else STANDOFF_M
         else:
             ring = [context.level(corner) for corner in area.rings[0]]
-            corners = ring[:-1]
-            centre = (
-                sum(east for east, _ in corners) / len(corners),
-                sum(north for _, north in corners) / len(corners),
-            )
+            centre = middle_of(ring[:-1])
             reach = _reach(ring, centre, angle)
         place = (centre[0] + reach * math.cos(angle), centre[1] + reach * math.sin(angle))
         heading = (math.pi / 2 - (angle + math.pi)) % math.tau

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from itertools import accumulate, combinations, pairwise
+from itertools import combinations
 
 from m2pem.fleet.parameters import read_offsets
+from m2pem.geo.polyline import EastNorthUp, Polyline, shifted, trimmed
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
-from m2pem.teams.paths import SPACING_M, Path, Vector, beside, shifted, slot, trimmed
+from m2pem.teams.paths import SPACING_M, MemberPath, beside, slot
 from m2pem.teams.plan import Leg, March, Marcher, Plan, PlanningContext, TeamRefusedError
 
 GAP_SHARE = 0.5
@@ -66,13 +67,12 @@ class _Way:
         self,
         context: PlanningContext,
         member: ResourceId,
-        route: Sequence[Vector],
+        route: Sequence[EastNorthUp],
         place: tuple[float, float],
     ) -> None:
         self.member = member
         self.back_m, self.left_m = place
-        steps = (math.dist(a[:2], b[:2]) for a, b in pairwise(route))
-        marks = list(accumulate(steps, initial=0.0))
+        marks = list(Polyline(place[:2] for place in route).marks_m)
         moved = shifted(route, self.left_m)
         kept = trimmed(moved, self.back_m)
         end_mark = marks[-1] - self.back_m
@@ -86,7 +86,7 @@ class _Way:
             kept, marks = [(*begin, 0.0), *kept], [marks[0] - first, *marks]
         elif len(kept) == 1:
             kept, marks = [*kept, *kept], [*marks, *marks]
-        self.path = Path(kept, marks)
+        self.path = MemberPath(kept, marks)
 
     def leg(
         self, context: PlanningContext, speed_m_s: float | None, after: ResourceId | None

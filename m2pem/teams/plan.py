@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.local_frame import LocalFrame
+from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polyline import EastNorthUp
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.geometry import Coordinate, Point, Route, VehiclePosition
-from m2pem.teams.paths import Path, Vector
+from m2pem.teams.paths import MemberPath
 
 REACTION_S = 1.0
 """From a change of what is seen to a vehicle that begins to brake: telemetry, thought, command."""
@@ -70,7 +71,7 @@ class Marcher:
     """A member on the march: `back_m` behind the lead along the route, `left_m` beside it."""
 
     member: ResourceId
-    path: Path
+    path: MemberPath
     back_m: float
     left_m: float
     motion: Motion
@@ -161,7 +162,7 @@ class PlanningContext:
             )
         return east, north
 
-    def coordinate(self, place: Vector | tuple[float, float], up_m: float | None) -> Coordinate:
+    def coordinate(self, place: EastNorthUp | EastNorth, up_m: float | None) -> Coordinate:
         """A place of the plane as a coordinate, with that altitude."""
         return (*self.frame.to_latlon(place[:2]), up_m)
 
@@ -208,7 +209,7 @@ class PlanningContext:
     def to_place(
         self,
         member: ResourceId,
-        place: Vector | tuple[float, float],
+        place: EastNorthUp | EastNorth,
         heading_rad: float | None = None,
         after: ResourceId | None = None,
     ) -> Leg:

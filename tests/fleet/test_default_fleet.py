@@ -1,9 +1,8 @@
-import math
-
 from m2pem.findings import Finding
 from m2pem.fleet.check import check_mission
 from m2pem.fleet.default_fleet import ORIGIN, fleet_for
 from m2pem.fleet.fleet import Domain, Fleet
+from m2pem.geo.local_frame import distance_m
 from m2pem.mission.behavior import Behavior, BehaviorType, ServiceCall
 from m2pem.mission.geometry import Area, Point, Route
 
@@ -27,11 +26,6 @@ TASKS: list[Behavior | ServiceCall] = [
 
 def check(fleet: Fleet, *tasks: Behavior | ServiceCall) -> list[Finding]:
     return check_mission(mission(*tasks), fleet, everything)
-
-
-def distance_m(latitude: float, longitude: float) -> float:
-    east = (longitude - ORIGIN[1]) * 111_195 * math.cos(math.radians(ORIGIN[0]))
-    return math.hypot(east, (latitude - ORIGIN[0]) * 111_195)
 
 
 def test_a_made_up_fleet_fits_its_mission() -> None:
@@ -65,7 +59,7 @@ def test_what_takes_off_flies_and_the_rest_drives() -> None:
 def test_vehicles_start_apart_and_near_the_origin() -> None:
     fleet = fleet_for(mission(*TASKS))
     homes = [vehicle.settings["home"] for vehicle in fleet.vehicles.values()]
-    apart = [distance_m(*home) for home in homes]
+    apart = [distance_m(ORIGIN[:2], home[:2]) for home in homes]
     assert all(abs(d - 10 * i) < 0.1 for i, d in enumerate(apart))
 
 
@@ -74,7 +68,7 @@ def test_routes_are_a_few_hundred_metres_long_and_apart() -> None:
     alpha, bravo = fleet_for(mission(*tasks)).geometries.values()
     assert isinstance(alpha, Route)
     assert isinstance(bravo, Route)
-    assert 290 < distance_m(*alpha.waypoints[-1][:2]) < 310
+    assert 290 < distance_m(ORIGIN[:2], alpha.waypoints[-1][:2]) < 310
     assert alpha.waypoints[-1] != bravo.waypoints[-1]
 
 

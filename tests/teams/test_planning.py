@@ -18,7 +18,7 @@ from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Point, Route, VehiclePosition
 from m2pem.teams.areas import strips
-from m2pem.teams.paths import Path, slot
+from m2pem.teams.paths import MemberPath, slot
 from m2pem.teams.plan import MemberPose, Plan, PlanningContext, TeamRefusedError
 from m2pem.teams.restart import Reference, read_reference
 from m2pem.teams.team_state import PLANS
@@ -142,7 +142,7 @@ def test_what_cannot_be_done_is_refused_by_name(
 
 
 def test_the_way_back_is_told_from_the_way_there() -> None:
-    path = Path([(0, 0, 0), (100, 0, 0), (100, 4, 0), (0, 4, 0)], [0, 100, 104, 204])
+    path = MemberPath([(0, 0, 0), (100, 0, 0), (100, 4, 0), (0, 4, 0)], [0, 100, 104, 204])
     assert path.find((40, 2.5), None, 0, yaw_rad=0.0) == pytest.approx(40)
     assert path.find((40, 1.5), None, 0, yaw_rad=math.pi) == pytest.approx(164)
     assert path.find((40, 2.5), 35.0, 20.0) == pytest.approx(40), "not the nearer leg, but the next"
@@ -150,7 +150,7 @@ def test_the_way_back_is_told_from_the_way_there() -> None:
 
 
 def test_marks_of_two_paths_are_the_same_abreast() -> None:
-    inner = Path([(0, 0, 0), (90, 0, 0), (90, 90, 0)], [0, 100, 200])
+    inner = MemberPath([(0, 0, 0), (90, 0, 0), (90, 90, 0)], [0, 100, 200])
     assert inner.mark_m(45) == pytest.approx(50)
     assert inner.mark_m(1000) == 200
     assert inner.mark_m(-5) == 0

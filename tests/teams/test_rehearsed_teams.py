@@ -16,8 +16,7 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import RehearsalResult, rehearse
 from m2pem.simulation.settings import Fault
-from m2pem.teams.paths import Path as Way
-from m2pem.teams.paths import slot
+from m2pem.teams.paths import MemberPath, slot
 
 from .conftest import START_US, area, one_task, route
 from .rehearsed import Rehearsed, rehearsed, sim_fleet
@@ -194,7 +193,7 @@ def test_the_spacing_is_kept_on_any_route_whatever_the_members_can(
     corners = [(-spacing_m * len(names), 0.0), *places]
     steps = [math.dist(*each) for each in pairwise(corners)]
     marks = [sum(steps[:index]) for index in range(len(corners))]
-    way = Way([(*corner, 0.0) for corner in corners], marks)
+    way = MemberPath([(*corner, 0.0) for corner in corners], marks)
     fleet = sim_fleet(
         starts,
         {"way": route(*places)},

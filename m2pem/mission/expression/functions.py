@@ -19,7 +19,11 @@ from m2pem.mission.expression.operators import (
 from m2pem.mission.values import Value
 
 EARTH_RADIUS_M = 6_371_008.8
-"""Mean radius of the WGS-84 ellipsoid (2a + b) / 3."""
+"""Mean radius of the WGS-84 ellipsoid (2a + b) / 3.
+
+`distance()` of expressions is that of the haversine formula on this sphere, not the one of
+`m2pem.geo`: missions and journals that exist must always give the same values.
+"""
 
 _ANY = ("null", "boolean", "number", "text", "list", "map")
 

@@ -1,9 +1,8 @@
 """The behavior `area_observe`: aircraft circle over an area or a point, others stop at its edge."""
 
 import math
-from itertools import pairwise
 
-from m2pem.api import Area, BehaviorState, EastNorth, LatLon, LocalFrame
+from m2pem.api import Area, BehaviorState, LatLon, LocalFrame, Polyline, middle_of
 from m2pem_plugin_mavlink.behaviors.arrival import accepts_mode, is_still, position_of
 from m2pem_plugin_mavlink.behaviors.behavior import (
     BehaviorContext,
@@ -62,7 +61,7 @@ class ObserveFromTheEdge(Goto):
         if area is not None:
             frame = LocalFrame(area.rings[0][0][:2])
             ring = [frame.to_local(corner[:2]) for corner in area.rings[0]]
-            return frame.to_latlon(_nearest(ring, frame.to_local(here)))
+            return frame.to_latlon(Polyline(ring).nearest(frame.to_local(here)))
         target = self.parameters.target_position()
         frame = LocalFrame((target.latitude_deg, target.longitude_deg))
         east, north = frame.to_local(here)
@@ -124,19 +123,5 @@ def middle(area: Area) -> tuple[LatLon, float]:
     """Return the centre of an area, and the distance to its farthest corner in metres."""
     frame = LocalFrame(area.rings[0][0][:2])
     corners = [frame.to_local(corner[:2]) for corner in area.rings[0][:-1]]
-    center = (
-        sum(east for east, _ in corners) / len(corners),
-        sum(north for _, north in corners) / len(corners),
-    )
+    center = middle_of(corners)
     return frame.to_latlon(center), max(math.dist(center, corner) for corner in corners)
-
-
-def _nearest(ring: list[EastNorth], here: EastNorth) -> EastNorth:
-    candidates = []
-    for (ae, an), (be, bn) in pairwise(ring):
-        de, dn = be - ae, bn - an
-        length2 = de * de + dn * dn
-        part = ((here[0] - ae) * de + (here[1] - an) * dn) / length2 if length2 else 0.0
-        part = max(0.0, min(1.0, part))
-        candidates.append((ae + de * part, an + dn * part))
-    return min(candidates, key=lambda point: math.dist(point, here))

@@ -5,10 +5,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import edges_enclose
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
@@ -33,19 +35,9 @@ class PolygonZone:
 
     def breached(self, point: Point) -> bool:
         """Whether a point is on the wrong side."""
-        return self.contains(point) != self.keep_in
-
-    def contains(self, point: Point) -> bool:
-        """Whether a point is inside: a ray to the north crosses an odd number of sides."""
-        inside = False
-        last = self.corners[-1]
-        for corner in self.corners:
-            if (corner.east_m > point.east_m) != (last.east_m > point.east_m):
-                component = (point.east_m - corner.east_m) / (last.east_m - corner.east_m)
-                north_m = corner.north_m + component * (last.north_m - corner.north_m)
-                inside ^= point.north_m < north_m
-            last = corner
-        return inside
+        ring = [(corner.east_m, corner.north_m) for corner in self.corners]
+        inside = edges_enclose(pairwise([*ring, ring[0]]), (point.east_m, point.north_m))
+        return inside != self.keep_in
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,10 @@ def points_in_area(
 
 
 def inside(rings: list[Vector], points: Vector) -> NDArray[np.bool_]:
-    """Return which points (latitude, longitude) are in the outer ring and in none of the holes."""
+    """Return which points (latitude, longitude) are in the outer ring and in none of the holes.
+
+    As `m2pem.api.edges_enclose`, for an array of points at once.
+    """
     latitude, longitude = points[:, 0], points[:, 1]
     odd = np.zeros(len(points), dtype=bool)
     for ring in rings:

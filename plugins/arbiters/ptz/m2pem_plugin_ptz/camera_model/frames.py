@@ -1,7 +1,8 @@
 """Rotations between the frames of a camera, its vehicle and the Earth.
 
 Vectors and matrices are of NumPy, in metres or unit vectors. ECEF: of the Earth (WGS-84). ENU:
-east, north, up at a position. Deck: forward, left, up of a vehicle (REP-103).
+east, north, up at a position. Deck: forward, left, up of a vehicle (REP-103). The camera model
+converts arrays of thousands of points, by pymap3d, on the ellipsoid of `m2pem.api.LocalFrame`.
 """
 
 import math

@@ -2,33 +2,12 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 
-from m2pem_plugin_ros.behaviors.motion_state import Place, angle_between, direction_to, point_beyond
+from m2pem.api import Polyline, Segment
+from m2pem_plugin_ros.behaviors.motion_state import Place, angle_between
 
 SHORTEST_M = 0.05
 """Waypoints closer to each other than this count as one."""
-
-
-@dataclass(frozen=True, slots=True)
-class Leg:
-    """A straight leg from one waypoint to the next."""
-
-    start: Place
-    yaw_rad: float
-    length_m: float
-
-    def at(self, along_m: float) -> Place:
-        """Return the position at a distance along the leg, which may be before its start or after
-        its end."""
-        return point_beyond(self.start, self.yaw_rad, along_m)
-
-    def along(self, place: Place) -> float:
-        """Return the distance along the leg of the foot of the perpendicular from a position."""
-        return (place[0] - self.start[0]) * math.cos(self.yaw_rad) + (
-            place[1] - self.start[1]
-        ) * math.sin(self.yaw_rad)
 
 
 class Path:
@@ -49,14 +28,14 @@ class Path:
                 kept.append(kept[lap])
             self._lap = lap
         self.end = kept[-1]
-        self._legs = [_leg(start, end) for start, end in pairwise(kept)]
-        self.length_m = sum(leg.length_m for leg in self._legs)
+        line = Polyline(kept)
+        self._legs, self.length_m = line.segments, line.length_m
 
     @property
     def repeats(self) -> bool:
         return self._lap is not None
 
-    def leg(self, number: int) -> Leg | None:
+    def leg(self, number: int) -> Segment | None:
         """Return the leg with an index, counted through all laps; None after the end of the
         path."""
         count = len(self._legs)
@@ -72,10 +51,6 @@ class Path:
         return (
             0.0 if leg is None or after is None else abs(angle_between(leg.yaw_rad, after.yaw_rad))
         )
-
-
-def _leg(start: Place, end: Place) -> Leg:
-    return Leg(start, direction_to(start, end), math.dist(start, end))
 
 
 PASSED_M = 0.15
@@ -99,7 +74,7 @@ class Progress:
         return self._before_m + self._along_m
 
     @property
-    def leg(self) -> Leg | None:
+    def leg(self) -> Segment | None:
         """The current leg; None if the path has none."""
         return self.path.leg(self._number)
 
@@ -107,7 +82,7 @@ class Progress:
         """Whether the corner after a leg is sharp."""
         return self.path.turn(number) > self._sharp_rad
 
-    def ahead(self) -> Iterator[tuple[int, Leg, float, float]]:
+    def ahead(self) -> Iterator[tuple[int, Segment, float, float]]:
         """Yield the legs from here on: index, leg, distance along it at which it begins, and
         distance from here. A path that repeats has no end."""
         number, begin, away = self._number, self._along_m, 0.0
@@ -190,7 +165,7 @@ def next_waypoint(places: Sequence[Place], here: Place, within_m: float) -> int 
     Return None if that is ambiguous: the route passes farther away than `within_m`, or more than
     once.
     """
-    away = [_distance(leg, here) for leg in pairwise(places)]
+    away = [leg.distance_m(here) for leg in Polyline(places).segments]
     near = [number for number, distance_m in enumerate(away) if distance_m <= within_m]
     if not near or near[-1] - near[0] >= len(near):
         return None
@@ -199,12 +174,3 @@ def next_waypoint(places: Sequence[Place], here: Place, within_m: float) -> int 
         if away[number] < away[found] - NEARER_M:
             found = number
     return found + 1
-
-
-def _distance(leg: tuple[Place, Place], place: Place) -> float:
-    (x, y), end = leg
-    east, north = end[0] - x, end[1] - y
-    square = east * east + north * north
-    share = 0.0 if square == 0.0 else ((place[0] - x) * east + (place[1] - y) * north) / square
-    share = max(0.0, min(1.0, share))
-    return math.dist((x + share * east, y + share * north), place)

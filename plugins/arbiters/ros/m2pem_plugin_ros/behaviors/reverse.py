@@ -2,6 +2,7 @@
 
 import math
 
+from m2pem.api import Segment
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import (
     STANDSTILL,
@@ -11,7 +12,6 @@ from m2pem_plugin_ros.behaviors.motion_state import (
     position_of,
 )
 from m2pem_plugin_ros.behaviors.parameters import LocalParameters
-from m2pem_plugin_ros.behaviors.path import Leg
 from m2pem_plugin_ros.behaviors.steering import (
     braking_speed,
     curvature_to,
@@ -34,7 +34,7 @@ class Reverse(Motion):
     def __init__(self, parameters: LocalParameters, bounds: Bounds) -> None:
         super().__init__(parameters, bounds)
         self._distance_m = parameters.distance_m
-        self._line: Leg | None = None
+        self._line: Segment | None = None
         self._over = False
 
     def step(self, state: MotionState) -> DesiredMotion | Ending:
@@ -42,7 +42,7 @@ class Reverse(Motion):
         backwards = state.pose.yaw_rad + math.pi
         if self._line is None:
             end = position_of(state.pose)
-            self._line = Leg(end, math.remainder(backwards, math.tau), self._distance_m)
+            self._line = Segment(end, math.remainder(backwards, math.tau), self._distance_m)
         along = self._line.along(position_of(state.pose))
         left = self._distance_m - along
         self._over = left <= (BACK_AGAIN_M if self._over else ENDED_M)

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import msgspec
 
-from m2pem.api import GeoPosition, PayloadState, VehicleState
+from m2pem.api import GeoPosition, PayloadState, VehicleState, distance_m
 
 SPACING_S = 1.0
 """Least seconds of mission time between two states of a resource; more in long runs."""
@@ -14,8 +14,6 @@ SPACING_S = 1.0
 MOVED_M = 0.5
 TURNED_RAD = math.radians(5.0)
 ZOOMED = 1.05
-
-_M_PER_DEG = 111_320.0
 
 State: TypeAlias = VehicleState | PayloadState
 
@@ -84,10 +82,8 @@ def _moved(before: GeoPosition | None, now: GeoPosition | None) -> bool:
     before, now = _known_place(before), _known_place(now)
     if before is None or now is None:
         return before is not now
-    north_m = (now.latitude_deg - before.latitude_deg) * _M_PER_DEG
-    degrees = math.remainder(now.longitude_deg - before.longitude_deg, 360.0)
-    east_m = degrees * _M_PER_DEG * math.cos(math.radians(before.latitude_deg))
-    return math.hypot(north_m, east_m, now.altitude_m - before.altitude_m) > MOVED_M
+    places = [(each.latitude_deg, each.longitude_deg) for each in (before, now)]
+    return math.hypot(distance_m(*places), now.altitude_m - before.altitude_m) > MOVED_M
 
 
 def _turned(before: float | None, now: float | None) -> bool:
