@@ -24,11 +24,12 @@ from m2pem.simulation.broadcast import DEFAULT_HZ, Broadcast
 from m2pem.simulation.detectors import Detectors
 from m2pem.simulation.event_queue import EventQueue
 from m2pem.simulation.executions import Body, Effect, Execution, Strike
+from m2pem.simulation.faults import Fault, FaultList
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.links import Links
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.planning import Planner
-from m2pem.simulation.settings import Fault, FaultList, own_faults, read_settings
+from m2pem.simulation.settings import own_faults, read_settings
 from m2pem.simulation.simulation import Simulation
 from m2pem.simulation.state_file import Memory, StateFile
 from m2pem.simulation.trajectory import US_PER_S, Warp

@@ -2,8 +2,9 @@
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 from m2pem.api.arbiter import Connection
@@ -12,52 +13,9 @@ from m2pem.findings import Finding, Severity
 from m2pem.geo.local_frame import Origin
 from m2pem.geo.positions import NO_ORIGIN, out_of_reach
 from m2pem.mission.catalogue import ResourceId
+from m2pem.simulation.faults import Fault, read_faults
 from m2pem.simulation.kinematics import DEFAULTS, Kinematics
 from m2pem.units import Dimension, quantity
-
-FAULT_KINDS = ("reject", "fail", "stall", "lose_link")
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """`kind` is one of `FAULT_KINDS`; it strikes `after_s` into the behavior.
-
-    `behavior`: the name of those that it strikes, "" for all. `times`: how many of them.
-
-    * reject: the behavior is refused (`after_s` has no meaning).
-    * fail: the vehicle stops, and the behavior fails with `error` ("" is FAILED).
-    * stall: the vehicle stops and nothing more is heard of the behavior.
-    * lose_link: nothing more is heard of the vehicle, and it hears nothing.
-    """
-
-    kind: str
-    behavior: str = ""
-    after_s: float = 0.0
-    error: str = ""
-    times: int = 1
-
-
-class FaultList:
-    """The faults that still wait for a behavior of one resource, first come first served."""
-
-    def __init__(self, faults: Iterable[Fault] = ()) -> None:
-        self._waiting: list[Fault] = list(faults)
-
-    def add(self, fault: Fault) -> None:
-        """One more."""
-        self._waiting.append(fault)
-
-    def take(self, behavior: str) -> Fault | None:
-        """The fault that strikes a behavior which starts now; used up by this."""
-        for index, fault in enumerate(self._waiting):
-            if fault.behavior in ("", behavior):
-                if fault.times > 1:
-                    self._waiting[index] = replace(fault, times=fault.times - 1)
-                else:
-                    del self._waiting[index]
-                return fault
-        return None
-
 
 Coordinates = tuple[float, float, float | None]
 
@@ -158,7 +116,7 @@ def read_settings(connection: Connection, origin: Origin) -> Settings:
         detection_range_m=reader.number("range", Dimension.DISTANCE, 5.0),
         detections=reader.items("detections", _detection),
         targets=reader.items("targets", _target),
-        faults=reader.items("faults", _fault),
+        faults=tuple(chain(*reader.items("faults", read_faults, (str, Mapping)))),
         telemetry_hz=reader.rate("telemetry_hz"),
         state=reader.text("state"),
     )
@@ -274,7 +232,9 @@ class _Reader:
         self.near(key, place)
         return place
 
-    def items(self, key: str, read: Any) -> tuple[Any, ...]:
+    def items(
+        self, key: str, read: Any, types: type | tuple[type, ...] = Mapping
+    ) -> tuple[Any, ...]:
         value = self._settings.get(key)
         if value is None:
             return ()
@@ -283,7 +243,7 @@ class _Reader:
             return ()
         found = []
         for index, item in enumerate(value):
-            if not isinstance(item, Mapping):
+            if not isinstance(item, types):
                 self.wrong(f"{key}[{index}]", f"{item!r} is not a map")
                 continue
             try:
@@ -328,19 +288,3 @@ def _detection(item: Mapping[str, Any]) -> PlannedDetection:
 
 def _target(item: Mapping[str, Any]) -> Target:
     return Target(str(item["type"]), _coordinates(item["position"]))
-
-
-def _fault(item: Mapping[str, Any]) -> Fault:
-    kind = item["kind"]
-    if kind not in FAULT_KINDS:
-        raise ValueError(f"kind: {kind!r} is not one of {', '.join(FAULT_KINDS)}")
-    times = item.get("times", 1)
-    if isinstance(times, bool) or not isinstance(times, int) or times < 1:
-        raise ValueError(f"times: {times!r} is not a whole number above 0")
-    return Fault(
-        kind=kind,
-        behavior=str(item.get("behavior", "")),
-        after_s=quantity(item.get("after", 0.0), Dimension.DURATION),
-        error=str(item.get("error", "")),
-        times=times,
-    )

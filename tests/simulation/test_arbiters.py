@@ -13,8 +13,8 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.faults import Fault
 from m2pem.simulation.kinematics import DEFAULTS
-from m2pem.simulation.settings import Fault
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 S = 1_000_000

@@ -7,7 +7,8 @@ import pytest
 from m2pem.api.arbiter import Connection
 from m2pem.errors import FleetError
 from m2pem.mission.catalogue import ResourceId
-from m2pem.simulation.settings import Fault, PlannedDetection, Settings, Target, read_settings
+from m2pem.simulation.faults import Fault
+from m2pem.simulation.settings import PlannedDetection, Settings, Target, read_settings
 
 ORIGIN = (38.1, -77.3, 0.0)
 
@@ -54,6 +55,17 @@ def test_lists_are_read() -> None:
     assert settings.faults == (Fault("fail", "", 5.0, "E", 2),)
 
 
+def test_faults_are_read_as_text() -> None:
+    faults = ["goto, orbit: fail BLOCKED at 2 min", "refuse", "stall at 5 s", "cut link at 4 s"]
+    assert read(faults=faults).faults == (
+        Fault("fail", "goto", 120.0, "BLOCKED"),
+        Fault("fail", "orbit", 120.0, "BLOCKED"),
+        Fault("reject"),
+        Fault("stall", after_s=5.0),
+        Fault("lose_link", after_s=4.0),
+    )
+
+
 @pytest.mark.parametrize(
     ("settings", "element", "said"),
     [
@@ -72,6 +84,8 @@ def test_lists_are_read() -> None:
         ({"faults": [{"after": 3}]}, "faults[0]", "'kind' is missing"),
         ({"faults": [{"kind": "fail", "times": 0}]}, "faults[0]", "times"),
         ({"faults": [3]}, "faults[0]", "not a map"),
+        ({"faults": ["explode"]}, "faults[0]", "'explode' is no action. Actions: refuse"),
+        ({"faults": ["stall for 3 s"]}, "faults[0]", "'stall' has no end"),
         ({"detections": [{"at": "soon", "type": "x"}]}, "detections[0]", "soon"),
         ({"targets": [{"type": "x"}]}, "targets[0]", "'position' is missing"),
     ],

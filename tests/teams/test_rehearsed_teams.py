@@ -15,7 +15,7 @@ from m2pem.fleet.fleet import LostMemberPolicy
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import RehearsalResult, rehearse
-from m2pem.simulation.settings import Fault
+from m2pem.simulation.faults import Fault
 from m2pem.teams.paths import MemberPath, slot
 
 from .conftest import START_US, area, one_task, route

@@ -3,29 +3,33 @@
 import pytest
 from click.testing import CliRunner
 from m2pem_plugin_mavlink.simulator.command_line import mavlink
-from m2pem_plugin_mavlink.simulator.faults import FaultError, parse
+from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, plan
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
 from test_mavlink_sim_faults import World
 
+from m2pem.api.faults import FaultError
+
+parse = GRAMMAR.parse
+
 
 def test_vehicles_times_and_what_happens_are_read() -> None:
     fault = parse("1, 3: cut link at 40 s for 600 s")
-    assert (fault.systems, fault.at_s, fault.for_s) == ((1, 3), 40.0, 600.0)
-    assert parse("all: lose gps").systems is None
+    assert (fault.targets, fault.at_s, fault.for_s) == (("1", "3"), 40.0, 600.0)
+    assert parse("all: lose gps").targets is None
     assert parse("lose gps at 1.5s").at_s == 1.5
 
 
 def happening(text: str) -> World:
     world = World()
-    parse(text).plan(world.faults)
+    plan(parse(text), world.faults)
     world.run(2)
     return world
 
 
 def test_a_link_is_cut_at_a_time_after_arming_and_for_a_time() -> None:
     world = World().armed()
-    parse("cut link at 5 s for 10 s").plan(world.faults)
+    plan(parse("cut link at 5 s for 10 s"), world.faults)
     world.run(4)
     assert world.sent
     world.run(2)
@@ -71,7 +75,7 @@ def test_the_others_do_what_they_say() -> None:
 
 def test_somebody_else_changes_the_mode() -> None:
     world = World().armed()
-    parse("mode loiter at 3 s").plan(world.faults)
+    plan(parse("mode loiter at 3 s"), world.faults)
     world.run(2)
     assert world.autopilot.modes.mode.name == "GUIDED"
     world.run(2)
@@ -94,7 +98,7 @@ def test_what_was_begun_ends() -> None:
         ("battery 140 %", "a battery has at most 100 %"),
         ("drop 140 %", "no more than 100 % of the frames, so not 140 %"),
         ("drop every 0", "Of 1 or more, not of 0"),
-        ("mode loiter", "say when, such as 'mode LOITER at 40 s'"),
+        ("mode loiter", "say when, such as 'mode loiter at 40 s'"),
         ("cut link at noon", "'cut link at noon' is no action"),
     ],
 )

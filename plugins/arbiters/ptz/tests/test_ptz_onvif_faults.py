@@ -96,12 +96,12 @@ async def test_a_user_who_is_locked_out_on_the_way_is_said_so(tmp_path):
 async def test_a_fault_is_told_and_gone_when_the_camera_obeys_again(tmp_path, caplog):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
-        server.faults.fault("the motor is too hot")
+        server.faults.refuse("the motor is too hot")
         bench.driver.point(0.5, 0.0)
         await until(lambda: "the motor is too hot" in bench.driver.refusal("ptz_point_at"))
         assert "refuses AbsoluteMove" in bench.driver.refusal("ptz_point_at")
         assert bench.driver.refusal("take_picture") == ""
-        server.faults.fault("")
+        server.faults.refuse("")
         await until(lambda: bench.looks_at(0.5, 0.0))
         assert bench.driver.refusal("ptz_point_at") == ""
     assert caplog.text.count("the motor is too hot") == 1
@@ -110,7 +110,7 @@ async def test_a_fault_is_told_and_gone_when_the_camera_obeys_again(tmp_path, ca
 async def test_a_fault_of_what_was_wanted_before_does_not_count_after_a_halt(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
-        server.faults.fault("no")
+        server.faults.refuse("no")
         bench.driver.point(0.5, 0.0)
         await until(lambda: bench.driver.refusal("ptz_point_at"))
         bench.driver.halt()

@@ -1,13 +1,10 @@
-"""What the commands of this plugin share: lazy loading, and types of options."""
+"""What the commands of this plugin share: lazy loading."""
 
-import math
 from collections.abc import MutableMapping
 from importlib import import_module
 from typing import Any
 
 import click
-
-from m2pem.api import GeoPosition
 
 
 class LazyCommand(click.Command):
@@ -36,23 +33,3 @@ def group(commands: MutableMapping[str, click.Command], name: str, summary: str)
         found = click.Group(name, help=summary)
         commands[name] = found
     return found
-
-
-class Place(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A position on Earth: LAT,LON or LAT,LON,ALT."""
-
-    name = "lat,lon,alt"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> GeoPosition:
-        """Return the position: WGS-84 in degrees, metres above mean sea level."""
-        if isinstance(value, GeoPosition):
-            return value
-        try:
-            latitude, longitude, altitude = (*map(float, str(value).split(",")), 0.0)[:3]
-        except ValueError:
-            self.fail(f"{value!r} is not LAT,LON,ALT, such as 38.1,-77.3,60", param, ctx)
-        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-            self.fail(f"{value!r} is not on Earth", param, ctx)
-        return GeoPosition(latitude, longitude, altitude)

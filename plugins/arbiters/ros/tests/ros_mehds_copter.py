@@ -3,7 +3,7 @@
 import asyncio
 import sys
 
-from m2pem_plugin_mavlink.simulator.faults import parse
+from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, plan
 from m2pem_plugin_mavlink.simulator.geometry import Location
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
@@ -16,7 +16,7 @@ PARAMETERS = {"FS_GCS_ENABLE": 1.0, "FS_GCS_TIMEOUT": 20.0, "BATT_FS_LOW_ACT": 2
 async def main(port: int, speed: float) -> None:
     spec = VehicleSpec(home=HOME, parameters=PARAMETERS, estimator_s=6.0)
     async with Simulator([spec], speed=speed, to=("127.0.0.1", port)) as vehicles:
-        read_stdin_lines(lambda line: parse(line).plan(vehicles[1].faults))
+        read_stdin_lines(lambda line: plan(GRAMMAR.parse(line), vehicles[1].faults))
         print("ready", flush=True)
         await vehicles.stopped()
 

@@ -40,7 +40,7 @@ LOST_AFTER_S = 20
 SILENT = f"silent for {LOST_AFTER_S + 2} s"
 """Until it is lost, and hardly longer: it is back, and has stopped, before an operator answers."""
 
-STUCK = "wheels stuck for 25 s"
+STUCK = "stuck for 25 s"
 """ROUTE_BLOCKED after 15 s."""
 
 THINKS_S = 6.0

@@ -120,7 +120,7 @@ def test_the_simulator_keeps_to_this_machine_whatever_the_environment_says(ros_d
         (["--set", "max_sped=3"], "did you mean 'max_speed'?"),
         (["--set", "home=[38, -77]"], "say --home"),
         (["--fault", "ugv1: sulk"], "'sulk' is no action"),
-        (["--fault", "ugv9: silent"], "there is no vehicle 'ugv9'; there are: ugv1"),
+        (["--fault", "ugv9: silent"], "there is no vehicle ugv9; there are: ugv1"),
         (["--driver", "base", "--fault", "lie"], "ugv1 is a plain base"),
         (["--fleet", "/no/such.yaml"], "'/no/such.yaml' does not exist"),
     ],

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from m2pem_plugin_ros import settings
-from m2pem_plugin_ros.simulator.faults import KINDS, parse
+from m2pem_plugin_ros.simulator.faults import GRAMMAR, KINDS
 from m2pem_plugin_ros.simulator.specification import DETECTOR_SETTINGS, SETTINGS
 from m2pem_plugin_ros.testing import Peer
 from ros_sim_watch import COMMAND
@@ -22,7 +22,9 @@ def test_all_faults_are_told_and_can_be_written_so() -> None:
     table = SECTION.partition("| action | what happens |")[2]
     rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
     told = [word for row in rows for word in re.findall(r"`([^`]+)`", row)]
-    assert {parse(word).kind.pattern for word in told} == {kind.pattern for kind in KINDS.values()}
+    assert {GRAMMAR.parse(word).kind.pattern for word in told} == {
+        kind.pattern for kind in KINDS.values()
+    }
 
 
 def test_all_words_are_told() -> None:

@@ -86,7 +86,7 @@ async def test_odometry_may_jump(ros: RosRuntime, odometry: Heard) -> None:
 async def test_wheels_that_are_stuck_do_not_obey(ros: RosRuntime, odometry: Heard) -> None:
     motions = Heard(ros, UInt32, "/ugv1/motions", qos.STATUS)
     before = (await until(lambda: motions.last)).data
-    await switch(ros, "ugv1: wheels stuck for 30 s")
+    await switch(ros, "ugv1: stuck for 30 s")
     async with Joystick(ros, "/ugv1/cmd_vel", 1.0):
         await until(lambda: ros.node.count_subscribers("/ugv1/cmd_vel"))
         seen = len(odometry)
@@ -142,7 +142,7 @@ async def test_a_node_may_die_and_come_back_where_it_was(ros: RosRuntime, odomet
     ("words", "reason"),
     [
         ("ugv1: sulk", "'sulk' is no action. Actions: silent; kill"),
-        ("ugv7: silent", "there is no vehicle 'ugv7'; there are: ugv1, ugv2"),
+        ("ugv7: silent", "there is no vehicle ugv7; there are: ugv1, ugv2"),
         ("ugv1: lie", "ugv1 is a plain base"),
     ],
 )

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from m2pem_plugin_ros.settings import DriverName, Settings
 from m2pem_plugin_ros.simulator.dynamics import Chassis
-from m2pem_plugin_ros.simulator.faults import KINDS, FaultError, TrafficFaults, parse
+from m2pem_plugin_ros.simulator.faults import GRAMMAR, KINDS, TrafficFaults, check
 from m2pem_plugin_ros.simulator.sensors import DetectorSpec, Target
 from m2pem_plugin_ros.simulator.specification import (
     SettingError,
@@ -16,6 +16,8 @@ from m2pem_plugin_ros.simulator.specification import (
     detector,
 )
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
+
+from m2pem.api.faults import FaultError
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 
@@ -158,7 +160,7 @@ class Patient:
         "stop odometry",
         "freeze odometry",
         "odometry nan",
-        "wheels stuck",
+        "stuck",
         "lose gps",
         "refuse",
         "never accept",
@@ -171,29 +173,29 @@ class Patient:
     ],
 )
 def test_what_a_fault_begins_it_ends(words: str) -> None:
-    patient, fault = Patient(), parse(f"evsg1: {words} at 2 s for 3 s")
+    patient, fault = Patient(), GRAMMAR.parse(f"evsg1: {words} at 2 s for 3 s")
     well = patient.state
-    assert (fault.vehicles, fault.at_s, fault.for_s) == (("evsg1",), 2.0, 3.0)
-    assert fault.end is not None
-    fault.begin(patient)
+    assert (fault.targets, fault.at_s, fault.for_s) == (("evsg1",), 2.0, 3.0)
+    assert fault.effect.end is not None
+    fault.effect.begin(patient)
     assert str(patient.state) != str(well)
-    fault.end(patient)
+    fault.effect.end(patient)
     assert patient.state == well
 
 
 @pytest.mark.parametrize("words", ["kill", "kill node"])
 def test_nodes_that_were_ended_begin_again(words: str) -> None:
-    patient, fault = Patient(), parse(words)
-    fault.begin(patient)
-    assert fault.end is not None
-    fault.end(patient)
+    patient, fault = Patient(), GRAMMAR.parse(words)
+    fault.effect.begin(patient)
+    assert fault.effect.end is not None
+    fault.effect.end(patient)
     assert patient.nodes == [words, "start"]
 
 
 def test_numbers_in_faults_count() -> None:
     patient = Patient()
     for words in ('refuse "too wet"', "flood 100", "battery 30 %", "jump 7.5 m", "detect mine"):
-        parse(words).begin(patient)
+        GRAMMAR.parse(words).effect.begin(patient)
     assert patient.traffic_faults == TrafficFaults(refusal="too wet", flood_per_s=100.0)
     assert patient.vehicle.battery.fraction == 0.3
     assert patient.vehicle.odometer.read(0).pose.north_m == pytest.approx(7.5)
@@ -204,13 +206,13 @@ def test_a_nav2_that_is_dead_takes_no_harm() -> None:
     patient = Patient()
     patient.navigation = None
     for words in ("nav2 inactive", "nav2 reject"):
-        parse(words).begin(patient)
+        GRAMMAR.parse(words).effect.begin(patient)
 
 
 def test_every_fault_can_be_written_as_it_is_listed() -> None:
     for listed in KINDS:
         for words in listed.split(", "):
-            assert parse(words).text == words
+            assert GRAMMAR.parse(words).text == words
 
 
 @pytest.mark.parametrize(
@@ -225,7 +227,7 @@ def test_every_fault_can_be_written_as_it_is_listed() -> None:
 )
 def test_faults_that_make_no_sense_are_refused(words: str, said: str) -> None:
     with pytest.raises(FaultError) as caught:
-        parse(words)
+        GRAMMAR.parse(words)
     assert said in str(caught.value)
 
 
@@ -239,11 +241,11 @@ def test_faults_that_make_no_sense_are_refused(words: str, said: str) -> None:
 )
 def test_faults_of_nodes_need_such_a_node(words: str, driver: DriverName, said: str) -> None:
     with pytest.raises(FaultError) as caught:
-        parse(words).check(spec(driver))
+        check(GRAMMAR.parse(words), spec(driver))
     assert said in str(caught.value)
 
 
 def test_detecting_needs_a_detector() -> None:
-    parse("detect").check(spec())
+    check(GRAMMAR.parse("detect"), spec())
     with pytest.raises(FaultError, match="evsg1 carries no detector"):
-        parse("detect").check(spec(detects=False))
+        check(GRAMMAR.parse("detect"), spec(detects=False))

@@ -3,14 +3,16 @@
 import asyncio
 import difflib
 import math
-import re
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import astuple, replace
 from urllib.parse import urlsplit
 
 import click
 
-from m2pem_plugin_mavlink.simulator.faults import FaultError, PlannedFault, parse
+from m2pem.api import GeoPosition
+from m2pem.api.command_options import DurationOption, FaultOption, PositionOption
+from m2pem.api.faults import PlannedFault
+from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, Faults
 from m2pem_plugin_mavlink.simulator.firmware import FIRMWARES
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
 from m2pem_plugin_mavlink.simulator.server import Address
@@ -21,7 +23,6 @@ APART_M = 5.0
 """Vehicles stand in a row, so far from each other."""
 MOST_SYSTEMS = 250
 """Ground stations have the numbers above."""
-UNITS_S = {"s": 1.0, "ms": 0.001, "min": 60.0, "": 1.0}
 
 
 class UdpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
@@ -43,26 +44,6 @@ class UdpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks hav
         self.fail(f"{value!r} is not a UDP address such as udp://127.0.0.1:14550", param, ctx)
 
 
-class Place(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """LAT,LON or LAT,LON,ALT."""
-
-    name = "lat,lon,alt"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Location:
-        """WGS-84 in degrees; metres above mean sea level."""
-        if isinstance(value, Location):
-            return value
-        try:
-            latitude, longitude, altitude = (*map(float, str(value).split(",")), 0.0)[:3]
-        except ValueError:
-            self.fail(f"{value!r} is not LAT,LON,ALT, such as 47.39,8.54,488", param, ctx)
-        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-            self.fail(f"{value!r} is not on Earth", param, ctx)
-        return Location(latitude, longitude, altitude)
-
-
 class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
     """NAME=VALUE."""
 
@@ -81,38 +62,6 @@ class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have
         except ValueError:
             pass
         self.fail(f"{value!r} is not NAME=VALUE, such as FS_GCS_ENABLE=1", param, ctx)
-
-
-class Duration(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """Seconds, or with a unit: 6s, 500ms, 1min."""
-
-    name = "duration"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """In seconds."""
-        match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|ms|min|)", str(value))
-        if match is None:
-            self.fail(f"{value!r} is not a duration such as 6s", param, ctx)
-        return float(match[1]) * UNITS_S[match[2]]
-
-
-class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A fault in words, such as 1: cut link at 40 s for 600 s."""
-
-    name = "fault"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> PlannedFault:
-        """When and where it happens."""
-        if isinstance(value, PlannedFault):
-            return value
-        try:
-            return parse(str(value))
-        except FaultError as error:
-            self.fail(str(error), param, ctx)
 
 
 @click.command()
@@ -141,14 +90,13 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
 )
 @click.option(
     "--home",
-    type=Place(),
-    default=ZURICH,
+    type=PositionOption(),
     help="Where the first vehicle stands.  [default: Zurich]",
 )
 @click.option(
     "--ekf",
     "estimator_s",
-    type=Duration(),
+    type=DurationOption(),
     default="41s",
     show_default=True,
     help="Until vehicles know where they are, in simulated time.",
@@ -173,7 +121,7 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
 @click.option(
     "--fault",
     "faults",
-    type=Fault(),
+    type=FaultOption(GRAMMAR),
     multiple=True,
     help='What goes wrong, such as "1: cut link at 40 s for 600 s": [VEHICLES:] ACTION '
     "[at SECONDS s after it was first armed] [for SECONDS s]. May be given more than once.",
@@ -186,14 +134,14 @@ def mavlink(
     speed: float,
     to: Address,
     listen: Address | None,
-    home: Location,
+    home: GeoPosition | None,
     estimator_s: float,
     first_system: int,
     firmware: str,
     parameters: tuple[tuple[str, float], ...],
     camera: bool,
     gimbal: bool,
-    faults: tuple[PlannedFault, ...],
+    faults: tuple[PlannedFault[Faults], ...],
 ) -> None:
     """Simulate MAVLink vehicles over UDP, as ArduPilot or PX4 speaks, until Ctrl-C.
 
@@ -208,7 +156,7 @@ def mavlink(
     if first_system + len(kinds) - 1 > MOST_SYSTEMS:
         raise click.UsageError(f"system ids go to {MOST_SYSTEMS}: these are too many vehicles")
     like = VehicleSpec(
-        home=home,
+        home=ZURICH if home is None else Location(*astuple(home)),
         estimator_s=estimator_s,
         firmware=firmware,
         parameters=dict(parameters),

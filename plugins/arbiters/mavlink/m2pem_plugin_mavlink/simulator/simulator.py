@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import TracebackType
 from typing import Self
 
+from m2pem.api.faults import PlannedFault
 from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
-from m2pem_plugin_mavlink.simulator.faults import FaultError, Faults, PlannedFault
+from m2pem_plugin_mavlink.simulator.faults import Faults, plan
 from m2pem_plugin_mavlink.simulator.geometry import Location
 from m2pem_plugin_mavlink.simulator.server import Address, VehiclePort
 from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
@@ -108,20 +109,15 @@ class Simulator:
         self._moved = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
-    def plan(self, faults: Iterable[PlannedFault]) -> None:
+    def plan(self, faults: Iterable[PlannedFault[Faults]]) -> None:
         """Let faults happen to vehicles when their time comes.
 
         Raises:
             FaultError: it is for a vehicle that is not there, or cannot happen to it.
         """
         for fault in faults:
-            for system in self._vehicles if fault.systems is None else fault.systems:
-                if system not in self._vehicles:
-                    known = ", ".join(map(str, self._vehicles))
-                    raise FaultError(
-                        f"fault {fault.text!r}: there is no vehicle {system}; there are: {known}"
-                    )
-                fault.plan(self._vehicles[system].faults)
+            for system in fault.targets_among([*map(str, self._vehicles)]):
+                plan(fault, self._vehicles[int(system)].faults)
 
     def __getitem__(self, system: int) -> SimulatedVehicle:
         return self._vehicles[system]

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId
+from m2pem.api.command_options import PositionOption
 from m2pem.errors import PluginError
-from m2pem_plugin_ros.command_options import Place
 from m2pem_plugin_ros.loopback import keep_on_loopback
 from m2pem_plugin_ros.settings import DriverName, Settings, read_settings
 
@@ -49,7 +49,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
 )
 @click.option(
     "--origin",
-    type=Place(),
+    type=PositionOption(),
     required=True,
     help="Of the frame map of its odometry: the fleet's origin.",
 )

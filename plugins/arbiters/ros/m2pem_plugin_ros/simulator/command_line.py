@@ -12,12 +12,13 @@ from typing import Any
 import click
 
 from m2pem.api import GeoPosition
+from m2pem.api.command_options import FaultOption, PositionOption
+from m2pem.api.faults import FaultError, PlannedFault
 from m2pem.errors import PluginError
-from m2pem_plugin_ros.command_options import Place
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.loopback import keep_on_loopback
 from m2pem_plugin_ros.settings import DriverName
-from m2pem_plugin_ros.simulator.faults import DRIVER_TEXTS, FaultError, PlannedFault, parse
+from m2pem_plugin_ros.simulator.faults import DRIVER_TEXTS, GRAMMAR, FaultTarget
 from m2pem_plugin_ros.simulator.fleet import make_default_vehicles
 from m2pem_plugin_ros.simulator.sensors import Target
 from m2pem_plugin_ros.simulator.specification import FORT, SettingError, VehicleSpec
@@ -55,23 +56,7 @@ class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks 
         kind, at, place = str(value).partition("@")
         if not (kind.strip() and at):
             self.fail(f"{value!r} is not TYPE@LAT,LON, such as gpr@38.1,-77.3", param, ctx)
-        return kind.strip(), Place().convert(place, param, ctx)
-
-
-class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A fault as text, such as evsg1: silent at 20 s for 5 s."""
-
-    name = "fault"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> PlannedFault:
-        if isinstance(value, PlannedFault):
-            return value
-        try:
-            return parse(str(value))
-        except FaultError as error:
-            self.fail(str(error), param, ctx)
+        return kind.strip(), PositionOption().convert(place, param, ctx)
 
 
 @click.command()
@@ -88,7 +73,9 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
     type=click.Choice([str(each) for each in DriverName]),
     help="How vehicles without a fleet are reached.  [default: m2pem]",
 )
-@click.option("--home", type=Place(), help="Where the first vehicle without a fleet stands.")
+@click.option(
+    "--home", type=PositionOption(), help="Where the first vehicle without a fleet stands."
+)
 @click.option(
     "--target",
     "targets",
@@ -118,7 +105,7 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
 @click.option(
     "--fault",
     "faults",
-    type=Fault(),
+    type=FaultOption(GRAMMAR),
     multiple=True,
     help='What goes wrong, such as "evsg1: silent at 20 s for 5 s": [VEHICLES:] ACTION '
     "[at SECONDS s] [for SECONDS s]. May be given more than once; also a line of standard input.",
@@ -133,7 +120,7 @@ def ros(
     speed: float,
     domain_id: int | None,
     words: tuple[tuple[str, str], ...],
-    faults: tuple[PlannedFault, ...],
+    faults: tuple[PlannedFault[FaultTarget], ...],
 ) -> None:
     """Simulate ROS vehicles, on 127.0.0.1 alone, until Ctrl-C.
 
@@ -200,11 +187,12 @@ def _crew(
 
 
 async def _run(
-    specs: list[VehicleSpec], speed: float, domain_id: int | None, faults: Iterable[PlannedFault]
+    specs: list[VehicleSpec],
+    speed: float,
+    domain_id: int | None,
+    faults: Iterable[PlannedFault[FaultTarget]],
 ) -> None:
     from m2pem_plugin_ros.simulator.simulation import Simulation  # noqa: PLC0415  # imports rclpy
-
-    pass
 
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -217,7 +205,7 @@ async def _run(
 
         def hear(line: str) -> None:
             try:
-                vehicles.plan(parse(line))
+                vehicles.plan(GRAMMAR.parse(line))
             except FaultError as error:
                 click.echo(f"m2pem: {error}", err=True)
             else:

@@ -5,14 +5,16 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import TimeoutError as NoAnswerError
 from dataclasses import replace
+from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
 from rcl_interfaces.msg import SetParametersResult
 
+from m2pem.api.faults import FaultError, FaultSchedule, PlannedFault
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.simulator.clock import SimulatedClock
-from m2pem_plugin_ros.simulator.faults import FaultError, PlannedFault, parse
+from m2pem_plugin_ros.simulator.faults import GRAMMAR, FaultTarget, check
 from m2pem_plugin_ros.simulator.host import SimulatedVehicle
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
@@ -47,7 +49,7 @@ class Simulation:
         *,
         speed: float = 1.0,
         domain_id: int | None = None,
-        faults: Iterable[PlannedFault] = (),
+        faults: Iterable[PlannedFault[FaultTarget]] = (),
         seed: int = 0,
     ) -> None:
         _check(specs)
@@ -55,7 +57,7 @@ class Simulation:
         self._specs, self._domain_id, self._seed = specs, domain_id, seed
         self._hosts: dict[str, SimulatedVehicle] = {}
         self._runtimes: dict[int | None, RosRuntime] = {}
-        self._events: list[tuple[float, Callable[[], None]]] = []
+        self._schedule = FaultSchedule()
         self._planned = tuple(faults)
         for fault in self._planned:
             self.check(fault)
@@ -107,42 +109,31 @@ class Simulation:
 
     # --- faults -----------------------------------------------------------------------------------
 
-    def check(self, fault: PlannedFault) -> None:
+    def check(self, fault: PlannedFault[FaultTarget]) -> None:
         """Check that a fault can happen.
 
         Raises:
             FaultError: one of its vehicles is not there, or it cannot happen to it.
         """
         specs = {spec.name: spec for spec in self._specs}
-        for name in fault.vehicles or specs:
-            if name not in specs:
-                known = ", ".join(specs)
-                raise FaultError(
-                    f"fault {fault.text!r}: there is no vehicle {name!r}; there are: {known}"
-                )
-            fault.check(specs[name])
+        for name in fault.targets_among(specs):
+            check(fault, specs[name])
 
-    def plan(self, fault: PlannedFault) -> None:
+    def plan(self, fault: PlannedFault[FaultTarget]) -> None:
         """Plan a fault. Its time counts from now.
 
         Raises:
             FaultError: one of its vehicles is not there, or it cannot happen to it.
         """
         self.check(fault)
-        for simulated in [self[name] for name in fault.vehicles or self._hosts]:
-            self._after(fault.at_s, lambda simulated=simulated: self._begin(fault, simulated))  # type: ignore[misc]
+        for name in fault.targets_among(self._hosts):
+            self._after(fault.at_s or 0.0, partial(fault.start, self[name], self._after))
 
-    def _begin(self, fault: PlannedFault, simulated: SimulatedVehicle) -> None:
-        fault.begin(simulated)
-        end = fault.end
-        if end is not None and fault.for_s is not None:
-            self._after(fault.for_s, lambda: end(simulated))
-
-    def _after(self, seconds: float, action: Callable[[], None]) -> None:
+    def _after(self, seconds: float, call: Callable[[], object]) -> None:
         if seconds <= 0:
-            action()
+            call()
         else:
-            self._events.append((self._now_s + seconds, action))
+            self._schedule.at(self._now_s + seconds, call)
 
     # --- time -------------------------------------------------------------------------------------
 
@@ -159,14 +150,7 @@ class Simulation:
             for simulated in self:
                 simulated.step(self._now_s, wall_s - last_s)
             last_s = wall_s
-            self._do_what_is_due()
-
-    def _do_what_is_due(self) -> None:
-        due = [each for each in self._events if each[0] <= self._now_s]
-        if due:
-            self._events = [each for each in self._events if each[0] > self._now_s]
-            for _, action in sorted(due, key=lambda each: each[0]):
-                action()
+            self._schedule.run_until(self._now_s)
 
     # --- ROS --------------------------------------------------------------------------------------
 
@@ -213,7 +197,7 @@ logger = logging.getLogger(__name__)
 class FaultParameter:
     """The ROS parameter `fault`. Setting it plans a fault, or fails with what is wrong."""
 
-    def __init__(self, node: Any, plan: Callable[[PlannedFault], None]) -> None:
+    def __init__(self, node: Any, plan: Callable[[PlannedFault[FaultTarget]], None]) -> None:
         self._loop = asyncio.get_running_loop()
         self._plan = plan
         node.declare_parameter(PARAMETER, "")
@@ -234,5 +218,5 @@ class FaultParameter:
         return SetParametersResult(successful=True)
 
     async def _begin(self, text: str) -> None:
-        self._plan(parse(text))
+        self._plan(GRAMMAR.parse(text))
         logger.info("fault: %s", text)

@@ -4,17 +4,16 @@ Every run is the same: random choices have a seed.
 """
 
 from m2pem_plugin_mavlink.simulator.faults.faults import Direction, Faults
-from m2pem_plugin_mavlink.simulator.faults.grammar import FaultError, PlannedFault, parse
+from m2pem_plugin_mavlink.simulator.faults.grammar import GRAMMAR, plan
 from m2pem_plugin_mavlink.simulator.faults.link import LinkFaults, Rate, every, share
 
 __all__ = [
+    "GRAMMAR",
     "Direction",
-    "FaultError",
     "Faults",
     "LinkFaults",
-    "PlannedFault",
     "Rate",
     "every",
-    "parse",
+    "plan",
     "share",
 ]

@@ -12,13 +12,14 @@ from enum import StrEnum
 from random import Random
 from typing import Any
 
+from m2pem.api.faults import FaultSchedule
 from m2pem_plugin_mavlink.simulator.faults.link import NO_FAULTS, FaultyWire
 from m2pem_plugin_mavlink.simulator.interfaces import CommandRefusal
 from m2pem_plugin_mavlink.simulator.messages import Result
 from m2pem_plugin_mavlink.simulator.missions.plan import MISSION, Item
 from m2pem_plugin_mavlink.simulator.server import VehiclePort
 
-Action = Callable[["Faults"], None]
+Action = Callable[["Faults"], object]
 
 LOW = 0.069
 """So full is a low battery: below ArduPilot's threshold, and critical for PX4."""
@@ -41,7 +42,7 @@ class Faults:
         self._sent = FaultyWire(port.outward.deliver, Random(f"{seed}/{system}/sent"))
         self._received = FaultyWire(port.inward.deliver, Random(f"{seed}/{system}/received"))
         port.outward, port.inward = self._sent, self._received
-        self._timed: list[tuple[float, Action]] = []
+        self._schedule = FaultSchedule()
         self._after_arming: list[tuple[float, Action]] = []
         self._armed_s: float | None = None
 
@@ -141,14 +142,14 @@ class Faults:
 
     def after(self, seconds: float, action: Action) -> None:
         """Do something later."""
-        self._timed.append((self.autopilot.now_s + seconds, action))
+        self._schedule.at(self.autopilot.now_s + seconds, lambda: action(self))
 
     def after_arming(self, seconds: float, action: Action) -> None:
         """Do something so long after the vehicle was armed for the first time."""
         if self._armed_s is None:
             self._after_arming.append((seconds, action))
         else:
-            self._timed.append((self._armed_s + seconds, action))
+            self._schedule.at(self._armed_s + seconds, lambda: action(self))
 
     def step(self) -> None:
         """Do what is due."""
@@ -157,9 +158,7 @@ class Faults:
             events = autopilot.log.events
             first_s = next((each.at_s for each in events if each.kind == "armed"), autopilot.now_s)
             self._armed_s = first_s
-            self._timed += [(first_s + seconds, action) for seconds, action in self._after_arming]
+            for seconds, action in self._after_arming:
+                self.after_arming(seconds, action)
             self._after_arming.clear()
-        due = [each for each in self._timed if each[0] <= autopilot.now_s]
-        self._timed = [each for each in self._timed if each[0] > autopilot.now_s]
-        for _, action in sorted(due, key=lambda each: each[0]):
-            action(self)
+        self._schedule.run_until(autopilot.now_s)

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
+from m2pem.api.command_options import DurationOption, FaultOption
+from m2pem.api.faults import PlannedFault
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.onvif.settings import read_credentials
 from m2pem_plugin_ptz.simulator.onvif.camera import Account, CameraSpec
-from m2pem_plugin_ptz.simulator.onvif.faults import FaultTextError, PlannedFault, parse
+from m2pem_plugin_ptz.simulator.onvif.faults import GRAMMAR, Faults
 from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 
 Address = tuple[str, int]
-UNITS_S = {"s": 1.0, "ms": 0.001, "": 1.0}
 
 
 class HttpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
@@ -33,20 +34,6 @@ class HttpAddress(click.ParamType):  # type: ignore[type-arg]  # older clicks ha
         return ("127.0.0.1" if host == "localhost" else host), int(match[2])
 
 
-class Seconds(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """Seconds, or with a unit: 50ms; a clock that is behind has a minus: -3600s."""
-
-    name = "duration"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        match = re.fullmatch(r"([+-]?\d+(?:\.\d+)?)\s*(s|ms|)", str(value))
-        if match is None:
-            self.fail(f"{value!r} is not a duration such as 50ms or 3600s", param, ctx)
-        return float(match[1]) * UNITS_S[match[2]]
-
-
 class Range(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
     """LOW,HIGH in degrees."""
 
@@ -64,22 +51,6 @@ class Range(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
         if not -360 <= low < high <= 360:
             self.fail(f"{value!r}: it goes up from LOW to HIGH, within -360 to 360", param, ctx)
         return low, high
-
-
-class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A fault as text, such as silent at 10 s for 5 s."""
-
-    name = "fault"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> PlannedFault:
-        if isinstance(value, PlannedFault):
-            return value
-        try:
-            return parse(str(value))
-        except FaultTextError as error:
-            self.fail(str(error), param, ctx)
 
 
 @click.command()
@@ -110,13 +81,24 @@ class Fault(click.ParamType):  # type: ignore[type-arg]  # older clicks have it 
 @click.option("--generic", is_flag=True, help="It counts from -1 to 1 only, not in degrees.")
 @click.option("--no-recording", is_flag=True, help="It has no recording control.")
 @click.option(
-    "--latency", "latency_s", type=Seconds(), default="50ms", show_default=True, help="Of answers."
+    "--latency",
+    "latency_s",
+    type=DurationOption(),
+    default="50ms",
+    show_default=True,
+    help="Of answers.",
 )
-@click.option("--clock", "skew_s", type=Seconds(), default="0s", help="How far its clock is ahead.")
+@click.option(
+    "--clock",
+    "skew_s",
+    type=DurationOption(negative=True),
+    default="0s",
+    help="How far its clock is ahead.",
+)
 @click.option(
     "--fault",
     "faults",
-    type=Fault(),
+    type=FaultOption(GRAMMAR),
     multiple=True,
     help='What goes wrong, such as "silent at 10 s for 5 s": ACTION [at SECONDS s] '
     "[for SECONDS s]. May be given more than once.",
@@ -133,7 +115,7 @@ def onvif(
     no_recording: bool,
     latency_s: float,
     skew_s: float,
-    faults: tuple[PlannedFault, ...],
+    faults: tuple[PlannedFault[Faults], ...],
 ) -> None:
     """Simulate a camera that turns, zooms and speaks ONVIF over HTTP, until Ctrl-C.
 
@@ -163,7 +145,7 @@ def onvif(
         raise click.ClickException(f"cannot listen at {host}:{port}: {error.strerror}") from error
 
 
-async def _run(server: OnvifServer, faults: tuple[PlannedFault, ...]) -> None:
+async def _run(server: OnvifServer, faults: tuple[PlannedFault[Faults], ...]) -> None:
     async with server:
         click.echo(f"camera  http://{server.host}:{server.port}/onvif/device_service")
         for fault in faults:

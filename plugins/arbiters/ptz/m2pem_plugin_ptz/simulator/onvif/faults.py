@@ -6,18 +6,13 @@ A fault without `at` begins at once, one without `for` stays.
 import asyncio
 import re
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 
+from m2pem.api.faults import NUMBER, Effect, FaultGrammar, FaultKind, PlannedFault, fixed
 from m2pem_plugin_ptz.simulator.onvif.camera import Camera
 
 REBOOT_S = 5.0
-EXAMPLE = '"silent at 10 s for 5 s"'
 
 Switch = Callable[[], Awaitable[None]]
-
-
-class FaultTextError(ValueError):
-    """The text is not a fault; the message says what is right."""
 
 
 class Faults:
@@ -46,8 +41,8 @@ class Faults:
         self._camera.advance()
         self._camera.gimbal.pan.stuck = self._camera.gimbal.tilt.stuck = on
 
-    def fault(self, text: str) -> None:
-        """Answer moves with a fault; "" ends it."""
+    def refuse(self, text: str) -> None:
+        """Answer moves with a SOAP fault; "" ends it."""
         self._camera.fault_state.fault = text
 
     def clock(self, seconds: float) -> None:
@@ -63,9 +58,9 @@ class Faults:
         self._camera.restart()
         await self._on()
 
-    def plan(self, fault: "PlannedFault") -> None:
+    def plan(self, fault: PlannedFault["Faults"]) -> None:
         """Plan a fault. Its time counts from now."""
-        task = asyncio.get_running_loop().create_task(fault.happen(self))
+        task = asyncio.get_running_loop().create_task(_happen(fault, self))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
@@ -76,88 +71,49 @@ class Faults:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
 
-Action = Callable[[Faults], Awaitable[None] | None]
+async def _happen(fault: PlannedFault[Faults], faults: Faults) -> None:
+    """Wait for the time of a fault, and apply it."""
+    await asyncio.sleep(fault.at_s or 0.0)
+    await _done(fault.effect.begin(faults))
+    if fault.for_s is not None and fault.effect.end is not None:
+        await asyncio.sleep(fault.for_s)
+        await _done(fault.effect.end(faults))
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedFault:
-    """`begin` after `at_s` seconds, and `end` after `for_s` more (None: never)."""
-
-    begin: Action
-    end: Action
-    at_s: float = 0.0
-    for_s: float | None = None
-
-    async def happen(self, faults: Faults) -> None:
-        """Wait for the time of the fault, and apply it."""
-        await asyncio.sleep(self.at_s)
-        await _done(self.begin(faults))
-        if self.for_s is not None:
-            await asyncio.sleep(self.for_s)
-            await _done(self.end(faults))
-
-
-async def _done(result: Awaitable[None] | None) -> None:
-    if result is not None:
+async def _done(result: object) -> None:
+    if isinstance(result, Awaitable):
         await result
 
 
-_NUMBER = r"(-?\d+(?:\.\d+)?)"
-_ACTIONS: dict[str, tuple[str, Callable[[re.Match[str]], tuple[Action, Action]]]] = {
-    "silent": (
-        "silent",
-        lambda _: (lambda faults: faults.silent(True), lambda faults: faults.silent(False)),
-    ),
-    "slow 2 s": (
-        rf"slow\s+{_NUMBER}\s*s",
-        lambda match: (
-            lambda faults: faults.slow(float(match[1])),
-            lambda faults: faults.slow(0.0),
-        ),
-    ),
-    "refuse auth": (
-        r"refuse\s+auth",
-        lambda _: (lambda faults: faults.locked(True), lambda faults: faults.locked(False)),
-    ),
-    "stuck": (
-        "stuck",
-        lambda _: (lambda faults: faults.stuck(True), lambda faults: faults.stuck(False)),
-    ),
-    'fault "text"': (
-        r"fault\s+\"([^\"]+)\"",
-        lambda match: (lambda faults: faults.fault(match[1]), lambda faults: faults.fault("")),
-    ),
-    "clock +3600 s": (
-        rf"clock\s+\+?{_NUMBER}\s*s",
-        lambda match: (
-            lambda faults: faults.clock(float(match[1])),
-            lambda faults: faults.clock(-float(match[1])),
-        ),
-    ),
-    "reboot": ("reboot", lambda _: (Faults.switch_off, Faults.switch_on)),
-}
-_SHAPE = re.compile(
-    rf"(?P<what>.*?)(?:\s+at\s+{_NUMBER}\s*s)?(?:\s+for\s+{_NUMBER}\s*s)?", re.DOTALL
+Match = re.Match[str]
+
+
+def _slow(match: Match) -> Effect[Faults]:
+    return Effect(lambda faults: faults.slow(float(match[1])), lambda faults: faults.slow(0.0))
+
+
+def _refuse(match: Match) -> Effect[Faults]:
+    return Effect(lambda faults: faults.refuse(match[1]), lambda faults: faults.refuse(""))
+
+
+def _clock(match: Match) -> Effect[Faults]:
+    seconds = float(match[1])
+    return Effect(lambda faults: faults.clock(seconds), lambda faults: faults.clock(-seconds))
+
+
+def _switch(switch: Callable[[Faults, bool], None]) -> Callable[[Match], Effect[Faults]]:
+    return fixed(lambda faults: switch(faults, True), lambda faults: switch(faults, False))
+
+
+GRAMMAR = FaultGrammar(
+    {
+        "silent": FaultKind("silent", _switch(Faults.silent)),
+        "slow 2 s": FaultKind(rf"slow\s+{NUMBER}\s*s", _slow),
+        "refuse auth": FaultKind(r"refuse\s+auth", _switch(Faults.locked)),
+        'refuse "text"': FaultKind(r"refuse\s+\"([^\"]+)\"", _refuse),
+        "stuck": FaultKind("stuck", _switch(Faults.stuck)),
+        "clock +3600 s": FaultKind(r"clock\s+([+-]?\d+(?:\.\d+)?)\s*s", _clock),
+        "reboot": FaultKind("reboot", fixed(Faults.switch_off, Faults.switch_on), REBOOT_S),
+    },
+    "silent at 10 s for 5 s",
 )
-
-
-def parse(text: str) -> PlannedFault:
-    """Read `ACTION [at SECONDS s] [for SECONDS s]`.
-
-    Raises:
-        FaultWordsError: it is something else.
-    """
-    shape = _SHAPE.fullmatch(text.strip())
-    assert shape is not None, "the pattern takes anything"
-    what = shape["what"].strip()
-    at_s, for_s = (None if each is None else float(each) for each in shape.groups()[1:])
-    for known, (pattern, make) in _ACTIONS.items():
-        match = re.fullmatch(pattern, what, re.IGNORECASE)
-        if match is not None:
-            if known == "reboot" and for_s is None:
-                for_s = REBOOT_S
-            return PlannedFault(*make(match), at_s or 0.0, for_s)
-    raise FaultTextError(
-        f"{text!r}: {what!r} is no action. Actions: {'; '.join(_ACTIONS)}. Then 'at 10 s' "
-        f"(without: at once) and 'for 5 s' (without: for good), such as {EXAMPLE}"
-    )
