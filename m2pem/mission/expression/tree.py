@@ -218,7 +218,7 @@ def names(node: Node) -> frozenset[str]:
     if isinstance(node, Literal):
         return _NO_NAMES
     found: set[str] = set()
-    waiting = [node]
+    waiting: list[Node] = [node]
     while waiting:
         current = waiting.pop()
         if isinstance(current, Name):
