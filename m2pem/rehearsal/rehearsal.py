@@ -317,7 +317,11 @@ class _Rehearsal:
 
     def _give_up(self, executive: Executive, runner: Runner, ahead_s: float | None) -> bool:
         """Called when nothing is ready: end the run if nothing that is scheduled can change it."""
-        if runner.run.state.status is not EngineStatus.RUNNING:
+        status = runner.run.state.status
+        if status is EngineStatus.PAUSED and ahead_s is None and not self._answers.to_send:
+            runner.post(GiveUp("the run is paused, and nothing resumes it"))
+            return True
+        if status is not EngineStatus.RUNNING:
             return False
         if self._expects(executive, runner):
             self._quiet_since_us = None

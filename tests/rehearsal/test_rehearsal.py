@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from m2pem.engine.records import (
     FlowTaken,
     Record,
     RunEnded,
+    RunPaused,
     ServiceEnded,
     SignalThrown,
     TokenEntered,
@@ -473,6 +475,17 @@ def test_a_loop_that_takes_no_time_is_bounded_by_its_steps(play: Rehearse, max_s
     assert f"the {max_steps} steps that are allowed" in result.summary.detail
     # Three records a step; steps are bounded in batches.
     assert 3 * max_steps <= result.summary.records <= 3 * (max_steps + 10_000)
+
+
+def test_a_run_that_is_paused_as_it_never_waits_fails_and_says_so(play: Rehearse) -> None:
+    body = '<exclusiveGateway id="G"/><task id="T"/>'
+    flows = flow("S", "G") + flow("G", "E", "over") + flow("G", "T") + flow("T", "G")
+    bounded = replace(fleet(), steps_between_waits=200)
+    result = play(process(body + flows), "", bounded)
+    ((_, paused),) = of(result, RunPaused)
+    assert "steps and did not wait once" in paused.by
+    assert result.summary.status is RunStatus.FAILED
+    assert result.summary.detail == "the run is paused, and nothing resumes it"
 
 
 def test_a_loop_that_takes_time_is_bounded_too(play: Rehearse) -> None:
