@@ -59,6 +59,13 @@ if TYPE_CHECKING:
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.ocu import Ocu
+    from m2pem.api.operations import (
+        MAX_DATA_VALUES,
+        MAX_NAME_CHARACTERS,
+        MAX_REASON_CHARACTERS,
+        OPERATIONS,
+        Operation,
+    )
     from m2pem.api.run_view import RunView
     from m2pem.api.service import Service, ServiceContext, ServiceError
     from m2pem.api.telemetry import (
@@ -122,6 +129,9 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.ocu": "Ocu",
+    "m2pem.api.operations": (
+        "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
+    ),
     "m2pem.api.run_view": "RunView",
     "m2pem.api.service": "Service ServiceContext ServiceError",
     "m2pem.api.telemetry": (
@@ -152,6 +162,10 @@ _MODULES = {
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
+    "MAX_DATA_VALUES",
+    "MAX_NAME_CHARACTERS",
+    "MAX_REASON_CHARACTERS",
+    "OPERATIONS",
     "SHARED",
     "AddressedArbiter",
     "AdjustingArbiter",
@@ -203,6 +217,7 @@ __all__ = [
     "Ocu",
     "OcuCapabilities",
     "OpenPrompt",
+    "Operation",
     "Outline",
     "OutlineElement",
     "OutlineProcess",

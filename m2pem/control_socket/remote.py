@@ -10,13 +10,25 @@ from typing import Any, cast
 import msgspec
 
 from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId
+from m2pem.api.operations import OPERATIONS, STREAMED, MissionFiles, Operation
 from m2pem.bpmn import parse_mission
-from m2pem.control_socket.operations import OPERATIONS, REFUSED, STREAMED, MissionFiles, Operation
 from m2pem.control_socket.paths import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
 from m2pem.errors import OperatorError
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
+
+REFUSED = {
+    "start": "missions are started where the executive runs: m2pem run",
+    "check": "missions are checked where the executive runs: m2pem check",
+    "simulate": "missions are rehearsed where the executive runs: m2pem simulate",
+    "verify": "missions are verified where the executive runs: m2pem verify",
+    "editable": "missions are edited where the executive runs",
+    "outline": "missions are edited where the executive runs",
+    "geometries": "geometries are listed where the executive runs",
+    "services": "services are listed where the executive runs",
+}
+"""The methods of `MissionControl` that the socket does not serve, and where to ask instead."""
 
 
 class RemoteControl:

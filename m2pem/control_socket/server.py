@@ -16,7 +16,7 @@ from typing import Any, Self
 import msgspec
 
 from m2pem.api.control import MissionControl
-from m2pem.control_socket.operations import OPERATIONS, Operation
+from m2pem.api.operations import OPERATIONS, Operation
 from m2pem.control_socket.paths import ControlSocketError, address, live_sockets, make_place
 from m2pem.control_socket.protocol import (
     LONGEST_LINE_BYTES,

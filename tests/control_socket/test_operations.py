@@ -8,8 +8,8 @@ import msgspec
 import pytest
 
 from m2pem.api.control import MissionControl
-from m2pem.control_socket.operations import OPERATIONS, REFUSED, Operation
-from m2pem.control_socket.remote import RemoteControl
+from m2pem.api.operations import OPERATIONS, Operation
+from m2pem.control_socket.remote import REFUSED, RemoteControl
 
 ROOT = Path(__file__).parents[2]
 OPERATION = pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)

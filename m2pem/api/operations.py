@@ -1,7 +1,9 @@
-"""The operations of the control socket: one table that server, remote client and docs come from.
+"""The operations of `MissionControl`: one table, from which operators are served.
 
-An operation has the name of the method of `MissionControl` that it calls. Its parameters have the
-names of that method's arguments, except where the field of the struct says another one.
+The control socket, its client, the REST interface and the ROS services find here which operations
+there are and what parameters they take. An operation has the name of the method of `MissionControl`
+that it calls. Its parameters have the names of that method's arguments; over the socket a field may
+have another name.
 """
 
 from base64 import b64decode, b64encode
@@ -29,6 +31,12 @@ from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.library import Source
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
+
+MAX_NAME_CHARACTERS = 200
+MAX_REASON_CHARACTERS = 1000
+MAX_DATA_VALUES = 1000
+"""The longest name, the longest reason and the most values of `data` that are accepted from other
+machines (REST, ROS). The control socket serves processes of this user only, and bounds nothing."""
 
 
 class Params(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -218,15 +226,3 @@ OPERATIONS: dict[str, Operation] = {
 }
 """Calls are answered once; streams with null, and then with notifications of the same name until
 the caller hangs up."""
-
-REFUSED = {
-    "start": "missions are started where the executive runs: m2pem run",
-    "check": "missions are checked where the executive runs: m2pem check",
-    "simulate": "missions are rehearsed where the executive runs: m2pem simulate",
-    "verify": "missions are verified where the executive runs: m2pem verify",
-    "editable": "missions are edited where the executive runs",
-    "outline": "missions are edited where the executive runs",
-    "geometries": "geometries are listed where the executive runs",
-    "services": "services are listed where the executive runs",
-}
-"""The methods of `MissionControl` that the socket does not serve, and where to ask instead."""
