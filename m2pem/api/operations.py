@@ -89,7 +89,7 @@ class Message(Params, frozen=True):
     """As `MissionControl.message`."""
 
     message: str = msgspec.field(name="id")
-    run: str | None = None
+    run: str
     data: dict[str, Value] = msgspec.field(default_factory=dict)
     by: str = ""
 

@@ -3,8 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
+from m2pem.api import OPERATIONS
 from m2pem.control_socket import client
 from m2pem.errors import OperatorError
 from tests.cli.conftest import Invoke
@@ -16,6 +18,46 @@ CALLS = [
     ("continue r1", "resume", {}),
     ("stop r1 --reason rain", "stop", {"reason": "rain"}),
 ]
+
+OTHERWISE = {
+    "stop_all": "m2pem stop --all",
+    "set_geometry": "route, area and point in m2pem attach",
+    "take": "takeover in m2pem attach",
+    "preview_take": "takeover in m2pem attach",
+    "give_back": "handback in m2pem attach",
+    "holders": "who in m2pem attach",
+    "runs": "m2pem runs, and runs in m2pem attach",
+    "prompts": "m2pem attach shows them",
+    "subscribe": "m2pem attach shows what comes",
+    "records": "m2pem replay reads the journal",
+    "mission": "m2pem replay reads the journal",
+    "mission_time_s": "m2pem attach finds the executive of a run by it",
+    "wait": "m2pem run and m2pem resume wait in the executive",
+    "fleet": "m2pem fleet reads the file",
+    "catalogue": "m2pem fleet asks the arbiters of the file",
+    "telemetry": "the terminal unit in m2pem attach shows it",
+    "journal_file": "--journal names it",
+}
+NO_COMMAND = {
+    "message": "programs send messages: over the control socket, REST or ROS",
+    "simulated": "the fleet file says it, and m2pem run --simulate",
+    "speed": "the person who starts an executive sets it: m2pem run --speed",
+}
+
+
+def test_every_operation_has_a_command_or_a_reason_why_not() -> None:
+    commands = {method for _, method, _ in CALLS}
+    assert commands | {*OTHERWISE} | {*NO_COMMAND} == set(OPERATIONS)
+
+
+@pytest.mark.parametrize(
+    ("method", "params"),
+    [*((method, {"run": "r1", **more}) for _, method, more in CALLS), ("stop_all", {"reason": ""})],
+)
+def test_an_operation_accepts_what_a_command_sends(method: str, params: dict[str, Any]) -> None:
+    parameters = OPERATIONS[method].parameters
+    read = msgspec.convert({"by": "anna", **params}, parameters)
+    assert msgspec.to_builtins(read).items() >= params.items()
 
 
 @pytest.mark.parametrize(("words", "method", "params"), CALLS)
