@@ -38,17 +38,17 @@ class Services:
         self._offer(srv.StartMission, "start_mission", start_mission, STARTING)
         self._offer(srv.ListRuns, "list_runs", self._list_runs, LISTING)
         self._offer_control()
-        for service_type, handler in (
-            (srv.SendSignal, requests.send_signal),
-            (srv.SendMessage, requests.send_message),
-            (srv.SetRoute, requests.set_route),
-            (srv.SetArea, requests.set_area),
-            (srv.SetWaypoints, requests.set_waypoints),
-            (srv.TakeVehicle, requests.take_vehicle),
-            (srv.GiveBackVehicle, requests.give_back_vehicle),
-            (srv.AnswerPrompt, self._answer_prompt),
+        for service_type, name, handler in (
+            (srv.SendSignal, "send_signal", _operation("signal")),
+            (srv.SendMessage, "send_message", _operation("message")),
+            (srv.SetRoute, "set_route", requests.set_route),
+            (srv.SetArea, "set_area", requests.set_area),
+            (srv.SetWaypoints, "set_waypoints", requests.set_waypoints),
+            (srv.TakeVehicle, "take_vehicle", _operation("take")),
+            (srv.GiveBackVehicle, "give_back_vehicle", _operation("give_back")),
+            (srv.AnswerPrompt, "answer_prompt", self._answer_prompt),
         ):
-            self._offer(service_type, handler.__name__.lstrip("_"), handler, SEVERAL)
+            self._offer(service_type, name, handler, SEVERAL)
 
     def _offer(self, service_type: Any, name: str, handler: Handler, at_once: int) -> None:
         gate = self.gates[name] = Gate(at_once)
@@ -82,7 +82,7 @@ class Services:
 
     async def _answer_prompt(self, control: MissionControl, request: Any, response: Any) -> None:
         try:
-            await requests.answer_prompt(control, request, response)
+            await requests.carry_out(control, "answer", request)
         except OperatorError as refusal:
             # A run that has ended since cannot say who was first.
             closed = self._topics.closed_prompts.get((request.run, request.prompt))
@@ -98,3 +98,10 @@ class Services:
                 continue
             time_s = await self._topics.mission_time_s(summary)
             response.runs.append(messages.run_status(summary, time_s))
+
+
+def _operation(name: str) -> Handler:
+    async def handler(control: MissionControl, request: Any, _: Any) -> None:
+        await requests.carry_out(control, name, request)
+
+    return handler

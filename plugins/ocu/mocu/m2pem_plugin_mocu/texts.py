@@ -1,12 +1,10 @@
 """Texts of requests, and texts for messages of ROS."""
 
+from m2pem.api import MAX_NAME_CHARACTERS
 from m2pem.errors import OperatorError
 
 NAMELESS = "mocu"
 """Who asked, where a request does not say."""
-
-NAME_CHARACTERS = 200
-REASON_CHARACTERS = 1000
 
 
 def sendable(text: str) -> str:
@@ -29,7 +27,7 @@ def named(text: str, field: str, example: str) -> str:
     """
     if not text.strip():
         raise OperatorError(f"{field} is empty: say which, for example {example}")
-    return bounded(text, field, NAME_CHARACTERS)
+    return bounded(text, field, MAX_NAME_CHARACTERS)
 
 
 def bounded(text: str, field: str, characters: int) -> str:
@@ -51,4 +49,4 @@ def asker(by: str) -> str:
     Raises:
         OperatorError: the name is too long.
     """
-    return one_line(bounded(by, "by", NAME_CHARACTERS)) or NAMELESS
+    return one_line(bounded(by, "by", MAX_NAME_CHARACTERS)) or NAMELESS

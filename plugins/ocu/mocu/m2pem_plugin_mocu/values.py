@@ -5,11 +5,9 @@ from typing import Any
 
 import msgspec
 
-from m2pem.api import Value
+from m2pem.api import MAX_DATA_VALUES, MAX_NAME_CHARACTERS, Value
 from m2pem.errors import OperatorError
-from m2pem_plugin_mocu.texts import NAME_CHARACTERS
 
-MOST_VALUES = 1000
 MOST_CHARACTERS = 1_000_000
 """Of all values of a request together."""
 
@@ -25,9 +23,9 @@ def decode_data(pairs: Sequence[Any]) -> dict[str, Value]:
     Raises:
         OperatorError: one is not JSON, or not what a journal could keep; the text names its key.
     """
-    if len(pairs) > MOST_VALUES:
+    if len(pairs) > MAX_DATA_VALUES:
         raise OperatorError(
-            f"data has {len(pairs):,} values; {MOST_VALUES:,} are the most that it may have"
+            f"data has {len(pairs):,} values; {MAX_DATA_VALUES:,} are the most that it may have"
         )
     size = sum(len(pair.value) for pair in pairs)
     if size > MOST_CHARACTERS:
@@ -36,8 +34,8 @@ def decode_data(pairs: Sequence[Any]) -> dict[str, Value]:
     for pair in pairs:
         if not pair.key.strip():
             raise OperatorError("data has a value without a key, such as mission.speed")
-        if len(pair.key) > NAME_CHARACTERS:
-            raise OperatorError(f"data has a key of more than {NAME_CHARACTERS} characters")
+        if len(pair.key) > MAX_NAME_CHARACTERS:
+            raise OperatorError(f"data has a key of more than {MAX_NAME_CHARACTERS} characters")
         if pair.key in data:
             raise OperatorError(f"data[{pair.key!r}] is there twice: give each key once")
         data[pair.key] = _decode(pair.key, pair.value)

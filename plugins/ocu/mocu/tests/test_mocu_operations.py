@@ -1,0 +1,93 @@
+"""The ROS services and the table of operations agree."""
+
+from collections.abc import Awaitable, Callable
+from inspect import signature
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import AsyncMock, Mock
+
+import pytest
+from m2pem_interfaces import msg, srv
+from m2pem_plugin_mocu.services import Services
+
+from m2pem.api import OPERATIONS, MissionControl
+
+POINT = msg.GeoPoint(latitude_deg=51.0, longitude_deg=7.0, altitude_m=2.0)
+DATA = [msg.KeyValue(key="a", value="1")]
+CONTROL = srv.ControlRun.Request
+
+COMMANDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "answer": ("answer_prompt", {"run": "r1", "prompt": "p1", "decision": "go"}),
+    "signal": ("send_signal", {"signal": "s", "run": "r1", "data": DATA}),
+    "message": ("send_message", {"message_id": "m", "run": "r1", "data": DATA}),
+    "stop": ("control_run", {"verb": CONTROL.STOP, "run": "r1", "reason": "rain"}),
+    "stop_all": ("control_run", {"verb": CONTROL.STOP, "run": "all", "reason": "rain"}),
+    "pause": ("control_run", {"verb": CONTROL.PAUSE, "run": "r1"}),
+    "resume": ("control_run", {"verb": CONTROL.RESUME, "run": "r1"}),
+    "set_geometry": ("set_waypoints", {"name": "gate", "waypoints": [POINT], "run": "r1"}),
+    "take": ("take_vehicle", {"vehicle": "ugv1/camera"}),
+    "give_back": ("give_back_vehicle", {"vehicle": "ugv1/camera"}),
+}
+SENT = {
+    "run": "r1",
+    "prompt": "p1",
+    "decision": "go",
+    "signal": "s",
+    "message": "m",
+    "data": {"a": 1},
+    "reason": "rain",
+    "name": "gate",
+    "geometry": {
+        "type": "Feature",
+        "properties": {"altitude_frame": "relative"},
+        "geometry": {"type": "Point", "coordinates": [7.0, 51.0, 2.0]},
+    },
+    "resource": "ugv1/camera",
+    "by": "anna",
+}
+"""What the requests of `COMMANDS` say, by the parameter of the operation."""
+
+SERVED_OTHERWISE = {
+    "runs": "service list_runs, and topic status",
+    "mission_time_s": "a field of the runs of list_runs and of topic status",
+    "prompts": "topic prompts",
+    "subscribe": "topics events, prompt_events, active_elements",
+    "telemetry": "topics payloads, teams and /diagnostics",
+    "mission": "topic active_elements has the labels of its elements",
+    "fleet": "/diagnostics names its vehicles and payloads",
+}
+NOT_SERVED = {
+    "preview_take": "no message has its effects",
+    "holders": "no message has them; a refused take_vehicle names the holder",
+    "records": "a client has them from topic events on; older ones are in the journal",
+    "wait": "topic status shows that a run has ended",
+    "catalogue": "operators over ROS start missions that are drawn elsewhere",
+    "simulated": "settings of DDS depend on it; operators do not see it",
+    "speed": "missions with operators over ROS run in real time",
+    "journal_file": "a path of the executive's machine",
+}
+
+
+def test_every_operation_is_served_or_has_a_reason_why_not() -> None:
+    assert {*COMMANDS, *SERVED_OTHERWISE, *NOT_SERVED} == set(OPERATIONS)
+
+
+@pytest.mark.parametrize("operation", COMMANDS)
+async def test_a_service_passes_every_parameter_of_its_operation(operation: str) -> None:
+    services: dict[str, tuple[Any, Callable[[Any, Any], Awaitable[Any]]]] = {}
+
+    def serve(service_type: Any, name: str, handler: Any) -> None:
+        services[name] = service_type, handler
+
+    control = Mock(spec=MissionControl, mission_time_s=AsyncMock())
+    method = AsyncMock(spec=getattr(MissionControl, operation))
+    setattr(control, operation, method)
+    Services(SimpleNamespace(serve=serve), control, Mock())
+    name, fields = COMMANDS[operation]
+    service_type, handler = services[name]
+    response = await handler(service_type.Request(by="anna", **fields), service_type.Response())
+    assert response.success, response.message
+    sent = method.call_args
+    bound = signature(getattr(MissionControl, operation)).bind(None, *sent.args, **sent.kwargs)
+    names = OPERATIONS[operation].parameters.__struct_fields__
+    assert bound.arguments == {"self": None} | {name: SENT[name] for name in names}
