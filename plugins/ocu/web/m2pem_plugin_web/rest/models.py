@@ -1,16 +1,27 @@
 """Runs, prompts and findings as JSON, and the run that an address names."""
 
-from collections.abc import Iterable
+from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from m2pem.api import Finding, MissionControl, RunStatus, RunSummary, Severity
+from m2pem.api import (
+    MAX_DATA_VALUES,
+    MAX_NAME_CHARACTERS,
+    MAX_REASON_CHARACTERS,
+    Finding,
+    MissionControl,
+    RunStatus,
+    RunSummary,
+    Severity,
+)
+from m2pem.errors import NotDrivenError
 from m2pem_plugin_web.problems import ProblemError
 
-Name = Annotated[str, Field(min_length=1, max_length=200)]
-Reason = Annotated[str, Field(max_length=1000)]
-Data = Annotated[dict[Name, Any], Field(max_length=1000)]
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME_CHARACTERS)]
+Reason = Annotated[str, Field(max_length=MAX_REASON_CHARACTERS)]
+Data = Annotated[dict[Name, Any], Field(max_length=MAX_DATA_VALUES)]
 """Names and values for the data store of a run."""
 
 
@@ -136,3 +147,21 @@ async def find_run(control: MissionControl, run: str) -> RunSummary:
         if summary.run == run:
             return summary
     raise ProblemError(404, f"there is no run {run}")
+
+
+@asynccontextmanager
+async def known_run(control: MissionControl, run: str) -> AsyncIterator[None]:
+    """Say of a command to a run that is not driven whether there is such a run.
+
+    The journal is read after the command only: it may be what does not answer, and STOP waits for
+    nothing.
+
+    Raises:
+        ProblemError: 404, there is none.
+        NotDrivenError: there is one.
+    """
+    try:
+        yield
+    except NotDrivenError:
+        await find_run(control, run)
+        raise

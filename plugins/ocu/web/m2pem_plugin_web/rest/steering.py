@@ -4,14 +4,13 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem.errors import NotDrivenError
 from m2pem_plugin_web.access.permissions import Operator, Stopper, Viewer
 from m2pem_plugin_web.access.requests import LATEST_S, age_s
 from m2pem_plugin_web.access.roles import Person
 from m2pem_plugin_web.live.hub import Hub
 from m2pem_plugin_web.live.messages import prompt_of
 from m2pem_plugin_web.problems import RESPONSES, ProblemError
-from m2pem_plugin_web.rest.models import Body, Data, Name, PromptModel, Reason, find_run
+from m2pem_plugin_web.rest.models import Body, Data, Name, PromptModel, Reason, known_run
 
 
 class StopModel(Body):
@@ -66,27 +65,20 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     async def stop(request: Request, person: Stopper, run: str, wanted: StopModel) -> None:
         """End every token of a run, and cancel its behaviors."""
         reason = reason_of(request, person, f"STOP of {run}", wanted)
-        try:
-            # Not after a look into the journal, which may be what does not answer.
+        async with known_run(control, run):
             await control.stop(run, by=person.name, reason=reason)
-        except NotDrivenError:
-            await find_run(control, run)
-            raise
 
     @routes.post("/runs/{run}/pause", status_code=204)
     async def pause(person: Operator, run: str) -> None:
         """Hold the vehicles of a run, and its time."""
-        try:
+        async with known_run(control, run):
             await control.pause(run, by=person.name)
-        except NotDrivenError:
-            await find_run(control, run)
-            raise
 
     @routes.post("/runs/{run}/resume", status_code=204)
     async def resume(person: Operator, run: str) -> None:
         """Go on after a pause."""
-        await find_run(control, run)
-        await control.resume(run, by=person.name)
+        async with known_run(control, run):
+            await control.resume(run, by=person.name)
 
     @routes.post("/signals", status_code=204)
     async def signal_all(person: Operator, wanted: SignalModel) -> None:
@@ -96,14 +88,14 @@ def router(control: MissionControl, hub: Hub) -> APIRouter:
     @routes.post("/runs/{run}/signals", status_code=204)
     async def signal(person: Operator, run: str, wanted: SignalModel) -> None:
         """Throw a signal in a run."""
-        await find_run(control, run)
-        await control.signal(wanted.signal, run=run, data=wanted.data, by=person.name)
+        async with known_run(control, run):
+            await control.signal(wanted.signal, run=run, data=wanted.data, by=person.name)
 
     @routes.post("/runs/{run}/messages", status_code=204)
     async def message(person: Operator, run: str, wanted: MessageModel) -> None:
         """Send a message to a run."""
-        await find_run(control, run)
-        await control.message(wanted.message, run=run, data=wanted.data, by=person.name)
+        async with known_run(control, run):
+            await control.message(wanted.message, run=run, data=wanted.data, by=person.name)
 
     return routes
 
@@ -129,8 +121,8 @@ def prompt_router(control: MissionControl, hub: Hub) -> APIRouter:
     @routes.post("/runs/{run}/prompts/{prompt}", status_code=204)
     async def answer(person: Operator, run: str, prompt: str, wanted: AnswerModel) -> None:
         """Answer a question. The first answer to it wins."""
-        await find_run(control, run)
-        await control.answer(run, prompt, wanted.decision, by=person.name)
+        async with known_run(control, run):
+            await control.answer(run, prompt, wanted.decision, by=person.name)
 
     return routes
 

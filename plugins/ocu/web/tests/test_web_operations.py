@@ -1,0 +1,109 @@
+"""The REST interface and the table of operations agree."""
+
+from inspect import signature
+from typing import Any
+from unittest.mock import AsyncMock, Mock
+
+import httpx
+import pytest
+from fastapi import FastAPI
+from m2pem_plugin_web.rest import steering
+from rest_world import As, app_of
+
+from m2pem.api import OPERATIONS, MissionControl, RunStatus, RunSummary
+
+COMMANDS: dict[str, tuple[str, str, Any]] = {
+    "answer": ("POST", "/api/runs/r1/prompts/p1", {"decision": "go"}),
+    "signal": ("POST", "/api/runs/r1/signals", {"signal": "s", "data": {"a": 1}}),
+    "message": ("POST", "/api/runs/r1/messages", {"message": "m", "data": {"a": 1}}),
+    "stop": ("POST", "/api/runs/r1/stop", {"reason": "rain"}),
+    "stop_all": ("POST", "/api/stop-all", {"reason": "rain"}),
+    "pause": ("POST", "/api/runs/r1/pause", None),
+    "resume": ("POST", "/api/runs/r1/resume", None),
+    "set_geometry": (
+        "PUT",
+        "/api/geometries/gate",
+        {"geometry": {"type": "Point", "coordinates": [7.0, 51.0]}, "run": "r1"},
+    ),
+    "take": ("POST", "/api/resources/ugv1/camera/take", None),
+    "give_back": ("POST", "/api/resources/ugv1/camera/give-back", None),
+}
+SENT = {
+    "run": "r1",
+    "prompt": "p1",
+    "decision": "go",
+    "signal": "s",
+    "message": "m",
+    "data": {"a": 1},
+    "reason": "rain",
+    "name": "gate",
+    "geometry": {"type": "Point", "coordinates": [7.0, 51.0]},
+    "resource": "ugv1/camera",
+    "by": "a commander",
+}
+"""What the requests of `COMMANDS` say, by the parameter of the operation."""
+
+QUERIES = {
+    "runs": "/api/runs",
+    "records": "/api/runs/{run}/records",
+    "mission": "/api/runs/{run}/mission",
+    "mission_time_s": "/api/runs/{run}",
+    "prompts": "/api/prompts",
+    "holders": "/api/resources",
+    "fleet": "/api/fleet",
+    "catalogue": "/api/behaviors",
+}
+NOT_SERVED = {
+    "preview_take": "no page takes a vehicle, so that there is nothing to warn of",
+    "wait": "a page follows the end of a run over its WebSocket",
+    "subscribe": "the WebSocket sends what is committed, folded into views of runs",
+    "telemetry": "the WebSocket sends the latest states, as fast as the browser takes them",
+    "simulated": "a field of the session",
+    "speed": "a field of the session",
+    "journal_file": "a path of the executive's machine",
+}
+
+
+@pytest.fixture
+def control() -> Mock:
+    control = Mock(spec=MissionControl)
+    for name in COMMANDS:
+        setattr(control, name, AsyncMock(spec=getattr(MissionControl, name), return_value=[]))
+    control.holders = AsyncMock(return_value={SENT["resource"]: ""})
+    control.runs = AsyncMock(return_value=[RunSummary("r1", "M", "P", RunStatus.RUNNING, 0)])
+    return control
+
+
+@pytest.fixture
+def app(control: Mock) -> FastAPI:
+    app = app_of(Mock(control=control))
+    for router in (
+        steering.router(control, Mock()),
+        steering.prompt_router(control, Mock()),
+        steering.resource_router(control),
+    ):
+        app.include_router(router)
+    return app
+
+
+def test_every_operation_has_a_route_or_a_reason_why_not() -> None:
+    assert {*COMMANDS, *QUERIES, *NOT_SERVED} == set(OPERATIONS)
+
+
+@pytest.mark.parametrize("operation", COMMANDS)
+async def test_a_route_passes_every_parameter_of_its_operation(
+    operation: str, app: FastAPI, control: Mock
+) -> None:
+    method, path, body = COMMANDS[operation]
+    transport = httpx.ASGITransport(As(app))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
+        answer = await http.request(method, path, json=body)
+    assert answer.is_success, answer.text
+    sent = getattr(control, operation).call_args
+    bound = signature(getattr(MissionControl, operation)).bind(None, *sent.args, **sent.kwargs)
+    fields = OPERATIONS[operation].parameters.__struct_fields__
+    assert bound.arguments == {"self": None} | {name: SENT[name] for name in fields}
+
+
+def test_the_routes_of_queries_are_there(app: FastAPI) -> None:
+    assert set(QUERIES.values()) <= set(app.openapi()["paths"])
