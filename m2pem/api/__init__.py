@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from m2pem.api.bus import FleetBus
     from m2pem.api.capabilities import ArbiterCapabilities, OcuCapabilities
     from m2pem.api.clock import Clock
+    from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.control import (
         Alert,
         ControlEvent,
@@ -118,6 +119,7 @@ _MODULES = {
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.capabilities": "ArbiterCapabilities OcuCapabilities",
     "m2pem.api.clock": "Clock",
+    "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.control": (
         "Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
         " RunSummary SimulationResult StampedRecord TelemetrySample"
@@ -204,6 +206,7 @@ __all__ = [
     "Importance",
     "Kind",
     "LatLon",
+    "LazyCommand",
     "Limits",
     "LinkState",
     "Listener",
@@ -258,6 +261,7 @@ __all__ = [
     "VehicleState",
     "adjusts",
     "as_geojson",
+    "command_group",
     "describe",
     "distance_m",
     "edges_enclose",
@@ -269,6 +273,7 @@ __all__ = [
     "parse_geojson",
     "parse_mission",
     "quantity",
+    "simulator_group",
 ]
 
 

@@ -27,14 +27,14 @@ def m2pem_register_commands(cli: "click.Group") -> None:
 
 def add_commands(commands: "MutableMapping[str, click.Command]") -> None:
     """Add the commands. The module of a command is imported only when it is called."""
-    from m2pem_plugin_ros.command_options import LazyCommand, group  # noqa: PLC0415  # click
+    from m2pem.api import LazyCommand, command_group, simulator_group  # noqa: PLC0415  # click
 
-    group(commands, "sim", "Simulate vehicles that speak as real ones do.").add_command(
+    simulator_group(commands).add_command(
         LazyCommand(
             "ros", "m2pem_plugin_ros.simulator.command_line", "Simulate ROS vehicles on 127.0.0.1."
         )
     )
-    group(commands, "ros", "For vehicles that speak ROS 2.").add_command(
+    command_group(commands, "ros", "For vehicles that speak ROS 2.").add_command(
         LazyCommand(
             "onboard",
             "m2pem_plugin_ros.onboard.command_line",
