@@ -4,7 +4,6 @@ Plugins are looked for when something is first asked for. One that breaks is kep
 with what broke, and stops neither the others nor the rest of itself.
 """
 
-import difflib
 import logging
 import os
 import re
@@ -26,6 +25,7 @@ from m2pem.plugin_loading import (
     failure,
     find_plugins,
 )
+from m2pem.suggestions import did_you_mean, nearest
 
 if TYPE_CHECKING:
     import click
@@ -238,12 +238,12 @@ class PluginManager:
             )
         offers = self._offers.get(kind, {})
         parts = [f"there is no {kind} {name!r}; known: {', '.join(sorted(offers)) or 'none'}"]
-        if near := difflib.get_close_matches(name, offers, n=1):
-            parts.append(f"did you mean {near[0]!r}?")
+        if hint := did_you_mean(name, offers):
+            parts.append(hint)
         elif kind in ("arbiter", "ocu") and re.fullmatch(r"[a-z][a-z0-9_-]*", name):
-            known = difflib.get_close_matches(canonical(name), PUBLISHED, n=1)
+            known = nearest(canonical(name), PUBLISHED, 0.6)
             parts.append(
-                f"{known[0]!r} is in a plugin: pip install m2pem-plugin-{known[0]}"
+                f"{known!r} is in a plugin: pip install m2pem-plugin-{known}"
                 if known
                 else "is the plugin that has it installed?"
             )

@@ -30,14 +30,15 @@ def suggest(name: str, known: Iterable[str], what: str) -> str:
     return f"known {what}: {listed}"
 
 
-def nearest(name: str, candidates: Collection[str]) -> str:
+def nearest(name: str, candidates: Collection[str], similarity: float = 0.75) -> str:
     """Return the candidate that is spelled most like `name`, or "".
 
-    Much stricter than `did_you_mean`, and quick for names from files of any size.
+    Much stricter than `did_you_mean`, and quick for names from files of any size. `similarity`:
+    the least that counts, from 0 to 1 for equal names.
     """
     if len(candidates) > _MOST_CANDIDATES or len(name) > _LONGEST_NAME:
         return ""
-    found = difflib.get_close_matches(name, candidates, n=1, cutoff=0.75)
+    found = difflib.get_close_matches(name, candidates, n=1, cutoff=similarity)
     return found[0] if found else ""
 
 

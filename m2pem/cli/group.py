@@ -1,6 +1,5 @@
 """The top command `m2pem`: its lazily loaded commands, its log, and its exit status."""
 
-import difflib
 import logging
 import os
 import sys
@@ -16,6 +15,7 @@ import click
 import m2pem
 from m2pem.errors import M2pemError
 from m2pem.findings import escaped
+from m2pem.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
@@ -93,10 +93,9 @@ class LazyGroup(click.Group):
     def _unknown(self, ctx: click.Context, name: str) -> str:
         """There is no such command; if a plugin is broken, it may have had it."""
         known = self.list_commands(ctx)
-        near = difflib.get_close_matches(name, known, n=1)
-        meant = f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(known)}"
+        hint = did_you_mean(name, known) or f"there are: {', '.join(known)}"
         broken = "".join(f"\n{failure}" for failure in self._plugins.failures)
-        return f"there is no command {name!r}{meant}{broken}"
+        return f"there is no command {name!r}; {hint}{broken}"
 
     @cached_property
     def _plugins(self) -> "PluginManager":

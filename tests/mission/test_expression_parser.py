@@ -272,7 +272,7 @@ def test_names_may_be_of_any_script(name):
         ("${execution.getVariable(1)}", 2, "takes the name of a variable"),
         ("${var:base64(a)}", 2, "after 'var:' there are get,"),
         ("${var:eq(a + 1, 2)}", 2, "takes the name of a variable"),
-        ("foor(1)", 0, "did you mean floor?"),
+        ("foor(1)", 0, "did you mean 'floor'?"),
         ("eval('x')", 0, "there is no function 'eval'"),
         ("abs()", 0, "expected abs(x), found 0 arguments"),
         ("abs(1, 2)", 0, "expected abs(x), found 2 arguments"),

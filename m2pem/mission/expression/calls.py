@@ -4,7 +4,6 @@ JUEL: methods of texts and lists, Camunda's `execution.getVariable('x')`, and Fl
 `var:equals(x, 1)`. XPath: the functions that BPMN adds to it (BPMN 2.0.2, clause 10.4.3).
 """
 
-import difflib
 from collections.abc import Callable
 
 from m2pem.mission.expression.dialect import Dialect
@@ -22,6 +21,7 @@ from m2pem.mission.expression.tree import (
     Not,
     Or,
 )
+from m2pem.suggestions import did_you_mean
 
 Arguments = tuple[Node, ...]
 Build = Callable[..., Node]
@@ -79,8 +79,7 @@ def _function(name: str, arguments: Arguments) -> Node:
     if function is None:
         if "." in name:
             raise CallError(f"{name[:40]!r} would run a method of an object, which m2pem does not")
-        near = difflib.get_close_matches(name, FUNCTIONS, n=1)
-        hint = f"did you mean {near[0]}?" if near else "there are " + ", ".join(FUNCTIONS)
+        hint = did_you_mean(name, FUNCTIONS) or "there are " + ", ".join(FUNCTIONS)
         raise CallError(f"there is no function {name[:40]!r}; {hint}")
     if not function.accepts(len(arguments)):
         raise CallError(f"expected {function.signature}, found {len(arguments)} arguments")

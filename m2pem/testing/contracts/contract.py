@@ -1,10 +1,11 @@
 """The base of all contracts: subjects that authors may declare unsupported, with a reason."""
 
-import difflib
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NoReturn, TypeVar
 
 import pytest
+
+from m2pem.suggestions import nearest
 
 NOT_SUPPORTED = "not supported: "
 """Prefix of the reason of a skipped test; the summary at the end searches for it."""
@@ -46,8 +47,8 @@ class Contract:
         super().__init_subclass__(**options)
         for subject, why in cls.unsupported.items():
             if subject not in cls.subjects:
-                near = difflib.get_close_matches(subject, cls.subjects, n=1)
-                hint = f"did you mean {near[0]!r}? " if near else ""
+                near = nearest(subject, cls.subjects, 0.6)
+                hint = f"did you mean {near!r}? " if near else ""
                 raise TypeError(
                     f"{cls.__name__}.unsupported: {subject!r} cannot be declared unsupported;"
                     f" {hint}{cls.m2pem_contract} knows: {', '.join(cls.subjects) or 'nothing'}"
