@@ -1,7 +1,6 @@
 """Behaviors and services as XML: the paper's Figure 3 (docs/missions.md)."""
 
-from collections.abc import Callable, Iterator
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator
 
 from lxml import etree
 
@@ -26,8 +25,6 @@ from m2pem.bpmn.xml import BPMN, M2PEM, local
 from m2pem.mission.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
 
 _ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
-
-Named = TypeVar("Named", Role, Parameter)
 
 
 class BehaviorReader:
@@ -226,16 +223,21 @@ class BehaviorReader:
             if _is_in_own_namespace(child.tag):
                 yield child
 
-    def refuse_repeated(self, items: list[Named], rule: Rule) -> None:
-        """Report the names that stand there more than once."""
+    def refuse_repeated(
+        self,
+        items: Iterable[Role | Parameter],
+        rule: Rule,
+        besides: Iterable[Role | Parameter] = (),
+    ) -> None:
+        """Report the names that repeat another item's, or one of `besides`."""
         what = rule.slug.removeprefix("duplicate-")
-        seen: set[str] = set()
+        seen = {item.name for item in besides}
         for item in items:
             if item.name in seen:
                 self._error(
                     item.line,
                     rule,
-                    f"the {what} '{item.name}' stands there twice",
+                    f"the {what} '{item.name}' is given twice",
                     "keep one of the two",
                 )
             seen.add(item.name)

@@ -131,10 +131,10 @@ def _service_call(
     if not named:
         return None
     first = named[0]
-    properties = [*first.properties, *_loose_properties(reader, found, extensions)]
-    roles = [*first.roles, *reader.roles(extensions.get("role", []))]
-    reader.refuse_repeated(properties, DUPLICATE_PROPERTY)
-    return ServiceCall(first.service, first.line, tuple(roles), tuple(properties))
+    loose = _loose_properties(reader, found, extensions)
+    reader.refuse_repeated(loose, DUPLICATE_PROPERTY, first.properties)
+    roles = (*first.roles, *reader.roles(extensions.get("role", [])))
+    return ServiceCall(first.service, first.line, roles, (*first.properties, *loose))
 
 
 def _bound_elsewhere(found: Children) -> str:

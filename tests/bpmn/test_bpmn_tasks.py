@@ -206,6 +206,22 @@ def test_roles_and_properties_of_a_service() -> None:
             ("duplicate-property", 4),
         ),
         (
+            extended(
+                "serviceTask",
+                '<m2pem:service class="A"><m2pem:property name="b" value="1"/>'
+                '<m2pem:property name="b" value="2"/></m2pem:service>',
+            ),
+            ("duplicate-property", 4),
+        ),
+        (
+            extended(
+                "serviceTask",
+                '<m2pem:service class="A"><m2pem:property name="b" value="1"/></m2pem:service>'
+                '<m2pem:property name="b" value="2"/>',
+            ),
+            ("duplicate-property", 4),
+        ),
+        (
             extended("serviceTask", '<m2pem:service class="A"/>', ' camunda:class="B"'),
             ("two-services", 3),
         ),
