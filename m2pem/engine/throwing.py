@@ -57,7 +57,7 @@ def throw_error(
         end_run(
             x,
             RunOutcome.FAILED,
-            f"error {code} from {node.id} was caught by no boundary{because}",
+            f"no event catches error {code} from {node.id}{because}",
             failed,
         )
     else:
