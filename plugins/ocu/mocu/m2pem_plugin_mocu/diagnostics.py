@@ -1,5 +1,7 @@
 """What /diagnostics says of the executive, its journal and its vehicles (diagnostic_msgs)."""
 
+import asyncio
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -7,10 +9,24 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from m2pem_plugin_ros import RosRuntime
 
-from m2pem.api import Fleet, LinkState, PayloadState, ResourceId, VehicleState
+from m2pem.api import (
+    Fleet,
+    Follower,
+    LinkState,
+    MissionControl,
+    PayloadState,
+    ResourceId,
+    RunId,
+    TeamState,
+    VehicleState,
+)
+from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import messages
+from m2pem_plugin_mocu.services import Services
 from m2pem_plugin_mocu.texts import one_line
+from m2pem_plugin_mocu.topics import Topics, now_us
 
 SILENT_AFTER_S = 5.0
 """For a vehicle of a fleet that does not say `lost_after`."""
@@ -19,12 +35,19 @@ LOW_BATTERY = 0.2
 LATE_S = 1.0
 """When the executive's event loop comes so much too late, operators notice."""
 
+EVERY_S = 1.0
+JOURNAL_WITHIN_S = 5.0
+BEYOND_ALL = 2**60
+"""A place in a journal where nothing is: to read from there shows that it can be read."""
+
+log = logging.getLogger("m2pem.ocu.mocu")
+
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """Of the executive, as this unit feels it.
+    """State of the executive, as this unit measures it.
 
-    `listeners`: how many operators' clients hear all events. `servers`: how many nodes offer our
+    `listeners`: how many operators' clients receive all events. `servers`: how many nodes offer our
     services. `journal_s`: how long it took to read from the journal; `journal_error`: why it could
     not be.
     """
@@ -42,19 +65,19 @@ class Health:
 
 
 class Vehicles:
-    """The last that each vehicle and payload has said, and when that was heard."""
+    """The latest state of each vehicle and payload, and when it was received."""
 
     def __init__(self, fleet: Fleet, now_s: Callable[[], float] = time.monotonic) -> None:
         self._fleet = fleet
         self._now_s = now_s
         self._last: dict[ResourceId, tuple[VehicleState | PayloadState, float]] = {}
 
-    def hear(self, state: VehicleState | PayloadState) -> None:
-        """A vehicle or payload says how it is."""
+    def receive(self, state: VehicleState | PayloadState) -> None:
+        """Keep a state."""
         self._last[state.resource] = (state, self._now_s())
 
     def statuses(self) -> list[Any]:
-        """One for each vehicle, and for each payload that has said something."""
+        """One for each vehicle, and for each payload that has sent a state."""
         mounted = [each for each in self._fleet.payloads if each in self._last]
         return [self._status(resource) for resource in [*self._fleet.vehicles, *mounted]]
 
@@ -62,8 +85,8 @@ class Vehicles:
         name = f"m2pem: link {resource}"
         if resource not in self._last:
             return _status(name, resource, DiagnosticStatus.STALE, "nothing heard yet", {})
-        state, heard_s = self._last[resource]
-        silent_s = self._now_s() - heard_s
+        state, received_s = self._last[resource]
+        silent_s = self._now_s() - received_s
         values = {"link": state.link.value, "behavior": state.behavior}
         problems: list[str] = []
         if isinstance(state, VehicleState):
@@ -162,3 +185,84 @@ def _status(name: str, hardware: str, level: bytes, text: str, values: dict[str,
         message=one_line(text),
         values=[KeyValue(key=key, value=one_line(str(value))) for key, value in values.items()],
     )
+
+
+class DiagnosticsPublisher:
+    """Publishes /diagnostics once a second. `run` and `listen` go on until cancelled."""
+
+    def __init__(
+        self,
+        ros: RosRuntime,
+        control: MissionControl,
+        follower: Follower,
+        topics: Topics,
+        services: Services,
+    ) -> None:
+        self._node = ros.node
+        self._control = control
+        self._follower = follower
+        self._latest_run: RunId | None = None
+        self._topics = topics
+        self._services = services
+        self._vehicles = Vehicles(control.fleet())
+        self._publisher = ros.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._warned = False
+
+    async def listen(self) -> None:
+        """Receive telemetry."""
+        async for state in self._control.telemetry():
+            if not isinstance(state, TeamState):
+                self._vehicles.receive(state)
+
+    async def run(self) -> None:
+        """Measure and publish."""
+        late_s = 0.0
+        while True:
+            try:
+                health = await self._measure(late_s)
+                self._publisher.publish(diagnostics(health, self._vehicles, now_us()))
+            except Exception:  # what cannot be measured now may be the next time
+                log.exception("/diagnostics cannot be published")
+            began_s = time.monotonic()
+            await asyncio.sleep(EVERY_S)
+            late_s = time.monotonic() - began_s - EVERY_S
+
+    async def _measure(self, late_s: float) -> Health:
+        servers = self._node.count_services(f"{self._node.get_namespace()}/start_mission")
+        if servers > 1 and not self._warned:
+            self._warned = True
+            log.warning(
+                "%d executives serve %s in this ROS domain, and each does what operators ask: "
+                "give one another namespace (M2PEM_ROS_NAMESPACE) or domain (ROS_DOMAIN_ID)",
+                servers,
+                self._node.get_namespace(),
+            )
+        began_s = time.monotonic()
+        error = await self._journal_error()
+        return Health(
+            name=self._control.fleet().name,
+            late_s=max(0.0, late_s),
+            servers=servers,
+            runs=sum(not each.status.ended for each in self._follower.views.values()),
+            prompts=len(self._follower.prompts),
+            listeners=self._topics.listeners(),
+            refused=sum(limit.refused for limit in self._services.limits.values()),
+            left_out=self._topics.left_out,
+            journal_s=time.monotonic() - began_s,
+            journal_error=error,
+        )
+
+    async def _journal_error(self) -> str:
+        try:
+            async with asyncio.timeout(JOURNAL_WITHIN_S):
+                if (run := next(iter(self._follower.views), self._latest_run)) is None:
+                    self._latest_run = next(
+                        (each.run for each in reversed(await self._control.runs())), None
+                    )
+                else:
+                    await self._control.records(run, BEYOND_ALL, 1)
+        except TimeoutError:
+            return f"it does not answer within {JOURNAL_WITHIN_S:g} s"
+        except M2pemError as error:
+            return str(error)
+        return ""

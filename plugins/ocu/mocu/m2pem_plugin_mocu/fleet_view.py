@@ -1,4 +1,4 @@
-"""What operators hear of payloads and teams: where payloads look, and how teams march."""
+"""Topics of payloads and teams: where payloads look, and how teams march."""
 
 import logging
 import re
@@ -20,10 +20,10 @@ from m2pem.api import (
     Telemetry,
 )
 from m2pem_plugin_mocu import messages
-from m2pem_plugin_mocu.pacing import Paced
+from m2pem_plugin_mocu.publish_throttle import PublishThrottle
 
 MARCH_FOR_S = 2.0
-"""A team of which nothing was told for so long marches no more."""
+"""A team of which no state has come for so long marches no more."""
 
 MAP = "map"
 
@@ -53,23 +53,23 @@ class FleetView:
         create = ros.node.create_publisher
         self._payload_publisher = create(msg.PayloadStatuses, "payloads", qos.STATUS)
         self._team_publisher = create(msg.TeamStatuses, "teams", qos.STATUS)
-        self._paced = Paced(self._say)
+        self._throttle = PublishThrottle(self._publish)
 
     async def listen(self) -> None:
-        """Hear what is told of the fleet."""
+        """Receive telemetry of the fleet."""
         async for state in self._control.telemetry():
             try:
-                self._hear(state)
-            except Exception:  # one that no message can carry must not make us deaf
-                log.exception("what is told of %r cannot be passed on", state)
+                self._receive(state)
+            except Exception:  # a state that no message can carry must not end this
+                log.exception("%r cannot be published", state)
 
     async def run(self) -> None:
-        """Speak."""
-        await self._paced.run()
+        """Publish until cancelled."""
+        await self._throttle.run()
 
     # --- inside ---------------------------------------------------------------------------------
 
-    def _hear(self, state: Telemetry) -> None:
+    def _receive(self, state: Telemetry) -> None:
         if isinstance(state, PayloadState):
             message = write_payload_status(msg, state, to_operators=True)
             message.stamp = messages.time_of(self._now_us())
@@ -81,13 +81,13 @@ class FleetView:
             self._teams[state.behavior] = (message, self._now_s())
         else:
             return
-        self._paced.change()
+        self._throttle.mark_changed()
 
-    async def _say(self) -> None:
+    async def _publish(self) -> None:
         oldest_s = self._now_s() - MARCH_FOR_S
-        self._teams = {id_: told for id_, told in self._teams.items() if told[1] >= oldest_s}
+        self._teams = {id_: team for id_, team in self._teams.items() if team[1] >= oldest_s}
         stamp = messages.time_of(self._now_us())
-        payloads, teams = list(self._payloads.values()), [told[0] for told in self._teams.values()]
+        payloads, teams = list(self._payloads.values()), [team[0] for team in self._teams.values()]
         self._payload_publisher.publish(msg.PayloadStatuses(stamp=stamp, payloads=payloads))
         self._team_publisher.publish(msg.TeamStatuses(stamp=stamp, teams=teams))
 

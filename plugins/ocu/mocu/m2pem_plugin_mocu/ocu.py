@@ -53,13 +53,13 @@ class MocuOcu:
         self._follower = follow(control)
 
     async def serve(self) -> None:
-        """Tell operators what happens, and do what they ask, until cancelled.
+        """Publish what happens, and carry out what operators ask, until cancelled.
 
         Ends when the executive does.
         """
         from m2pem_plugin_ros import RosRuntime  # noqa: PLC0415  # rclpy
 
-        from m2pem_plugin_mocu.examiner import Examiner  # noqa: PLC0415
+        from m2pem_plugin_mocu.diagnostics import DiagnosticsPublisher  # noqa: PLC0415
         from m2pem_plugin_mocu.fleet_view import FleetView  # noqa: PLC0415
         from m2pem_plugin_mocu.services import Services  # noqa: PLC0415
         from m2pem_plugin_mocu.topics import Topics, now_us  # noqa: PLC0415
@@ -68,13 +68,13 @@ class MocuOcu:
             topics = Topics(ros, self._control, self._follower)
             self._follower.listener = topics
             services = Services(ros, self._control, topics)
-            examiner = Examiner(ros, self._control, self._follower, topics, services)
+            diagnostics = DiagnosticsPublisher(ros, self._control, self._follower, topics, services)
             fleet = FleetView(ros, self._control, now_us)
             following = asyncio.create_task(self._follower.run())
-            speaking = [
+            publishing = [
                 asyncio.create_task(topics.run()),
-                asyncio.create_task(examiner.run()),
-                asyncio.create_task(examiner.listen()),
+                asyncio.create_task(diagnostics.run()),
+                asyncio.create_task(diagnostics.listen()),
                 asyncio.create_task(fleet.run()),
                 asyncio.create_task(fleet.listen()),
             ]
@@ -83,7 +83,7 @@ class MocuOcu:
                 await asyncio.wait([following])
                 self._say_why(following)
             finally:
-                ending = asyncio.create_task(self._end(topics, following, speaking))
+                ending = asyncio.create_task(self._end(topics, following, publishing))
                 try:
                     await asyncio.shield(ending)
                 finally:  # whoever cancels again does not wait for readers: the node goes now
@@ -100,13 +100,13 @@ class MocuOcu:
         self,
         topics: "Topics",
         following: "asyncio.Task[None]",
-        speaking: "list[asyncio.Task[None]]",
+        publishing: "list[asyncio.Task[None]]",
     ) -> None:
-        """Tell how it ended: the last records may have come just before."""
+        """Publish how it ended: the last records may have come just before."""
         await self._settle(following)
-        for task in [following, *speaking]:
+        for task in [following, *publishing]:
             task.cancel()
-        await asyncio.gather(following, *speaking, return_exceptions=True)
+        await asyncio.gather(following, *publishing, return_exceptions=True)
         await topics.flush()
 
     async def _settle(self, following: "asyncio.Task[None]") -> None:

@@ -1,6 +1,7 @@
 """What operators may ask for: the services of docs/ros.md, "Operators over ROS"."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from m2pem_interfaces import srv
@@ -9,7 +10,6 @@ from m2pem_plugin_ros import RosRuntime
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_mocu import messages, requests
-from m2pem_plugin_mocu.gate import Gate
 from m2pem_plugin_mocu.starting import start_mission
 from m2pem_plugin_mocu.texts import sendable
 from m2pem_plugin_mocu.topics import Topics
@@ -27,14 +27,42 @@ STOPPING = 100
 """STOP has places of its own: it waits for nothing."""
 
 
+class ConcurrencyLimit:
+    """Refuses requests beyond `at_once` at once, so that none wait behind one that hangs."""
+
+    def __init__(self, at_once: int) -> None:
+        self._at_once = at_once
+        self.active = 0
+        self.refused = 0
+
+    @contextmanager
+    def slot(self) -> Iterator[None]:
+        """Count a request while it is handled.
+
+        Raises:
+            OperatorError: too many are being handled.
+        """
+        if self.active >= self._at_once:
+            self.refused += 1
+            raise OperatorError(
+                f"{self.active} requests of this kind are being handled, and more are not taken "
+                "at once: wait for their answers, then ask again"
+            )
+        self.active += 1
+        try:
+            yield
+        finally:
+            self.active -= 1
+
+
 class Services:
-    """Offers them while the runtime is there."""
+    """Offers the services while the ROS runtime runs."""
 
     def __init__(self, ros: RosRuntime, control: MissionControl, topics: Topics) -> None:
         self._ros = ros
         self._control = control
         self._topics = topics
-        self.gates: dict[str, Gate] = {}
+        self.limits: dict[str, ConcurrencyLimit] = {}
         self._offer(srv.StartMission, "start_mission", start_mission, STARTING)
         self._offer(srv.ListRuns, "list_runs", self._list_runs, LISTING)
         self._offer_control()
@@ -51,27 +79,29 @@ class Services:
             self._offer(service_type, name, handler, SEVERAL)
 
     def _offer(self, service_type: Any, name: str, handler: Handler, at_once: int) -> None:
-        gate = self.gates[name] = Gate(at_once)
+        limit = self.limits[name] = ConcurrencyLimit(at_once)
 
         async def serve(request: Any, response: Any) -> Any:
-            return await self._handle(gate, handler, request, response)
+            return await self._handle(limit, handler, request, response)
 
         self._ros.serve(service_type, name, serve)
 
     def _offer_control(self) -> None:
-        gate = self.gates["control_run"] = Gate(SEVERAL)
-        stop = self.gates["stop"] = Gate(STOPPING)
+        limit = self.limits["control_run"] = ConcurrencyLimit(SEVERAL)
+        stop = self.limits["stop"] = ConcurrencyLimit(STOPPING)
 
         async def serve(request: Any, response: Any) -> Any:
             if request.verb == srv.ControlRun.Request.STOP:
                 return await self._handle(stop, requests.stop_run, request, response)
-            return await self._handle(gate, requests.control_run, request, response)
+            return await self._handle(limit, requests.control_run, request, response)
 
         self._ros.serve(srv.ControlRun, "control_run", serve)
 
-    async def _handle(self, gate: Gate, handler: Handler, request: Any, response: Any) -> Any:
+    async def _handle(
+        self, limit: ConcurrencyLimit, handler: Handler, request: Any, response: Any
+    ) -> Any:
         try:
-            with gate.passed():
+            with limit.slot():
                 await handler(self._control, request, response)
         except M2pemError as refusal:
             response.success = False

@@ -1,4 +1,4 @@
-"""What operators hear: the topics of docs/ros.md, "Operators over ROS"."""
+"""The topics that operators receive: docs/ros.md, "Operators over ROS"."""
 
 import asyncio
 import logging
@@ -28,7 +28,7 @@ from m2pem.api import (
 from m2pem.api import records as r
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import messages
-from m2pem_plugin_mocu.pacing import Paced
+from m2pem_plugin_mocu.publish_throttle import PublishThrottle
 
 PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -76,50 +76,50 @@ class Topics(Listener):
         self._waiting: deque[tuple[RunView, StampedRecord, int]] = deque()
         self._some_wait = asyncio.Event()
         self.left_out = 0
-        self._paced_prompts = Paced(self._say_prompts)
-        self._paced_status = Paced(self._say_status)
-        self._paced_active = Paced(self._say_active)
+        self._prompts_throttle = PublishThrottle(self._publish_prompts)
+        self._status_throttle = PublishThrottle(self._publish_status)
+        self._active_throttle = PublishThrottle(self._publish_active)
 
     def listeners(self) -> int:
-        """How many clients hear events, and prompts as they come."""
-        heard = (self._events, self._prompt_events)
-        return min(int(publisher.get_subscription_count()) for publisher in heard)
+        """How many clients receive events, and prompts as they come."""
+        publishers = (self._events, self._prompt_events)
+        return min(int(publisher.get_subscription_count()) for publisher in publishers)
 
     async def run(self) -> None:
-        """Speak until cancelled."""
+        """Publish until cancelled."""
         async with asyncio.TaskGroup() as group:
-            for paced in (self._paced_prompts, self._paced_status, self._paced_active):
-                group.create_task(paced.run())
+            for throttle in (self._prompts_throttle, self._status_throttle, self._active_throttle):
+                group.create_task(throttle.run())
             group.create_task(self._send_events())
 
     async def flush(self) -> None:
-        """Say how things stand at the end, and give readers the time to hear it."""
+        """Publish the last state, and give clients the time to receive it."""
         try:
             async with asyncio.timeout(FLUSH_S):
                 while self._waiting:
                     self._send_some()
                     await asyncio.sleep(0)
-                for say in (self._say_prompts, self._say_status, self._say_active):
-                    await say()
-                spoke = (
+                for publish in (self._publish_prompts, self._publish_status, self._publish_active):
+                    await publish()
+                publishers = (
                     self._prompts,
                     self._prompt_events,
                     self._status,
                     self._active,
                     self._events,
                 )
-                for publisher in spoke:
-                    wait = Duration(seconds=FLUSH_S / len(spoke))
+                for publisher in publishers:
+                    wait = Duration(seconds=FLUSH_S / len(publishers))
                     await asyncio.to_thread(publisher.wait_for_all_acked, wait)
         except TimeoutError:
-            log.warning("some operators may not have heard how it ended")
+            log.warning("some operators may not have received how it ended")
 
     # --- what the follower reports --------------------------------------------------------------
 
     def run_added(self, view: RunView) -> None:
         """Publish the new run soon."""
-        self._paced_status.change()
-        self._paced_active.change()
+        self._status_throttle.mark_changed()
+        self._active_throttle.mark_changed()
 
     def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
         """Queue an event for a new record."""
@@ -131,18 +131,18 @@ class Topics(Listener):
         self._waiting.append((view, stamped, view.at_us(stamped.t_s)))
         self._some_wait.set()
         if type(stamped.record) in TOKEN_RECORDS:
-            self._paced_active.change()
+            self._active_throttle.mark_changed()
 
     def status_changed(self, view: RunView) -> None:
         """Publish the status soon."""
-        self._paced_status.change()
-        self._paced_active.change()
+        self._status_throttle.mark_changed()
+        self._active_throttle.mark_changed()
 
     def prompt_opened(self, prompt: OpenPrompt) -> None:
         """Publish it at once as an event, and soon among all open prompts."""
         opened_us = self._opened_us[prompt.run, prompt.prompt] = now_us()
         self._prompt_events.publish(messages.open_prompt(prompt, opened_us))
-        self._paced_prompts.change()
+        self._prompts_throttle.mark_changed()
 
     def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
         """Publish it at once as an event, and soon all prompts that are still open."""
@@ -154,25 +154,25 @@ class Topics(Listener):
         self._prompt_events.publish(
             messages.closed_prompt(prompt, closed.decision, closed.by, now_us())
         )
-        self._paced_prompts.change()
+        self._prompts_throttle.mark_changed()
 
     def alerted(self, alert: Alert) -> None:
         """Log it, which ROS shows to operators."""
         log.error("%s", f"{alert.run}: {alert.text}" if alert.run else alert.text)
 
-    # --- speaking -------------------------------------------------------------------------------
+    # --- publishing -----------------------------------------------------------------------------
 
-    async def _say_prompts(self) -> None:
+    async def _publish_prompts(self) -> None:
         prompts = [
             messages.open_prompt(prompt, self._opened_us.get(key, 0))
             for key, prompt in self._follower.prompts.items()
         ]
         self._prompts.publish(msg.OpenPrompts(stamp=messages.time_of(now_us()), prompts=prompts))
 
-    async def _say_active(self) -> None:
+    async def _publish_active(self) -> None:
         self._active.publish(messages.active_elements(self._follower.views.values(), now_us()))
 
-    async def _say_status(self) -> None:
+    async def _publish_status(self) -> None:
         runs: list[Any] = []
         for view in list(self._follower.views.values()):
             summary = view.summary
@@ -198,7 +198,7 @@ class Topics(Listener):
 
     def _send_some(self) -> None:
         if not self._events.get_subscription_count():
-            self._waiting.clear()  # what nobody hears is not kept: the journal has it
+            self._waiting.clear()  # what no client receives is not kept: the journal has it
         for _ in range(min(EVENTS_AT_ONCE, len(self._waiting))):
             view, stamped, at_us = self._waiting.popleft()
             try:

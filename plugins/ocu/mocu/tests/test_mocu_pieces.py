@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_mocu.diagnostics import SILENT_AFTER_S, Health, Vehicles, diagnostics
-from m2pem_plugin_mocu.pacing import LEAST_S, MOST_S, Paced
+from m2pem_plugin_mocu.publish_throttle import MAX_PERIOD_S, MIN_PERIOD_S, PublishThrottle
 from m2pem_plugin_mocu.settings import SettingError, namespace, stays_on_loopback
 from m2pem_plugin_mocu.texts import one_line, sendable
 from mocu_world import fleet
@@ -38,13 +38,13 @@ def said_while(virtual: Virtual, changes: int, every_s: float) -> list[int]:
             if number == 3:
                 raise ValueError("cannot be said")
 
-        paced = Paced(say)
-        running = asyncio.create_task(paced.run())
+        throttle = PublishThrottle(say)
+        running = asyncio.create_task(throttle.run())
         for _ in range(changes):
             await clock.sleep(every_s)
             number += 1
-            paced.change()
-        await clock.sleep(MOST_S)
+            throttle.mark_changed()
+        await clock.sleep(MAX_PERIOD_S)
         running.cancel()
         return said
 
@@ -53,7 +53,7 @@ def said_while(virtual: Virtual, changes: int, every_s: float) -> list[int]:
 
 def test_a_thousand_changes_a_second_are_said_ten_times_a_second(virtual: Virtual) -> None:
     said = said_while(virtual, 10_000, 0.001)
-    assert len(said) <= 11 / LEAST_S
+    assert len(said) <= 11 / MIN_PERIOD_S
     assert said[-1] == 10_000
     assert said == sorted(said)
 
@@ -130,7 +130,7 @@ def test_a_vehicle_is_told_as_it_is(
 ) -> None:
     now_s = Watch()
     vehicles = Vehicles(fleet(), now_s)
-    vehicles.hear(state)
+    vehicles.receive(state)
     now_s.now_s += silent_s
     first, second = vehicles.statuses()
     assert (first.level, first.message) == (level, says)
