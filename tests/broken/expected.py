@@ -67,14 +67,14 @@ EXPECTED = [
         "End (all done) is reached twice",
     ),
     Expected(
-        "escalation_nobody_catches",
+        "uncaught_escalation",
         "is-caught",
         frozenset({"EndDetected"}),
         "of EndDetected (hazard detected) is caught by nothing",
         warning=True,
     ),
     Expected(
-        "error_nobody_catches",
+        "uncaught_error",
         "errors-caught",
         frozenset({"NotDelivered"}),
         "error NOT_DELIVERED of NotDelivered (not delivered) is caught by nothing",

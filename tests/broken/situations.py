@@ -200,9 +200,9 @@ def situations() -> Iterable[Situation]:
         ),
         Situation("unanswered_decision", _decisions("nothing"), _no_way_on, asking),
         Situation("exclusive_join_after_a_fork", [ONE_AFTER_THE_OTHER], _ended_twice, two),
-        Situation("escalation_nobody_catches", [DETECTED], _passed_over, vignette),
+        Situation("uncaught_escalation", [DETECTED], _passed_over, vignette),
         Situation(
-            "error_nobody_catches",
+            "uncaught_error",
             [LINK_LOST],
             _failed_for_the_error,
             _example("t16_faults_on_purpose"),
