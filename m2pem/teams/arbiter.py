@@ -1,4 +1,4 @@
-"""The arbiter of teams: makes a team behavior of behaviors of the members, whoever serves them."""
+"""The arbiter of teams: composes a team behavior of behaviors of members of any arbiter."""
 
 import logging
 from collections.abc import AsyncIterator, Callable, Sequence
@@ -29,14 +29,14 @@ from m2pem.teams.team_state import TeamPlan, TeamSituation
 REMEMBERED = 1_000
 STATES_WAITING = 1_000
 CANCEL_MARGIN_S = 1.0
-"""So that a team can say which member did not end in time, before it is itself given up."""
+"""Time for a team to name the member that did not end, before the team's own timeout."""
 
 _log = logging.getLogger("m2pem.teams")
 
 
 @dataclass(frozen=True, slots=True)
 class _Remains:
-    """What was found after a restart of a team behavior that is not whole any more."""
+    """A team behavior after a restart of which some parts are not known."""
 
     request: BehaviorRequest
     scheme: TeamPlan
@@ -47,9 +47,9 @@ class _Remains:
 class Teams:
     """Implements `m2pem.api.Arbiter` for team behaviors of any members.
 
-    `arbiter_of`: the arbiter of a vehicle. Parts of a behavior are named after it and their member:
-    "r1.b3.evsg1" is what evsg1 does of r1.b3; who reads the arbiters' reports hands those of parts
-    to `report_received`, and faults of members to `fault`.
+    `arbiter_of`: the arbiter of a vehicle. A part's id has the behavior and the member:
+    "r1.b3.evsg1" is the part of evsg1 in r1.b3. The reader of the arbiters' reports passes those of
+    parts to `report_received`, and faults of members to `fault`.
     """
 
     capabilities = ArbiterCapabilities()
@@ -72,29 +72,28 @@ class Teams:
         self._remains: dict[BehaviorId, _Remains] = {}
         self._states: AsyncQueue[TeamState] = AsyncQueue(STATES_WAITING)
 
-    # --- what can be done -----------------------------------------------------------------------
+    # --- capabilities ---------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What a vehicle can do beside others: what it can do alone, and the team behaviors in
-        which it can take part by that."""
+        """Return a vehicle's own behaviors, and the team behaviors in which it can take part."""
         alone = self._capabilities.alone(resource)
         together = self._capabilities.together(resource)
         names = {spec.name for spec in together}
         return (*together, *(spec for spec in alone.values() if spec.name not in names))
 
     def limits(self, resource: ResourceId) -> Limits:
-        """A member's own, and some time to say what became of it."""
+        """Return a member's own limits, with some time for the team's report."""
         own = self._arbiter_of(resource).limits(resource)
         return replace(own, cancel_timeout_s=own.cancel_timeout_s + CANCEL_MARGIN_S)
 
     def marshals(self, resource: ResourceId) -> bool:
-        """Whether a vehicle is a member of a team behavior that goes on: a hold must come here."""
+        """Whether a vehicle is a member of a running team behavior: holds must come here."""
         return self._behavior_of(resource) is not None
 
     def parts_of(
         self, behaviors: Sequence[BehaviorId], resources: Sequence[ResourceId]
     ) -> tuple[BehaviorId, ...]:
-        """Behaviors to preempt, with those parts of team behaviors that resources are busy with."""
+        """Return the behaviors to preempt, with the parts of theirs that resources carry out."""
         parts = []
         for name in behaviors:
             behavior = self._behaviors.get(name)
@@ -109,16 +108,16 @@ class Teams:
     # --- the protocol ---------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Nothing to reach: the members have arbiters of their own."""
+        """Do nothing: the members have arbiters of their own."""
 
     async def start(self, request: BehaviorRequest) -> None:
         """Start a team behavior."""
         await self._situation.until_seen(request, self._context.clock)
         made: list[TeamPlan] = []
 
-        def refusal(wished: BehaviorRequest) -> str:
+        def refusal(checked: BehaviorRequest) -> str:
             try:
-                made.append(self._situation.scheme(wished, begun=False))
+                made.append(self._situation.scheme(checked, begun=False))
             except TeamRefusedError as error:
                 return str(error)
             return ""
@@ -146,11 +145,11 @@ class Teams:
             self._behaviors[behavior].cancel(epoch)
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What became of a team behavior; after a restart, what became of its parts.
+        """Report the state of a team behavior; after a restart, query the arbiters of its parts.
 
-        It goes on if all of them are known; parts that have failed meanwhile count as if they did
-        so now. Else it is UNKNOWN; what goes on of it is kept in mind for a `start` under the same
-        id, which takes it up, or a `cancel`.
+        The behavior goes on if all parts are known; parts that have failed meanwhile fail now.
+        Else it is UNKNOWN; its running parts are kept for a `start` with the same id, which adopts
+        them, or a `cancel`.
         """
         request = self._requests.pop(behavior, None)
         known = self._ledger.last(behavior)
@@ -174,7 +173,7 @@ class Teams:
         return replace(self._ledger.last(behavior), held=held)
 
     async def hold(self, resource: ResourceId) -> None:
-        """A run holds a member: the team waits as one."""
+        """Hold a member for a run: the whole team waits."""
         behavior = self._behavior_of(resource)
         if behavior is None:
             await self._arbiter_of(resource).hold(resource)
@@ -182,7 +181,7 @@ class Teams:
             await behavior.hold(resource)
 
     async def resume(self, resource: ResourceId) -> None:
-        """A run lets a member go on; the team goes on when all may."""
+        """Resume a member for a run; the team goes on when no member is held."""
         behavior = self._behavior_of(resource)
         if behavior is None:
             await self._arbiter_of(resource).resume(resource)
@@ -190,24 +189,24 @@ class Teams:
             await behavior.resume(resource)
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
-        """Of team behaviors, each as one."""
+        """Yield the reports of team behaviors."""
         return self._ledger.reports()
 
     def telemetry(self) -> AsyncIterator[TeamState]:
-        """How well teams on the march keep their places; members have arbiters of their own."""
+        """Yield the states of teams on the march."""
         return self._states.read()
 
     async def close(self) -> None:
-        """FormationController nobody any more. Vehicles keep doing what they do."""
+        """End all formation controllers. Vehicles go on with their parts."""
         for behavior in self._behaviors.values():
             behavior.close()
         self._states.close()
         self._ledger.close()
 
-    # --- what the executive tells ---------------------------------------------------------------
+    # --- calls of the executive -----------------------------------------------------------------
 
     def report_received(self, report: BehaviorReport) -> bool:
-        """Take a report if it is of a part; False: it is a behavior's of its own."""
+        """Process a report if it is of a part; return False if it is of another behavior."""
         name, _, part = report.id.partition(".")
         name, part = f"{name}.{part.partition('.')[0]}", part.partition(".")[2]
         if not part:
@@ -220,7 +219,7 @@ class Teams:
         return True
 
     def fault(self, resource: ResourceId, code: str, reason: str) -> bool:
-        """Take a fault of a member, for its team; False: it is in no team at work."""
+        """Process a fault of a member; return False if it is in no running team behavior."""
         behavior = self._behavior_of(resource)
         if behavior is None:
             return False
@@ -228,12 +227,12 @@ class Teams:
         return True
 
     def recall(self, request: BehaviorRequest) -> None:
-        """After a restart: what a behavior was that `query` will ask for."""
+        """Remember the request of a behavior that `query` will be called for after a restart."""
         self._requests[request.id] = request
 
     @property
     def expects(self) -> bool:
-        """For rehearsals: whether a team may yet do something by itself."""
+        """Whether a team may still change by the passing of time; for rehearsals."""
         return any(behavior.expects for behavior in self._behaviors.values())
 
     # --- inside ---------------------------------------------------------------------------------
@@ -248,7 +247,7 @@ class Teams:
         def failed(member: ResourceId, reason: str) -> None:
             behavior.failed_to_start(member, reason)
 
-        def tell(state: BehaviorState, code: str, reason: str) -> None:
+        def report_state(state: BehaviorState, code: str, reason: str) -> None:
             if state.terminal:
                 self._ledger.end(request.id, state, code, reason)
             else:
@@ -266,7 +265,7 @@ class Teams:
             members,
             self._context.clock,
             lambda member: self._situation.look(member, scheme.frame),
-            tell,
+            report_state,
             lambda reference: self._ledger.refer(request.id, reference.text()),
             show,
             goes_on=self._goes_on(request),
@@ -285,7 +284,7 @@ class Teams:
         return all(policies.get(tuple(crew)) == {LostMemberPolicy.CONTINUE} for crew in crews)
 
     def _forget(self) -> None:
-        """Let go of the oldest that is over."""
+        """Forget the oldest behavior that has ended."""
         if len(self._behaviors) > REMEMBERED:
             over = (name for name, each in self._behaviors.items() if each.over)
             if (oldest := next(over, None)) is not None:

@@ -14,9 +14,9 @@ from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
 
 
 def split(whole: float, weights: Sequence[float], reaches: Sequence[float]) -> list[float] | None:
-    """The share of each, their sum the whole; None: all of them together cannot do it.
+    """Return shares that add up to `whole`; None: the sum of the reaches is less than `whole`.
 
-    A share is as its weight, or its reach where that is less; what is left is for the others.
+    A share is proportional to its weight, but at most its reach; the others take the rest.
     """
     if sum(reaches) < whole:
         return None
@@ -34,9 +34,9 @@ def split(whole: float, weights: Sequence[float], reaches: Sequence[float]) -> l
 
 
 def owners(lengths: Sequence[float], shares: Sequence[float]) -> list[int]:
-    """Whose each of some lengths in a row is, so that together they are nearly as the shares.
+    """Return the owner of each length in a row, so that the owners' sums approximate the shares.
 
-    Nobody has more than a share and the longest of the lengths.
+    No owner gets more than its share and the longest of the lengths.
     """
     whole = sum(lengths) or 1.0
     bounds = [sum(shares[: index + 1]) / sum(shares) for index in range(len(shares))]
@@ -52,7 +52,7 @@ def owners(lengths: Sequence[float], shares: Sequence[float]) -> list[int]:
 
 
 def reach_m(lasts_s: float | None, way_s: float, speed_m_s: float) -> float:
-    """How far a vehicle can go that lasts so long, if it is so long under way there and back."""
+    """Return the distance that a vehicle can survey in `lasts_s`, `way_s` of which is travel."""
     return math.inf if lasts_s is None else max(0.0, lasts_s - way_s) * speed_m_s
 
 
@@ -60,11 +60,11 @@ Place: TypeAlias = tuple[float, float]
 """East and north in metres."""
 
 Pass: TypeAlias = Sequence[Place]
-"""Its two ends; or the corners of a ring, the first of them again at the end."""
+"""The two ends of a pass; or the corners of a closed ring, the first one again at the end."""
 
 
 def lanes(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
-    """The passes in their order, cut so that the ways over the area are as the shares."""
+    """Return each member's passes, in their order, so that their lengths are as the shares."""
     lanes: list[list[Pass]] = [[] for _ in shares]
     lengths = [math.dist(*each) for each in passes]
     for each, index in zip(passes, owners(lengths, shares), strict=True):
@@ -75,7 +75,7 @@ def lanes(passes: Sequence[Pass], shares: Sequence[float]) -> list[list[Pass]]:
 def strips(
     rings: Sequence[Pass], passes: Sequence[Pass], yaw_rad: float, shares: Sequence[float]
 ) -> list[list[list[Place]]]:
-    """The parts of an area between passes, as rings; nothing for whom there is no pass."""
+    """Return each member's band of an area as rings; an empty list for a member without a pass."""
     level = [[turned(corner, (0.0, 0.0), yaw_rad) for corner in ring] for ring in rings]
     low = min(y for _, y in level[0])
     high = max(y for _, y in level[0])
@@ -106,7 +106,7 @@ def strips(
 
 
 def _between(ring: Pass, bottom: float, top: float) -> list[Place]:
-    """What of a closed ring lies between two y, as corners."""
+    """Return the corners of the part of a closed ring between two y."""
     kept = _above(list(ring[:-1]), bottom)
     over = _above([(x, -y) for x, y in kept], -top)
     return [(x, -y) for x, y in over]
@@ -125,7 +125,7 @@ def _above(corners: Sequence[Place], bottom: float) -> list[Place]:
 def turned(
     place: tuple[float, float], centre: tuple[float, float], angle_rad: float
 ) -> tuple[float, float]:
-    """In a frame at the centre whose first axis points that way."""
+    """Return a place in a frame at `centre` whose first axis points to `angle_rad`."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     east, north = place[0] - centre[0], place[1] - centre[1]
     return east * cos + north * sin, north * cos - east * sin
@@ -134,15 +134,14 @@ def turned(
 SURVEY_SPACING_M = 20.0
 STANDOFF_M = 20.0
 FLYING_STANDOFF_M = 30.0
-"""When nobody says."""
+"""Defaults."""
 
 
 def survey(context: PlanningContext) -> Plan:
-    """The passes over the area in as many lanes as there are members, the faster the wider, and
-    none longer than its member lasts.
+    """Divide the passes over the area into one band for each member, by speed and endurance.
 
-    Where all can survey an area themselves, with cameras that their arbiters trigger perhaps, each
-    is given the area of its band; else each moves along the passes.
+    If all members offer `area_survey`, each surveys the area of its band, so that its arbiter can
+    trigger a camera; else each moves along its passes.
     """
     area = context.parameters.area
     if area is None:
@@ -155,9 +154,9 @@ def survey(context: PlanningContext) -> Plan:
         tracks = lawn_mower(rings, spacing, yaw, context.parameters.overshoot_m)
     except ValueError as error:
         raise TeamRefusedError(f"parameter 'spacing': {error}") from None
-    wished = context.parameters.speed_m_s
+    speed_m_s = context.parameters.speed_m_s
     passes = [tracks[index : index + 2] for index in range(0, len(tracks), 2)]
-    shares = context.split or _shares(context, rings[0], passes, wished)
+    shares = context.split or _shares(context, rings[0], passes, speed_m_s)
     themselves = all("area_survey" in context.offered[member] for member in context.members)
     behavior = "area_survey" if themselves else "single_vehicle_routing"
     legs: list[Leg] = []
@@ -176,7 +175,7 @@ def survey(context: PlanningContext) -> Plan:
         for member, band in zip(context.members, lanes(passes, shares), strict=True):
             if band:
                 places = (context.coordinate(place, None) for each in band for place in each)
-                parameters = {"route": Route(tuple(places)), "speed": wished}
+                parameters = {"route": Route(tuple(places)), "speed": speed_m_s}
                 legs.append(context.leg(member, behavior, parameters))
     takes = {
         member: frozenset(accepted(context.offered[member][behavior])) for member in context.members
@@ -185,12 +184,12 @@ def survey(context: PlanningContext) -> Plan:
 
 
 def _shares(
-    context: PlanningContext, ring: Pass, passes: Sequence[Pass], wished_m_s: float | None
+    context: PlanningContext, ring: Pass, passes: Sequence[Pass], requested_m_s: float | None
 ) -> list[float]:
-    """How many metres of the passes each member is to do: as its speed, within its endurance.
+    """Return each member's share of the passes in metres: by its speed, within its endurance.
 
     Raises:
-        TeamRefusedError: together they do not last long enough.
+        TeamRefusedError: the endurance of all members together is too short.
     """
     lengths = [math.dist(*each) for each in passes]
     corners = ring[:-1]
@@ -198,7 +197,7 @@ def _shares(
     weights, reaches = [], []
     for member in context.members:
         nominal_m_s = context.motion(member).nominal_m_s
-        speed_m_s = nominal_m_s if wished_m_s is None else wished_m_s
+        speed_m_s = nominal_m_s if requested_m_s is None else requested_m_s
         way_s = 2 * math.dist(context.poses[member].place, middle) / nominal_m_s
         reach = reach_m(context.lasts_s.get(member), way_s, speed_m_s)
         weights.append(speed_m_s)
@@ -218,7 +217,7 @@ def _shares(
 
 
 def _band_area(context: PlanningContext, area: Area, rings: Sequence[Pass]) -> Area:
-    """A part of the area, at the height that it says."""
+    """Return a part of the area, at the area's altitude."""
     up_m = area.rings[0][0][2]
     return Area(
         tuple(tuple(context.coordinate(corner, up_m) for corner in ring) for ring in rings),
@@ -227,7 +226,7 @@ def _band_area(context: PlanningContext, area: Area, rings: Sequence[Pass]) -> A
 
 
 def observe(context: PlanningContext) -> Plan:
-    """Each goes to a place of its own around the area or target, looks at it, and stays."""
+    """Send each member to a place around the area or target, from which it looks at it."""
     area = context.parameters.area
     legs = []
     for index, member in enumerate(context.members):
@@ -249,7 +248,7 @@ def observe(context: PlanningContext) -> Plan:
 def _reach(
     ring: Sequence[tuple[float, float]], centre: tuple[float, float], angle_rad: float
 ) -> float:
-    """How far it is from the centre to the outermost edge in a direction."""
+    """Return the distance from the centre to the outermost edge in a direction, in metres."""
     found = 0.0
     for a, b in pairwise(ring):
         (ax, ay), (bx, by) = (turned(corner, centre, angle_rad) for corner in (a, b))
@@ -259,7 +258,7 @@ def _reach(
 
 
 def escort(context: PlanningContext) -> Plan:
-    """Each keeps to a place of its own around the target, the first one ahead of it."""
+    """Let each member keep its place around the target, the first one ahead of it."""
     spacing = context.parameters.spacing_m or SPACING_M
     target = context.parameters.target
     legs = []

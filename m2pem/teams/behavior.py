@@ -1,4 +1,4 @@
-"""One team behavior while it goes on: parts begin, are marshalled, end, and are lost."""
+"""One running team behavior: its parts begin, keep formation, end, and are lost."""
 
 import asyncio
 import logging
@@ -16,31 +16,34 @@ from m2pem.teams.plan import MemberPose, Plan
 from m2pem.teams.restart import Reference
 
 PERIOD_S = 0.25
-"""How often a march is looked at."""
+"""Period of the formation controller."""
 
 IDLE_PERIOD_S = 1.0
 STIRS_WITHIN_S = 120.0
-"""A march of which nobody has moved for so long waits for something that it cannot bring about."""
+"""A rehearsed march of which no member has moved for this time cannot go on by itself."""
 
 STIR_M = 0.01
 ACCEPT_WITHIN_S = 15.0
-"""A member that has said nothing of its part by then has not understood it."""
+"""A member that has reported nothing about its part by then has failed to start it."""
 
 US_PER_S = 1_000_000
 
 _log = logging.getLogger("m2pem.teams")
 
-Tell = Callable[[BehaviorState, str, str], None]
-"""(state, code, reason): RUNNING, or the end."""
+ReportState = Callable[[BehaviorState, str, str], None]
+"""(state, code, reason): RUNNING, or a terminal state."""
 
 
 class TeamBehavior:
-    """`look`: where a member is seen now; None: nobody knows. `tell` is told RUNNING and the end;
-    `refer` the reference to keep before each word of RUNNING. `show`: how well members of a march
-    keep their places, and their spacing in metres. `goes_on`: without a lost member.
+    """Carries out a plan by the members.
 
-    All is synchronous, for reports must be taken in their order; what arbiters are asked for waits
-    in the members.
+    `look` returns a member's present pose; None: it is not known. `report_state` is called with
+    RUNNING and with the end; `refer`, before each RUNNING, with the reference that the journal
+    keeps. `show` gets the members' deviations from their places in a march, and the spacing in
+    metres. `goes_on`: the behavior continues without a lost member.
+
+    All methods but `hold` and `resume` are synchronous, so that reports are processed in their
+    order; calls to arbiters wait in the members.
     """
 
     def __init__(
@@ -50,7 +53,7 @@ class TeamBehavior:
         members: Mapping[ResourceId, Member],
         clock: Clock,
         look: Callable[[ResourceId], MemberPose | None],
-        tell: Tell,
+        report_state: ReportState,
         refer: Callable[[Reference], None],
         show: Callable[[tuple[TeamMemberState, ...], float], None],
         *,
@@ -63,7 +66,7 @@ class TeamBehavior:
         self._plan = plan
         self._clock = clock
         self._look = look
-        self._tell = tell
+        self._report_state = report_state
         self._refer = refer
         self._show = show
         self._goes_on = goes_on
@@ -71,7 +74,7 @@ class TeamBehavior:
         steady = [each.id for each in members.values() if not each.adjustable]
         self._controller = FormationController(plan.march, steady) if plan.march else None
         self._reference = Reference()
-        self._told_running = False
+        self._running_reported = False
         self._ended_meanwhile: list[BehaviorReport] = []
         self._ending: tuple[BehaviorState, str, str] | None = None
         self._ending_due_us = 0
@@ -81,7 +84,7 @@ class TeamBehavior:
         self._wake = asyncio.Event()
         self._ticking: asyncio.Task[None] | None = None
 
-    # --- what the team is asked for -------------------------------------------------------------
+    # --- commands of the run ---------------------------------------------------------------------
 
     def start(self) -> None:
         """Begin, or go on after a restart."""
@@ -104,7 +107,7 @@ class TeamBehavior:
                 member.cancel(self.epoch)
 
     def close(self) -> None:
-        """Command nothing more; the vehicles go on with what they do."""
+        """Command nothing more; the vehicles go on with their parts."""
         self._over = True
         if self._ticking is not None:
             self._ticking.cancel()
@@ -113,17 +116,17 @@ class TeamBehavior:
 
     @property
     def over(self) -> bool:
-        """Whether its end was told, or is nobody's concern any more."""
+        """Whether it has reported its end, or another behavior has taken its team over."""
         return self._over
 
     async def hold(self, member: ResourceId) -> None:
-        """A run holds a member; one that is not held fails the team."""
+        """Hold a member for a run; the team fails if the member cannot be held."""
         wrong = await self.members[member].hold()
         if wrong:
             self._disobeyed(member, f"it was not held: {wrong}")
 
     async def resume(self, member: ResourceId) -> None:
-        """A run lets a member go on; one that does not fails the team."""
+        """Resume a member for a run; the team fails if the member does not resume."""
         wrong = await self.members[member].resume()
         if wrong:
             self._disobeyed(member, f"it was not let go on: {wrong}")
@@ -131,22 +134,22 @@ class TeamBehavior:
 
     @property
     def paused(self) -> bool:
-        """Whether a run holds one of them: then nobody is let go, slowed or sent off."""
+        """Whether a run holds a member: then no member is resumed, slowed or started."""
         return any(member.paused for member in self.members.values() if not member.lost)
 
     @property
     def expects(self) -> bool:
-        """Whether anything may come of it by the passing of time alone."""
+        """Whether the behavior may still change by the passing of time alone."""
         if self._over or self._period_s() is None:
             return False
         if self._ending is not None or self._controller is None:
             return True
         return self._clock.now_us() - self._stirred_us < STIRS_WITHIN_S * US_PER_S
 
-    # --- what happens to members ----------------------------------------------------------------
+    # --- events of members ----------------------------------------------------------------------
 
     def report_received(self, report: BehaviorReport) -> None:
-        """A member's arbiter has reported of its part."""
+        """Process a report of a member's arbiter about its part."""
         member = next((each for each in self.members.values() if each.part == report.id), None)
         if member is None or not member.active:
             return
@@ -157,17 +160,17 @@ class TeamBehavior:
         self._review()
 
     def lose(self, member: ResourceId, code: str, reason: str) -> None:
-        """A member is not heard any more, or can go on no longer."""
+        """Process the loss of a member's link, or another fault of it."""
         lost = self.members[member]
         if not lost.lost and not self._over:
             lost.cancel(self.epoch)
             if code == "LINK_LOST":
-                lost.state = BehaviorState.LOST  # its end may never be heard: nobody waits for it
+                lost.state = BehaviorState.LOST  # its end may never be reported: do not wait for it
             self._miss(lost, code, reason)
             self._review()
 
     def failed_to_start(self, member: ResourceId, reason: str) -> None:
-        """A member's arbiter did not take its part."""
+        """Fail the team, because a member's arbiter did not accept its part."""
         failed = self.members[member]
         if failed.active:
             failed.state = BehaviorState.REJECTED
@@ -181,11 +184,11 @@ class TeamBehavior:
     def found(
         self, reports: Mapping[str, BehaviorReport], kept: Reference, *, halts: bool = False
     ) -> None:
-        """After a restart, before `start`: what the arbiters know of the parts.
+        """Adopt the parts that the arbiters know; after a restart, before `start`.
 
-        `halts`: the controller has halted those that are held, and lets them go on.
+        `halts`: the formation controller has halted the held members, and resumes them.
         """
-        self._told_running = True
+        self._running_reported = True
         self._reference = kept
         for name, why in kept.lost.items():
             if name in self.members:
@@ -203,9 +206,9 @@ class TeamBehavior:
                 member.halted = halts and report.held
 
     def take_up(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
-        """As `found`, but some parts are missing: they are begun anew, and the others let go."""
+        """As `found`, but some parts are missing: they start again, and the others resume."""
         self.found(reports, kept)
-        self._told_running = False
+        self._running_reported = False
         self._shares.again = True
         for member in self.members.values():
             member.let_go()
@@ -224,14 +227,14 @@ class TeamBehavior:
             self._miss(member, code, reason)
 
     def _miss(self, member: Member, code: str, reason: str) -> None:
-        """By the team's policy: end, or go on without it."""
+        """By the team's policy: end, or go on without the member."""
         member.lost = f"{code}: {reason}"
         if self._ending is not None:
             return
         left = [each for each in self.members.values() if not each.lost]
         if not self._goes_on or not left:
-            nobody = code == "LINK_LOST" and not left
-            state = BehaviorState.LOST if nobody else BehaviorState.FAILED
+            all_links_lost = code == "LINK_LOST" and not left
+            state = BehaviorState.LOST if all_links_lost else BehaviorState.FAILED
             self._end_all(state, code, f"{member.id}: {reason}")
             return
         _log.warning("%s goes on without %s: %s", self.id, member.id, member.lost)
@@ -243,7 +246,7 @@ class TeamBehavior:
             self._controller.drop(member.id)
         self._shares.drop(member.id)
 
-    # --- what is to be done now -----------------------------------------------------------------
+    # --- next steps -----------------------------------------------------------------------------
 
     def _review(self) -> None:
         if self._over:
@@ -258,8 +261,8 @@ class TeamBehavior:
         active = [member for member in self.members.values() if member.active]
         if any(member.state is None for member in active):
             return
-        if not self._told_running:
-            self._told_running = True
+        if not self._running_reported:
+            self._running_reported = True
             self._note()
         elif self._unnoted():
             self._note()
@@ -286,15 +289,15 @@ class TeamBehavior:
         return self._parts() != self._reference.begun
 
     def _note(self) -> None:
-        """Say RUNNING, with what the journal should know."""
-        if not self._told_running or self._ending is not None:
+        """Report RUNNING, with the reference that the journal keeps."""
+        if not self._running_reported or self._ending is not None:
             return
         lost = {member.id: member.lost for member in self.members.values() if member.lost}
         self._reference = Reference(
             self._parts(), self._shares.done, lost, self._reference.version + 1, self._plan.split
         )
         self._refer(self._reference)
-        self._tell(BehaviorState.RUNNING, "", "")
+        self._report_state(BehaviorState.RUNNING, "", "")
 
     def _end_all(self, state: BehaviorState, code: str, reason: str) -> None:
         if self._over or self._ending is not None:
@@ -321,7 +324,7 @@ class TeamBehavior:
     def _finish(self, state: BehaviorState, code: str, reason: str) -> None:
         self._over = True
         self._wake.set()
-        self._tell(state, code, reason)
+        self._report_state(state, code, reason)
 
     # --- time -----------------------------------------------------------------------------------
 
@@ -341,7 +344,7 @@ class TeamBehavior:
                     self._end_all(BehaviorState.FAILED, "FAILED", "a bug in m2pem: see its log")
 
     def _period_s(self) -> float | None:
-        """Until the next look; None: nothing that takes time is under way."""
+        """Return the time until the next check; None: no member needs one."""
         if self._ending is not None:
             return PERIOD_S
         if self._controller is not None and any(member.goes for member in self.members.values()):

@@ -1,4 +1,4 @@
-"""Which team behaviors can be made of what vehicles can do alone. Loads nothing that runs them."""
+"""Which team behaviors the members' own behaviors allow. Imports nothing that runs them."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -11,7 +11,7 @@ from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 
 
 class Capabilities:
-    """What the members of a fleet's teams offer alone and together, by their own arbiters."""
+    """The vehicle behaviors and team behaviors of a fleet's members, by their own arbiters."""
 
     def __init__(self, fleet: Fleet, arbiter_of: Callable[[ResourceId], Arbiter]) -> None:
         self._fleet = fleet
@@ -19,7 +19,7 @@ class Capabilities:
         self._in_teams = {member for team in fleet.teams.values() for member in team.members}
 
     def alone(self, resource: ResourceId) -> Mapping[str, BehaviorSpec]:
-        """What a vehicle can do alone, of what the fleet lets it do."""
+        """Return a vehicle's own behaviors that the fleet allows, by name."""
         vehicle = self._fleet.vehicles.get(resource)
         allowed = vehicle.behaviors if vehicle is not None else ()
         return {
@@ -29,7 +29,7 @@ class Capabilities:
         }
 
     def together(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """The team behaviors in which a vehicle can take part by what it can do alone."""
+        """Return the team behaviors in which a vehicle can take part."""
         if resource not in self._in_teams:
             return ()
         alone = self.alone(resource)

@@ -12,16 +12,16 @@ from m2pem.teams.paths import SPACING_M, MemberPath, beside, slot
 from m2pem.teams.plan import Leg, March, Marcher, Plan, PlanningContext, TeamRefusedError
 
 GAP_SHARE = 0.5
-"""Of the spacing: what members in one lane keep at least, along the route."""
+"""Share of the spacing: the minimum distance of members in one lane, along the route."""
 
 HEADROOM_SHARE = 0.4
-"""Of the spacing: what a member may need to stop, so that it need not always brake and start."""
+"""Share of the spacing that the stopping distance may take, to avoid frequent braking."""
 
 _SAME_PLACE_M = 0.01
 
 
 def march(context: PlanningContext, default_shape: str) -> Plan:
-    """All move together and keep their places; without a route they form up on the lead."""
+    """Move together in a shape; without a route, form up on the lead."""
     shape, spacing = _shape(context, default_shape)
     route = context.parameters.route
     places = _places(context, shape, spacing)
@@ -41,7 +41,7 @@ def march(context: PlanningContext, default_shape: str) -> Plan:
 
 
 def one_by_one(context: PlanningContext) -> Plan:
-    """Each sets off when the one before it has arrived, and stops behind it."""
+    """Let each member set off when the member before it has arrived, and stop behind it."""
     shape, spacing = _shape(context, "column")
     route = context.parameters.route
     places = _places(context, shape, spacing)
@@ -49,19 +49,19 @@ def one_by_one(context: PlanningContext) -> Plan:
         return Plan(_forming_up(context, places, chained=True))
     ways = _ways(context, route, places)
     befores: list[ResourceId | None] = [None, *(way.member for way in ways)]
-    wished = context.parameters.speed_m_s
+    speed_m_s = context.parameters.speed_m_s
     return Plan(
-        tuple(way.leg(context, wished, after) for way, after in zip(ways, befores, strict=False))
+        tuple(way.leg(context, speed_m_s, after) for way, after in zip(ways, befores, strict=False))
     )
 
 
 def lane_mates(a: Marcher, b: Marcher, spacing_m: float) -> bool:
-    """Whether one drives in the other's track."""
+    """Whether two members are in one lane."""
     return abs(a.left_m - b.left_m) < spacing_m / 2
 
 
 class _Way:
-    """A member's own way: the route moved to its side, and cut short by what it stays behind."""
+    """A member's route: the team's, shifted sideways and shortened by its distance behind."""
 
     def __init__(
         self,
@@ -99,8 +99,8 @@ class _Way:
             context.coordinate(place, None if up is None else place[2])
             for place, up in zip(self.places, ups, strict=False)
         )
-        wished = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
-        return context.leg(self.member, "single_vehicle_routing", wished, after)
+        parameters = {"route": Route(waypoints, route.altitude_frame), "speed": speed_m_s}
+        return context.leg(self.member, "single_vehicle_routing", parameters, after)
 
 
 def _shape(context: PlanningContext, default: str) -> tuple[str, float]:
@@ -108,7 +108,7 @@ def _shape(context: PlanningContext, default: str) -> tuple[str, float]:
 
 
 def _places(context: PlanningContext, shape: str, spacing_m: float) -> list[tuple[float, float]]:
-    """Where each member is to be, in metres behind the lead and to its left."""
+    """Return each member's place, in metres behind the lead and to its left."""
     text = context.parameters.text("offsets")
     if not text:
         slots = (slot(shape, index) for index in range(len(context.members)))
@@ -126,7 +126,7 @@ def _places(context: PlanningContext, shape: str, spacing_m: float) -> list[tupl
 
 
 def _refuse_wrong_order(marchers: Sequence[Marcher], spacing_m: float) -> None:
-    """Who comes later in a team looks out for those before it, not the other way round."""
+    """Raise unless, in each lane, members ahead come first: each keeps clear of those before it."""
     for index, marcher in enumerate(marchers):
         for other in marchers[:index]:
             if lane_mates(marcher, other, spacing_m) and marcher.back_m < other.back_m:
@@ -147,7 +147,7 @@ def _ways(
 
 
 def _apart(context: PlanningContext, route: Route) -> list[tuple[float, float, float | None]]:
-    """The waypoints that differ; a route of one begins where the lead is."""
+    """Return the waypoints without repetitions; a route of one point begins at the lead."""
     kept = [route.waypoints[0]]
     for waypoint in route.waypoints[1:]:
         if math.dist(context.level(waypoint), context.level(kept[-1])) > _SAME_PLACE_M:
@@ -162,7 +162,7 @@ def _apart(context: PlanningContext, route: Route) -> list[tuple[float, float, f
 
 
 def _march_speed(context: PlanningContext, marchers: Sequence[Marcher], spacing_m: float) -> float:
-    """As wished, but so that each can stop before it comes too near to the one in its lane."""
+    """Return the requested speed, limited so that each member can stop behind the one ahead."""
     speed = context.speed()
     for index, marcher in enumerate(marchers):
         for other in marchers[:index]:

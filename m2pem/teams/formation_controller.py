@@ -1,8 +1,8 @@
-"""Keeps the members of a march in their places, by nothing but how fast each may go.
+"""Keeps the members of a march in their places by limiting their speeds.
 
-Whoever is ahead of its place waits, so does everybody when somebody falls back too far, and nobody
-comes too near to the one ahead in its lane, even if that one stops dead.
-Pure: it is told what is seen, and knows no clock.
+A member that is ahead of its place waits. All members wait when one falls back too far. No member
+comes too near to the member ahead in its lane, even if that one stops at once.
+Pure: the caller passes the poses; the controller uses no clock.
 """
 
 import math
@@ -18,15 +18,16 @@ _SLACK_S = 1.5
 _LOOK_AHEAD_M = 50.0
 _CRAWL_SHARE = 0.1
 _START_SHARE = 0.2
-"""Of the speed of the march: what is slower stops; what stands goes on at the second."""
+"""Shares of the march's speed: a member stops below the first, and starts again at the second."""
 
 _RESTART_SHARE = 0.1
-"""Of the spacing: how much wider than needed a gap is when one who can but stop and go goes on."""
+"""Share of the spacing: a member without variable speed restarts when its gap is that much wider
+than needed."""
 
 
 @dataclass(slots=True, eq=False)
 class _Track:
-    """What is known of a member: how far it is, along its own path and the team's route."""
+    """A member's progress in metres: `along_m` on its own path, `mark_m` on the team's route."""
 
     marcher: Marcher
     back_m: float
@@ -38,7 +39,10 @@ class _Track:
 
 
 class FormationController:
-    """`steady`: members that can go or stop, but not slower; all others take any speed."""
+    """Computes the speed of each member of a march.
+
+    `steady`: members that can only move at the march's speed or stop; all others take any speed.
+    """
 
     def __init__(self, march: March, steady: Collection[ResourceId] = ()) -> None:
         self._march = march
@@ -50,21 +54,21 @@ class FormationController:
 
     @property
     def spacing_m(self) -> float:
-        """Between two of them."""
+        """The spacing between two members in a row."""
         return self._march.spacing_m
 
     @property
     def floor_m(self) -> float:
-        """The least way along the route between two in one lane."""
+        """The minimum distance along the route between two members in one lane."""
         return GAP_SHARE * self._march.spacing_m
 
     @property
     def marks_m(self) -> tuple[float, ...]:
-        """How far along the route each was seen last."""
+        """The last known progress of each member along the team's route."""
         return tuple(track.mark_m for track in self._tracks.values())
 
     def drop(self, member: ResourceId) -> None:
-        """Go on without a member; in a column, who is behind it moves up."""
+        """Go on without a member; in a column, the members behind it move up."""
         self._tracks.pop(member, None)
         if self._march.closes:
             for rank, track in enumerate(self._tracks.values()):
@@ -73,10 +77,10 @@ class FormationController:
     def step(
         self, seen: Mapping[ResourceId, MemberPose], arrived: Collection[ResourceId] = ()
     ) -> dict[ResourceId, float]:
-        """How fast each member may go now, in m/s; 0: it must stand.
+        """Return the maximum speed of each member now, in m/s; 0: it must stand.
 
-        `seen`: where those are of whom it is known. Who was never seen is left alone. `arrived`:
-        who is at the end of its way; they are told nothing.
+        `seen`: the known poses; a member without any pose so far gets no speed. `arrived`: members
+        at the end of their way; they get no speed either.
         """
         for member, track in self._tracks.items():
             self._look(track, seen.get(member), member in arrived)
@@ -94,7 +98,7 @@ class FormationController:
         return wanted
 
     def kept(self) -> tuple[TeamMemberState, ...]:
-        """How well the members keep their places, by what `step` saw last."""
+        """Return the members' deviations from their places, by the last `step`."""
         known = [track for track in self._tracks.values() if track.mark_m > -math.inf]
         states = []
         for track in self._tracks.values():
@@ -123,7 +127,7 @@ class FormationController:
             track.off_m = path.off_m(stand.place, found_m)
 
     def _speed(self, track: _Track, before: list[_Track], waits_m: float) -> float:
-        """`waits_m`: how far the last of the others has fallen back behind this one."""
+        """`waits_m`: how far the slowest other member has fallen back behind this one."""
         march_m_s, slack = self._march.speed_m_s, self._slack_m
         lag_m = _lag_m(track, before[0]) if before else 0.0
         free_m = self._free_m(track, before)
@@ -140,7 +144,7 @@ class FormationController:
         return march_m_s if goes else 0.0
 
     def _free_m(self, track: _Track, before: list[_Track]) -> float:
-        """The way that it may go before it is too near to one of its lane, were that to stop."""
+        """The distance to go until it is too near to a member ahead in its lane that stops now."""
         gaps = [
             other.mark_m - track.mark_m
             for other in before
@@ -155,9 +159,9 @@ class FormationController:
 
 
 def _lag_m(track: _Track, other: _Track) -> float:
-    """How far one is behind the place that is its own beside the other; less than 0: ahead of it.
+    """Return how far `track` is behind its place relative to `other`, in metres; below 0: ahead.
 
-    Nobody waits for what lies beyond the end of a way.
+    A place beyond the end of the member's path counts as the end.
     """
     place_m = other.mark_m + other.back_m - track.back_m
     return min(place_m, track.marcher.path.end_mark_m) - track.mark_m

@@ -1,4 +1,4 @@
-"""One member of a team behavior: the part that it does, and the calls to its arbiter."""
+"""One member of a team behavior: its part, and the calls to its arbiter."""
 
 import asyncio
 import logging
@@ -10,24 +10,25 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Leg
 
 CALL_TIMEOUT_S = 10.0
-"""As the dispatcher's: an arbiter only hands over, and one that hangs is a fault."""
+"""As the dispatcher's: an arbiter only sends a command; one that hangs is faulty."""
 
 TURN_TIMEOUT_S = 8.0
-"""Of a hold or resume by the run: the team must know before the dispatcher gives it up."""
+"""Of a hold or resume by the run: the team must fail before the dispatcher's own timeout."""
 
 SPEED_STEP_SHARE = 0.05
-"""Of the speed that was said last: smaller changes are not worth a command."""
+"""Share of the last commanded speed: smaller changes are not sent."""
 
 _log = logging.getLogger("m2pem.teams")
 
 
 class Member:
-    """Commands of the formation controller are sent one after the other. A hold and a resume by the
-    run, and a cancel, go at once; the controller's last command is dropped if it was not sent yet.
+    """Sends the formation controller's commands one after the other. A hold and a resume by the
+    run, and a cancel, are sent at once; a command of the controller that still waits is dropped.
 
-    `part`: the id of its part, "" before and between them. `state`: where that is; None: no word of
-    it yet. `paused`: a run holds it. `halted`: the controller does. `lost`: why the team goes on
-    without it. `failed`: is told what an arbiter's `start` raised.
+    `part`: the id of its part, "" before and between parts. `state`: the part's last reported
+    state; None: no report yet. `paused`: a run holds the member. `halted`: the controller holds it.
+    `lost`: why the team goes on without it. `failed` is called with the reason when the arbiter's
+    `start` raises or hangs.
     """
 
     def __init__(
@@ -57,33 +58,33 @@ class Member:
 
     @property
     def adjustable(self) -> bool:
-        """Whether it can be told to go slower while it goes on."""
+        """Whether its speed can be changed while its part is running."""
         return self._adjusting is not None
 
     @property
     def publishes_position(self) -> bool:
-        """Whether it tells where it is all the time."""
+        """Whether its telemetry has its position regularly."""
         return math.isfinite(self.limits.lost_after_s)
 
     @property
     def in_sight(self) -> bool:
-        """Whether it is known all the time where it is, so that it can be marshalled."""
+        """Whether its position is always known, so that it can keep its place in a formation."""
         return self._sighted or self.publishes_position
 
     @property
     def active(self) -> bool:
-        """Whether its part goes on, or may."""
+        """Whether its part has not ended, as far as known."""
         return bool(self.part) and (self.state is None or not self.state.terminal)
 
     @property
     def goes(self) -> bool:
-        """Whether its part is known to go on."""
+        """Whether its part was reported RUNNING and has not ended."""
         return self.active and self.state is BehaviorState.RUNNING
 
     def begin(
         self, part: str, leg: Leg, epoch: int, preempts: tuple[str, ...], now_us: int
     ) -> None:
-        """Have it start a part."""
+        """Start a part."""
         self.part, self.state, self.native_ref, self.begun_us = part, None, None, now_us
         self.halted = False
         speed = leg.parameters.get("speed")
@@ -113,18 +114,18 @@ class Member:
         self._starting = self._enqueue(start)
 
     def adopt(self, part: str, report: BehaviorReport, native_ref: str | None) -> None:
-        """After a restart: it was found doing a part, or at its end."""
+        """Adopt a part that its arbiter knows after a restart, running or ended."""
         self.part, self.state = part, report.state
         self.native_ref = report.native_ref or native_ref
 
     def let_go(self) -> None:
-        """After a restart: what was held until somebody said how to go on."""
+        """Resume its part after a restart, when an operator has decided to go on."""
         self.halted = False
         if self.active:
             self._enqueue(self._go_on)
 
     def cancel(self, epoch: int) -> None:
-        """Have it end its part, once."""
+        """Cancel its part, once."""
         part = self.part
         if self.active and self._cancelled != part:
             self._cancelled = part
@@ -134,7 +135,7 @@ class Member:
             )
 
     def go(self, speed_m_s: float, epoch: int) -> None:
-        """Let it go at a speed, or (0) not at all; nothing while an earlier word is on its way."""
+        """Command a speed, or (0) a halt; skipped while an earlier command still waits."""
         if self.paused or not self.goes or (self._tail is not None and not self._tail.done()):
             return
         if speed_m_s == 0.0:
@@ -149,19 +150,19 @@ class Member:
             self._enqueue(self._go_on)
 
     async def hold(self) -> str:
-        """A run holds it. Returns "", or why it is not held."""
+        """Hold it for a run. Return "", or why it is not held."""
         self.paused = True
         return await self._turn(f"hold {self.id}", self._arbiter.hold(self.id))
 
     async def resume(self) -> str:
-        """The run lets it go; it stays held if the controller wants that. Returns as `hold`."""
+        """Resume it for a run, unless the controller halts it. Return as `hold` does."""
         self.paused = False
         if self.halted:
             return ""
         return await self._turn(f"resume {self.id}", self._arbiter.resume(self.id))
 
     async def query(self, part: str, native_ref: str | None) -> BehaviorReport:
-        """What its arbiter knows of a part."""
+        """Query its arbiter for a part."""
         return await self._arbiter.query(part, native_ref)
 
     def close(self) -> None:
@@ -178,12 +179,12 @@ class Member:
     async def _adjust(self, speed_m_s: float, epoch: int) -> None:
         if self._adjusting is not None and self._obeys:
             self._speed_m_s = speed_m_s
-            wished = self._adjusting.adjust(self.part, epoch, {"speed": speed_m_s})
-            await self._call(f"adjust {self.part}", wished)
+            call = self._adjusting.adjust(self.part, epoch, {"speed": speed_m_s})
+            await self._call(f"adjust {self.part}", call)
 
     @property
     def _obeys(self) -> bool:
-        """Whether the controller may still tell it something."""
+        """Whether the controller may still command it."""
         return self.active and not self.paused and self._cancelled != self.part
 
     async def _halt(self) -> None:
@@ -194,7 +195,7 @@ class Member:
         if not self._obeys:
             return
         await self._call(f"go on {self.id}", self._arbiter.resume(self.id))
-        if self.paused:  # a run has held it meanwhile, and the last word is the run's
+        if self.paused:  # a run has held it meanwhile, and the run has precedence
             await self._call(f"hold {self.id}", self._arbiter.hold(self.id))
 
     def _enqueue(self, job: Callable[[], Awaitable[None]]) -> asyncio.Task[None]:
@@ -220,7 +221,7 @@ class Member:
     async def _turn(
         self, what: str, call: Awaitable[None], timeout_s: float = TURN_TIMEOUT_S
     ) -> str:
-        """Await an arbiter's call within its bound. Returns "", or what went wrong."""
+        """Await an arbiter's call within its bound. Return "", or the fault."""
         try:
             async with asyncio.timeout(timeout_s):
                 await call

@@ -1,4 +1,4 @@
-"""What is to be done by a team, and by whom: each member's own share, or what a lost one left."""
+"""Which member carries out which share of a plan: its own, or that of a lost member."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,8 @@ from m2pem.teams.plan import Leg, Plan
 
 @dataclass(slots=True)
 class Share:
-    """What one member was to do. `by`: who does it now; None: nobody yet. `part`: as what."""
+    """The planned part of one member. `by`: the member that carries it out; None: no member yet.
+    `part`: the id of the part."""
 
     leg: Leg
     by: ResourceId | None = None
@@ -20,13 +21,13 @@ class Share:
 
     @property
     def over(self) -> bool:
-        """Whether nobody needs to do it any more."""
+        """Whether it is done or given up."""
         return self.done or self.given_up
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """A share that a member can begin now, as that part."""
+    """A share that a member can begin now. `own`: it is the share that the plan gave the member."""
 
     member: Member
     leg: Leg
@@ -35,9 +36,9 @@ class Assignment:
 
 
 class Partition:
-    """The shares of a plan, by the member whose own each is.
+    """The shares of a plan, by the member to which the plan gave each.
 
-    `again`: parts get new names, as arbiters may know the old ones, and that they have ended.
+    `again`: parts get new ids, because arbiters may know the old ones as ended.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -47,27 +48,27 @@ class Partition:
 
     @property
     def all_over(self) -> bool:
-        """Whether nothing is left to do."""
+        """Whether all shares are done or given up."""
         return all(share.over for share in self._shares.values())
 
     @property
     def arrived(self) -> Sequence[ResourceId]:
-        """Those whose own share is done."""
+        """Members whose own share is done."""
         return [origin for origin, share in self._shares.items() if share.done]
 
     @property
     def done(self) -> tuple[str, ...]:
-        """The parts that have ended well."""
+        """The parts that have succeeded."""
         return tuple(each.part for each in self._shares.values() if each.done and each.part)
 
     def finish(self, part: str) -> None:
-        """A part has ended well."""
+        """Mark a part as succeeded."""
         for share in self._shares.values():
             if share.part == part:
                 share.done = True
 
     def place(self, part: str, *, done: bool) -> ResourceId:
-        """After a restart: a part is done, or somebody does it; returns who."""
+        """Assign a part that an arbiter knows after a restart; return its member."""
         doer, _, rest = part.partition("/")
         share = self._shares.get(ResourceId(rest.partition("/")[0] or doer))
         if share is not None:
@@ -75,14 +76,14 @@ class Partition:
         return ResourceId(doer)
 
     def drop(self, member: ResourceId) -> None:
-        """A member is lost: what it has not done is left to the others, or given up."""
+        """Leave the unfinished shares of a lost member to the others, or give them up."""
         for share in self._shares.values():
             if (share.by or share.leg.member) == member and not share.over:
                 share.by, share.part = None, ""
                 share.given_up = not self._plan.shared
 
     def assignments(self, members: Mapping[ResourceId, Member], epoch: int) -> Iterator[Assignment]:
-        """What can begin now. Each is marked as begun when it is handed out."""
+        """Yield the shares that can begin now, and mark each as begun."""
         for origin, share in self._shares.items():
             if share.over or share.by is not None:
                 continue
@@ -101,7 +102,7 @@ class Partition:
     def _taker(
         self, origin: ResourceId, share: Share, members: Mapping[ResourceId, Member]
     ) -> Member | None:
-        """Who begins a share now; None: nobody yet."""
+        """Return the member that begins a share now; None: no member can yet."""
         before = self._shares.get(share.leg.after) if share.leg.after is not None else None
         if before is not None and not before.over:
             return None

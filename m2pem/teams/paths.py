@@ -7,7 +7,7 @@ from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polyline import EastNorthUp, Polyline, Segment
 
 SPACING_M = 15.0
-"""Between members, when nobody says."""
+"""The default spacing between members."""
 
 
 def slot(shape: str, index: int) -> tuple[float, float]:
@@ -33,7 +33,7 @@ def slot(shape: str, index: int) -> tuple[float, float]:
 
 
 def beside(place: EastNorth, yaw_rad: float, back_m: float, left_m: float) -> EastNorthUp:
-    """The place behind and to the left of one who looks along `yaw_rad`, on the level."""
+    """Return the place behind and to the left of a pose with that yaw, at altitude 0."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     east, north = place
     return (east - back_m * cos - left_m * sin, north - back_m * sin + left_m * cos, 0.0)

@@ -1,4 +1,4 @@
-"""What each member of a team does, and what the team keeps to meanwhile."""
+"""The plan of a team behavior: the members' parts and their formation; the context of planning."""
 
 import math
 from collections.abc import Mapping
@@ -14,23 +14,23 @@ from m2pem.mission.geometry import Coordinate, Point, Route, VehiclePosition
 from m2pem.teams.paths import MemberPath
 
 REACTION_S = 1.0
-"""From a change of what is seen to a vehicle that begins to brake: telemetry, thought, command."""
+"""Time from a change of telemetry until the vehicle brakes: telemetry, control, command."""
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """`nominal_m_s`: the speed of a march when nobody says. `braking_m_s2`: what a vehicle that is
-    told to stop brakes with at least."""
+    """`nominal_m_s`: the default speed of a march. `braking_m_s2`: the minimum deceleration of a
+    vehicle after a command to stop."""
 
     nominal_m_s: float
     braking_m_s2: float
 
     def stopping_m(self, speed_m_s: float) -> float:
-        """The way from what is seen at that speed to the stand."""
+        """Return the distance that the vehicle needs to stop from that speed."""
         return speed_m_s * REACTION_S + speed_m_s**2 / (2 * self.braking_m_s2)
 
     def safe_m_s(self, distance_m: float) -> float:
-        """The highest speed from which it stops within the distance; 0 without any."""
+        """Return the maximum speed from which it stops within the distance; 0 if that is <= 0."""
         if distance_m <= 0:
             return 0.0
         lag = self.braking_m_s2 * REACTION_S
@@ -47,18 +47,18 @@ MOTIONS: Mapping[str, Motion] = {
 
 
 MAX_RANGE_M = 100_000.0
-"""Farther from its members than this a team does not work."""
+"""The maximum distance between the places of a team behavior and its members."""
 
 _FLYING_OR_DIVING = ("air", "subsurface")
 
 
 class TeamRefusedError(Exception):
-    """The team cannot do it; the text says why, naming the member or the parameter."""
+    """The team cannot carry the behavior out; the text names the member or the parameter."""
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What one member does. `after`: it begins when that member has ended its own."""
+    """The part of one member. `after`: it begins when that member's part has ended."""
 
     member: ResourceId
     behavior: str
@@ -81,7 +81,7 @@ class Marcher:
 class March:
     """Members that move along one route and keep their places to each other, the lead first.
 
-    `closes`: who comes behind a lost member moves up to its place.
+    `closes`: the members behind a lost one move up.
     """
 
     marchers: tuple[Marcher, ...]
@@ -92,9 +92,12 @@ class March:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """`legs`: at most one a member. `stays`: it goes on when all have ended, for `duration_s` if
-    that is given. `shared`: what a lost member has not done is done by another one; `takes`: the
-    parameters that each takes then. `split`: what share of it each member has."""
+    """The members' parts of one team behavior.
+
+    `legs`: at most one for each member. `stays`: the behavior goes on when all have ended, for
+    `duration_s` if that is given. `shared`: another member takes over what a lost member has not
+    done; `takes`: the parameters that each accepts then. `split`: each member's share.
+    """
 
     legs: tuple[Leg, ...]
     march: March | None = None
@@ -107,7 +110,8 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class MemberPose:
-    """Where a vehicle is on the plane; `yaw_rad` from east, counter-clockwise; None: not known."""
+    """A vehicle's pose: `place` is east and north in metres in the team's local frame; `yaw_rad`
+    from east, counter-clockwise; None: not known."""
 
     place: tuple[float, float]
     yaw_rad: float | None = None
@@ -115,12 +119,12 @@ class MemberPose:
 
 @dataclass(frozen=True, slots=True)
 class PlanningContext:
-    """What a plan is made from. `offered`: each member's own vehicle behaviors, by name.
+    """The input of a plan. `offered`: each member's own vehicle behaviors, by name.
 
-    `poses`: where each member is. `target`: where the vehicle is that `target` names. `begun`: the
-    members are under way already (after a restart), not on their way to the route's start; what
-    was split among them then was as `split` says. `cruises_m_s`: how fast members go that the fleet
-    says it of. `lasts_s`: how long those can go on that it says that of.
+    `poses`: the members' poses. `target`: the pose of the vehicle that the parameter `target`
+    names. `begun`: the members are on the route already (after a restart), with the shares of
+    `split`. `cruises_m_s`: the members' cruise speeds that the fleet states. `lasts_s`: the time
+    that members can still move, where the fleet states their endurance.
     """
 
     members: tuple[ResourceId, ...]
@@ -136,10 +140,10 @@ class PlanningContext:
     split: tuple[float, ...] = ()
 
     def target_place(self) -> tuple[float, float]:
-        """Where `target` is now.
+        """Return the present place of `target`, east and north in metres.
 
         Raises:
-            TeamRefusedError: nobody knows.
+            TeamRefusedError: its position is not known.
         """
         value = self.parameters.target
         if isinstance(value, Point):
@@ -150,7 +154,7 @@ class PlanningContext:
         raise TeamRefusedError(f"parameter 'target': the position of {what} is not known")
 
     def level(self, place: Coordinate) -> tuple[float, float]:
-        """A coordinate on the frame.
+        """Return a coordinate as east and north in metres in the local frame.
 
         Raises:
             TeamRefusedError: it is too far away.
@@ -163,22 +167,22 @@ class PlanningContext:
         return east, north
 
     def coordinate(self, place: EastNorthUp | EastNorth, up_m: float | None) -> Coordinate:
-        """A place of the plane as a coordinate, with that altitude."""
+        """Return a place of the local frame as a coordinate with that altitude."""
         return (*self.frame.to_latlon(place[:2]), up_m)
 
     def motion(self, member: ResourceId) -> Motion:
-        """How a member moves."""
+        """Return the speed and the braking of a member."""
         motion = MOTIONS.get(self.domains[member], MOTIONS["ground"])
         return replace(motion, nominal_m_s=self.cruises_m_s.get(member, motion.nominal_m_s))
 
     def speed(self) -> float:
-        """The speed of all together: as wished, else what the slowest is taken to go.
+        """Return the team's speed in m/s: as requested, else the nominal speed of the slowest.
 
-        Not above what the arbiter of a member allows.
+        It is at most the maximum that the arbiter of each member allows.
         """
-        wished = self.parameters.speed_m_s
+        requested_m_s = self.parameters.speed_m_s
         bounds = [self.motion(member).nominal_m_s for member in self.members]
-        speed = min(bounds) if wished is None else wished
+        speed = min(bounds) if requested_m_s is None else requested_m_s
         for member in self.members:
             spec = self.offered[member].get("single_vehicle_routing")
             limit = spec.by_name["speed"].maximum if spec and "speed" in spec.by_name else None
@@ -189,14 +193,14 @@ class PlanningContext:
         self,
         member: ResourceId,
         behavior: str,
-        wished: Mapping[str, ResolvedValue],
+        parameters: Mapping[str, ResolvedValue],
         after: ResourceId | None = None,
     ) -> Leg:
-        """A member's part: the wished parameters that it takes, at the team's altitude if any."""
+        """Return a member's part: the parameters that it accepts, at the team's altitude if any."""
         spec = self.offered[member].get(behavior)
         if spec is None:
             raise TeamRefusedError(f"{member} has no behavior '{behavior}'")
-        given = dict(wished)
+        given = dict(parameters)
         if self.domains[member] in _FLYING_OR_DIVING:
             given = {**self.parameters.only("altitude", "altitude_frame"), **given}
         taken = {
@@ -213,12 +217,12 @@ class PlanningContext:
         heading_rad: float | None = None,
         after: ResourceId | None = None,
     ) -> Leg:
-        """A member's way to a place: `goto`, or a route of two points where it has none."""
+        """Return a member's way to a place: `goto`, or else a route of two points."""
         there = self.coordinate(place, None)
         speed = self.parameters.speed_m_s
         if "goto" in self.offered[member]:
-            wished = {"target": Point(there), "speed": speed, "heading": heading_rad}
-            return self.leg(member, "goto", wished, after)
+            target = {"target": Point(there), "speed": speed, "heading": heading_rad}
+            return self.leg(member, "goto", target, after)
         here = self.coordinate(self.poses[member].place, None)
-        wished_route = {"route": Route((here, there)), "speed": speed}
-        return self.leg(member, "single_vehicle_routing", wished_route, after)
+        route = {"route": Route((here, there)), "speed": speed}
+        return self.leg(member, "single_vehicle_routing", route, after)

@@ -1,4 +1,4 @@
-"""What the journal keeps of a team behavior, and what has become of it after a restart."""
+"""The reference of a team behavior in the journal, and its parts after a restart."""
 
 import asyncio
 import json
@@ -13,9 +13,9 @@ from m2pem.teams.plan import Plan
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have ended
-    well. `lost`: members that the team goes on without, and why. `version`: how often it changed.
-    `split`: the shares of the members in what they divide.
+    """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have
+    succeeded. `lost`: members that the team goes on without, and why. `version`: the number of
+    changes. `split`: the members' shares, for a plan that divides its work.
     """
 
     begun: Mapping[str, str | None] = field(default_factory=dict)
@@ -25,7 +25,7 @@ class Reference:
     split: tuple[float, ...] = ()
 
     def text(self) -> str:
-        """As the journal keeps it."""
+        """Return it as JSON, for the journal."""
         return json.dumps(
             {
                 "begun": dict(self.begun),
@@ -39,7 +39,7 @@ class Reference:
 
 
 def read_reference(text: str | None) -> Reference:
-    """What `Reference.text` wrote; an empty one for nothing, and for what cannot be read."""
+    """Read the text of `Reference.text`; return an empty one if there is none or it is invalid."""
     try:
         data = json.loads(text or "{}")
         return Reference(
@@ -54,7 +54,7 @@ def read_reference(text: str | None) -> Reference:
 
 
 QUERY_TIMEOUT_S = 8.0
-"""Less than a team itself is given to answer."""
+"""Less than the timeout of a query to the team itself."""
 
 _GOOD = (BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.SUCCEEDED)
 
@@ -63,15 +63,15 @@ _log = logging.getLogger("m2pem.teams")
 
 @dataclass(frozen=True, slots=True)
 class FoundParts:
-    """`reports`: of the parts that had begun, by part. `gap`: what is not known of a part; "" if
-    it is known of all what became of them."""
+    """`reports`: reports of the parts that had begun, by part. `gap`: names the parts that are not
+    known; "" if all are."""
 
     reports: Mapping[str, BehaviorReport]
     gap: str = ""
 
     @property
     def good(self) -> Mapping[str, BehaviorReport]:
-        """The parts that go on or have ended well."""
+        """The parts that are running or have succeeded."""
         return {part: each for part, each in self.reports.items() if each.state in _GOOD}
 
     def held(self, *, marches: bool) -> bool:
@@ -81,7 +81,7 @@ class FoundParts:
         return bool(going) and (all(going) if marches else any(going))
 
     def trimmed(self, kept: Reference) -> Reference:
-        """What was kept, without the parts that cannot go on: they are not asked for again."""
+        """Return the reference without the parts that cannot go on: they are not queried again."""
         return replace(kept, begun={p: ref for p, ref in kept.begun.items() if p in self.good})
 
 
@@ -91,7 +91,7 @@ async def look_for_parts(
     kept: Reference,
     arbiter_of: Callable[[ResourceId], Arbiter],
 ) -> FoundParts:
-    """Ask the arbiters for every part that has begun, or may have.
+    """Query the arbiters for every part that has begun, or may have.
 
     A part that the journal does not know may have begun just before the crash; if its arbiter does
     not know it either, it has not.

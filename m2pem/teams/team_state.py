@@ -1,4 +1,4 @@
-"""What a team knows: where its members are, what each can do, and so what each is to do."""
+"""The members' poses and capabilities, and the plan of a team behavior from them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -26,11 +26,11 @@ PLANS: Mapping[str, Callable[[PlanningContext], Plan]] = {
     "area_observe": observe,
     "escort": escort,
 }
-"""By the behavior's name. Each raises TeamRefusedError when it cannot be done."""
+"""Planners by the behavior's name. Each raises TeamRefusedError if no plan is possible."""
 
 
 def alike(request: BehaviorRequest) -> Plan:
-    """A behavior of vehicles that several are to do at once: each does it."""
+    """Return the plan of a vehicle behavior with several vehicles: each carries it out."""
     return Plan(
         tuple(Leg(each, request.behavior, request.parameters) for each in request.resources)
     )
@@ -39,19 +39,19 @@ def alike(request: BehaviorRequest) -> Plan:
 SEEN_WITHIN_S = 1.5
 LOOK_EVERY_S = 0.1
 LEFT_OVER = 0.2
-"""Of a full battery: below it a member counts as one with a low battery, soon."""
+"""Fraction of a full battery that a plan leaves unused."""
 
 
 @dataclass(frozen=True, slots=True)
 class TeamPlan:
-    """A plan, and the plane that its places are in."""
+    """A plan, and the local frame of its places."""
 
     plan: Plan
     frame: LocalFrame
 
 
 class TeamSituation:
-    """Looks through the fleet's bus, and through arbiters that need not wait for telemetry."""
+    """Reads poses from the fleet's bus, and from arbiters that need not wait for telemetry."""
 
     def __init__(
         self,
@@ -71,10 +71,10 @@ class TeamSituation:
     def scheme(
         self, request: BehaviorRequest, *, begun: bool, split: tuple[float, ...] = ()
     ) -> TeamPlan:
-        """What each member of a request does. `split`: the shares that they have, if they have.
+        """Plan a request. `split`: the members' shares from before a restart, if there are any.
 
         Raises:
-            TeamRefusedError: it cannot be done; the text says why.
+            TeamRefusedError: no plan is possible; the text says why.
         """
         if not request.resources:
             raise TeamRefusedError(f"{request.behavior} has no members")
@@ -113,7 +113,7 @@ class TeamSituation:
         return TeamPlan(PLANS[request.behavior](context), frame)
 
     async def until_seen(self, request: BehaviorRequest, clock: Clock) -> None:
-        """Wait a moment for members that have not been heard since the start of the executive."""
+        """Wait at most `SEEN_WITHIN_S` for the first positions of the members."""
         vehicles = request.resources if request.behavior in PLANS else ()
         waited_s = 0.0
         while waited_s < SEEN_WITHIN_S and not all(self._state(each) for each in vehicles):
@@ -121,7 +121,7 @@ class TeamSituation:
             waited_s += LOOK_EVERY_S
 
     def look(self, vehicle: ResourceId, frame: LocalFrame) -> MemberPose | None:
-        """Where a vehicle is; None: nobody knows."""
+        """Return a vehicle's pose; None: it is not known."""
         state = self._state(vehicle)
         return None if state is None else pose_of(frame, state)
 
@@ -137,13 +137,13 @@ class TeamSituation:
 
 
 def lasts_s(endurance_s: float, state: VehicleState | None) -> float:
-    """How long a vehicle can go on, until its battery is at what is to be left over."""
+    """Return how long a vehicle can move until its battery is at `LEFT_OVER`."""
     charged = state.battery_fraction if state is not None else None
     return endurance_s * max(0.0, (1.0 if charged is None else charged) - LEFT_OVER)
 
 
 def pose_of(frame: LocalFrame, state: VehicleState) -> MemberPose:
-    """A vehicle on the plane; its position must be known."""
+    """Return a vehicle's pose in the local frame; its position must be known."""
     if state.position is None:
         raise ValueError(f"the position of {state.resource} is not known")
     place = frame.to_local(state.position.latlon)
