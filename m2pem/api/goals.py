@@ -1,4 +1,4 @@
-"""An arbiter for vehicles that take a goal each, and tell over a link how they stand."""
+"""A base class of arbiters for vehicles that have one goal at a time and report their state."""
 
 import asyncio
 import uuid
@@ -26,12 +26,12 @@ RETRY_AFTER_S = 0.5
 
 
 class GoalArbiter:
-    """Keeps every promise of `Arbiter` for subclasses that only speak to their vehicles.
+    """Implements the contract of `Arbiter` for subclasses that only communicate with vehicles.
 
-    A subclass has `behaviors` and `bounds`, and writes `listen`, `begin`, `end`, `hold` and
-    `resume`. What a vehicle says goes to `receive`. A goal is a text, unique for ever, that stands
-    for a behavior on the vehicle: after a restart the behavior is found again by it. Silence of
-    a vehicle ends its behavior as LOST. All seconds are those of the clock that was lent.
+    A subclass has `behaviors` and `bounds`, and implements `listen`, `begin`, `end`, `hold` and
+    `resume`. It passes each state of a vehicle to `receive`. A goal is a text, unique forever, that
+    identifies a behavior on the vehicle: after a restart the behavior is found again by it. When no
+    state arrives, the vehicle's behavior ends as LOST. All times are those of the context's clock.
     """
 
     capabilities: ClassVar[ArbiterCapabilities] = ArbiterCapabilities()
@@ -47,16 +47,16 @@ class GoalArbiter:
         self._states: AsyncQueue[VehicleState | PayloadState] = AsyncQueue(STATES_WAITING)
         self._behaviors: dict[str, BehaviorId] = {}
         self._goals: dict[ResourceId, str] = {}
-        self._heard_us: dict[ResourceId, int] = {}
-        self._all_heard = asyncio.Event()
+        self._received_us: dict[ResourceId, int] = {}
+        self._all_received = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
 
-    # --- what a subclass writes -----------------------------------------------------------------
+    # --- methods that a subclass implements -----------------------------------------------------
 
     async def listen(self, resource: ResourceId) -> None:
-        """Connect to a resource and hand what it says to `receive`, as long as the link lasts.
+        """Connect to a resource and pass its states to `receive`, as long as the link lasts.
 
-        It is called again a while after it returns or raises OSError.
+        It is called again soon after it returns or raises OSError.
         """
         raise NotImplementedError
 
@@ -65,15 +65,15 @@ class GoalArbiter:
         return ""
 
     async def begin(self, request: BehaviorRequest, goal: str) -> None:
-        """Give the resources a goal, in place of the one that they may have."""
+        """Send the resources a goal, in place of their present one."""
         raise NotImplementedError
 
     async def end(self, resource: ResourceId, goal: str) -> None:
-        """Have a resource give a goal up, if it still has it."""
+        """Cancel a goal of a resource, if it still has it."""
         raise NotImplementedError
 
     async def hold(self, resource: ResourceId) -> None:
-        """Bring the resource to a stand, keeping its goal."""
+        """Bring the resource to a stand, and keep its goal."""
         raise NotImplementedError
 
     async def resume(self, resource: ResourceId) -> None:
@@ -81,11 +81,11 @@ class GoalArbiter:
         raise NotImplementedError
 
     def held(self, resource: ResourceId) -> bool:
-        """Whether the resource says that it is held. Override it where a hold outlives this process
-        on the vehicle; it is asked after a restart."""
+        """Whether the resource reports that it is held. Override it if a hold outlives this process
+        on the vehicle; it is called after a restart."""
         return False
 
-    # --- what a subclass calls ------------------------------------------------------------------
+    # --- methods that a subclass calls ----------------------------------------------------------
 
     def receive(
         self,
@@ -95,15 +95,15 @@ class GoalArbiter:
         code: str = "",
         reason: str = "",
     ) -> None:
-        """A resource has spoken: where it is, and the goal that it has or had last.
+        """Process a state of a resource, and its present or last goal.
 
-        `became`: how the goal ended (SUCCEEDED, FAILED with a `code`, CANCELLED); None while it is
-        pursued. The same may be said again and again.
+        `became`: how the goal ended (SUCCEEDED, FAILED with a `code`, CANCELLED); None before its
+        end. The same values may be passed repeatedly.
         """
         self._states.put(state)
-        self._heard_us[state.resource] = self.context.clock.now_us()
-        if len(self._heard_us) == len(self.connections):
-            self._all_heard.set()
+        self._received_us[state.resource] = self.context.clock.now_us()
+        if len(self._received_us) == len(self.connections):
+            self._all_received.set()
         self._goals[state.resource] = goal
         if behavior := self._behaviors.get(goal):
             self._ledger.progress(behavior)
@@ -113,23 +113,23 @@ class GoalArbiter:
     # --- the protocol ---------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """`behaviors`, on every resource."""
+        """Return `behaviors`, for every resource."""
         return self.behaviors
 
     def limits(self, resource: ResourceId) -> Limits:
-        """`bounds`, for every resource."""
+        """Return `bounds`, for every resource."""
         return self.bounds
 
     async def connect(self) -> None:
-        """Listen to all resources; returns when all were heard, or soon."""
+        """Connect to all resources; return when each has sent a state, or soon."""
         create = asyncio.get_running_loop().create_task
         self._tasks = [create(self._listen_on(resource)) for resource in self.connections]
         self._tasks += [create(self._watch(resource)) for resource in self.connections]
-        heard, late = create(self._wait_for_all()), create(self._sleep(CONNECT_WITHIN_S))
-        await asyncio.wait([heard, late], return_when=asyncio.FIRST_COMPLETED)
-        for task in (heard, late):
+        waits = [create(self._wait_for_all()), create(self._sleep(CONNECT_WITHIN_S))]
+        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        for task in waits:
             task.cancel()
-        await asyncio.gather(heard, late, return_exceptions=True)
+        await asyncio.gather(*waits, return_exceptions=True)
 
     async def start(self, request: BehaviorRequest) -> None:
         """`begin`, unless the request is known, past, refused, or for a busy resource."""
@@ -147,7 +147,7 @@ class GoalArbiter:
                     await self.end(resource, goal)
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What is known, or after a restart: what a resource that has the goal says."""
+        """Return the known state; after a restart, find the behavior by the resources' goals."""
         holders = [resource for resource, goal in self._goals.items() if goal == native_ref]
         if native_ref and holders and native_ref not in self._behaviors:
             self._behaviors[native_ref] = behavior
@@ -160,11 +160,11 @@ class GoalArbiter:
         return self._ledger.reports()
 
     def telemetry(self) -> AsyncIterator[VehicleState | PayloadState]:
-        """States as they come; a reader who is slow misses old ones."""
+        """States as they come; a slow reader misses old ones."""
         return self._states.read()
 
     async def close(self) -> None:
-        """Stop listening. Vehicles keep doing what they do."""
+        """Close all connections. Vehicles go on with their goals."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -180,24 +180,24 @@ class GoalArbiter:
                 await self.listen(resource)
             except OSError as error:
                 self.context.logger.info("%s: %s", resource, error)
-            except Exception:  # what one vehicle says must not deafen us to the others
+            except Exception:  # a fault of one vehicle must not affect the others
                 self.context.logger.exception("%s: cannot be understood", resource)
             await self._sleep(RETRY_AFTER_S)
 
     async def _watch(self, resource: ResourceId) -> None:
         # A whole number: of less than a microsecond no clock would wait to the end.
         bound_us = round(self.limits(resource).lost_after_s * 1_000_000)
-        heard_us = self.context.clock.now_us()
+        last_us = self.context.clock.now_us()
         while True:
-            heard_us = self._heard_us.get(resource, heard_us)
-            silent_us = self.context.clock.now_us() - heard_us
+            last_us = self._received_us.get(resource, last_us)
+            silent_us = self.context.clock.now_us() - last_us
             if silent_us >= bound_us:
                 self._ledger.lose(resource, f"not heard for {silent_us / 1_000_000:.1f} s")
             wait_us = bound_us - silent_us if silent_us < bound_us else bound_us
             await self._sleep(wait_us / 1_000_000)
 
     async def _wait_for_all(self) -> None:
-        await self._all_heard.wait()
+        await self._all_received.wait()
 
     async def _sleep(self, seconds: float) -> None:
         await self.context.clock.sleep(seconds)

@@ -79,7 +79,7 @@ class Bus:
         self._closed = False
 
     def latest(self, resource: ResourceId) -> State | None:
-        """The state heard last, or None before the first."""
+        """Return the newest state, or None before the first."""
         return self._latest.get(resource)
 
     def publish(self, state: Telemetry) -> None:

@@ -19,16 +19,16 @@ from m2pem.mission.catalogue import ResourceId
 
 US_PER_S = 1_000_000
 STALL_US = 500_000
-"""A check that comes later than this says that we did not listen, not that nobody spoke."""
+"""A check that is later than this shows that this process was not running, not a lost link."""
 
 
 @dataclass(slots=True)
 class _Link:
-    """`steady_since_us`: while lost, since when it has been heard again without a gap."""
+    """`steady_since_us`: while lost, since when its telemetry has arrived again without a gap."""
 
     bound_us: int
-    heard_us: int
-    never_heard: bool = True
+    received_us: int
+    never_received: bool = True
     lost: bool = False
     steady_since_us: int | None = None
 
@@ -36,10 +36,10 @@ class _Link:
 class LinkMonitor:
     """Times are microseconds since the Unix epoch.
 
-    `lost_after_s`: for each resource the longest silence, in seconds (its arbiter's or the fleet's
-    bound); a resource that is missing here, or whose bound is infinite, may be silent for ever.
-    `since_us`: when the arbiters were connected; silence counts from then. `critical`, `recovered`:
-    fractions of a full battery.
+    `lost_after_s`: for each resource the maximum time without telemetry, in seconds (its arbiter's
+    or the fleet's bound); a resource that is missing here, or whose bound is infinite, needs none.
+    `since_us`: when the arbiters were connected; the time counts from then. `critical`,
+    `recovered`: fractions of a full battery.
     """
 
     def __init__(
@@ -70,11 +70,11 @@ class LinkMonitor:
 
     @property
     def next_check_us(self) -> int | None:
-        """When `check` must be called next; None: never."""
+        """The time of the next necessary `check`; None: none is necessary."""
         return self._next_check_us
 
     def received(self, state: VehicleState | PayloadState, now_us: int) -> list[ResourceFault]:
-        """A state came in at `now_us`; its own `time_us` is another machine's and not trusted."""
+        """Process a state that arrived at `now_us`; its `time_us` is of another machine's clock."""
         faults: list[ResourceFault] = []
         link = self._links.get(state.resource)
         if state.link is LinkState.LOST:
@@ -83,36 +83,36 @@ class LinkMonitor:
                 if not link.lost:
                     faults.append(self._lose(state.resource, link, "its arbiter lost the link"))
         elif link is not None:
-            self._hear(link, now_us)
+            self._receive(link, now_us)
         if isinstance(state, VehicleState) and state.battery_fraction is not None:
             faults += self._battery(state.resource, state.battery_fraction)
         return faults
 
     def check(self, now_us: int) -> list[ResourceFault]:
-        """Time has passed: who has been silent beyond the bound?"""
+        """Return a fault for each resource without telemetry for longer than its bound."""
         if self._next_check_us is None or now_us < self._next_check_us:
             return []
         if now_us - self._next_check_us > STALL_US and not self._stalled:
-            # We stood still ourselves: what was said meanwhile still waits to be heard. Only once
-            # in a row, as on a fast clock every check is late.
+            # This process was not running: states that arrived meanwhile still wait. Only once in a
+            # row, as on a fast clock every check is late.
             self._stalled = True
             self._next_check_us = now_us + STALL_US
             return []
         self._stalled = False
         faults = []
         for resource, link in self._links.items():
-            silence_us = now_us - link.heard_us
+            silence_us = now_us - link.received_us
             if not link.lost and silence_us > link.bound_us:
-                what = "never heard since connecting" if link.never_heard else "not heard"
+                what = "never heard since connecting" if link.never_received else "not heard"
                 reason = f"{what} for {silence_us / US_PER_S:.1f} s"
                 faults.append(self._lose(resource, link, reason))
         self._next_check_us = self._first_due(now_us)
         return faults
 
-    def _hear(self, link: _Link, now_us: int) -> None:
-        gap_us = now_us - link.heard_us
-        link.heard_us = now_us
-        link.never_heard = False
+    def _receive(self, link: _Link, now_us: int) -> None:
+        gap_us = now_us - link.received_us
+        link.received_us = now_us
+        link.never_received = False
         if not link.lost:
             return
         if link.steady_since_us is None or gap_us > link.bound_us:
@@ -136,10 +136,10 @@ class LinkMonitor:
         return []
 
     def _first_due(self, now_us: int) -> int | None:
-        # A lost resource may recover and fall silent before its next check: look at it at least
-        # once in its bound. Hearing somebody only puts off what is due, so `received` need not ask.
+        # A lost resource may recover and be lost again before its next check: check it at least
+        # once in its bound. A state only postpones a check, so `received` need not call this.
         due = (
-            (now_us if link.lost else link.heard_us) + link.bound_us + 1
+            (now_us if link.lost else link.received_us) + link.bound_us + 1
             for link in self._links.values()
         )
         return min(due, default=None)
