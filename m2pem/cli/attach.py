@@ -14,7 +14,7 @@ from m2pem.cli.options import UnusableError, example, journal_option, ocu_option
 def attach(run_id: str | None, journal: str | None, ocu_names: str | None) -> None:
     """Serve an operator of an executive that is running on this host.
 
-    RUN tells which executive, when several write to the journal. All its operators see the same
+    RUN selects the executive, when several write to the journal. All its operators see the same
     and may do the same; missions go on when this one leaves.
     """
     asyncio.run(_attach(run_id, journal, ocu_names))

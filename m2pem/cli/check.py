@@ -70,7 +70,7 @@ def _check(
     search_path: tuple[Path, ...],
     data: "dict[str, Value]",
 ) -> tuple[list[Finding], bool]:
-    """All findings, and whether there is nothing there to be checked."""
+    """Return all findings, and whether the file has no BPMN at all."""
     from m2pem.bpmn import NO_BPMN_RULES
     from m2pem.executive.loading import load_source
 
@@ -122,7 +122,7 @@ def _against_fleet(
 
 
 def _summary(mission: str, findings: list[Finding]) -> str:
-    """How many findings each file has, the mission's own last."""
+    """Return the number of findings of each file, the mission's own last."""
     if not findings:
         return f"{escaped(mission)}: nothing found"
     files = sorted(dict.fromkeys(each.file for each in findings), key=lambda file: file == mission)

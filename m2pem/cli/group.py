@@ -66,7 +66,7 @@ class LazyGroup(click.Group):
         return [*COMMANDS, *sorted(self._of_plugins.commands)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name; None if nobody has it."""
+        """Return the command of that name; None if there is none."""
         if cmd_name in COMMANDS:
             return built_in(cmd_name)
         return self._of_plugins.commands.get(cmd_name)
@@ -74,7 +74,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """As click's; an unknown command that a broken plugin may have had is told as such."""
+        """As click's; the error for an unknown command names broken plugins that may have it."""
         name = args[0]
         if not name.startswith("-") and self.get_command(ctx, name) is None:
             raise click.UsageError(self._unknown(ctx, name), ctx)
@@ -111,7 +111,7 @@ class LazyGroup(click.Group):
 
 
 def built_in_names() -> click.Group:
-    """What plugins add their commands to: it knows which names are taken."""
+    """Return a group for the commands of plugins, in which the built-in names are taken."""
     return _Names("m2pem")
 
 
@@ -143,7 +143,7 @@ def _log_to_stderr(level: int) -> None:
 
 
 def log_from_a_thread() -> None:
-    """Have a thread write the log: standard error that nobody reads must not hold up a mission."""
+    """Write the log from a thread: a full pipe at standard error must not delay a mission."""
     from m2pem.cli.standard_streams import writer_for
 
     class Lines(logging.Handler):

@@ -132,10 +132,10 @@ async def accept(journal: Journal, run: str) -> None:
 
 
 async def last_decided_us(journal: Journal, line: RunInfo) -> int:
-    """When the last input of a run was decided, in microseconds since the Unix epoch."""
+    """Return the time of a run's last input, in microseconds since the Unix epoch."""
     back = 1
     while True:
-        # An entry is found by its first record, and nobody knows how many the last one has.
+        # An entry is found by its first record; how many the last one has is unknown.
         after = max(0, line.last_seq - back)
         times = [entry.at_us async for entry in journal.read(line.run, after)]
         if times or after == 0:

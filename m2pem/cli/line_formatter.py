@@ -51,7 +51,7 @@ NAMING = frozenset(
         r.PromptWithdrawn,
     )
 )
-"""Records that a view is told of here: lines name behaviors and prompts by what came before."""
+"""Records that a view needs, so that later lines can name behaviors and prompts."""
 
 _READ = SHOWN | NAMING
 

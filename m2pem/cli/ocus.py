@@ -15,7 +15,7 @@ from m2pem.plugins import PluginManager
 
 log = logging.getLogger("m2pem.ocu")
 
-NOBODY = "none"
+NO_UNIT = "none"
 PLAIN = "plain"
 TERMINAL = "terminal"
 
@@ -32,10 +32,10 @@ def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
     if names is None:
         return (TERMINAL if on_terminal and TERMINAL in plugins.ocus() else PLAIN,)
     wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
-    if wanted == (NOBODY,):
+    if wanted == (NO_UNIT,):
         return ()
-    if not wanted or NOBODY in wanted:
-        raise click.UsageError(f"--ocu {names!r}: name units, or `{NOBODY}` alone")
+    if not wanted or NO_UNIT in wanted:
+        raise click.UsageError(f"--ocu {names!r}: name units, or `{NO_UNIT}` alone")
     found: dict[str, None] = {}
     for name in wanted:
         try:
@@ -52,7 +52,7 @@ def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
 
 
 class Operators:
-    """The units at work. One that breaks is told of and stops nothing."""
+    """The units that serve. A unit that raises is reported, and stops nothing."""
 
     def __init__(self, names: Sequence[str], plugins: PluginManager) -> None:
         self.names = tuple(names)
@@ -80,7 +80,7 @@ class Operators:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def end(self) -> None:
-        """Let them go."""
+        """Cancel all units, and wait until they have ended."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -18,7 +18,7 @@ MADE_UP = "sim"
 
 
 class UnusableError(M2pemError):
-    """What the command line names is not there or cannot be used."""
+    """A file or value of the command line is missing or cannot be used."""
 
     exit_status = 2
 
@@ -118,7 +118,7 @@ ocu_option = click.option(
     "--ocu",
     "ocu_names",
     metavar="NAMES",
-    help="Operator control units, separated by commas; none for nobody  "
+    help="Operator control units, separated by commas; none for no unit  "
     "[default: terminal if it is installed and this is one, else plain]",
 )
 

@@ -1,4 +1,4 @@
-"""Prints what is committed, as it is: a line for people, or a record as JSON."""
+"""Prints committed records: each as a line for people, or as JSON."""
 
 import asyncio
 import os
@@ -18,7 +18,7 @@ from m2pem.mission.mission import Mission
 US_PER_S = 1_000_000
 
 TURN = 200
-"""Records printed before others may do something."""
+"""Records printed before other tasks may run."""
 
 
 def wants_colour(stream: TextIO) -> bool:
@@ -72,7 +72,7 @@ class Output:
         return self.lines.format(stamped)
 
     async def follow(self, notices: AsyncIterator[ControlEvent]) -> None:
-        """Print every record that is told, until there will be no more."""
+        """Print every record, until the subscription ends."""
         printed = 0
         async for notice in notices:
             printed += 1
@@ -95,7 +95,7 @@ class Output:
 def output_of(wanted: str) -> Iterator[Output]:
     """The output in a format, `text` or `json`.
 
-    Within, as JSON, whatever else prints (an OCU, a plugin) does so on standard error.
+    With `json`, OCUs and plugins print to standard error within the block.
     """
     stdout = sys.stdout
     as_json = wanted == "json"

@@ -38,16 +38,16 @@ HELP = """\
   start! FILE        the same, even if other runs or operators have its vehicles
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
   handback evsg1     give it back
-  who                say who has each vehicle and payload
-  runs               list what ran, and how it stands
+  who                print the holder of each vehicle and payload
+  runs               list the runs and their states
   quit               leave; missions go on without an operator here
 With several runs, say which: stop r2."""
 
 
 class PlainOcu:
-    """One line, one command. It serves until its operator quits.
+    """Reads one command from each line, until its operator quits.
 
-    At the end of the input nobody answers any more, and it goes on showing what is asked.
+    At the end of the input no operator answers here any more; the unit still shows the prompts.
     """
 
     def __init__(self, control: MissionControl) -> None:
@@ -56,7 +56,7 @@ class PlainOcu:
         self._notices = control.subscribe(size=BACKLOG)
         self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
         self._active: dict[RunId, None] = {}
-        """Runs that have not ended, in the order in which they were heard of."""
+        """Runs that have not ended, in the order of their first events."""
         self._lines: asyncio.Queue[str] = asyncio.Queue()
         self._listening = True
         self._end_noted = False
@@ -78,7 +78,7 @@ class PlainOcu:
         }
 
     async def serve(self) -> None:
-        """Show and obey until the operator quits."""
+        """Show prompts and carry out commands until the operator quits."""
         watching = asyncio.create_task(self._watch())
         obeying = asyncio.create_task(self._obey_in_turn())
         try:
@@ -87,7 +87,7 @@ class PlainOcu:
                     await self._lines.join()
                     return
                 if line.split()[:1] == ["stop"]:
-                    # It comes in its turn, too, unless what was typed before it hangs.
+                    # It keeps its order, too, unless an earlier command hangs.
                     with suppress(TimeoutError):
                         await asyncio.wait_for(self._lines.join(), STOP_WAITS_S)
                     await self._obey(line)
@@ -146,10 +146,10 @@ class PlainOcu:
         self._out.put(" " * indent + printable(text))
 
     def _note_the_end(self) -> None:
-        """Once, when somebody is asked and it can't be here."""
+        """Print, once, that a prompt is open which cannot be answered here."""
         if not self._listening and self._prompts and not self._end_noted:
             self._end_noted = True
-            self._say("the input has ended: nobody answers here any more")
+            self._say("the input has ended: no operator answers here any more")
 
     def _name(self, key: tuple[RunId, str]) -> str:
         """p1; with more than one run, r2 p1."""
@@ -185,7 +185,7 @@ class PlainOcu:
         await self._control.answer(prompt.run, prompt.prompt, decision.value, by=NAME)
 
     def _addressed(self, words: list[str]) -> tuple[OpenPrompt, str]:
-        """The prompt that a line is for, and the rest of the line."""
+        """Return the prompt that a line answers, and the rest of the line."""
         for (run, name), prompt in self._prompts.items():
             if words[:2] == [run, name]:
                 return prompt, " ".join(words[2:])
@@ -195,7 +195,7 @@ class PlainOcu:
         if len(self._prompts) == 1:
             return next(iter(self._prompts.values())), " ".join(words)
         if not self._prompts:
-            raise OperatorError(f"{words[0]!r} is no command, and nothing is asked; try: help")
+            raise OperatorError(f"{words[0]!r} is no command, and no prompt is open; try: help")
         names = ", ".join(map(self._name, self._prompts))
         raise OperatorError(f"several prompts are open: {names}; begin with the one you answer")
 
@@ -218,7 +218,7 @@ class PlainOcu:
         await self._control.pause(self._which(words), by=NAME)
 
     async def _resume(self, words: list[str]) -> None:
-        """Let a paused run go on; while none is paused, it may answer what a restart has asked."""
+        """Resume a paused run; while none is paused, it may answer a prompt after a restart."""
         asked = any(
             decision.value == "resume"
             for prompt in self._prompts.values()

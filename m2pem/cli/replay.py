@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Check that all entries are there, decide every input again, and compare.",
 )
-@click.option("--state", "state_only", is_flag=True, help="Print only how it stands.")
+@click.option("--state", "state_only", is_flag=True, help="Print only the run's state.")
 @click.option(
     "--counterexample",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -67,7 +67,7 @@ def replay(
     fleet_file: str | None,
     output: str,
 ) -> int:
-    """Print what happened in a run, and how it stands.
+    """Print the records of a run, and its state.
 
     The state is rebuilt by applying the journaled records alone, as after a crash. With --verify
     every input is decided again instead, and the first difference ends it with status 1; so does
@@ -274,7 +274,7 @@ class Verification:
         return record_line(self._run_id, seq, t_us, record).decode()
 
     def as_data(self) -> dict[str, Any]:
-        """For programs."""
+        """Return the comparison as JSON values."""
         return {
             "run": self._run_id,
             "inputs": self._inputs,
@@ -284,7 +284,7 @@ class Verification:
         }
 
     def as_text(self) -> str:
-        """For people."""
+        """Return the comparison as text."""
         same = f"{self._run_id}: {self._inputs} inputs decided again, {self._records} records"
         loss = f"\n{self._run_id}: {self._loss}" if self._loss is not None else ""
         if not self.difference:
@@ -298,15 +298,15 @@ class Verification:
 
 
 Progress: TypeAlias = Callable[[int], None]
-"""Called with how much more has been done."""
+"""Called with the number of records processed since the last call."""
 
 LONG = 10_000
-"""Less than this is done before anybody has read the bar."""
+"""Shorter work needs no progress bar."""
 
 
 @contextmanager
 def progress(label: str, length: int, *, shown: bool = True) -> Iterator[Progress]:
-    """A bar that fills within the block; none when it is short work or nobody looks."""
+    """Show a progress bar within the block, for long work and on a terminal."""
     if not shown or length < LONG or not sys.stderr.isatty():
         yield lambda _: None
         return

@@ -22,7 +22,7 @@ from m2pem.cli.options import (
 @journal_option
 @ocu_option
 @answers_option
-@click.option("--stop", is_flag=True, help="Stop it at once: its vehicles are told to stop.")
+@click.option("--stop", is_flag=True, help="Stop the run, and the vehicles, at once.")
 @format_option
 def resume(
     run_id: str,

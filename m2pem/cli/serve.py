@@ -89,7 +89,7 @@ async def _serve(
         )
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:
-                who = ", ".join(operators.names) or "nobody"
+                who = ", ".join(operators.names) or "none"
                 click.echo(f"m2pem: serving {fleet.name}; operators: {who}", err=True)
                 for line in others:
                     click.echo(
@@ -106,7 +106,7 @@ async def _serve(
 async def _interrupted(
     journal: "Journal", fleet: "Fleet", speed: float
 ) -> "tuple[list[RunInfo], list[RunInfo]]":
-    """The runs that nobody drives: those with this very fleet, and the others."""
+    """The runs that no executive drives: those with the same fleet, and the others."""
     from m2pem.errors import JournalError
     from m2pem.fleet.fleet import dump, restore
     from m2pem.journal.mission import fleet_of

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("m2pem.cli")
 
 BACKLOG = 1_000_000
-"""Records that may wait to be printed before printing is given up."""
+"""The maximum number of records that wait to be printed."""
 
 EXIT_STATUS = {
     RunStatus.COMPLETED: 0,
@@ -55,8 +55,8 @@ async def driving(
 ) -> AsyncIterator["Interruption"]:
     """Connect, print and serve within the block; at its end, stop what still runs and close.
 
-    `journal`: its file, beside which other processes find the executive. `one`: there is one run
-    that matters, or several.
+    `journal`: its file, beside which other processes find the executive. `one`: the command is
+    about one run, not several.
     """
 
     def mission(run: RunId) -> Mission | None:
@@ -69,7 +69,7 @@ async def driving(
     with Interruption(executive) as interruption:
 
         def stop_output() -> None:
-            loop.call_soon_threadsafe(interruption.stop, "nobody reads its output any more")
+            loop.call_soon_threadsafe(interruption.stop, "the reader of its output has ended")
 
         output.writer.when_broken(stop_output)
         # First, as nothing may come between connecting and taking up a run: reports would be lost.
@@ -152,7 +152,7 @@ GIVE_UP_PRINTING_S = 1.0
 
 
 class Interruption:
-    """Watches the signals within its block. `asked` is set when everything is to stop."""
+    """Handles SIGINT and SIGTERM within its block. `asked` is set when all runs must stop."""
 
     def __init__(self, executive: Executive) -> None:
         self.asked = asyncio.Event()
@@ -177,7 +177,7 @@ class Interruption:
             loop.remove_signal_handler(number)
 
     def stop(self, reason: str) -> None:
-        """Stop every run; what follows waits until the vehicles are released."""
+        """Stop every run; the end of the block waits until the vehicles are released."""
         self.asked.set()
         if self._stopping is None:
             self._stopping = asyncio.create_task(self._executive.stop_all(reason))
@@ -208,15 +208,15 @@ class Interruption:
         return ", ".join(held)
 
     def _say(self, text: str) -> None:
-        # From a thread: standard error that nobody reads must not hold up the stop.
+        # From a thread: a full pipe at standard error must not delay the stop.
         writer_for(sys.stderr).put(f"m2pem: {text}")
 
 
 def refuse_speed(fleet: Fleet, speed: float) -> None:
-    """Real vehicles keep real time.
+    """Refuse a speed for real vehicles.
 
     Raises:
-        UsageError: the clock would not be theirs.
+        UsageError: the fleet has real vehicles, and the speed is not 1.
     """
     if speed == 1.0:
         return
@@ -280,13 +280,15 @@ STATE = "state"
 
 
 def with_own_state(fleet: Fleet, journal: Path | None) -> Fleet:
-    """The fleet, kept in a new file beside the journal: nobody else has these vehicles."""
+    """Return the fleet with its state in a new file beside the journal, for this run alone."""
     return _with_state(fleet, journal, secrets.token_hex(4))
 
 
 def with_shared_state(fleet: Fleet, journal: Path | None, written: Fleet) -> Fleet:
-    """The fleet, kept in the file that it always has beside this journal. `written`: the fleet as
-    its own file says."""
+    """Return the fleet with its state in the file that belongs to this fleet and journal.
+
+    `written`: the fleet as its own file says.
+    """
     name = hashlib.sha256(dump(written)).hexdigest()[:8]
     return _with_state(fleet, journal, name)
 
@@ -297,7 +299,7 @@ def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
     path = f"{_prefix(journal)}{name}"
 
     def settings(arbiter: str, own: Mapping[str, Any]) -> Mapping[str, Any]:
-        """What the fleet says itself goes first."""
+        """Return the settings; those of the fleet have precedence."""
         return {STATE: path, **own} if arbiter == SIMULATED else own
 
     return replace(

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import TextIO
 
 MAX_WAITING = 100_000
-"""Lines that may wait before whoever prints many ought to wait too."""
+"""Lines that may wait before a producer of many lines should wait."""
 
 
 class LineWriter:
@@ -30,7 +30,7 @@ class LineWriter:
         threading.Thread(target=self._write, name="printing", daemon=True).start()
 
     def put(self, line: str) -> None:
-        """Have a line printed; returns at once."""
+        """Print a line later, from the thread; return at once."""
         with self._changed:
             self._waiting.append(line)
             if len(self._waiting) == 1:
@@ -38,11 +38,11 @@ class LineWriter:
 
     @property
     def full(self) -> bool:
-        """Whether so much waits that whoever prints many lines ought to wait."""
+        """Whether a producer of many lines should wait (`drain`)."""
         return len(self._waiting) >= MAX_WAITING
 
     def when_broken(self, call: Callable[[], None]) -> None:
-        """Call this, from another thread, when nobody reads the stream any more."""
+        """Call this, from another thread, when the stream's reader has ended."""
         self._when_broken.append(call)
 
     def drain(self, timeout_s: float | None = None) -> None:
@@ -99,7 +99,7 @@ class Lines:
     async def __aiter__(self) -> AsyncIterator[str]:
         loop = asyncio.get_running_loop()
         lines: asyncio.Queue[str | None] = asyncio.Queue()
-        with suppress(ValueError):  # not in the main thread: somebody else's affair
+        with suppress(ValueError):  # not in the main thread: the program around us decides
             # Read from in the background, a terminal would stop the whole executive.
             signal.signal(signal.SIGTTIN, signal.SIG_IGN)
         read = threading.Thread(
@@ -112,7 +112,7 @@ class Lines:
     def _read(self, loop: asyncio.AbstractEventLoop, lines: "asyncio.Queue[str | None]") -> None:
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         rest = ""
-        with suppress(RuntimeError):  # the loop is closed: nobody listens any more
+        with suppress(RuntimeError):  # the loop is closed
             while block := self._block():
                 *whole, rest = (rest + decoder.decode(block)).split("\n")
                 for line in whole:
@@ -122,11 +122,11 @@ class Lines:
             loop.call_soon_threadsafe(lines.put_nowait, None)
 
     def _block(self) -> bytes:
-        """What is there to be read; nothing at the end."""
+        """Read the next bytes; b"" at the end."""
         while True:
             try:
                 return os.read(self._descriptor, 65_536)
-            except BlockingIOError:  # whoever started us left it so
+            except BlockingIOError:  # the parent process has made it non-blocking
                 select.select([self._descriptor], [], [])
             except OSError:
                 if not self._in_background():

@@ -29,7 +29,7 @@ class RunStatusView:
         self.mission = self._run.state.mission
 
     def take(self, record: Record) -> None:
-        """The next record."""
+        """Apply the next record."""
         state = self._run.state
         self._run.replay([record])
         # Kept here, as the state forgets the root's data when it ends.
@@ -37,7 +37,7 @@ class RunStatusView:
             self._data[record.key] = record.value
 
     def commanded(self) -> dict[str, str]:
-        """What it commands: the behavior of each vehicle and payload."""
+        """The present behavior of each vehicle and payload that the run commands."""
         state = self._run.state
         return {
             resource: state.behaviors[holders[-1]].name
@@ -46,7 +46,7 @@ class RunStatusView:
         }
 
     def as_data(self) -> dict[str, Any]:
-        """For programs."""
+        """Return the status as JSON values."""
         state = self._run.state
         return {
             "run": state.run,
@@ -79,7 +79,7 @@ class RunStatusView:
         }
 
     def as_text(self) -> str:
-        """For people."""
+        """Return the status as text."""
         state = self._run.state
         detail = f": {state.detail}" if state.detail else ""
         parts = [f"\n{state.run} is {self._summary.status.value}{detail}"]

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 @click.option(
     "--emit",
     metavar="promela[=FILE]",
-    help="Check nothing: print what Spin would be given, or write it to FILE.",
+    help="Check nothing: print the input of Spin, or write it to FILE.",
 )
 @click.option(
     "--timers",
@@ -121,7 +121,7 @@ def verify(
 
     Ends with 0 if all holds, with 1 if something is violated, with 2 if the mission, the fleet or
     the requirements cannot be used, and with 3 if something is undecided. Ctrl-C ends the search:
-    what was seen until then is told.
+    the command reports the part that it has searched.
     """
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
     from m2pem.executive.loading import load_source
@@ -185,7 +185,7 @@ def _text(found: "Findings") -> str:
 
 
 _QUIET_S = 1.0
-"""A search that takes less is over before anybody has read how far it is."""
+"""A shorter search shows no progress."""
 _BETWEEN_LINES_S = 0.2
 
 
@@ -198,12 +198,13 @@ def search_request(
     *,
     timers_in_order: bool = False,
 ) -> "SearchRequest":
-    """What is to be searched, if `m2pem check` finds no errors in it. `spec`: more requirements.
+    """Return the search of a mission in which `m2pem check` finds no errors. `spec`: more
+    requirements.
 
     Raises:
-        MissionError: there are errors; tells them all.
+        MissionError: there are errors; it lists all.
         FleetError: the fleet cannot be used.
-        RequirementsError: requirements cannot be read, or do not fit; tells all that is wrong.
+        RequirementsError: requirements cannot be read, or do not fit; it lists all findings.
     """
     from m2pem.cli.arguments import arbiters_of, get_fleet
     from m2pem.executive import verification as proving
@@ -218,7 +219,7 @@ def search_request(
 
 
 def findings(asked: "SearchRequest", engine: "SearchEngine", *, strict: bool) -> "Findings":
-    """Search, and tell what was found."""
+    """Search, and return the findings."""
     from m2pem.executive.verification import search
 
     with _ended_as_by_hand(), progress() as show:
@@ -226,7 +227,7 @@ def findings(asked: "SearchRequest", engine: "SearchEngine", *, strict: bool) ->
 
 
 def promela(asked: "SearchRequest") -> str:
-    """The model that Spin would be given."""
+    """Return the input of Spin."""
     from m2pem.verify.net.simplify import simplify
     from m2pem.verify.spin.promela import text_of
     from m2pem.verify.translate import translate
@@ -237,7 +238,7 @@ def promela(asked: "SearchRequest") -> str:
 
 @contextmanager
 def _ended_as_by_hand() -> Iterator[None]:
-    """What else asks a program to end does what Ctrl-C does: what was seen is told, Spin ends."""
+    """Let SIGTERM and SIGHUP do what Ctrl-C does within the block: report, and end Spin."""
     before = {}
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:

@@ -276,7 +276,7 @@ async def test_the_end_of_the_input_is_noted_once_when_somebody_is_asked(
     await operator.type(None)
     assert operator.screen == ""
     await operator.hear(prompt("p1"), prompt("p2"))
-    assert operator.screen.count("the input has ended: nobody answers here any more") == 1
+    assert operator.screen.count("the input has ended: no operator answers here any more") == 1
     assert not operator.serving.done()
 
 

@@ -105,7 +105,7 @@ def test_the_end_of_the_input_is_noted_when_a_prompt_is_open(m2pem: CommandLine)
     program = m2pem.start("run", MISSION, "--fleet", "sim")
     program.until_text("[p1] UserSendRoute")
     program.end_input()
-    program.until_text("the input has ended: nobody answers here any more")
+    program.until_text("the input has ended: no operator answers here any more")
     program.send(signal.SIGTERM)
     assert program.rest()[0] == 130
 

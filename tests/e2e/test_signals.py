@@ -70,7 +70,7 @@ def test_a_run_whose_reader_goes_away_is_stopped(m2pem: CommandLine, tmp_path: P
     assert program.process.stderr is not None
     assert program.process.stderr.read() == ""
     assert [each.kind.value for each in recorded_effects(state)][-1] == "end"
-    assert "nobody reads its output any more" in m2pem.run("runs")[1]
+    assert "the reader of its output has ended" in m2pem.run("runs")[1]
 
 
 def test_a_reader_who_stands_still_does_not_hold_the_mission_up(
