@@ -120,7 +120,7 @@ def _order(origin: Origin) -> tuple[str, str]:
 def _entry_points() -> Iterator[tuple[Origin, Callable[[], object]]]:
     seen: set[str] = set()
     for distribution in importlib.metadata.distributions():
-        # Looked at before it is parsed: what other projects wrote there is not ours to fail on.
+        # Searched before it is parsed: invalid files of other projects must not fail here.
         try:
             text = distribution.read_text("entry_points.txt") or ""
         except (OSError, UnicodeError):

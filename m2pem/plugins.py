@@ -207,7 +207,7 @@ class PluginManager:
         return findings
 
     def records_committed(self, run_id: str, records: "Sequence[Record]") -> None:
-        """Tell the observers; what breaks in one is logged and hurts nobody."""
+        """Call the observers; an exception of one is logged, and affects no other."""
         for plugin in self._observers:
             try:
                 plugin.call(_OBSERVE, run_id=run_id, records=records)
@@ -228,7 +228,7 @@ class PluginManager:
         return [self._info(origin) for origin in (*loaded, *broken, *self._found.blocked)]
 
     def unknown(self, kind: str, name: str) -> PluginError:
-        """The error for a name that nobody offers. `kind`: arbiter, ocu, service or command."""
+        """Return the error for an unknown name. `kind`: arbiter, ocu, service or command."""
         hook = _HOOKS[kind]
         blocked = [_blocked(origin) for origin in self._found.blocked]
         broken = [each for each in self.failures if each.hook in ("", hook)] + blocked
@@ -355,13 +355,13 @@ def _is_namesake(broken: PluginFailure, name: str) -> bool:
 
 
 def _taken(known: set[str], cli: "click.Group", own: "click.Group") -> Iterator[str]:
-    """The commands of `own` that somebody else has already; in a group of both, "group command"."""
+    """Yield the commands of `own` that `cli` has already; "group command" in a group of both."""
     import click  # noqa: PLC0415  # see `PluginManager.commands`
 
     for name in known & set(own.commands):
-        theirs, ours = cli.commands.get(name), own.commands[name]
-        if isinstance(theirs, click.Group) and isinstance(ours, click.Group):
-            yield from (f"{name} {each}" for each in set(theirs.commands) & set(ours.commands))
+        first, second = cli.commands.get(name), own.commands[name]
+        if isinstance(first, click.Group) and isinstance(second, click.Group):
+            yield from (f"{name} {each}" for each in set(first.commands) & set(second.commands))
         else:
             yield name
 

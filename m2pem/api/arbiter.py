@@ -34,10 +34,10 @@ class Connection:
     """How a resource is reached: the fleet file's `connection`, and what it is.
 
     `behaviors`: the names that the fleet allows; None means all that the arbiter offers.
-    `failsafe`: the fleet's word for what the vehicle does by itself when its link is lost, or "".
+    `failsafe`: the vehicle's own reaction to a lost link, as the fleet states it, or "".
     `fence`: the area that the vehicle may not leave; None: the fleet has none. `sitl`: software in
-    the loop: what answers is a simulation on this machine. `cruise_speed_m_s`, `endurance_s`: how
-    fast a vehicle goes when nobody says, and how long it can with a full battery; None: not said.
+    the loop: the vehicle is simulated on this machine. `cruise_speed_m_s`: its default speed;
+    `endurance_s`: how long it can move with a full battery; None: the fleet states none.
     """
 
     resource: ResourceId
@@ -55,13 +55,13 @@ class Connection:
 
 @dataclass(frozen=True, slots=True)
 class ArbiterContext:
-    """What the executive lends to an arbiter. All time goes through `clock`.
+    """What the executive provides to an arbiter. Use `clock` for all times.
 
     `origin`: of the local ENU frame, (latitude in degrees, longitude in degrees, altitude in
     metres). `teams`: members of each team, the lead first. `journal`: names the journal that the
     ids of behaviors belong to; with it, they are unique for ever. It is the same after a restart.
     `epoch_of`: the epoch with which this executive drives the run of a behavior; 0: it does not.
-    Commands that are not asked for with an epoch, such as the question for a behavior, carry it.
+    Commands whose call has no epoch, such as a query, carry it.
     """
 
     clock: "Clock"
@@ -102,16 +102,16 @@ class BehaviorRequest:
 
 @dataclass(frozen=True, slots=True)
 class BehaviorReport:
-    """What became of a behavior. `number` rises from 1 with each report of one behavior.
+    """The state of a behavior. `number` rises from 1 with each report of one behavior.
 
     ACCEPTED comes before RUNNING, exactly one terminal state comes last. `code` is an error code
     of docs/missions.md ("ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.
     `native_ref`: the arbiter's own name for it, handed back to `query` after a restart.
-    `outputs`: of a terminal report: what the mission's data store gets, under names that the
-    behavior's `BehaviorSpec.writes` declares, such as `picture.files`. `held`: of an answer to
-    `query`: the behavior goes on, but one of its resources is held. `not_begun`: of an answer
-    UNKNOWN to `query`: the resource shows that it has not begun the behavior, beyond being made
-    ready for it, so that starting it now is what its mission wants.
+    `outputs` (terminal reports): values for the mission's data store, under names that the
+    behavior's `BehaviorSpec.writes` declares, such as `picture.files`. `held` (answers to `query`):
+    the behavior goes on, but one of its resources is held. `not_begun` (answers UNKNOWN to
+    `query`): the resource shows that it has not begun the behavior, at most prepared for it, so
+    that it can be started now.
     """
 
     id: BehaviorId
@@ -134,19 +134,19 @@ class Arbiter(Protocol):
         return ArbiterCapabilities()
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
-        """What the resource can do. Needs no connection and no transport library."""
+        """Return the behaviors of a resource. Needs no connection and no transport library."""
         ...
 
     def limits(self, resource: ResourceId) -> Limits:
-        """The bounds that hold for the resource."""
+        """Return the bounds of a resource."""
         ...
 
     async def connect(self) -> None:
-        """Reach the resources. Returns when listening; a silent resource is not an error."""
+        """Connect to the resources. A resource that does not answer is not an error."""
         ...
 
     async def start(self, request: BehaviorRequest) -> None:
-        """Start a behavior. Everything that comes of it, a refusal too, is a report."""
+        """Start a behavior. Its states are reported, a refusal too."""
         ...
 
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
@@ -154,15 +154,15 @@ class Arbiter(Protocol):
         ...
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """What has become of a behavior, by looking at the vehicle. UNKNOWN if it is not known.
+        """Return the state of a behavior, by querying the vehicle. UNKNOWN if it is not known.
 
-        A vehicle may have been held by an executive that is gone: then the answer says `held`, or
-        UNKNOWN where the vehicle cannot say so. `resume` lets it go on.
+        If an earlier executive has held the vehicle, the answer says `held`, or UNKNOWN if the
+        vehicle cannot report that. `resume` lets it go on.
         """
         ...
 
     async def hold(self, resource: ResourceId) -> None:
-        """Bring the resource to a safe stand-still, keeping its behavior for `resume`."""
+        """Bring the resource to a safe standstill, and keep its behavior for `resume`."""
         ...
 
     async def resume(self, resource: ResourceId) -> None:
@@ -178,30 +178,31 @@ class Arbiter(Protocol):
         ...
 
     async def close(self) -> None:
-        """Let go of everything. Vehicles keep doing what they do."""
+        """Close all connections. Vehicles go on with their behaviors."""
         ...
 
 
 class AdjustingArbiter(Protocol):
-    """An arbiter that can also change a behavior which goes on. Teams keep their spacing by it."""
+    """An arbiter that can also change a running behavior. Teams keep their spacing by it."""
 
     async def adjust(
         self, behavior: BehaviorId, epoch: int, parameters: Mapping[str, ResolvedValue]
     ) -> None:
         """Go on with these parameters, such as `speed`, in place of those of the same names.
 
-        What cannot be changed on the way, and a behavior that has ended, is left as it is.
+        Parameters that cannot be changed on the way, and behaviors that have ended, stay as they
+        are.
         """
         ...
 
 
 class SightedArbiter(Protocol):
-    """An arbiter that can tell at any moment where a vehicle is, not only when the vehicle tells of
-    itself. Teams look through it where it is offered."""
+    """An arbiter that knows the state of a vehicle at any time, not only when telemetry arrives.
+    Teams prefer it to telemetry."""
 
     def sight(self, resource: ResourceId) -> VehicleState | None:
-        """The state of a vehicle now; None: it cannot be known now, and what its telemetry said
-        last holds."""
+        """Return the state of a vehicle now; None: not known now, so that its last telemetry
+        counts."""
         ...
 
 
@@ -216,22 +217,22 @@ class AddressedArbiter(Protocol):
 
 
 class ReclaimingArbiter(Protocol):
-    """An arbiter that ends what a vehicle goes on with after its link was lost. Without this, a
-    vehicle that is heard again is told to `hold`, and its lost behavior to `cancel`."""
+    """An arbiter that ends a lost behavior when the link returns. Without this, the executive calls
+    `cancel` for the lost behavior and `hold` for the vehicle."""
 
     async def reclaim(self, resource: ResourceId) -> str:
-        """A resource that was lost is heard again: end what it does under behaviors that were LOST.
+        """End the LOST behaviors of a resource whose link has returned.
 
-        Returns when the resource has acknowledged, and "" then; only then may it be given another
-        behavior. Otherwise why it may not yet, for operators, such as its own failsafe that must
-        not be interrupted: it is asked for again soon. What nobody here had it do is left alone.
+        Return "" when the resource has acknowledged; only then may it get another behavior.
+        Otherwise return the reason, for operators, such as its own failsafe that must not be
+        interrupted: the executive calls again soon. Commands of other clients are not ended.
         """
         ...
 
 
 class DetectingArbiter(Protocol):
-    """An arbiter that knows by their connections which payloads detect, beside those that the fleet
-    marks with `detector: true`."""
+    """An arbiter that knows from their connections which payloads are detectors, beside those that
+    the fleet marks with `detector: true`."""
 
     @property
     def detectors(self) -> Collection[ResourceId]:

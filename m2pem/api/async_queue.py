@@ -36,12 +36,12 @@ class AsyncQueue(Generic[T]):
         self._news.set()
 
     def close(self) -> None:
-        """Let nothing more in."""
+        """Ignore items from now on; `read` ends after the waiting ones."""
         self._closed = True
         self._news.set()
 
     async def read(self) -> AsyncIterator[T]:
-        """All items, for one reader."""
+        """Yield all items, for one reader."""
         while True:
             while self._waiting:
                 yield self._waiting.popleft()

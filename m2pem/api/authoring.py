@@ -1,4 +1,4 @@
-"""What MissionControl tells people who draw a mission."""
+"""What MissionControl returns to editors of missions."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +34,7 @@ class Editable:
 
 @dataclass(frozen=True, slots=True)
 class OutlineProcess:
-    """A process. `starts`: whether a run begins with it, unless it is told otherwise."""
+    """A process. `starts`: whether a run begins with it by default."""
 
     id: str
     name: str
@@ -76,7 +76,7 @@ class OutlineTrigger:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """What a file has, as far as it can be read."""
+    """The contents of a mission file, as far as it can be read."""
 
     processes: tuple[OutlineProcess, ...] = ()
     elements: tuple[OutlineElement, ...] = ()
@@ -87,7 +87,7 @@ class Outline:
 
 @dataclass(frozen=True, slots=True)
 class SearchLimits:
-    """Where a verification ends undecided."""
+    """Limits at which a verification ends undecided."""
 
     states: int = 2_000_000
     seconds: float = 600.0
@@ -95,7 +95,7 @@ class SearchLimits:
 
 @dataclass(frozen=True, slots=True)
 class SearchProgress:
-    """How far a verification is: `waiting` of the `states` found are still to be searched."""
+    """Progress of a verification: `waiting` of the `states` found are still to be searched."""
 
     seconds: float
     states: int = 0

@@ -1,7 +1,7 @@
 """The parameters of a behavior, as every arbiter reads them.
 
 They are resolved (`m2pem.fleet.parameters`): SI numbers, texts and geometries. `refusal` checks
-them against an arbiter's catalogue; whoever sent a request, an arbiter trusts none of them.
+them against an arbiter's catalogue; an arbiter checks them in every request.
 """
 
 import math
@@ -95,17 +95,17 @@ class BehaviorParameters:
 
     @property
     def altitude_m(self) -> float | None:
-        """In the frame `altitude_frame`."""
+        """The altitude in metres in the frame `altitude_frame`."""
         return self.number("altitude")
 
     @property
     def altitude_frame(self) -> str:
-        """What `altitude_m` counts from: "relative" (home), "amsl" or "terrain"."""
+        """The zero of `altitude_m`: "relative" (home), "amsl" or "terrain"."""
         return self.text("altitude_frame") or "relative"
 
     @property
     def heading_rad(self) -> float | None:
-        """From true north, clockwise."""
+        """The heading from true north, clockwise."""
         return self.number("heading")
 
     @property
@@ -121,7 +121,7 @@ class BehaviorParameters:
 
     @property
     def elevation_rad(self) -> float | None:
-        """Up from the horizon."""
+        """The elevation above the horizon."""
         return self.number("elevation")
 
     @property
@@ -139,7 +139,7 @@ class BehaviorParameters:
 
     @property
     def distance_m(self) -> float:
-        """How far to move backwards."""
+        """The distance to move backwards."""
         return self._number_or_default("distance")
 
     @property
@@ -149,14 +149,14 @@ class BehaviorParameters:
 
     @property
     def overshoot_m(self) -> float:
-        """How far the tracks of a survey go on beyond its area."""
+        """The distance by which the tracks of a survey extend beyond its area."""
         return self.number("overshoot") or 0.0
 
     # --- how fast, how long, how often ----------------------------------------------------------
 
     @property
     def speed_m_s(self) -> float | None:
-        """Over ground."""
+        """The speed over ground."""
         return self.number("speed")
 
     @property
@@ -174,7 +174,7 @@ class BehaviorParameters:
 
     @property
     def turns(self) -> float | None:
-        """How many times round."""
+        """The number of turns around the target."""
         return self.number("turns")
 
     @property
@@ -184,12 +184,12 @@ class BehaviorParameters:
 
     @property
     def count(self) -> int:
-        """How many pictures."""
+        """The number of pictures."""
         return int(self._number_or_default("count"))
 
     @property
     def interval_s(self) -> float:
-        """Between pictures."""
+        """The time between two pictures."""
         return self._number_or_default("interval")
 
     @property

@@ -62,8 +62,8 @@ class BehaviorTracker:
         False: it is known already, or of a past epoch; or it was reported REJECTED, because the
         behavior or a parameter does not fit the catalogue, or a resource is busy. Behaviors that it
         preempts are reported CANCELLED: the new command must end them on the vehicle. `refusal`
-        tells why a request that fits the catalogue cannot be done; "" if it can. A `native_ref`
-        that must be made is made once nothing speaks against the request.
+        returns why a request that fits the catalogue cannot be done; "" if it can. A callable
+        `native_ref` is called only if the request is accepted.
         """
         if not self._is_new(request):
             return False
@@ -91,7 +91,7 @@ class BehaviorTracker:
         return self._may("adjustment", behavior, epoch)
 
     def last(self, behavior: BehaviorId) -> BehaviorReport:
-        """What `Arbiter.query` answers: the last report; UNKNOWN, with number 0, without one."""
+        """Return the last report of a behavior; UNKNOWN, with number 0, without one."""
         entry = self._entries.get(behavior)
         if entry is None:
             reason = "this arbiter knows no such behavior"
@@ -99,7 +99,7 @@ class BehaviorTracker:
         return entry.last
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
-        """What `Arbiter.reports` returns."""
+        """Return the stream of reports, for `Arbiter.reports`."""
         return self._reports.read()
 
     def close(self) -> None:
@@ -149,7 +149,7 @@ class BehaviorTracker:
         self._report(entry, state, code or _DEFAULT_CODES.get(state, ""), reason, outputs)
 
     def lose(self, resource: ResourceId, reason: str) -> None:
-        """The resource is not heard any more: what it does is reported LOST."""
+        """Report the behavior of a resource as LOST, because its link is lost."""
         self.end(self.holder(resource), BehaviorState.LOST, reason=reason)
 
     def adopt(

@@ -11,11 +11,11 @@ class FleetBus(Protocol):
     """Latest value of every resource, plus bounded subscriptions (the oldest is dropped)."""
 
     def latest(self, resource: ResourceId) -> VehicleState | PayloadState | None:
-        """The newest state heard, or None before the first."""
+        """Return the newest state, or None before the first."""
         ...
 
     def publish(self, state: VehicleState | PayloadState) -> None:
-        """Make a state known; never blocks."""
+        """Publish a state; never blocks."""
         ...
 
     def subscribe(self, size: int = 100) -> AsyncIterator[Telemetry]:

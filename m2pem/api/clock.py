@@ -1,4 +1,4 @@
-"""The clock that everything but the engine asks for time; the engine is told."""
+"""The clock of everything but the engine, which gets the time with each input."""
 
 from typing import Protocol
 

@@ -32,7 +32,7 @@ RunId: TypeAlias = str
 
 
 class RunStatus(StrEnum):
-    """Where a run is. INTERRUPTED: it has not ended, and no executive drives it."""
+    """The status of a run. INTERRUPTED: it has not ended, and no executive drives it."""
 
     RUNNING = "running"
     PAUSED = "paused"
@@ -248,13 +248,13 @@ class MissionControl(Protocol):
         ...
 
     async def holders(self) -> Mapping[ResourceId, str]:
-        """Who has each resource: an operator, a behavior ("r1.b3"), or "" when nobody does."""
+        """Who has each resource: an operator, a behavior ("r1.b3"), or "" when it is free."""
         ...
 
     def subscribe(
         self, run: RunId | None = None, size: int = 10_000
     ) -> AsyncIterator[ControlEvent]:
-        """What is committed from this call on, and first the prompts that are open."""
+        """Yield the prompts that are open, and then all events from this call on."""
         ...
 
     def telemetry(self, size: int = 100) -> AsyncIterator[Telemetry]:
@@ -293,7 +293,7 @@ class MissionControl(Protocol):
         ...
 
     def catalogue(self) -> Mapping[ResourceId, Sequence[BehaviorSpec]]:
-        """What every resource can do."""
+        """Return the behaviors of every resource."""
         ...
 
     def simulated(self) -> bool:
@@ -305,7 +305,7 @@ class MissionControl(Protocol):
         ...
 
     def journal_file(self) -> Path | None:
-        """Where the journal is, for what belongs beside it; None: it ends with its process."""
+        """The journal's file; None: the journal is in memory."""
         ...
 
     def check(
@@ -390,7 +390,7 @@ class HandedOver:
 
 @dataclass(frozen=True, slots=True)
 class TelemetrySample:
-    """How the vehicles and payloads of a rehearsal were at one moment of mission time."""
+    """The states of vehicles and payloads of a rehearsal at one mission time."""
 
     t_s: float
     vehicles: Mapping[ResourceId, VehicleState]

@@ -19,7 +19,7 @@ VALUE_CHARACTERS = 200
 
 
 class Kind(StrEnum):
-    """What a record is about; units filter and colour by it."""
+    """The subject of a record; units filter and colour by it."""
 
     RUN = "run"
     TOKENS = "tokens"

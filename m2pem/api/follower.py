@@ -46,7 +46,7 @@ log = logging.getLogger("m2pem.ocu")
 
 
 class Listener:
-    """What a follower calls at once; override what you need. No call may block."""
+    """Callbacks of a follower; override those that you need. No call may block."""
 
     def run_added(self, view: RunView) -> None:
         """A run has a view now, up to its last record."""
@@ -62,7 +62,7 @@ class Listener:
         """A run began, ended, was paused, resumed or claimed."""
 
     def prompt_opened(self, prompt: OpenPrompt) -> None:
-        """A prompt is open."""
+        """Called when a prompt opens."""
 
     def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
         """A prompt was answered or withdrawn."""

@@ -9,7 +9,7 @@ VARIABLE = "M2PEM_OPERATOR"
 
 
 def operator_name() -> str:
-    """What M2PEM_OPERATOR says, else the user and the host of this process, as "anna@gcs1"."""
+    """Return M2PEM_OPERATOR, else the user and the host of this process, as "anna@gcs1"."""
     if named := os.environ.get(VARIABLE, "").strip():
         return named
     try:

@@ -26,7 +26,7 @@ class ServiceError(M2pemError):
 
 @dataclass(frozen=True, slots=True)
 class ServiceContext:
-    """What the executive lends to a service. `detectors`: the fleet's detector payloads.
+    """What the executive provides to a service. `detectors`: the fleet's detector payloads.
 
     `run`, `element`: the run and the service task that it runs for. `service`: names this execution
     of the task, unique in the run; after a restart of the executive it is the same.
@@ -42,7 +42,7 @@ class ServiceContext:
 
 
 class Service(Protocol):
-    """One object per task that runs. Cancelled (asyncio) when its task is interrupted."""
+    """Runs a service task; one object for each. It is cancelled when its task is interrupted."""
 
     writes: Sequence[str]
     """The dotted names that it may write."""

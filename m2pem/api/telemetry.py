@@ -1,10 +1,11 @@
-"""What vehicles and payloads say about themselves, with frames and units in the names.
+"""Telemetry of vehicles, payloads and teams, with frames and units in the names.
 
 Positions are WGS-84 (EPSG:4979): degrees, metres above mean sea level. Local vectors are ENU
 (REP-103). `yaw_rad` is from east, counter-clockwise (REP-103); headings for people are made of it.
 A positive `roll_rad` has the right side down, a positive `pitch_rad` the bow (REP-103; autopilots,
-who speak NED, have the other sign of pitch).
-Telemetry is never journaled; `m2pem.telemetry.link_monitor` turns what matters into inputs.
+which use NED, have the other sign of pitch).
+Telemetry is never journaled; `m2pem.telemetry.link_monitor` makes inputs of lost links and low
+batteries.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ class GeoPosition:
 
 
 class LinkState(StrEnum):
-    """Whether the vehicle is heard."""
+    """The state of the link to a vehicle or payload."""
 
     CONNECTED = "connected"
     DEGRADED = "degraded"
@@ -59,7 +60,7 @@ class VehicleState:
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """Something a detector payload found; the `Detector` service writes it to the data store."""
+    """An object that a payload detected; the `Detector` service writes it to the data store."""
 
     type: str
     source: ResourceId
@@ -73,7 +74,7 @@ class PayloadState:
 
     `pan_rad`: from the vehicle's bow, clockwise. `tilt_rad`: up from the vehicle's deck, or from
     the horizon, if the payload keeps level by itself. `footprint`: the corners of what it sees of
-    the ground, in order; empty if it looks above the horizon, or its vehicle's place is unknown.
+    the ground, in order; empty if it looks above the horizon, or its vehicle's position is unknown.
     """
 
     resource: ResourceId
@@ -89,11 +90,11 @@ class PayloadState:
 
 @dataclass(frozen=True, slots=True)
 class TeamMemberState:
-    """Where a member of a march is, beside where it should be.
+    """The deviation of a member of a march from its place, in metres. None: not known yet.
 
-    `along_m`: how far it is ahead of its place beside the lead, along the route in metres; below 0:
-    behind. `aside_m`: how far off its own lane. `gap_m`: the way to the next one ahead in its lane;
-    None: there is none. What was not heard yet is not known: None.
+    `along_m`: how far it is ahead of its place beside the lead, along the route; below 0: behind.
+    `aside_m`: the distance from its own lane. `gap_m`: the way to the next member ahead in its
+    lane; None also if there is none.
     """
 
     resource: ResourceId
@@ -104,10 +105,10 @@ class TeamMemberState:
 
 @dataclass(frozen=True, slots=True)
 class TeamState:
-    """How well the members of a team behavior keep their places, while they march.
+    """The members' deviations from their places, while a team behavior marches.
 
-    `behavior`: its id ("r1.b3"), `name` what it is ("road_sweep"). `members`: those who are not
-    lost, the lead first. `spacing_m`: between two of them.
+    `behavior`: its id ("r1.b3"); `name`: its name in the catalogue ("road_sweep"). `members`: those
+    that are not lost, the lead first. `spacing_m`: the planned spacing.
     """
 
     behavior: str
@@ -118,4 +119,4 @@ class TeamState:
 
 
 Telemetry: TypeAlias = Union[VehicleState, PayloadState, TeamState]
-"""What a bus and MissionControl tell. More kinds may come: pass by what you do not know."""
+"""What a bus and MissionControl publish. Ignore kinds that you do not know: more may come."""

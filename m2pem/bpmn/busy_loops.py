@@ -161,7 +161,7 @@ def _flows(node: FlowNode) -> tuple[SequenceFlow, ...]:
 
 
 def _beside_flows(node: FlowNode) -> list[FlowNode]:
-    """Where a token can go other than by a sequence flow."""
+    """Return the nodes that a token can reach other than by a sequence flow."""
     if isinstance(node, Activity):
         return [each for each in node.boundary if _at_once(each)]
     if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
@@ -279,7 +279,7 @@ def _step(assignment: Assignment) -> int:
 
 
 def _assignments(node: FlowNode) -> list[Assignment]:
-    """What each execution of a script task assigns in the scope around it."""
+    """Return the assignments of each script task to the scope around it."""
     if not isinstance(node, ScriptTask) or node.script is None or node.loop is not None:
         return []
     statements = node.script.statements
@@ -456,7 +456,7 @@ class _Look:
 
 
 def _until(group: Sequence[FlowNode]) -> str:
-    """What ends a loop, as far as its conditions say."""
+    """Return the condition that ends a loop, as far as it can be read."""
     conditions = [flow.condition for node in group for flow in node.outgoing if flow.condition]
     conditions += [
         node.loop.condition
@@ -530,7 +530,7 @@ def _ends_its_scope(node: FlowNode) -> bool:
 
 
 def _ending(mission: Mission, group: Sequence[FlowNode]) -> FlowNode | None:
-    """What beside a loop can end the scope it is in: an event of that, or of what is around it."""
+    """Return the event, of the loop's scope or one around it, that can end the scope."""
     callers: dict[Process, list[CallActivity]] = {}
     for node in mission.nodes:
         if isinstance(node, CallActivity):

@@ -59,7 +59,7 @@ def read_children(context: ReadingContext, element: etree._Element, identifier: 
 
 @dataclass(slots=True)
 class ChildOrder:
-    """How far the children of one element have come in BPMN's order; warns once."""
+    """The position of one element's children in BPMN's order; it warns once."""
 
     reached: int = -1
     last: str = ""

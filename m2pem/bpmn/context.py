@@ -53,7 +53,7 @@ class FlowEnds:
 
 @dataclass(slots=True)
 class DataEnd:
-    """What a data association can refer to. `carriers` may have extension elements."""
+    """One end of a data association. `carriers` may have extension elements."""
 
     key: str
     carriers: list[etree._Element]
@@ -365,7 +365,7 @@ def association(element: etree._Element) -> Association:
 
 
 def text_of(element: etree._Element) -> str:
-    """All text inside an element, without the space around it."""
+    """Return all text inside an element, without the space around it."""
     if not len(element):
         return (element.text or "").strip()
     return "".join(map(str, element.itertext())).strip()

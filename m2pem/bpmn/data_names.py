@@ -41,7 +41,7 @@ class Read(NamedTuple):
 
 @dataclass(slots=True)
 class _Store:
-    """What happens to the data of one process; embedded subprocesses share it."""
+    """Reads and writes of the data of one process; embedded subprocesses share it."""
 
     reads: list[Read] = field(default_factory=list)
     written: set[str] = field(default_factory=set)

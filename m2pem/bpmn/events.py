@@ -330,7 +330,7 @@ def definition_elements(context: ReadingContext, found: Children) -> list[etree.
 def read_thrown(
     context: ReadingContext, found: Children, elements: Iterable[etree._Element]
 ) -> tuple[EventDefinition, ...]:
-    """What a multi-instance activity throws by itself (table 10.30): an implicit throw event."""
+    """Read the implicit throw event of a multi-instance activity (table 10.30)."""
     read = []
     for element in elements:
         name = local(element.tag).removesuffix("EventDefinition")
@@ -358,7 +358,7 @@ def _definition(
     container: Container,
     definition: etree._Element,
 ) -> EventDefinition | None:
-    """One of its definitions; None when a finding says what is wrong with it."""
+    """Read one definition of an event; None if it has an error, which is a finding."""
     name = local(definition.tag).removesuffix("EventDefinition")
     embedded = not _is_handler(container) and not isinstance(container, Process)
     if tag_name == "startEvent" and embedded:

@@ -17,7 +17,7 @@ from m2pem.suggestions import nearest, suggest_or
 
 
 class Type(StrEnum):
-    """What the text of an attribute is."""
+    """The kind of text that an attribute has."""
 
     TEXT = "text"
     NAME = "name"

@@ -30,7 +30,7 @@ class FileFindings:
         self._add(Severity.ERROR, where, element, rule, (message, remedy))
 
     def warning(self, where: Where, element: str, rule: Rule, message: str, remedy: str) -> None:
-        """Note something doubtful."""
+        """Add a warning."""
         self._add(Severity.WARNING, where, element, rule, (message, remedy))
 
     def _add(
@@ -42,5 +42,5 @@ class FileFindings:
         self.all.append(rule.finding(self.file, line, element, *said, severity))
 
     def sorted(self) -> tuple[Finding, ...]:
-        """All findings by line; those of one line in the order they were made."""
+        """Return all findings by line; those of one line in the order of their creation."""
         return tuple(sorted(self.all, key=lambda finding: finding.line))

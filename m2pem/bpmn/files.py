@@ -423,7 +423,7 @@ def merge(files: Files, reached: set[Process]) -> Mission:
 
 
 def _inside(reached: set[Process], parts: list[Part]) -> set[Container]:
-    """Those processes, and the subprocesses in them."""
+    """Return these processes, and the subprocesses in them."""
     inner = [each for part in parts for each in part.context.nodes if isinstance(each, SubProcess)]
     return {*reached, *(each for each in inner if each.process in reached)}
 

@@ -38,7 +38,7 @@ _TIMES: dict[str, Read] = {
 
 
 def expression_remedy(text: str) -> str:
-    """What to write for an expression that cannot be read."""
+    """Return the remedy for an expression that cannot be read."""
     if len(text) <= _MAX_CHARACTERS:
         inner = text.strip().removeprefix("return ").removesuffix(";").strip()
         if _reads(parse, inner):
@@ -50,14 +50,14 @@ def expression_remedy(text: str) -> str:
 
 
 def value_remedy(text: str) -> str:
-    """What to write for a value that is no expression: other engines take a text as it stands."""
+    """Return the remedy for a text that is no expression: other engines read it as plain text."""
     if _WORDS.fullmatch(text.strip()):
         return f"a text is written in quotes: '{shorten(text.strip())}'"
     return expression_remedy(text)
 
 
 def script_remedy(text: str, attribute: str = "scriptFormat") -> str:
-    """What to write for a script in another language, which `attribute` names."""
+    """Return the remedy for a script in another language, which `attribute` names."""
     statements = _statements(text) if len(text) <= _MAX_CHARACTERS else None
     if statements is None or len(statements) > _MAX_STATEMENTS:
         return (
@@ -72,7 +72,7 @@ def script_remedy(text: str, attribute: str = "scriptFormat") -> str:
 
 
 def statement_remedy(line: str) -> str:
-    """What to write for a line of a script that is in no language in particular."""
+    """Return the remedy for a line of a script whose language is unknown."""
     statements = _statements(line) if len(line) <= _MAX_CHARACTERS else None
     if statements is None:
         return SCRIPT
@@ -105,7 +105,7 @@ _FORMS = {
 
 
 def time_remedy(kind: str, text: str) -> str:
-    """What to write for the text of a timer; `kind` is timeDuration, timeDate or timeCycle."""
+    """Return the remedy for a timer's text; `kind` is timeDuration, timeDate or timeCycle."""
     text = text.strip()
     if len(text) > _MAX_TIME_CHARACTERS:
         return _FORMS[kind]

@@ -173,7 +173,7 @@ def _named(definitions: Iterable[EventDefinition]) -> Iterator[Signal | Message]
 
 
 def _recursion(mission: Mission) -> Iterator[Finding]:
-    """One warning for each call through which a process can call itself."""
+    """Return one warning for each call through which a process can call itself."""
     calls: dict[Process, list[CallActivity]] = {process: [] for process in mission.processes}
     for node in mission.nodes:
         if isinstance(node, CallActivity):

@@ -1,8 +1,8 @@
 """Which attributes and children BPMN 2.0.2 gives each element that m2pem reads, and their order.
 
 From the standard's XML schemas (Semantic.xsd). A group of names joined by `|` may come in any
-order among themselves; groups come in the order written. `INSIDE` also serves to tell a name that
-BPMN does not know from one that m2pem does not execute.
+order among themselves; groups come in the order written. `INSIDE` also distinguishes names that
+BPMN does not know from those that m2pem does not execute.
 """
 
 from dataclasses import dataclass
@@ -159,7 +159,7 @@ _TABLE: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What may be in one element: plain attributes, and the rank of each child's tag."""
+    """The allowed plain attributes of one element, and the rank of each child's tag."""
 
     attributes: frozenset[str]
     ranks: dict[str, int]

@@ -240,7 +240,7 @@ def resolve_prompts(context: ReadingContext) -> None:
 
 @dataclass(slots=True)
 class _Asked:
-    """What has been found of one prompt; what was found first counts."""
+    """The parts of one prompt that have been found; the first one of each counts."""
 
     context: ReadingContext
     task: str
@@ -265,7 +265,7 @@ class _Asked:
                 self.read(child)
 
     def data_object(self, identifier: str, *, own_decisions: bool) -> None:
-        """What the data object that the task reads carries."""
+        """Add the prompt of the data object that the task reads."""
         end = self.context.data.get(identifier)
         if end is None:
             return

@@ -42,7 +42,7 @@ def max_bytes() -> int:
 
 
 def too_large(has_bytes: int | None = None) -> tuple[str, str]:
-    """What is wrong with a larger file, and what would be right; its size if that is known."""
+    """Return the error and remedy for a file that is too large; `size` if it is known."""
     limit = max_bytes()
     has = f"has {has_bytes:,} bytes, more" if has_bytes is not None else "has more"
     return (
@@ -80,7 +80,7 @@ _KINDS = {
 
 
 def kind(tag: str) -> str:
-    """What a person calls the elements with this tag ("business rule task")."""
+    """Return the name of a tag's elements for people ("business rule task")."""
     name = local(tag)
     known = _KINDS.get(name)
     if known is not None:

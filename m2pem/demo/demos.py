@@ -30,7 +30,7 @@ def vignette() -> int:
     """Run the paper's mission twice: a hazard is detected, and nothing is detected."""
     here = examples()
     answers = here / "missions/answers"
-    # On a terminal only the detector is scripted, and whoever sits there is the operator.
+    # On a terminal only the detector is scripted, and the person there is the operator.
     operator = "_live" if sys.stdin.isatty() and sys.stdout.isatty() else ""
     words = m2pem(
         *("run", here / "missions/vignette1.bpmn"),

@@ -28,6 +28,6 @@ def draw(
 
     Raises:
         m2pem.bpmn.xml.XmlError: the bytes are no XML that m2pem reads.
-        ValueError: the file has no diagram, and cannot be laid out; the message tells why.
+        ValueError: the file has no diagram, and cannot be laid out; the message says why.
     """
     return paint(pictures_of(source), overlays or Overlays(), title=title, note=note, about=about)

@@ -49,7 +49,7 @@ def remove_diagrams(definitions: Element) -> None:
 
 
 def add_diagrams(definitions: Element) -> list[str]:
-    """Draw what is drawn nowhere; tells the ids of the processes, pools and subprocesses.
+    """Draw what is drawn nowhere; return the ids of the processes, pools and subprocesses.
 
     Everything that has a symbol or a line must have an id. What refers to nothing is left out.
     """

@@ -112,7 +112,7 @@ _EXPRESSIONS = (
 
 
 def flatten_texts(definitions: Element) -> list[str]:
-    """Make plain texts of those with elements in them; tells what was lost, where."""
+    """Replace texts with elements in them by plain texts; return what was lost, with its place."""
     notes = []
     for element in [*definitions.iter(etree.Element)]:
         name = tag(element)
@@ -208,7 +208,7 @@ def extensions_of(element: Element) -> Element:
 
 
 def _behavior_of(script: Element) -> Element | None:
-    """What a script carries; None when it carries no behavior, or something beside it."""
+    """Return the behavior of a script; None if it has none, or something else beside it."""
     if len(script) == 1:
         found = script[0]
     elif len(script) or not (script.text or "").lstrip().startswith("<"):

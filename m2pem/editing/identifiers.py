@@ -90,7 +90,7 @@ def name_all(definitions: Element) -> list[str]:
 def unqualify_references(definitions: Element) -> list[str]:
     """`tns:Flow` is `Flow` to an editor, where that is what the file calls an element of it.
 
-    What names nothing, and has no effect on execution either, is left out; tells which.
+    References to nothing, without effect on execution, are left out; returns which.
     """
     known = {each.get("id") or "" for each in _elements(definitions)}
     short = {}

@@ -73,7 +73,7 @@ def _elements(root: Element) -> Iterator[OutlineElement]:
 
 
 def _names(context: ReadingContext, services: Mapping[str, Sequence[str]]) -> Iterator[DataName]:
-    """What is written, by whom; then what is only read."""
+    """Yield the names that are written, with their writers; then those that are only read."""
     written: dict[tuple[str, str], None] = {}
     read: set[str] = set()
     for _, data in context.declared:
@@ -97,7 +97,7 @@ def _names(context: ReadingContext, services: Mapping[str, Sequence[str]]) -> It
 
 
 def _of_instances(node: object) -> Iterator[str]:
-    """What instances of an activity, and what is in it, read of themselves."""
+    """Yield the names that only instances of an activity have."""
     loop = node.loop if isinstance(node, Activity) else None
     if isinstance(loop, StandardLoop):
         yield LOOP_COUNTER

@@ -25,7 +25,7 @@ def open_for_writing(path: Path, marked: UUID | None = None) -> sqlite3.Connecti
     `marked`: the identity in the mark file beside it; a journal that has another is left alone.
 
     The connection may be handed to one other thread. A new file is readable by its owner alone:
-    missions and fleets tell where vehicles are.
+    missions and fleets contain positions of vehicles.
 
     Raises:
         JournalError: there is no such folder, no permission, it is not a journal, ...

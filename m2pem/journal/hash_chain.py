@@ -2,7 +2,7 @@
 
 The hash of an entry covers the hash before it and its own content, so that the last hash identifies
 the whole history. The chain begins with the hash of the run's header. Both hashes find damage, not
-forgery: whoever may write the file can compute them.
+forgery: a writer of the file can compute them.
 """
 
 import struct

@@ -15,7 +15,7 @@ class BehaviorType(StrEnum):
 
 
 class RoleKind(StrEnum):
-    """What a role's static allocation names."""
+    """The kind of resource that a role allocates."""
 
     VEHICLE = "vehicle"
     PAYLOAD = "payload"
@@ -130,7 +130,7 @@ class Mapping:
 
 @dataclass(frozen=True, slots=True)
 class Mappings:
-    """What passes into and out of a call activity; nothing else does."""
+    """The values that pass into and out of a call activity; no other value does."""
 
     inputs: tuple[Mapping, ...] = field(default=())
     outputs: tuple[Mapping, ...] = field(default=())

@@ -12,7 +12,7 @@ ResourceId = NewType("ResourceId", str)
 
 
 class ParameterKind(StrEnum):
-    """What a parameter's value is, and so which units it may carry. Inside, all is SI."""
+    """The type of a parameter's value, which determines its units. Inside, all is SI."""
 
     DURATION = "duration"  # s
     DISTANCE = "distance"  # m
@@ -32,7 +32,7 @@ class ParameterKind(StrEnum):
 
 
 class ResumePolicy(StrEnum):
-    """What to do after a restart with a behavior that its arbiter no longer knows."""
+    """The reaction, after a restart, to a behavior that its arbiter no longer knows."""
 
     RESTART = "restart"  # start it again: a scan, a picture
     FAIL = "fail"  # it ends with error LOST, for a boundary event to catch
@@ -40,7 +40,7 @@ class ResumePolicy(StrEnum):
 
 
 class BehaviorState(StrEnum):
-    """Where a behavior is (docs/architecture.md, "Plugins"); the last six are terminal."""
+    """The state of a behavior (docs/architecture.md, "Plugins"); the last six are terminal."""
 
     ACCEPTED = "ACCEPTED"
     RUNNING = "RUNNING"

@@ -54,7 +54,7 @@ class Element:
 
     @property
     def kind(self) -> str:
-        """What BPMN calls such an element, in lower case: "exclusive gateway", "subprocess"."""
+        """The element's name in BPMN, in lower case: "exclusive gateway", "subprocess"."""
         words = _CAPITAL.sub(" ", type(self).__name__).lower().replace("sub process", "subprocess")
         return words.replace("event based", "event-based").replace("ad hoc", "ad-hoc")
 
@@ -253,7 +253,7 @@ class Transaction(SubProcess):
 
 
 class AdHocOrdering(StrEnum):
-    """How many activities of an ad-hoc subprocess may run at a time (table 10.22)."""
+    """Whether several activities of an ad-hoc subprocess may run at a time (table 10.22)."""
 
     PARALLEL = "Parallel"
     SEQUENTIAL = "Sequential"
@@ -347,14 +347,14 @@ class Event(FlowNode):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StartEvent(Event):
-    """Where a container's tokens begin. `interrupting`: of an event subprocess only."""
+    """An event at which tokens begin. `interrupting`: of an event subprocess only."""
 
     interrupting: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EndEvent(Event):
-    """Where a token ends, perhaps throwing something."""
+    """An event at which a token ends; it may throw."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -52,7 +52,7 @@ class CorrelationProperty(RootElement):
 
 @dataclass(frozen=True, slots=True)
 class Error(RootElement):
-    """What an activity can end with when it fails (clause 8.4.8). `code` defaults to the id."""
+    """An error with which an activity may fail (clause 8.4.8). `code` defaults to the id."""
 
     code: str = ""
 
@@ -66,7 +66,7 @@ class Escalation(RootElement):
 
 @dataclass(frozen=True, slots=True)
 class EventDefinition:
-    """What triggers, or results from, an event."""
+    """The trigger or the result of an event."""
 
     line: int
 

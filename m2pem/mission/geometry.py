@@ -33,7 +33,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class VehiclePosition:
-    """Where a vehicle of the fleet is, whenever it is asked for: a moving target."""
+    """The present position of a vehicle of the fleet: a moving target."""
 
     vehicle: str
 

@@ -40,11 +40,11 @@ class LibraryError(Exception):
 
 
 class Library(Protocol):
-    """Finds other files."""
+    """Finds processes in other files."""
 
     @property
     def places(self) -> Sequence[str]:
-        """Where `called` looks, for messages to people."""
+        """The places in which `called` looks, for messages."""
         ...
 
     def called(self, element: str, namespace: str) -> Source | None:

@@ -18,7 +18,7 @@ from m2pem.mission.elements import (
 
 
 def following(node: FlowNode) -> list[FlowNode]:
-    """Where a token on a node can go next: by its flows, boundary events and link."""
+    """Return the nodes to which a token can go next: by flows, boundary events and a link."""
     found: list[FlowNode] = [flow.target for flow in node.outgoing]
     if isinstance(node, Activity):
         found += node.boundary

@@ -93,13 +93,13 @@ class Answers:
                     pass
 
     def service(self, run: str, element: str, name: str, service: str) -> ServiceEntry | None:
-        """What a service task does on this visit; None: nothing is scripted (any more)."""
+        """Return the scripted result of a service task on this visit; None: none is left."""
         key = self._service(element, name)
         place = self._visit(run, "services", key, service)
         return None if place is None else self.model.services[key][place]
 
     def behavior(self, run: str, behavior: str) -> tuple[str, BehaviorEntry] | None:
-        """The element that a behavior was requested for, and how it ends; None as for `service`."""
+        """Return the element of a behavior and its scripted end; None: none is left."""
         for element, entries in self.model.behaviors.items():
             place = self._visits.get((run, "behaviors", element), {}).get(behavior)
             if place is not None:
@@ -130,7 +130,7 @@ class Answers:
 
     @property
     def to_send(self) -> int:
-        """How many signals and messages are still to come."""
+        """The number of signals and messages that are still to be sent."""
         return self._to_send
 
     async def act(
@@ -183,7 +183,7 @@ class Answers:
         try:
             await control.answer(prompt.run, prompt.prompt, decision, by=by)
         except OperatorError as error:
-            # The first decision comes too late where others end the task; nobody scripted it.
+            # The default decision is too late when another answer has ended the task.
             level = logging.DEBUG if by == BY_DEFAULT else logging.WARNING
             log.log(level, "%s: the answer %r: %s", prompt.element, decision, error)
 

@@ -54,7 +54,7 @@ class _Model(BaseModel):
 
 
 class ServiceEntry(_Model):
-    """One visit to a service task: after a while it writes, or fails with an error code."""
+    """The result of one visit to a service task: values that it writes, or an error code."""
 
     after: Seconds = 0.0
     write: dict[Text, Any] = Field(default_factory=dict)
@@ -68,7 +68,7 @@ class ServiceEntry(_Model):
 
 
 class BehaviorEntry(_Model):
-    """One behavior that a task commands, on a simulated vehicle or payload."""
+    """The end of one behavior that a task commands on simulated vehicles or payloads."""
 
     after: Seconds
     end: Literal["succeeded", "failed", "stalled", "lost"]

@@ -239,7 +239,7 @@ def _lanes(extents: Iterable[tuple[float, float]]) -> list[int]:
 
 
 def _free(bars: Sequence[tuple[float, float]], lanes: Sequence[int]) -> list[tuple[float, float]]:
-    """How far it is from each bar to its neighbours in its lane."""
+    """Return the distance from each bar to its neighbours in its lane."""
     free: list[tuple[float, float]] = []
     before: dict[int, int] = {}
     for place, ((start, end), lane) in enumerate(zip(bars, lanes, strict=True)):

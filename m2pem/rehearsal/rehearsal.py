@@ -114,7 +114,7 @@ class Sampler:
                 self._next_us = last_us + self._every_us
 
     def at(self, time_us: int) -> None:
-        """Sample this moment."""
+        """Sample the states at this moment."""
         states = list(self._states_at(time_us))
         self.samples.append(
             TelemetrySample(
@@ -131,10 +131,10 @@ START_US = 1_767_225_600_000_000
 MAX_STEPS = 10_000_000
 
 SEARCH_US = 3600 * US_PER_S
-"""How long a vehicle whose motion has no end may go on looking for something to detect."""
+"""How long a vehicle whose motion has no end may go on searching for targets."""
 
 SETTINGS = {"telemetry_hz": 0, "state": ""}
-"""Of every simulated resource: telemetry tells of changes alone, and nothing outlives the run."""
+"""Settings of every simulated resource: telemetry has changes only, and no state file."""
 
 EXIT_STATUS = {
     RunStatus.COMPLETED: 0,
@@ -152,7 +152,7 @@ class RehearsalResult(SimulationResult):
 
     @property
     def exit_status(self) -> int:
-        """What `m2pem simulate` ends with (docs/cli.md)."""
+        """The exit status of `m2pem simulate` (docs/cli.md)."""
         return EXIT_STATUS[self.summary.status]
 
 
@@ -176,9 +176,9 @@ def rehearse(
     `mission`: a path, a `file:` or `http:` URL, BPMN bytes, or one that was loaded. `fleet` None:
     for a mission that commands no resource. `answers`: a file, its text as bytes, or one that was
     loaded and has not been used. `on_record` gets each record as soon as it is committed; what it
-    raises ends the rehearsal. `observed`: whether observers among the plugins are told.
+    raises ends the rehearsal. `observed`: whether plugins that observe records are called.
     `search_path`: folders of processes that the mission calls. `telemetry_every_s`: of mission
-    time, how often the result tells where the vehicles are; None: never.
+    time, the period of the vehicles' positions in the result; None: it has none.
 
     Raises:
         MissionError: the mission cannot be loaded, does not fit the fleet, or needs one.
@@ -230,7 +230,7 @@ def _refuse_misfits(answers: Answers, mission: Mission) -> None:
 
 
 class _Rehearsal:
-    """One run, from its beginning to its end."""
+    """One rehearsed run, from its beginning to its end."""
 
     def __init__(
         self,
@@ -257,7 +257,7 @@ class _Rehearsal:
     async def run(
         self, clock: VirtualClock, process: str | None, data: Mapping[str, Value] | None
     ) -> RunSummary:
-        journal = _TellingJournal(self._on_record)
+        journal = _NotifyingJournal(self._on_record)
         executive = Executive(
             simulated_fleet(self._fleet, SETTINGS),
             journal,
@@ -371,10 +371,10 @@ class StepLimit:
         return f"it has taken the {self.max_steps} steps that are allowed" if done else ""
 
 
-class _TellingJournal(MemoryJournal):
-    """Keeps nothing, and tells of each record when it is committed.
+class _NotifyingJournal(MemoryJournal):
+    """Keeps nothing, and calls the listener with each record when it is committed.
 
-    `broken`: is done, with the error, when the listener raised; it is told nothing after that.
+    `broken`: is done, with the error, when the listener raised; it is not called after that.
     """
 
     def __init__(self, on_record: OnRecord) -> None:

@@ -10,7 +10,7 @@ from m2pem.mission.catalogue import BehaviorState
 
 
 class Outcome(StrEnum):
-    """How what a bar stands for ended."""
+    """The end of the behavior, prompt or service of a bar."""
 
     SUCCEEDED = "succeeded"
     INTERRUPTED = "interrupted"
@@ -126,7 +126,7 @@ class _Reader:
                 pass
 
     def finish(self) -> None:
-        """What has not ended lasts to the end of the records."""
+        """Let bars without an end last to the end of the records."""
         for span in self._open.values():
             span.end_s = self.line.end_s
 

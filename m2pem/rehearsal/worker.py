@@ -25,7 +25,7 @@ MAX_STEPS = 100_000
 
 
 class Order(msgspec.Struct):
-    """What is to be rehearsed."""
+    """The arguments of a rehearsal, as the worker receives them."""
 
     mission: EncodedSource
     fleet: bytes
@@ -40,7 +40,7 @@ class Order(msgspec.Struct):
 
 
 class Done(msgspec.Struct):
-    """What came of it."""
+    """The result of a rehearsal, as the worker returns it."""
 
     summary: RunSummary
     records: list[StampedRecord]

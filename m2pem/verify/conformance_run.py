@@ -198,7 +198,7 @@ class ConformanceRun:
         return self._after(self.run.receive(item, self._now_us))
 
     def _after(self, step: Step) -> Sequence[Step]:
-        """What an input led to, with all that followed from it."""
+        """Return the steps after an input."""
         item = step.input
         before = len(self.steps)
         self.steps.append(step)

@@ -108,7 +108,7 @@ def test_data_that_the_run_is_started_with_is_known() -> None:
     assert ltl(mission, "[] mission.area == 'south'", options).result is VIOLATED
     answer = ltl(mission, "[] mission.area == 'north'")
     assert answer.result is UNDECIDED
-    assert "'mission.area' is cannot be told from the mission" in answer.why
+    assert "the value of 'mission.area' is not known from the mission" in answer.why
 
 
 def test_of_a_search_cut_short_what_is_broken_is_broken_and_the_rest_undecided() -> None:

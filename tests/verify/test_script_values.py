@@ -36,7 +36,7 @@ def test_a_counter_is_not_stuck_for_values_that_it_never_has() -> None:
     report = counting("a = a + 1", "a &gt;= limit")
     assert report.judged(strict=True) is Verdict.HOLDS
     rough = {a.element: (a.exactness, a.what) for a in report.net.approximations}
-    assert rough["Count"] == (Exactness.MORE, "'a' has more values than are told apart")
+    assert rough["Count"] == (Exactness.MORE, "'a' has more values than are distinguished")
 
 
 def test_a_counter_that_is_followed_value_by_value_is_no_approximation() -> None:

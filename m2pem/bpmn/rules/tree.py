@@ -139,7 +139,7 @@ class Tree:
     # --- references -----------------------------------------------------------------------------
 
     def find(self, owner: etree._Element, text: str) -> etree._Element | None:
-        """What a reference names in this file."""
+        """Return the element of this file that a reference names."""
         text = text.strip()
         found = self.ids.get(text)
         if found is None and ":" in text and not self._foreign(owner, text):
@@ -233,7 +233,7 @@ def children(element: etree._Element, text: str) -> Iterator[etree._Element]:
 
 
 def texts(element: etree._Element, name: str) -> list[str]:
-    """What children with a local name say, without the space around it."""
+    """Return the texts of the children with a local name, without the space around them."""
     return ["".join(map(str, child.itertext())).strip() for child in children(element, name)]
 
 

@@ -44,7 +44,7 @@ from m2pem.mission.values import ReadValue, Value
 
 
 def bind(variable: str, item: Value, read: ReadValue) -> ReadValue:
-    """What reads `variable`, and what is below it, from the item, and all else as before."""
+    """Return a lookup that reads `variable`, and names below it, from the item."""
 
     def bound(name: str) -> Value:
         return _part(item, name[len(variable) + 1 :]) if binds(variable, name) else read(name)
@@ -53,7 +53,7 @@ def bind(variable: str, item: Value, read: ReadValue) -> ReadValue:
 
 
 def _part(value: Value, path: str) -> Value:
-    """What a dotted path leads to in maps; null where it leads nowhere."""
+    """Return the value at a dotted path in maps; null if there is none."""
     for key in path.split(".") if path else ():
         value = value.get(key) if isinstance(value, dict) else None
     return value

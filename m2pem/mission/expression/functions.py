@@ -43,7 +43,7 @@ class Function:
 
     @property
     def name(self) -> str:
-        """What expressions call it."""
+        """The function's name in expressions."""
         return self.signature.partition("(")[0]
 
     def accepts(self, count: int) -> bool:
@@ -51,7 +51,7 @@ class Function:
         return count >= len(self.takes) if self.rest else count == len(self.takes)
 
     def call(self, arguments: list[Value]) -> Value:
-        """Its value; raises ExpressionError."""
+        """Return the function's value; raises ExpressionError."""
         null = False
         for index, argument in enumerate(arguments):
             kinds = self.takes[min(index, len(self.takes) - 1)]

@@ -130,7 +130,7 @@ def tokenize(text: str, span: Span, dialect: Dialect) -> list[Token]:
 
 
 class _Closely:
-    """Reads a token that only a closer look tells from a mistake, or says what the mistake is."""
+    """Read a token that resembles a mistake, or raise with what the mistake is."""
 
     def __init__(self, text: str, end: int, dialect: Dialect) -> None:
         self._text = text

@@ -70,7 +70,7 @@ class Parser:
         self._nesting = 0
 
     def parse(self) -> Node:
-        """The tree."""
+        """Parse the whole text, and return its tree."""
         if self._token.kind == "end":
             self._fail("an expression is missing")
         node = self._expression(LOWEST)
@@ -201,7 +201,7 @@ class Parser:
             self._fail(str(error), token)
 
     def _inside(self, node: Node) -> Node:
-        """What follows a value to take something out of it: `[0]`, `['key']`, `.key`."""
+        """Parse the accesses after a value: `[0]`, `['key']`, `.key`."""
         while self._token.text in ("[", "."):
             opening = self._next()
             if opening.text == "[":

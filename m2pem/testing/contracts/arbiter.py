@@ -76,7 +76,7 @@ class ArbiterContract(ArbiterLinks):
     def test_report_numbers_rise_from_one(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """The executive tells old reports from new ones by their numbers."""
+        """The executive distinguishes old reports from new ones by their numbers."""
 
         async def main(harness: ArbiterHarness) -> None:
             await start(harness, "r1.b1", case.short, case.vehicle)
@@ -204,7 +204,7 @@ class ArbiterContract(ArbiterLinks):
     def test_cancel_ends_a_behavior_within_the_declared_bound(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """Within `limits().cancel_timeout_s`."""
+        """A cancel ends a behavior within `limits().cancel_timeout_s`."""
 
         async def main(harness: ArbiterHarness) -> None:
             await start(harness, "r1.b1", case.long, case.vehicle)
@@ -219,7 +219,7 @@ class ArbiterContract(ArbiterLinks):
     def test_a_second_cancel_changes_nothing(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """One terminal report, however often it is cancelled."""
+        """A behavior has one terminal report, however often it is cancelled."""
 
         async def main(harness: ArbiterHarness) -> None:
             await start(harness, "r1.b1", case.long, case.vehicle)

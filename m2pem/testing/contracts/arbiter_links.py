@@ -282,7 +282,7 @@ class ArbiterLinks(ArbiterFixtures):
     def test_a_held_vehicle_does_not_hold_up_the_other(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """One is at rest, the other continues."""
+        """One vehicle is at rest, the other one continues."""
 
         async def main(harness: ArbiterHarness) -> None:
             await start(harness, "r1.b1", case.long, case.vehicle)

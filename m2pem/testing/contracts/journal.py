@@ -90,7 +90,7 @@ async def outcomes(*calls: Awaitable[None]) -> Sequence[BaseException | None]:
 
 @pytest.mark.asyncio
 class JournalContract(Contract):
-    """Override `open_journal`."""
+    """The contract of a journal: override the fixture `open_journal`."""
 
     m2pem_contract: ClassVar[str] = "JournalContract"
     subjects: ClassVar[Mapping[str, str]] = {
@@ -105,7 +105,7 @@ class JournalContract(Contract):
     # --- runs -----------------------------------------------------------------------------------
 
     async def test_runs_are_named_in_order(self, open_journal: OpenJournal) -> None:
-        """r1, r2, ..."""
+        """Runs are named r1, r2, ... in their order."""
         async with opened(open_journal) as journal:
             assert [await journal.create(HEADER) for _ in range(3)] == ["r1", "r2", "r3"]
             assert [found.run for found in await journal.runs()] == ["r1", "r2", "r3"]
@@ -197,7 +197,7 @@ class JournalContract(Contract):
             assert await written(journal, run) == some
 
     async def test_one_call_may_write_to_several_runs(self, open_journal: OpenJournal) -> None:
-        """And runs stay apart."""
+        """One call may write to several runs, and keeps them apart."""
         async with opened(open_journal) as journal:
             runs = [await journal.create(HEADER) for _ in range(3)]
             some = [entry(run, seq) for seq in (1, 2) for run in runs]
@@ -221,7 +221,7 @@ class JournalContract(Contract):
                 assert [found.seq for found in await written(journal, run)] == [1, 2, 3, 4, 5]
 
     async def test_nothing_to_append_is_no_error(self, open_journal: OpenJournal) -> None:
-        """And writes nothing."""
+        """An empty append writes nothing."""
         async with opened(open_journal) as journal:
             run = await journal.create(HEADER)
             await journal.append([])

@@ -81,7 +81,7 @@ class OcuContract(Contract):
         asyncio.run(run_with_ocu(make_ocu, operate, main, before))
 
     def test_shows_several_questions_at_once(self, with_ocu: Callable[[Main], None]) -> None:
-        """Of one run and of another."""
+        """Prompts of two runs are shown at once."""
 
         async def main(harness: OcuHarness) -> None:
             await harness.asked(scenarios.two_questions("Road?", "Bridge?"))
@@ -129,7 +129,7 @@ class OcuContract(Contract):
     def test_shows_that_another_operator_answered_first(
         self, with_ocu: Callable[[Main], None]
     ) -> None:
-        """It shows who it was."""
+        """The unit shows the name of the other operator."""
 
         async def main(harness: OcuHarness) -> None:
             (prompt,) = await harness.asked(scenarios.question("Is the road clear?"))
@@ -265,7 +265,7 @@ class OcuContract(Contract):
     def test_stop_works_while_another_call_takes_long(
         self, with_ocu: Callable[[Main], None]
     ) -> None:
-        """STOP waits for nothing."""
+        """STOP does not wait for another call."""
 
         async def main(harness: OcuHarness) -> None:
             run = await harness.moving()
@@ -283,7 +283,7 @@ class OcuContract(Contract):
     def test_ends_when_it_is_cancelled_and_leaves_no_task(
         self, with_ocu: Callable[[Main], None]
     ) -> None:
-        """With a question open."""
+        """The unit ends while a prompt is open."""
 
         async def main(harness: OcuHarness) -> None:
             await harness.asked(scenarios.question("Road?"))
@@ -296,7 +296,7 @@ class OcuContract(Contract):
         with_ocu(main)
 
     def test_bears_the_end_of_the_executive(self, with_ocu: Callable[[Main], None]) -> None:
-        """It ends, or waits to be cancelled; it does not break."""
+        """The unit ends, or waits to be cancelled; it raises nothing."""
 
         async def main(harness: OcuHarness) -> None:
             await harness.asked(scenarios.question("Road?"))

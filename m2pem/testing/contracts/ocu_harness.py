@@ -27,7 +27,7 @@ class Operator(Protocol):
     """The operator of a unit, who reads its screen and presses its keys."""
 
     def screen(self) -> str:
-        """All that the unit shows now or has shown, as text."""
+        """Return all text that the unit shows or has shown."""
         ...
 
     async def answer(self, prompt: OpenPrompt, decision: str) -> None:
@@ -64,7 +64,7 @@ class Faults:
         self._hanging.add(method)
 
     def mend(self) -> None:
-        """Let all calls through."""
+        """Let all blocked calls return."""
         self._refused.clear()
         self._hanging.clear()
         self._mended.set()
@@ -107,7 +107,7 @@ class OcuHarness:
         self.operator: Operator
 
     def begin(self) -> None:
-        """Make the unit serve."""
+        """Start the unit's `serve`."""
         tasks = self._tasks = _watch_tasks()
         context = copy_context()
         context.run(_MAKER.set, tasks)

@@ -60,7 +60,7 @@ class ServiceContract(Contract):
         assert len(set(service.writes)) == len(service.writes), "a name is declared twice"
 
     def test_writes_only_what_it_declared(self, service: Service, case: ServiceCase) -> None:
-        """What it returns is a map of declared names to values that the data store can hold."""
+        """A service returns a map of declared names to values that the data store can hold."""
         result = run_case(service, case)
         if isinstance(result, ServiceError):
             return

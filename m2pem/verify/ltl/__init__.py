@@ -4,7 +4,7 @@
     observer = Observer(negated(formula))       # accepts the runs that break it
 
 A run is a sequence of *moments*. What a step completes is true in a moment of its own, which a
-quiet moment in the same state follows; that is why no formula can tell how many steps that it does
+quiet moment in the same state follows; that is why no formula can count the steps that it does
 not name happen between two that it does, and why searches may leave such steps out.
 """
 

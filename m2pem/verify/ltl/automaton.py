@@ -278,7 +278,7 @@ def translate(formula: int, forms: Forms) -> Automaton:
 
 
 class _Choices:
-    """How formulas can be fulfilled; each is computed once."""
+    """The ways to fulfil formulas; each is computed once."""
 
     def __init__(self, forms: Forms) -> None:
         self.forms = forms

@@ -66,7 +66,7 @@ Proposition: TypeAlias = Union[Active, Completed, Commanded, Ended, Data]
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """Always true, or never."""
+    """A formula that is always true, or never."""
 
     value: bool
 
@@ -140,7 +140,7 @@ class WeakUntil:
 
 @dataclass(frozen=True, slots=True)
 class Next:
-    """In the next moment."""
+    """A formula about the next moment."""
 
     operand: "Formula"
 
@@ -295,7 +295,7 @@ _BINARY: dict[type[Formula], tuple[str, int]] = {
 
 
 def show(formula: Formula) -> str:
-    """The formula as text."""
+    """Return the formula as text."""
     return _show(formula, _LOOSE)
 
 

@@ -46,7 +46,7 @@ class Stopped(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a search is: pairs of states found, pairs still to expand, seconds so far."""
+    """Progress of a search: pairs of states found, pairs still to expand, seconds so far."""
 
     states: int
     waiting: int
@@ -148,7 +148,7 @@ class AcceptingComponent:
 
 
 def accepting_components(product: Product, fairness: Fairness) -> Iterator[AcceptingComponent]:
-    """All accepting components of what is expanded so far."""
+    """Return all accepting components of the expanded part."""
     expanded = len(product.moves)
     waiting = [frozenset(range(expanded))]
     while waiting:
@@ -229,7 +229,7 @@ def _prefix(product: Product, node: int) -> tuple[int, tuple[Move, ...]]:
 
 
 def _moves(steps: list[tuple[int, int]]) -> tuple[Move, ...]:
-    """What happens to the system, without quiet moments."""
+    """Return the transitions of the system, without quiet moments."""
     return tuple(
         Move(transition, state) for transition, state in steps if transition not in (QUIET, STUTTER)
     )

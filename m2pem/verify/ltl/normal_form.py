@@ -50,7 +50,7 @@ TRUE, FALSE = 0, 1
 
 
 class Forms:
-    """All formulas made so far. Its constructors simplify a formula first."""
+    """All formulas of one conversion. Its constructors simplify a formula first."""
 
     def __init__(self) -> None:
         self._nodes = [_Node(Op.TRUE, ()), _Node(Op.FALSE, ())]

@@ -61,7 +61,7 @@ class Reader:
         return found
 
     def peek(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
-        """What the pattern matches here; nothing is read."""
+        """Return the match of the pattern at this position, without reading it."""
         return pattern.match(self.text, self.skip())
 
     def take(self, symbol: str) -> bool:
@@ -77,7 +77,7 @@ class Reader:
             self.fail(f"expected '{symbol}' {why}, found {self.found()}")
 
     def found(self) -> str:
-        """What comes next, for messages."""
+        """Return the next symbol, for messages."""
         rest = self.text[self.skip() :]
         word = re.match(r"[\w.]+|\S{1,3}", rest)
         return repr(word[0]) if word else "the end"
@@ -89,7 +89,7 @@ class Reader:
         raise ExpressionSyntaxError(f"{message}; {hint}" if hint else message, self.text, where)
 
     def hint(self, position: int) -> str:
-        """What to write in place of a symbol of other notations."""
+        """Return the replacement for a symbol of other notations."""
         rest = self.text[position:]
         found = (hint for symbol, hint in _HINTS.items() if rest.startswith(symbol))
         return "" if rest.startswith(("==", "&&", "||")) else next(found, "")
@@ -173,7 +173,7 @@ _OPERATOR_AND, _OPERATOR_OR = re.compile(r"&&|and(?![\w.])"), re.compile(r"\|\||
 _OTHER_NOTATIONS = {
     "G": "write '[]'",
     "F": "write '<>'",
-    "X": "no formula can tell how many steps pass between two; see the patterns that can",
+    "X": "no formula can count the steps between two states; see the patterns that can",
     "always": "write '[]'",
     "eventually": "write '<>'",
 }

@@ -77,7 +77,7 @@ class Encoding:
         self.transitions = [self._compile(transition) for transition in net.transitions]
 
     def places_mask(self, places: Iterable[int]) -> int:
-        """All bits of some places."""
+        """Return the bits of some places."""
         mask = 0
         for place in places:
             mask |= self.mask[place]
@@ -224,7 +224,7 @@ class Encoding:
     # --- reading --------------------------------------------------------------------------------
 
     def marking(self, state: int) -> Marking:
-        """Decode a state."""
+        """Decode a state into a marking."""
         tokens = {
             place.index: count
             for place in self.net.places

@@ -43,7 +43,7 @@ class Kind(StrEnum):
 
 
 class Role(StrEnum):
-    """What a token on a place stands for."""
+    """The meaning of a token on a place."""
 
     ENTERING = "entering"
     """The token has entered an element that is executed next."""
@@ -60,7 +60,7 @@ class Role(StrEnum):
 
 
 class Trigger(StrEnum):
-    """What an external transition stands for, so that a run can be played to the engine."""
+    """The input of an external transition, with which the engine can execute a run."""
 
     SUCCEEDS = "succeeds"
     """A behavior's or service's work ends well."""
@@ -147,7 +147,7 @@ COMPENSATION_BEGINS, COMPENSATION_ENDS = "is undone", "has been undone"
 
 
 class Action(StrEnum):
-    """What happens to an element in a step."""
+    """The change of an element in a step."""
 
     ENTERED = "entered"
     COMPLETED = "completed"
@@ -216,7 +216,7 @@ class Transition:
 
 
 class Exactness(StrEnum):
-    """How the net of an element differs from what the engine does."""
+    """The difference between the net of an element and the engine."""
 
     MORE = "more"
     """The net can do all that the engine can, and more: a proof holds, an alarm may be false."""

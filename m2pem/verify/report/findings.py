@@ -147,7 +147,7 @@ def _unreached(mission: Mission, report: Report) -> frozenset[str]:
 
 
 def marks_of(violation: DescribedViolation, unreached: frozenset[str] = frozenset()) -> Overlays:
-    """What a diagram shows of a violation."""
+    """Return the marks of a violation in a diagram."""
     steps: Sequence[Sequence[str]] = [
         run_step.passes for run_step in (*violation.run_steps, *violation.loop)
     ]

@@ -75,7 +75,7 @@ class ElementNames:
         return f"'{ref}'" if ref else ""
 
     def behavior(self, element: str) -> str:
-        """What a task commands: which resource begins what; "" for nothing."""
+        """Return which resource begins which behavior at a task; "" for none."""
         behavior = getattr(self.mission.elements.get(element), "behavior", None)
         if not isinstance(behavior, Behavior):
             return ""
@@ -229,7 +229,7 @@ def encoding_of(net: PetriNet) -> Encoding:
 
 
 def tokens_of(encoding: Encoding, state: int) -> tuple[Token, ...]:
-    """Where tokens of the mission are, without those that only the net needs."""
+    """Return the mission's tokens, without those that only the net needs."""
     found: dict[tuple[str, str], int] = {}
     for index, count in encoding.marking(state).tokens.items():
         place = encoding.net.places[index]
@@ -290,7 +290,7 @@ def _run_step(
 
 
 def _writes(transition: Transition, element_names: ElementNames, net: PetriNet) -> dict[str, Value]:
-    """What came with a trigger."""
+    """Return the data of a trigger."""
     if transition.trigger is None:
         return {}
     return {
@@ -386,7 +386,7 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
 def _besides(
     element: str, actions: Sequence[Step], element_names: ElementNames, *, failed: bool = False
 ) -> list[str]:
-    """What else the step does: it throws, interrupts, triggers."""
+    """Return the other effects of a step: it throws, interrupts, triggers."""
     said = []
     for place, step in enumerate(actions):
         name = element_names.name(step.element)

@@ -90,7 +90,7 @@ def _shown(text: str) -> str:
 
 
 def covered(coverage: Coverage) -> str:
-    """How much was searched."""
+    """Return the extent of the search as text."""
     found = f"{coverage.states:,} states and {coverage.transitions:,} steps"
     by = " by Spin" if coverage.engine == "spin" else ""
     took = f"in {coverage.seconds * 1000:.0f} ms{by}"

@@ -154,7 +154,7 @@ class Labels:
         for name in sorted(each.expression.names):
             if name not in by_name:
                 raise UnknownDataError(
-                    f"what '{name}' is cannot be told from the mission: say what it begins with "
+                    f"the value of '{name}' is not known from the mission: give its first value "
                     "(--data), or write it in a task"
                 )
         return [by_name[name] for name in sorted(each.expression.names)]
@@ -171,7 +171,7 @@ class Labels:
             exact = exact and variable.exact[number]
         if not exact and not tells_apart(data.expression.tree):
             raise UnknownDataError(
-                f"whether {data.expression.text.strip()} is true cannot be told: it is more than "
+                f"whether {data.expression.text.strip()} is true is not known: it is more than "
                 "comparisons of single names with values"
             )
         try:

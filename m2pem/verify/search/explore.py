@@ -60,7 +60,7 @@ class Stopped(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a search is."""
+    """The progress of a search."""
 
     states: int
     waiting: int
@@ -118,7 +118,7 @@ class Exploration:
         return transitions[::-1]
 
     def marking(self, number: int) -> Marking:
-        """Decode a state."""
+        """Decode a state into a marking."""
         return self.encoding.marking(self.states[number])
 
     def successors(self, number: int) -> Iterator[tuple[int, int]]:

@@ -112,7 +112,7 @@ class NeverClaim:
             does.append(f"{held} = {now}")
 
     def _truth(self, number: int, places: Sequence[str], variables: Sequence[str]) -> str:
-        """When a proposition of states is true."""
+        """Return the expression of a proposition about states."""
         if not isinstance(self._labels.propositions[number], f.Data):
             names = [places[p] for p in sorted(self._labels.places_of(number))]
             return "(" + (" || ".join(f"{name} > 0" for name in names) or "false") + ")"
@@ -131,7 +131,7 @@ class NeverClaim:
         return "(" + (" || ".join(true) or "false") + ")"
 
     def after_transition(self, transition: int) -> list[str]:
-        """What a transition does to the bits."""
+        """Return the assignments of bits after a transition."""
         return [*(f"{name} = 1" for name in self._transitions.get(transition, ())), "moment()"]
 
     def quiet_line(self) -> str:

@@ -76,7 +76,7 @@ class Tools:
 
 @dataclass(frozen=True, slots=True)
 class CheckerOutput:
-    """What a checker printed. `ended`: why it was ended, "" if it finished by itself."""
+    """The output of a checker. `ended`: why m2pem ended it, "" if it finished by itself."""
 
     text: str
     ended: str

@@ -123,7 +123,7 @@ class Writer:
         self._out = _Lines()
 
     def write(self) -> Model:
-        """Return the whole text."""
+        """Write the model, and return its text."""
         out, net = self._out, self.net
         name = net.elements.get(net.process) or net.process
         out.add(

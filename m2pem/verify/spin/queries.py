@@ -18,7 +18,7 @@ from m2pem.verify.spin.promela import Model
 
 
 class ErrorKind(StrEnum):
-    """What a checker reports as an error."""
+    """The kind of error that a checker reports."""
 
     ASSERTION = "assertion violated"
     CYCLE = "acceptance cycle"
@@ -103,13 +103,13 @@ def read(text: str) -> CheckerReport:
 
 
 def states_so_far(text: str) -> int:
-    """How many states a running checker has reported."""
+    """Return the number of states that a running checker has reported."""
     output = _STATES.findall(text)
     return round(float(output[-1])) if output else 0
 
 
 class Storage(StrEnum):
-    """How Spin remembers the states that it has seen."""
+    """How Spin stores visited states."""
 
     EXACT = "exact"
     COLLAPSE = "collapse"

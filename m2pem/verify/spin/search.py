@@ -1,8 +1,8 @@
 """The exploration of a net with Spin.
 
-One search of all states tells which transitions ever fire. For each that should not, and for other
-violations, another query asks for a run that leads there. Every run is fired again, transition by
-transition, before it is believed.
+One search of all states finds the transitions that ever fire. For each that should not, and for
+other violations, another query asks for a run that leads there. Every run is fired again,
+transition by transition, before it is reported.
 """
 
 import time
@@ -57,7 +57,7 @@ class SpinExploration:
 
 @dataclass(frozen=True, slots=True)
 class WantedRuns:
-    """What runs are wanted to: transitions, deadlocks, places where a token is left at the end."""
+    """The targets of wanted runs: transitions, deadlocks, places with a token left at the end."""
 
     transitions: frozenset[int]
     stuck: bool = True
@@ -158,10 +158,10 @@ class _Search:
         limits, found = self.queries.limits, self.found
         most_bits = max((limits.tokens + 1).bit_length() - 1, 1)
         wider: dict[int, int] = {}
-        told_once: set[int] = set()
+        reported_once: set[int] = set()
         while True:
             self.encoding = found.encoding = Encoding(self.net, wider)
-            asked = frozenset(p.index for p in self.net.places) - found.beyond - told_once
+            asked = frozenset(p.index for p in self.net.places) - found.beyond - reported_once
             model = self._model(Assertions(full=asked))
             result = self.queries.query(model)
             if result.report.found is None:
@@ -172,7 +172,7 @@ class _Search:
                 assertions = Assertions(full=frozenset({place}))
                 found.overflow_runs[place] = self._short(assertions, result) or run
             if self.net.places[place].once:
-                told_once.add(place)
+                reported_once.add(place)
             elif self.encoding.width[place] < most_bits:
                 wider[place] = most_bits
             else:

@@ -122,7 +122,7 @@ def pass_on(
 
 
 def work(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
-    """What an activity, or an instance of one, does when it begins."""
+    """Translate the start of an activity, or of one of its instances."""
     node = instance.node
     behavior = behavior_of(node)
     if behavior is not None:
@@ -278,7 +278,7 @@ def _script(
             break
         if context.data.is_blurred(statement.key):
             context.net.approximate(
-                node, Exactness.MORE, f"'{statement.key}' has more values than are told apart"
+                node, Exactness.MORE, f"'{statement.key}' has more values than are distinguished"
             )
         ways = context.data.write(
             ways, statement.key, statement.expression, instance.outer, node, unable=unable

@@ -292,7 +292,7 @@ def arm_handler(context: TranslationContext, scope: ScopeDraft, start: e.StartEv
                 holder = holder_of(context, scope)
                 runs(context, holder, fixed(definition), (scope.open, *running), made)
             case SignalEventDefinition() | MessageEventDefinition():
-                caught = net.place(start, scope, Role.TRIGGERED, f":told{number}")
+                caught = net.place(start, scope, Role.TRIGGERED, f":reached{number}")
                 what, ref = what_and_ref(definition)
                 register_catcher(
                     context, what, ref, scope.open, caught, not start.interrupting, start

@@ -38,7 +38,7 @@ from m2pem.verify.translate.scopes import begin_event_subprocess, handler_instan
 
 
 def compensated_by(context: TranslationContext, node: e.Activity) -> CompensatedBy | None:
-    """What compensates an activity; None: nothing does."""
+    """Return the compensation of an activity; None: it has none."""
     if node not in context.compensated_by:
         context.compensated_by[node] = None  # while it is looked at: a process may call itself
         context.compensated_by[node] = _find_compensation(context, node)
@@ -338,7 +338,7 @@ def cancel(context: TranslationContext, node: e.EndEvent, scope: ScopeDraft) -> 
 
 
 def _points(context: TranslationContext, scope: ScopeDraft) -> list[_Point]:
-    """What can be compensated in a scope, if it has completed."""
+    """Return the activities of a scope that can be compensated, if they have completed."""
     if is_loop(scope):
         assert isinstance(scope.instance, ActivityInstance)
         node = scope.instance.node

@@ -67,7 +67,7 @@ class Catcher:
 
 
 class CompensatedBy(StrEnum):
-    """What compensates an activity."""
+    """The compensation of an activity."""
 
     ACTIVITY = "its compensation activity"
     INSIDE = "what is in it"
@@ -75,7 +75,7 @@ class CompensatedBy(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CompensationEffects:
-    """What compensates the points of a scope: how it begins, and when it is over."""
+    """The compensation of a scope's activities: the effects at its start and at its end."""
 
     thrown: Effect
     over: Effect

@@ -21,7 +21,7 @@ MOST_COMBINATIONS = 512
 
 
 class Unknown:
-    """Any value at all."""
+    """A variable that may have any value."""
 
     __slots__ = ()
 

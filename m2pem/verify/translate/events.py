@@ -197,7 +197,7 @@ def awaited(node: e.FlowNode) -> tuple[EventDefinition, ...]:
 
 
 def after(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> list[Effect]:
-    """What follows a catch event or receive task whose trigger has come already."""
+    """Translate the flow after a catch event or receive task whose trigger has already come."""
     if isinstance(node, e.Activity):
         done = [Effect(steps=(Step(node.id, Action.COMPLETED),))]
         for mapping in node.data_flow.outputs:
@@ -239,7 +239,7 @@ def _throw_all(
     definitions: tuple[EventDefinition, ...],
     ways: list[Effect],
 ) -> list[Effect]:
-    """What several event definitions throw, one after the other, and then `ways`."""
+    """Translate the throws of several event definitions, one after the other, and then `ways`."""
     begun = [_come(context, node, scope, Action.COMPLETED)]
     ended: list[Effect] = []
     for definition in definitions:
@@ -272,7 +272,7 @@ def _throw_all(
 
 
 def _interrupted(node: e.Event, thrown: list[Effect]) -> list[Effect]:
-    """What the event throws interrupts a scope around it: the event does not complete."""
+    """Translate an event whose throw interrupts a scope around it: the event does not complete."""
     done, cut = Step(node.id, Action.COMPLETED), Step(node.id, Action.INTERRUPTED)
     return [
         replace(each, steps=tuple(cut if step == done else step for step in each.steps))

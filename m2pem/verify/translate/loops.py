@@ -24,7 +24,7 @@ Work = Callable[[TranslationContext, ActivityInstance], list[Effect]]
 
 
 def looped(context: TranslationContext, whole: ActivityInstance, work: Work) -> list[Effect]:
-    """What an activity with a loop does when a token enters it."""
+    """Translate the entry of a token into an activity with a loop."""
     loop = whole.node.loop
     if isinstance(loop, StandardLoop):
         return _standard_loop(context, whole, loop, work)
@@ -58,7 +58,7 @@ def _count(loop: MultiInstance) -> int | None:
 def _instance(
     context: TranslationContext, whole: ActivityInstance, number: int, several: bool = False
 ) -> ActivityInstance:
-    """One instance: its token is in the scope of the whole."""
+    """Translate one instance: its token is in the scope of the whole activity."""
     node, net = whole.node, context.net
     behavior = behavior_of(node)
     held = resources(context, behavior) if behavior is not None else None
@@ -110,7 +110,7 @@ class _Sequence:
             context.net.transition(effect)
 
     def ends(self) -> list[Effect]:
-        """An instance has ended."""
+        """Translate the end of an instance."""
         return [Effect(produce=(self.ended,))]
 
 
@@ -233,7 +233,7 @@ def _sequential(
 def _note_and_end(
     context: TranslationContext, instance: ActivityInstance, number: int, ends: list[Effect]
 ) -> Callable[[], list[Effect]]:
-    """How an instance ends that can be compensated."""
+    """Translate the end of an instance that can be compensated."""
     return lambda: product([note_instance_completion(context, instance, number)], ends)
 
 

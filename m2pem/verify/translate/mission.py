@@ -193,7 +193,7 @@ def _begun_by(
 def _first_of_several(
     context: TranslationContext, start: e.StartEvent, definition: EventDefinition, scope: ScopeDraft
 ) -> Effect:
-    """One of the triggers that must all come has come; the others are awaited in the instance."""
+    """Translate the first of several triggers of a start event; the instance awaits the others."""
     places = trigger_places(context, start, scope)
     waiting = context.net.place(start, scope, Role.ACTIVE)
     triggers = [each for each in awaited(start) if isinstance(each, AWAITED)]

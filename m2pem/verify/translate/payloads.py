@@ -39,7 +39,7 @@ class Payloads:
                 self._sent.setdefault(ref, []).append(inputs)
 
     def received_values(self, node: e.FlowNode) -> list[ReceivedValue]:
-        """What a catch event or receive task may get by any of its triggers."""
+        """Return the values that a catch event or receive task may get by any of its triggers."""
         found: dict[str, ReceivedValue] = {}
         refs = list(_catches(node))
         for ref in refs:

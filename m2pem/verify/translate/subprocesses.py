@@ -81,7 +81,7 @@ def _completing(context: TranslationContext, container: e.Container, scope: Scop
 
 
 def subprocess(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
-    """Begin a subprocess."""
+    """Translate the start of a subprocess."""
     node = instance.node
     assert isinstance(node, e.SubProcess)
     build(context, node, instance.inside)

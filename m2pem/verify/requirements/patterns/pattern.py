@@ -11,7 +11,7 @@ from m2pem.verify.ltl.formula import Formula
 
 
 class Kind(StrEnum):
-    """What an argument is."""
+    """The type of an argument."""
 
     CONDITION = "condition"
     """A formula, or the id of an element, which means `completed(id)`."""
@@ -39,7 +39,7 @@ class Argument:
 
 
 class Surroundings(Protocol):
-    """What a pattern may ask about the mission and its fleet."""
+    """The mission and fleet, as patterns query them."""
 
     def places_of(self, resource: str, behavior: str) -> Mapping[str, Sequence[str]]:
         """The tasks in which a resource does a behavior, by location."""
@@ -51,7 +51,7 @@ class Surroundings(Protocol):
 
 
 class Words(Protocol):
-    """How parts of a pattern are written in English."""
+    """The English texts of the parts of a pattern."""
 
     def of(self, formula: Formula) -> str:
         """A condition as a clause: "'Drive route' is completed"."""
