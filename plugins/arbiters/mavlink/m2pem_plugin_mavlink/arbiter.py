@@ -41,12 +41,12 @@ HOLD_WITHIN_S = 6.0
 """BRAKE stops a copter from 10 m/s within 4 s; a command that is lost is sent again after 1.5 s."""
 
 CANCEL_TIMEOUT_S = 10.0
-HEARD_WITHIN_S = 5.0
-"""Vehicles that are there say so every second; `connect` waits for them no longer."""
+RECEIVED_WITHIN_S = 5.0
+"""Seconds for which `connect` waits; a running autopilot sends a heartbeat every second."""
 
 TELEMETRY_EVERY_S = 0.2
 LATE = 2.0
-"""So many times as long as that since the last look: this process was held up."""
+"""A loop that runs later than this many periods means that this process was suspended."""
 
 STATES_WAITING = 1000
 
@@ -125,7 +125,7 @@ class MavlinkArbiter:
         self._queried: set[BehaviorId] = set()
         self._tasks: list[asyncio.Task[None]] = []
 
-    # --- what is offered ------------------------------------------------------------------------
+    # --- catalogue ------------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """Return the behaviors of a vehicle, by its domain; payloads have none."""
@@ -160,7 +160,7 @@ class MavlinkArbiter:
 
     async def connect(self) -> None:
         """Open all links; return when all vehicles have sent their state, or after
-        `HEARD_WITHIN_S`."""
+        `RECEIVED_WITHIN_S`."""
         from m2pem_plugin_mavlink.vehicle_controller import VehicleController  # noqa: PLC0415  # it needs pymavlink
 
         lost_after_s = {resource: self.limits(resource).lost_after_s for resource in self._settings}
@@ -185,7 +185,7 @@ class MavlinkArbiter:
             self._tasks.append(create(self._monitor_vehicle(resource)))
         known = await asyncio.gather(
             *(
-                controller.wait_until_known(HEARD_WITHIN_S)
+                controller.wait_until_known(RECEIVED_WITHIN_S)
                 for controller in self._controllers.values()
             )
         )
@@ -194,7 +194,9 @@ class MavlinkArbiter:
         self._tasks += [create(self._check(vehicle)) for vehicle in vehicles.values()]
         for resource, is_known in zip(vehicles, known, strict=True):
             if not is_known:
-                self._context.logger.warning("%s: where it is was not heard yet", resource)
+                self._context.logger.warning(
+                    "%s: the vehicle has not reported its position yet", resource
+                )
 
     async def close(self) -> None:
         """Close all links. The vehicles continue what they do."""
@@ -348,10 +350,10 @@ class MavlinkArbiter:
         vehicle = controller.vehicle
         unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
         if checkpoint.behavior not in BEHAVIORS:
-            return replace(unknown, reason=f"there is no behavior '{checkpoint.behavior}' any more")
-        if not await controller.wait_until_known(HEARD_WITHIN_S):
+            return replace(unknown, reason=f"the behavior '{checkpoint.behavior}' no longer exists")
+        if not await controller.wait_until_known(RECEIVED_WITHIN_S):
             controller.mark_commanded()
-            return replace(unknown, reason=f"where {checkpoint.resource} is was not heard")
+            return replace(unknown, reason=f"{checkpoint.resource} has not reported its state")
         try:
             behavior = self._make(checkpoint)
             behavior.restore(checkpoint.state)
@@ -366,10 +368,12 @@ class MavlinkArbiter:
             return replace(unknown, number=3, state=state)
         if shows_not_begun(behavior, checkpoint.before, self._context.clock.now_us() / 1e6):
             self._queried.add(id_)
-            reason = f"{checkpoint.resource} is as it was before, and has not begun it"
+            reason = f"{checkpoint.resource} is as before, and has not begun the behavior"
             return replace(unknown, reason=reason, not_begun=True)
         mode = vehicle.telemetry().mode or "an unknown mode"
-        return replace(unknown, reason=f"{checkpoint.resource} is in {mode}, and does not do it")
+        return replace(
+            unknown, reason=f"{checkpoint.resource} is in {mode}, and does not execute the behavior"
+        )
 
     async def _check(self, vehicle: "Vehicle") -> None:
         """Log the differences between the fleet file and the vehicle's failsafes, once it is
@@ -388,7 +392,7 @@ class MavlinkArbiter:
         published, link, was_late = -1, LinkState.CONNECTED, False
         while True:
             now_us = clock.now_us()
-            # After a pause of our own, what the vehicle said meanwhile is still to be read.
+            # After a suspension of this process, messages of the vehicle are still to be read.
             late = not was_late and now_us - looked_us > LATE * TELEMETRY_EVERY_S * 1e6
             looked_us, was_late = now_us, late
             silent_s = vehicle.silent_s
@@ -396,7 +400,7 @@ class MavlinkArbiter:
                 silent_s = (now_us - began_us) / 1e6
             if silent_s >= bound_s and not late and self._tracker.holder(resource) is not None:
                 controller.release()
-                self._tracker.lose(resource, f"not heard for {silent_s:.1f} s")
+                self._tracker.lose(resource, f"no message for {silent_s:.1f} s")
             if vehicle.state.changes != published or vehicle.link_state != link:
                 published, link = vehicle.state.changes, vehicle.link_state
                 self._states.put(replace(vehicle.telemetry(), behavior=controller.behavior))

@@ -32,7 +32,7 @@ _BOUNDS: Mapping[ParameterKind, tuple[float | None, float | None]] = {
     ParameterKind.SPEED: (0.1, 100.0),
     ParameterKind.ALTITUDE: (-11_000.0, 20_000.0),
 }
-"""Within these every autopilot understands a value; what a vehicle can do is its own to say."""
+"""Bounds that every autopilot accepts; the vehicle itself refuses what it cannot do."""
 
 ORBIT_TURNS = 1000.0
 

@@ -1,4 +1,4 @@
-"""What is stored of a behavior outside of this process, to reattach to it after a restart.
+"""Checkpoints of behaviors, which reattach to them after a restart.
 
 A checkpoint is a short JSON text, the `native_ref` of a report. It has the vehicle, the behavior,
 its parameters except routes and areas, the behavior's own state (such as the fingerprint of its

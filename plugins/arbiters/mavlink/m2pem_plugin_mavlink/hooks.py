@@ -1,4 +1,4 @@
-"""What this plugin registers: the arbiter `mavlink`, and commands; each is loaded when used."""
+"""The hooks of this plugin: the arbiter `mavlink` and the commands; each is loaded when used."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING

@@ -1,6 +1,6 @@
-"""After a restart: does the vehicle show that it has not begun an accepted behavior?
+"""Detects after a restart that a vehicle has not begun an accepted behavior.
 
-It does if it stands at the same place a short time later, in the same state or in the state into
+That is so if it is at the same place a short time later, in the same state or in the state into
 which m2pem brings it before the start: in the behavior's mode and armed. Another mode, disarmed
 motors or another place may be a person's intention; then an operator is asked.
 """
@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.checkpoint import VehicleSnapshot
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 SOON_S = 60.0
-"""A person who walks up to the vehicle later than that does not expect it to move by itself."""
+"""Later, a person near the vehicle does not expect it to move by itself."""
 
 SAME_PLACE_M = 3.0
 """The reported position of a stopped vehicle drifts by up to this distance within that time."""

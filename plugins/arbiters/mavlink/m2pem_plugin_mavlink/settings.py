@@ -27,7 +27,7 @@ class Settings:
 
 
 SITL = "sitl"
-"""What `m2pem sitl` reads, and nothing else."""
+"""The keys that only `m2pem sitl` reads."""
 
 _KEYS = ("url", "system_id", "component_id", "driver", "gcs_system_id", "actuators", SITL)
 
@@ -58,7 +58,7 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
                 resource,
                 "gcs_system_id",
                 f"it is {settings.gcs_system_id}, and {first.gcs_system_id} for "
-                f"{next(iter(read))}; all vehicles hear the same ground station",
+                f"{next(iter(read))}; it must be the same for all vehicles",
             )
     return read
 

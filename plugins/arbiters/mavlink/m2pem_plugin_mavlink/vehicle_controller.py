@@ -32,7 +32,7 @@ STOP_SHARE = 0.8
 """The share of the cancel timeout after which a stop has failed."""
 
 _FAILSAFES = frozenset({FlightMode.RETURN, FlightMode.LAND})
-"""What autopilots do by themselves when a link is lost, beside standing (BRAKE, HOLD, LOITER)."""
+"""Modes that autopilots enter by themselves when a link is lost, besides stopping."""
 _HELD = frozenset({FlightMode.HOLD})
 _FAIL_SAFE = frozenset({FlightMode.RETURN, FlightMode.LAND})
 
@@ -86,7 +86,7 @@ class VehicleController:
             lambda: state.position is not None and state.landed is not None, within_s
         )
 
-    # --- what may be asked ----------------------------------------------------------------------
+    # --- requests -------------------------------------------------------------------------------
 
     def start(self, id_: BehaviorId, behavior: Behavior, *, look_first: bool = False) -> None:
         """Execute a behavior in place of the active one.
@@ -156,11 +156,11 @@ class VehicleController:
         lost."""
         self.release()
         if not await self.wait_until_known(KNOWN_WITHIN_S):
-            return "it is heard again, and does not say yet what it does"
+            return "its link is up again, but it has not reported its mode yet"
         state, driver = self.vehicle.state, self.vehicle.driver
         mode = "" if state.custom_mode is None else driver.mode_name(state.custom_mode)
         if state.armed and state.mode in _FAILSAFES and not self._stands():
-            return f"it is heard again in {mode}, which is not interrupted: free when it stands"
+            return f"its link is up again; {mode} is not interrupted: free when it stops"
         # PX4 uses the same mode to go to a place and to stay there.
         stands = (
             state.mode is FlightMode.HOLD
@@ -171,7 +171,7 @@ class VehicleController:
             try:
                 await self._stop()
             except ExchangeError as error:
-                return f"it is heard again in {mode}, and does not stop: {error}"
+                return f"its link is up again; it is in {mode}, and does not stop: {error}"
         self._was_commanded = False
         return ""
 
@@ -194,7 +194,7 @@ class VehicleController:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    # --- one thing at a time --------------------------------------------------------------------
+    # --- replacement ----------------------------------------------------------------------------
 
     def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
         before = set(self._work)
@@ -211,7 +211,7 @@ class VehicleController:
             await asyncio.wait(before)
         await work()
 
-    # --- what is done ---------------------------------------------------------------------------
+    # --- execution ------------------------------------------------------------------------------
 
     async def _run(
         self, active: _ActiveBehavior, before: Behavior | None = None, look_first: bool = False
@@ -232,9 +232,9 @@ class VehicleController:
             await self._fail(active, error.reason)
         except asyncio.CancelledError:
             raise
-        except Exception as error:  # one vehicle's bug must not hang its mission
+        except Exception as error:  # an error of one vehicle must not block its mission
             self._logger.exception("%s: %s", self.vehicle.resource, active.behavior.name)
-            await self._fail(active, f"m2pem is wrong: {type(error).__name__}: {error}")
+            await self._fail(active, f"internal error of m2pem: {type(error).__name__}: {error}")
         else:
             if isinstance(active.behavior, SetSpeed):
                 self.cruise_m_s = active.behavior.speed_m_s
@@ -265,7 +265,7 @@ class VehicleController:
 
     async def _wait_until_finished(self, active: _ActiveBehavior) -> None:
         create = asyncio.get_running_loop().create_task
-        steps, telling = (
+        steps, speeds = (
             create(active.behavior.run_in_background()),
             create(self._send_speeds(active)),
         )
@@ -279,9 +279,9 @@ class VehicleController:
                 self._check_progress(active.behavior, stillness)
                 await self.vehicle.sleep(LOOK_EVERY_S)
         finally:
-            for task in (steps, telling):
+            for task in (steps, speeds):
                 task.cancel()
-            await asyncio.gather(steps, telling, return_exceptions=True)
+            await asyncio.gather(steps, speeds, return_exceptions=True)
 
     async def _send_speeds(self, active: _ActiveBehavior) -> None:
         """Send new speeds beside the behavior, whose end must not wait for them; the newest
@@ -320,7 +320,7 @@ class VehicleController:
         mode = vehicle.driver.mode_name(vehicle.state.custom_mode or 0)
         said = "; ".join(vehicle.recent_texts(bound_s + TEXTS_BEFORE_S))
         raise BehaviorFailedError(
-            f"it should be on its way, and has not moved for {bound_s:g} s, in {mode}"
+            f"it should move, but has not moved for {bound_s:g} s, in {mode}"
             + (f"; it said: {said}" if said else "")
         )
 
@@ -328,7 +328,7 @@ class VehicleController:
         try:
             await self._stop()
             while active is not None and not self._has_restarted():
-                # One that is held before it has left the ground disarms itself after a while.
+                # A vehicle that is held before it has left the ground disarms itself after a while.
                 if not on_the_ground(self.vehicle):
                     self._check_takeover(_HELD)
                 await self.vehicle.sleep(LOOK_EVERY_S)
@@ -345,12 +345,12 @@ class VehicleController:
         try:
             await asyncio.wait([stop, late], return_when=asyncio.FIRST_COMPLETED)
             if not stop.done():
-                reason = f"it did not stop within {limit_s:g} s of the cancel"
+                reason = f"the vehicle did not stop within {limit_s:g} s of the cancel"
                 self._end(active, BehaviorState.FAILED, "TIMEOUT", reason)
             elif (error := stop.exception()) is not None:
-                self._end(active, BehaviorState.FAILED, "", f"it would not stop: {error}")
+                self._end(active, BehaviorState.FAILED, "", f"the vehicle did not stop: {error}")
             elif self._is_in_failsafe:
-                reason = "it returns or lands by itself, and was not interrupted"
+                reason = "the vehicle returns or lands by itself, and was not interrupted"
                 self._end(active, BehaviorState.FAILED, "TAKEN_OVER", reason)
             else:
                 self._end(active, BehaviorState.CANCELLED)
@@ -378,7 +378,9 @@ class VehicleController:
             state = self.vehicle.state
             mode = self.vehicle.driver.mode_name(state.custom_mode or 0)
             self._logger.warning(
-                "%s: not stopped: it is in %s, not asked for here", self.vehicle.resource, mode
+                "%s: not stopped: it is in %s, which m2pem did not command",
+                self.vehicle.resource,
+                mode,
             )
             return
         await self.vehicle.driver.stop()
@@ -392,7 +394,7 @@ class VehicleController:
             if active.behavior.moves_vehicle and state.landed is not True and not comes_down:
                 await self._stop()
         except ExchangeError as error:
-            self._logger.error("%s: does not stop: %s", self.vehicle.resource, error)
+            self._logger.error("%s: the vehicle does not stop: %s", self.vehicle.resource, error)
         self._end(active, BehaviorState.FAILED, code, reason)
 
     def _end(

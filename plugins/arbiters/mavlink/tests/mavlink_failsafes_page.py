@@ -43,7 +43,7 @@ ROUTINE = re.compile(
     r"|WARNING m2pem.arbiter: \w+: nothing happens when its battery is low.*"
     r"|WARNING m2pem.arbiter: \w+: fleet says .*"
     r"|WARNING m2pem.arbiter: \w+ is ready|.*waits until it is ready: EKF: .*"
-    r"|.*where it is was not heard yet)$"
+    r"|.*the vehicle has not reported its position yet)$"
 )
 """Lines of every mission; how it ends has a column of its own."""
 

@@ -64,7 +64,7 @@ class Station(Recording):
             system: dialect.MAVLink(None, system, GROUND_COMPONENT) for system in (OWN, SECOND)
         }
 
-    # --- what is seen -----------------------------------------------------------------------------
+    # --- observation ------------------------------------------------------------------------------
 
     @property
     def flies(self) -> bool:

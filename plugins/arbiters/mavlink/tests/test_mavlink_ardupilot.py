@@ -139,7 +139,9 @@ def test_a_mode_that_is_acknowledged_but_does_not_come_is_no_success(virtual: Ru
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             link.obey[SET_MODE] = lambda _: ACCEPTED
-            with pytest.raises(NoAnswerError, match="mode GUIDED was accepted, but does not come"):
+            with pytest.raises(
+                NoAnswerError, match="mode GUIDED was accepted, but was not confirmed"
+            ):
                 await vehicle.driver.set_mode(FlightMode.GUIDED)
 
     virtual(main)
@@ -425,7 +427,7 @@ def test_a_mission_that_does_not_begin_is_a_failure(virtual: Run, state: int, wo
         async with Playing((link, vehicle)):
             await in_the_air(link, vehicle)
             link.says["MISSION_CURRENT"] = {"seq": 1, "total": 3, "mission_state": state}
-            with pytest.raises(NoAnswerError, match=f"its mission does not begin: .*{words}.*AUTO"):
+            with pytest.raises(NoAnswerError, match=f"the mission does not begin: .*{words}.*AUTO"):
                 await vehicle.driver.start_mission()
             link.says["MISSION_CURRENT"] = {"seq": 1, "total": 3, "mission_state": 3}
             await vehicle.driver.start_mission()

@@ -102,7 +102,7 @@ def test_a_copter_follows_a_rover() -> None:
                 near = near + 1 if abs(distance_to_m - 6.0) < 4.0 else 0
         assert bench.states_of("r1.b3")[-1] is BehaviorState.RUNNING
         end = await bench.ended("r1.b3", AMPLE_S)
-        assert "v2 has not been heard" in end.reason
+        assert "v2 has sent no position" in end.reason
 
     fly(main, COPTER, ROVER)
 

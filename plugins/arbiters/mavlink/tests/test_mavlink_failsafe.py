@@ -62,7 +62,7 @@ def test_a_fleet_that_says_nothing_gets_no_findings() -> None:
             "land",
             ROVER,
             {"FS_GCS_ENABLE": 1.0},
-            "uav1: fleet says land on loss of link, which no ArduPilot rover can be set to",
+            "uav1: fleet says land on loss of link, which no ArduPilot rover supports",
         ),
         (
             "land",
@@ -89,7 +89,7 @@ def test_a_failsafe_that_watches_another_station_is_found() -> None:
     values = {**GOOD, "MAV_GCS_SYSID": 255.0}
     assert found("return_to_launch", COPTER, values, 255) == []
     (text,) = found("return_to_launch", COPTER, values, 245)
-    assert "watches the ground station with system id 255 (MAV_GCS_SYSID), m2pem has 245" in text
+    assert "monitors the ground station with system id 255 (MAV_GCS_SYSID), m2pem has 245" in text
 
 
 @pytest.mark.parametrize(

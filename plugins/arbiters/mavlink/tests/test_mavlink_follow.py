@@ -73,7 +73,7 @@ def test_a_target_that_falls_silent_stops_it_and_is_a_failure() -> None:
         await drives(bench, 5.0)
         end = await bench.ended("r1.b1", 10)
         assert end.state is BehaviorState.FAILED
-        assert "w has not been heard" in end.reason
+        assert "w has sent no position" in end.reason
         assert "stop" in bench.told
 
     play(Body().fly(), main)
@@ -83,7 +83,7 @@ def test_a_target_that_is_lost_or_never_heard_is_a_failure() -> None:
     async def never(bench) -> None:
         end = await bench.do("follow", 6.0, target=VehiclePosition("w"))
         assert end.state is BehaviorState.FAILED
-        assert "w has not been heard" in end.reason
+        assert "w has sent no position" in end.reason
         assert "go_to" not in bench.told
 
     async def lost(bench) -> None:

@@ -108,7 +108,7 @@ def test_going_to_a_vehicle_that_is_not_heard_is_a_failure() -> None:
     async def main(bench) -> None:
         end = await bench.do("goto", 6.0, target=VehiclePosition("w"))
         assert end.state is BehaviorState.FAILED
-        assert "w has not been heard" in end.reason
+        assert "w has sent no position" in end.reason
         assert "go_to" not in bench.told
 
     play(Body().fly(), main)

@@ -125,7 +125,7 @@ async def test_a_vehicle_cannot_have_our_own_system_id(vehicle_first: bool) -> N
     openings = [(Address(254, 1), Address(255, 190)), (Address(2, 1), OTHER)]
     first, second = openings if vehicle_first else openings[::-1]
     link = await open_link(first[0], [URL], HandClock(), first[1])
-    with pytest.raises(PluginError, match="system id 254 is a vehicle's and our own"):
+    with pytest.raises(PluginError, match="system id 254 is that of a vehicle and of m2pem"):
         await open_link(second[0], [URL], HandClock(), second[1])
     shared = port()
     await link.close()

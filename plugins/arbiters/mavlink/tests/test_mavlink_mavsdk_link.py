@@ -75,7 +75,7 @@ async def test_before_the_vehicle_is_heard_nothing_is_sent_or_performed():
     port = free_port()
     async with linked(f"udpin://127.0.0.1:{port}") as (link,):
         link.send(PING.make())
-        with pytest.raises(NoAnswerError, match="system 1 was not heard yet"):
+        with pytest.raises(NoAnswerError, match="system 1 has sent no message yet"):
             await link.perform(Ask())
         async with scripted(port) as vehicle:
             await vehicle.hears(lambda each: each.get_type() == "HEARTBEAT")

@@ -104,5 +104,5 @@ async def test_a_url_that_is_wrong_is_not_even_tried():
 
 
 async def test_there_is_one_url():
-    with pytest.raises(PluginError, match="`driver: mavsdk` takes one URL, and has 2"):
+    with pytest.raises(PluginError, match="`driver: mavsdk` takes one URL, not 2"):
         await open_mavsdk_link(ONE, ["udpin://127.0.0.1:1", "udpin://127.0.0.1:2"], None)

@@ -1,4 +1,4 @@
-"""The images that a camera says it has taken."""
+"""The images that a camera reports to have taken."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -75,9 +75,9 @@ def test_a_place_is_sent_in_whole_numbers() -> None:
 @pytest.mark.parametrize(
     ("place", "params", "says"),
     [
-        (CommandPosition(math.nan, 8.0, 1.0), (), "there is no place nan, 8.0"),
-        (CommandPosition(47.0, math.inf, 1.0), (), "there is no place 47.0, inf"),
-        (CommandPosition(91.0, 8.0, 1.0), (), "there is no place 91.0, 8.0"),
+        (CommandPosition(math.nan, 8.0, 1.0), (), "nan, 8.0 is not a position"),
+        (CommandPosition(47.0, math.inf, 1.0), (), "47.0, inf is not a position"),
+        (CommandPosition(91.0, 8.0, 1.0), (), "91.0, 8.0 is not a position"),
         (CommandPosition(47.0, 8.0, math.inf), (), "the altitude is infinite"),
         (None, (math.inf,), "a parameter is infinite"),
         (None, (0,) * 8, "seven parameters, not 8"),
@@ -125,7 +125,7 @@ def test_a_refusal_has_the_words_that_follow_it() -> None:
     ("result", "words", "temporary"),
     [
         (dialect.MAV_RESULT_TEMPORARILY_REJECTED, "not possible now", True),
-        (dialect.MAV_RESULT_DENIED, "denied, as it stands or with these values", False),
+        (dialect.MAV_RESULT_DENIED, "denied, in this state or with these values", False),
         (dialect.MAV_RESULT_UNSUPPORTED, "not supported", False),
         (6, "cancelled", False),
         (200, "refused with result 200", False),
@@ -185,7 +185,9 @@ def test_a_slow_command_is_begun_once_whatever_the_link_does() -> None:
         lambda direction, number: () if (direction, number) == (1, 10) else (0.0,),
     )
     assert isinstance(played.error, NoAnswerError)
-    assert played.error.reason == "PREFLIGHT_CALIBRATION: was begun, but not heard of again"
+    assert (
+        played.error.reason == "PREFLIGHT_CALIBRATION: in progress, but no more messages about it"
+    )
 
 
 def test_progress_without_end_ends() -> None:
@@ -265,5 +267,5 @@ def test_an_answer_that_never_comes_is_told_from_silence() -> None:
     command = dialect.MAV_CMD_REQUEST_MESSAGE
     played = run(request(), Answers(*[[ack(command)]] * 9))
     assert isinstance(played.error, ExchangeError)
-    assert played.error.reason == "REQUEST_MESSAGE: accepted, but the answer does not come"
+    assert played.error.reason == "REQUEST_MESSAGE: accepted, but no answer was received"
     assert len(played.sent) == RETRIES.tries

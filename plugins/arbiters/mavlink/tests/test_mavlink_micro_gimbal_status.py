@@ -38,7 +38,7 @@ def test_angles_are_those_of_the_quaternion() -> None:
         roll, pitch, yaw = dice.uniform(-3, 3), dice.uniform(-1.5, 1.5), dice.uniform(-3, 3)
         found = attitude_of(attitude(roll, pitch, yaw, flags=BOW), 5.0)
         assert found is not None
-        angles = (found.roll_rad, found.pitch_rad, found.yaw_from_bow_rad)
+        angles = (found.roll_rad, found.pitch_rad, found.yaw_from_vehicle_rad)
         assert angles == pytest.approx((roll, pitch, yaw), abs=1e-4)
         assert found.at_s == 5.0
 
@@ -61,7 +61,7 @@ def test_yaw_is_told_from_the_bow_and_from_north(
     found = attitude_of(attitude(0.0, -0.5, 1.0, flags=flags, delta_yaw=delta_yaw), 0.0)
     assert found is not None
     for angle, expected in (
-        (found.yaw_from_bow_rad, from_bow),
+        (found.yaw_from_vehicle_rad, from_bow),
         (found.yaw_from_north_rad, from_north),
     ):
         assert angle == (None if expected is None else pytest.approx(expected, abs=1e-5))

@@ -7,8 +7,8 @@ from typing import ClassVar
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_download import (
     BASE_S,
-    COUNT_PATIENCE,
-    ITEM_PATIENCE,
+    COUNT_RETRIES,
+    ITEM_RETRIES,
     MOST_ITEMS,
     PER_ITEM_S,
     DownloadMission,
@@ -87,8 +87,8 @@ def test_a_fence_is_asked_for_as_one() -> None:
 def test_a_silent_vehicle_ends_it() -> None:
     played = run(DownloadMission(VEHICLE), Silent())
     assert isinstance(played.error, NoAnswerError)
-    assert played.error.reason == "download of the mission: no answer, though asked 5 times"
-    assert played.ended_s == COUNT_PATIENCE.bound_s
+    assert played.error.reason == "download of the mission: no answer after 5 requests"
+    assert played.ended_s == COUNT_RETRIES.bound_s
 
 
 def test_an_item_that_does_not_come_is_named() -> None:
@@ -101,16 +101,16 @@ def test_an_item_that_does_not_come_is_named() -> None:
     vehicle.stored = storing().stored
     played = run(DownloadMission(VEHICLE), vehicle)
     assert isinstance(played.error, NoAnswerError)
-    assert "item 3 of 5 does not come, though asked 8 times" in played.error.reason
+    assert "item 3 of 5 was not received after 8 requests" in played.error.reason
     assert vehicle.acknowledged == [dialect.MAV_MISSION_OPERATION_CANCELLED]
-    assert played.ended_s == pytest.approx(ITEM_PATIENCE.bound_s, abs=0.5)
+    assert played.ended_s == pytest.approx(ITEM_RETRIES.bound_s, abs=0.5)
 
 
 @pytest.mark.parametrize("count", [65535, MOST_ITEMS + 1])
 def test_a_count_that_cannot_be_is_not_believed(count: int) -> None:
     played = run(DownloadMission(VEHICLE), Answers([counted(count)]))
     assert type(played.error) is ExchangeError
-    assert played.error.reason == f"download of the mission: {count} items cannot be"
+    assert played.error.reason == f"download of the mission: {count} items are impossible"
     assert len(played.sent) == 2
 
 
@@ -148,16 +148,16 @@ def test_a_mission_that_changes_while_it_is_read_is_read_anew_and_not_for_ever()
     changing = Answers(*[[counted(n)] for n in range(1, 99)])
     played = run(DownloadMission(VEHICLE), changing)
     assert type(played.error) is ExchangeError
-    assert "it changes while it is read: 3 items, then 4" in played.error.reason
+    assert "the mission changes during the download: 3 items, then 4" in played.error.reason
 
 
 def test_a_refusal_says_at_which_item() -> None:
     denied = mission_ack(dialect.MAV_MISSION_DENIED)
-    accepted = mission_ack(dialect.MAV_MISSION_ACCEPTED)  # a late one, of an upload
+    accepted = mission_ack(dialect.MAV_MISSION_ACCEPTED)  # from an earlier upload
     played = run(DownloadMission(VEHICLE), Answers([accepted, counted(5)], [denied]))
     assert isinstance(played.error, RefusedError)
     assert played.error.temporary
-    assert played.error.reason.endswith("another ground station is uploading, at item 0 of 5")
+    assert played.error.reason.endswith("another ground station may be uploading, at item 0 of 5")
 
 
 def test_a_cancelled_download_is_begun_anew_and_not_for_ever() -> None:
@@ -172,4 +172,4 @@ def test_places_that_are_none_are_told_as_they_are() -> None:
     strange = message_type("MISSION_ITEM").make(*item)._replace(x=math.nan, y=math.inf)
     played = run(DownloadMission(VEHICLE), Answers([counted(1)], [strange]))
     assert played.error is None
-    assert "there is no place nan, inf" in played.result[0].problem()
+    assert "nan, inf is not a position" in played.result[0].problem()

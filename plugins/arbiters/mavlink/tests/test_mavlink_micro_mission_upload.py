@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType, item_of
 from m2pem_plugin_mavlink.microservices.mission_upload import (
-    COUNT_PATIENCE,
+    COUNT_RETRIES,
     PASSES,
     REPEATS,
     SILENCE_S,
@@ -76,8 +76,8 @@ def test_without_faults_each_item_is_sent_once() -> None:
 def test_a_silent_vehicle_is_asked_as_the_specification_says() -> None:
     played = run(UploadMission(VEHICLE, ITEMS), Silent())
     assert isinstance(played.error, NoAnswerError)
-    assert played.error.reason == "upload of the mission: no answer, though asked 5 times"
-    assert played.ended_s == COUNT_PATIENCE.bound_s
+    assert played.error.reason == "upload of the mission: no answer after 5 attempts"
+    assert played.ended_s == COUNT_RETRIES.bound_s
 
 
 @pytest.mark.parametrize("type_", [MissionType.FENCE, MissionType.RALLY])
@@ -111,7 +111,7 @@ def test_acknowledgements_that_never_come_are_an_error_that_leaves_no_doubt() ->
     vehicle = Mute()
     played = run(UploadMission(VEHICLE, ITEMS), vehicle)
     assert isinstance(played.error, NoAnswerError)
-    said = "upload of the mission: silent after item 4; what it has stored is not known"
+    said = "upload of the mission: no answer after item 4; the stored items are not known"
     assert played.error.reason == said
     assert vehicle.uploads == PASSES
     assert vehicle.acknowledged == [dialect.MAV_MISSION_OPERATION_CANCELLED]
@@ -202,7 +202,7 @@ def test_requests_beyond_the_count_are_not_answered_and_told_of() -> None:
     vehicle = Answers(*[[request(65535), request(5)]] * 99)
     played = run(UploadMission(VEHICLE, ITEMS), vehicle)
     assert isinstance(played.error, NoAnswerError)
-    assert "no answer, though asked 5 times (it asked for item 5 of 5)" in played.error.reason
+    assert "no answer after 5 attempts (the vehicle requested item 5 of 5)" in played.error.reason
 
 
 def test_items_may_be_asked_for_in_any_order() -> None:
@@ -224,7 +224,7 @@ def test_an_item_that_is_asked_for_over_and_over_is_an_end() -> None:
 
     played = run(UploadMission(VEHICLE, ITEMS), Deaf())
     assert isinstance(played.error, NoAnswerError)
-    assert f"item 1 does not arrive, though sent {REPEATS} times" in played.error.reason
+    assert f"the vehicle requested item 1 {REPEATS} times" in played.error.reason
     assert len(played.sent) == REPEATS + 2
     assert played.ended_s > REPEATS * TOO_SOON_S
 
@@ -247,13 +247,13 @@ def test_a_vehicle_that_asks_slowly_and_for_ever_is_left_in_time() -> None:
 @pytest.mark.parametrize(
     ("bad", "says"),
     [
-        ({"latitude_deg": math.nan}, "item 2: there is no place nan, 8.5456"),
-        ({"longitude_deg": -math.inf}, "item 2: there is no place 47.3979, -inf"),
-        ({"latitude_deg": 91.0}, "item 2: there is no place 91.0, 8.5456"),
+        ({"latitude_deg": math.nan}, "item 2: nan, 8.5456 is not a position"),
+        ({"longitude_deg": -math.inf}, "item 2: 47.3979, -inf is not a position"),
+        ({"latitude_deg": 91.0}, "item 2: 91.0, 8.5456 is not a position"),
         ({"altitude_m": math.nan}, "item 2: altitude nan m"),
         ({"params": (0.0, math.inf, 0.0, 0.0)}, "item 2: a parameter is infinite"),
         ({"frame": dialect.MAV_FRAME_LOCAL_NED}, "item 2: frame 1 is not a global one"),
-        ({"command": 70_000}, "item 2: there is no command 70000"),
+        ({"command": 70_000}, "item 2: command 70000 does not exist"),
     ],
 )
 def test_items_that_make_no_sense_are_refused_before_anything_is_sent(

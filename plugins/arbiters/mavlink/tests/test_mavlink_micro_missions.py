@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem, MissionType, item_message
 from m2pem_plugin_mavlink.microservices.missions import (
-    CLEAR_PATIENCE,
+    CLEAR_RETRIES,
     ClearMission,
     ReadMissionItem,
     SetCurrentItem,
@@ -34,7 +34,7 @@ def test_a_mission_is_cleared_or_it_fails_clearly_whatever_the_link_does() -> No
         assert played.error is not None or vehicle.stored[0] == []
         assert played.error is None or isinstance(played.error, NoAnswerError)
 
-    play_table(lambda: (ClearMission(VEHICLE), storing()), check, lambda _: CLEAR_PATIENCE.bound_s)
+    play_table(lambda: (ClearMission(VEHICLE), storing()), check, lambda _: CLEAR_RETRIES.bound_s)
 
 
 def test_only_what_was_meant_is_cleared() -> None:
@@ -51,7 +51,7 @@ def test_clearing_may_be_refused() -> None:
     assert isinstance(played.error, RefusedError)
     assert played.error.reason == "clearing the mission: not accepted, or not now"
     assert played.error.temporary
-    assert run(ClearMission(VEHICLE), Silent()).ended_s == CLEAR_PATIENCE.bound_s
+    assert run(ClearMission(VEHICLE), Silent()).ended_s == CLEAR_RETRIES.bound_s
 
 
 def goes_to(command: Any, vehicle: Commanded) -> Sequence[Message]:
@@ -103,7 +103,10 @@ def test_where_the_command_is_not_known_the_message_sets_it() -> None:
         ),
     )
     assert isinstance(played.error, NoAnswerError)
-    assert played.error.reason == "current item 3: it does not show it, though asked 5 times"
+    assert (
+        played.error.reason
+        == "current item 3: MISSION_CURRENT does not confirm it after 5 requests"
+    )
 
 
 def test_an_item_that_is_not_there_cannot_be_the_current_one() -> None:

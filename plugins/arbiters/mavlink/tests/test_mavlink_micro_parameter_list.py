@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from m2pem_plugin_mavlink.microservices.parameters import (
     BASE_S,
-    GAP_PATIENCE,
-    LIST_PATIENCE,
+    GAP_RETRIES,
+    LIST_RETRIES,
     MOST,
     PER_PARAMETER_S,
     ReadParameters,
@@ -51,8 +51,8 @@ def test_gaps_are_asked_for_by_index() -> None:
 def test_silence_ends_it() -> None:
     played = run(ReadParameters(VEHICLE), Silent())
     assert isinstance(played.error, NoAnswerError)
-    assert played.error.reason == "reading the parameters: no answer, though asked 5 times"
-    assert played.ended_s == LIST_PATIENCE.bound_s
+    assert played.error.reason == "reading the parameters: no answer after 5 requests"
+    assert played.ended_s == LIST_RETRIES.bound_s
 
 
 def test_a_parameter_that_never_comes_ends_it() -> None:
@@ -62,16 +62,16 @@ def test_a_parameter_that_never_comes_ends_it() -> None:
 
     played = run(ReadParameters(VEHICLE), Withholds(VALUES))
     assert isinstance(played.error, NoAnswerError)
-    reason = "reading the parameters: the others do not come (49 of 50 came)"
+    reason = "reading the parameters: the others were not received (49 of 50 received)"
     assert played.error.reason == reason
-    assert len(played.sent) == 1 + GAP_PATIENCE.tries
+    assert len(played.sent) == 1 + GAP_RETRIES.tries
 
 
 def test_a_count_that_cannot_be_is_not_believed() -> None:
     value = message_type("PARAM_VALUE").make(param_id=b"P", param_count=65535)
     played = run(ReadParameters(VEHICLE), Answers([value]))
     assert type(played.error) is ExchangeError
-    assert played.error.reason == "reading the parameters: 65535 of them cannot be"
+    assert played.error.reason == "reading the parameters: 65535 parameters are impossible"
 
 
 def test_a_vehicle_that_gets_more_parameters_is_read_to_the_end() -> None:

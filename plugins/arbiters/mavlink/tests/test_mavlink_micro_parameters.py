@@ -124,7 +124,7 @@ def test_an_unanswered_set_leaves_the_value_unknown() -> None:
     value = message_type("PARAM_VALUE").make(param_id=b"RTL_ALT", param_type=REAL)
     played = run(SetParameter(VEHICLE, "RTL_ALT", 20.0), Answers([value]))
     assert isinstance(played.error, NoAnswerError)
-    assert "set, but there is no answer; its value is not known" in played.error.reason
+    assert "set, but not answered; its value is not known" in played.error.reason
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_an_unanswered_set_leaves_the_value_unknown() -> None:
     [
         ("FS_GCS", 300, "300 is outside of int8"),
         ("FS_GCS", 1.5, "1.5 is not a whole number, and the parameter is one (int8)"),
-        (LONG_NAME, 16_777_217, "16777217 has more digits than this autopilot can be sent"),
+        (LONG_NAME, 16_777_217, "16777217 has more digits than this autopilot can receive"),
         ("RTL_ALT", math.nan, "nan is not a finite number"),
         ("RTL_ALT", 1e39, "1e+39 is too large for a float"),
     ],

@@ -251,7 +251,7 @@ def stored() -> tuple[MissionItem, ...]:
 
 @pytest.mark.parametrize(
     ("mission", "first", "said"),
-    [((), 0, "no mission stored"), (stored(), 3, "no item 3")],
+    [((), 0, "no mission is stored"), (stored(), 3, "no item 3")],
 )
 def test_an_onboard_mission_that_is_not_there_fails(mission, first, said) -> None:
     async def main(bench) -> None:

@@ -112,7 +112,7 @@ def test_a_place_is_told_by_its_height_above_the_sea(virtual: Run) -> None:
             assert first.param4 == 1.5
             assert math.isnan(second.z)
             assert math.isnan(second.param4)
-            with pytest.raises(RefusedError, match="no height above terrain"):
+            with pytest.raises(RefusedError, match="no heights above terrain"):
                 await vehicle.driver.go_to(TargetPosition(47.4, 8.55, 20.0, "terrain"))
 
     virtual(main)

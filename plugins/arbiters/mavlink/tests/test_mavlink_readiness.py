@@ -48,7 +48,7 @@ def test_the_estimators_flag_of_a_constant_position_is_a_reason_on_ardupilot_alo
 
 def test_an_ardupilot_whose_estimator_is_silent_is_not_ready() -> None:
     found = reasons(ARDUPILOT, replace(READY, estimator_flags=None))
-    assert found == ("EKF: nothing heard of it yet, 12 s",)
+    assert found == ("EKF: no status yet, 12 s",)
 
 
 def test_a_px4_is_believed_on_its_prearm_bit_where_it_sends_no_estimator_status() -> None:

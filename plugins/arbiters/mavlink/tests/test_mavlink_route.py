@@ -77,7 +77,7 @@ def test_another_peer_with_the_same_id_is_not_believed_and_told_of_once(
     assert world.reached() == "first"
     assert set(world.received) == {1}
     assert len(caplog.records) == 1
-    assert "second says to be component 1 of system 5, as first does" in caplog.text
+    assert "second claims to be component 1 of system 5, as does first" in caplog.text
 
 
 def test_a_rival_is_believed_when_the_first_has_long_been_silent() -> None:

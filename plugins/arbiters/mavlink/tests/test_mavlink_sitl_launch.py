@@ -301,7 +301,7 @@ def test_a_system_id_of_px4_is_not_that_of_another_vehicle_on_its_ground_station
         (vehicle(sitl={"heading": 60}), "connection.sitl.heading: "),
         (vehicle(sitl={"parameters": {"A": "b"}}), "connection.sitl.parameters: "),
         (vehicle(sitl="quad"), "connection.sitl: 'quad' is not a map such as {frame: quad}"),
-        (vehicle(sitl=PX4, url="udpin://127.0.0.1:14540"), "say where it is with --px4 FOLDER"),
+        (vehicle(sitl=PX4, url="udpin://127.0.0.1:14540"), "give its folder with --px4 FOLDER"),
     ],
 )
 def test_what_cannot_be_started_as_the_fleet_says_is_refused_by_vehicle_and_key(
@@ -314,5 +314,5 @@ def test_what_cannot_be_started_as_the_fleet_says_is_refused_by_vehicle_and_key(
 
 
 def test_where_ardupilot_is_must_be_said(tmp_path: Path) -> None:
-    with pytest.raises(PluginError, match=r"v flies ArduPilot: .* --ardupilot FOLDER"):
+    with pytest.raises(PluginError, match=r"v runs ArduPilot: .* --ardupilot FOLDER"):
         started(tmp_path, None, v=vehicle())

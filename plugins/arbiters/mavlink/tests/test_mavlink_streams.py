@@ -8,7 +8,7 @@ FAST, SLOW = 30, 242
 def granted(now_s: float = 0.0) -> RequestedStreams:
     streams = RequestedStreams({FAST: 0.25, SLOW: 2.0})
     for id_ in (FAST, SLOW):
-        streams.asked(id_, now_s)
+        streams.requested(id_, now_s)
     return streams
 
 
@@ -22,7 +22,7 @@ def test_what_has_stopped_is_asked_for_again() -> None:
     assert streams.due({FAST: 10.0, SLOW: 10.0}, 14.0) == []
     assert streams.due({FAST: 10.0, SLOW: 10.0}, 16.0) == [FAST]
     assert streams.due({FAST: 10.0, SLOW: 10.0}, 19.0) == [FAST, SLOW]
-    streams.asked(FAST, 16.0)
+    streams.requested(FAST, 16.0)
     assert streams.due({FAST: 10.0, SLOW: 15.0}, 20.0) == []
     assert streams.due({FAST: 10.0, SLOW: 15.0}, 22.0) == [FAST]
 

@@ -81,14 +81,14 @@ def test_our_own_changes_are_nobodys_takeover(virtual: Run) -> None:
             "",
             Cause.STATION,
             "another ground station or a switch has taken over: the mode changed from GUIDED to "
-            "LOITER, not asked for here",
+            "LOITER, which m2pem did not command",
         ),
         (
             STABILIZE,
             "",
             Cause.PILOT,
-            "a person has taken over: the mode changed from GUIDED to STABILIZE, not asked for "
-            "here",
+            "a person has taken over: the mode changed from GUIDED to STABILIZE, which m2pem "
+            "did not command",
         ),
         (
             RTL,
@@ -239,7 +239,9 @@ def test_a_disarming_by_somebody_is_told_and_one_after_landing_is_not(virtual: R
             await vehicle.sleep(2.0)
             takeover = watched.watch.takeover(FLYING)
             assert takeover is not None
-            assert takeover.reason.startswith("it was disarmed in guided, not from here")
+            assert takeover.reason.startswith(
+                "it was disarmed in guided: by another ground station"
+            )
         watched = Watched(clock)
         async with watched as (link, vehicle):
             await vehicle.driver.land()

@@ -72,7 +72,7 @@ async def test_a_connection_is_tried_again_until_somebody_listens(
     with caplog.at_level(logging.WARNING):
         link = await open_link(VEHICLE, [f"tcpout://127.0.0.1:{port}"], HandClock())
         modes = heard(link)
-        await until(lambda: "connecting again until it works" in caplog.text)
+        await until(lambda: "reconnecting" in caplog.text)
         await server.open(port)
         await until(lambda: server.ends)
     server.ends[0].beat()

@@ -39,7 +39,7 @@ def test_a_vehicle_is_known_by_its_heartbeat_and_nothing_is_sent_before(virtual:
         vehicle.open()
         assert not await vehicle.identified(2.0)
         assert (link.sent, vehicle.telemetry().link) == ([], LinkState.LOST)
-        with pytest.raises(NoAnswerError, match="uav1 was not heard yet"):
+        with pytest.raises(NoAnswerError, match="uav1 has sent no message yet"):
             _ = vehicle.driver
         link.switch_on()
         assert await vehicle.identified(2.0)

@@ -220,7 +220,7 @@ async def test_failsafes_are_read_and_compared() -> None:
             "uav1: fleet says return_to_launch on loss of link, FS_GCS_ENABLE is 0 (disabled): "
             "set it to 1"
         ) in texts
-        assert any("watches the ground station with system id 255" in text for text in texts)
+        assert any("monitors the ground station with system id 255" in text for text in texts)
         truth.autopilot.parameters["FS_GCS_ENABLE"] = 1.0
         found = await failsafe.check(vehicle, "return_to_launch", OWN.system)
         assert "FS_GCS_ENABLE" not in [each.parameter for each in found]

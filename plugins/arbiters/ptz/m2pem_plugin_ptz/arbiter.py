@@ -41,7 +41,7 @@ FIRST_CONTACT_WITHIN_S = 5.0
 
 TELEMETRY_EVERY_S = 0.2
 LATE_FACTOR = 2.0
-"""A round that comes more than twice as late as planned means that this process was suspended."""
+"""A loop that runs later than this many periods means that this process was suspended."""
 
 STATES_WAITING = 1000
 
@@ -70,7 +70,7 @@ class PtzArbiter:
         self._pending: dict[BehaviorId, Behavior] = {}
         self._tasks: list[asyncio.Task[None]] = []
 
-    # --- what is offered ------------------------------------------------------------------------
+    # --- catalogue ------------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """Return the shared behaviors of payloads. The driver refuses what its camera cannot do."""
@@ -88,7 +88,7 @@ class PtzArbiter:
         `FIRST_CONTACT_WITHIN_S`.
 
         Raises:
-            PluginError: what a driver needs is not installed, or its settings cannot be.
+            PluginError: a library of a driver is missing, or its settings are invalid.
         """
         from m2pem_plugin_ptz.camera_model.model import CameraModel  # noqa: PLC0415
         from m2pem_plugin_ptz.controller import CameraController  # noqa: PLC0415  # it needs NumPy
@@ -109,12 +109,14 @@ class PtzArbiter:
             await driver.open()
         create = asyncio.get_running_loop().create_task
         self._tasks = [create(self._attend(resource)) for resource in cameras]
-        heard_of = await asyncio.gather(
+        are_received = await asyncio.gather(
             *(each.wait_for_ptz(FIRST_CONTACT_WITHIN_S) for each in cameras.values())
         )
-        for resource, is_heard in zip(cameras, heard_of, strict=True):
-            if not is_heard:
-                context.logger.warning("%s: where it looks was not heard yet", resource)
+        for resource, is_received in zip(cameras, are_received, strict=True):
+            if not is_received:
+                context.logger.warning(
+                    "%s: the camera has not reported its direction yet", resource
+                )
 
     async def close(self) -> None:
         """Close all connections. The cameras go on with what they do."""
@@ -221,9 +223,9 @@ class PtzArbiter:
         camera = self._cameras[checkpoint.resource]
         unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
         if checkpoint.behavior not in BEHAVIORS:
-            return replace(unknown, reason=f"there is no behavior '{checkpoint.behavior}' any more")
+            return replace(unknown, reason=f"the behavior '{checkpoint.behavior}' no longer exists")
         if not await camera.wait_for_ptz(FIRST_CONTACT_WITHIN_S):
-            return replace(unknown, reason=f"where {checkpoint.resource} looks was not heard")
+            return replace(unknown, reason=f"{checkpoint.resource} has not reported its direction")
         try:
             behavior = self._make(id_, checkpoint)
             state = behavior.state_after_restart()
@@ -236,7 +238,7 @@ class PtzArbiter:
             return self._tracker.last(id_)
         if state is BehaviorState.SUCCEEDED:
             return replace(unknown, number=3, state=state)
-        return replace(unknown, reason=f"where {checkpoint.resource} looks does not tell")
+        return replace(unknown, reason=f"the direction of {checkpoint.resource} proves nothing")
 
     async def _attend(self, resource: ResourceId) -> None:
         """Publish the state of a camera, and detect its silence."""
@@ -246,7 +248,7 @@ class PtzArbiter:
         was_late = False
         while True:
             now_us = clock.now_us()
-            # After a pause of our own, what the camera said meanwhile is still to be read.
+            # After a suspension of this process, messages of the camera are still to be read.
             late = not was_late and now_us - last_us > LATE_FACTOR * TELEMETRY_EVERY_S * 1e6
             last_us, was_late = now_us, late
             silent_us = now_us - (
@@ -255,11 +257,13 @@ class PtzArbiter:
             lost = silent_us >= bound_us and not late
             if lost and self._tracker.holder(resource) is not None:
                 camera.drop()
-                self._tracker.lose(resource, f"not heard for {silent_us / 1e6:.1f} s")
+                self._tracker.lose(resource, f"no message for {silent_us / 1e6:.1f} s")
             try:
                 self._states.put(self._state(camera, now_us, lost=lost))
-            except Exception:  # what one camera or vehicle says must not make us deaf
-                self._context.logger.exception("%s: where it looks cannot be told", resource)
+            except Exception:  # a bad message must not end the telemetry
+                self._context.logger.exception(
+                    "%s: cannot publish the state of the camera", resource
+                )
             await clock.sleep(TELEMETRY_EVERY_S)
 
     def _state(self, camera: "CameraController", now_us: int, *, lost: bool) -> PayloadState:

@@ -8,7 +8,7 @@ from m2pem.api import LazyCommand, simulator_group
 
 
 def add_commands(commands: MutableMapping[str, click.Command]) -> None:
-    """Add `sim onvif` and `sim ros-cameras`."""
+    """Add `sim onvif` and `sim ros-cameras`. The group `sim` may have commands of other plugins."""
     simulators = simulator_group(commands)
     simulators.add_command(
         LazyCommand(

@@ -22,8 +22,8 @@ _POLL_S = 0.1
 
 @dataclass(slots=True)
 class _Task:
-    """A behavior that goes on. `elapsed_s`: its time without holds. `adopted`: it was found going
-    on, and is not begun again."""
+    """The current behavior. `elapsed_s`: its time without holds. `adopted`: it was running before a
+    restart, and is not begun again."""
 
     id: BehaviorId
     behavior: Behavior
@@ -65,7 +65,7 @@ class CameraController:
             await self._clock.sleep(_POLL_S)
         return True
 
-    # --- what may be asked ----------------------------------------------------------------------
+    # --- requests -------------------------------------------------------------------------------
 
     def take(self, id_: BehaviorId, behavior: Behavior) -> None:
         """Start a behavior in place of the current one."""
@@ -76,7 +76,7 @@ class CameraController:
         self._replace(lambda: self._run(task))
 
     def adopt(self, id_: BehaviorId, behavior: Behavior, elapsed_s: float) -> None:
-        """Continue a behavior that was found going on."""
+        """Continue a behavior that was running before a restart."""
         self._task = task = _Task(id_, behavior, elapsed_s, adopted=True)
         self._held = False
         self._replace(lambda: self._run(task))
@@ -112,7 +112,7 @@ class CameraController:
             work.cancel()
         await asyncio.gather(*works, return_exceptions=True)
 
-    # --- one thing at a time --------------------------------------------------------------------
+    # --- replacement ----------------------------------------------------------------------------
 
     def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
         before = set(self._work)
@@ -129,7 +129,7 @@ class CameraController:
             await asyncio.wait(before)
         await work()
 
-    # --- what is done ---------------------------------------------------------------------------
+    # --- execution ------------------------------------------------------------------------------
 
     async def _run(self, task: _Task) -> None:
         try:
@@ -145,9 +145,9 @@ class CameraController:
             await self._fail(task, error.reason, error.code)
         except asyncio.CancelledError:
             raise
-        except Exception as error:  # one camera's bug must not hang its mission
+        except Exception as error:  # an error of one camera must not block its mission
             self._logger.exception("%s: %s", self.model.resource, task.behavior.name)
-            await self._fail(task, f"m2pem is wrong: {type(error).__name__}: {error}")
+            await self._fail(task, f"internal error of m2pem: {type(error).__name__}: {error}")
         else:
             self._end(task, BehaviorState.SUCCEEDED)
 
@@ -189,10 +189,10 @@ class CameraController:
         try:
             await asyncio.wait([leave, late], return_when=asyncio.FIRST_COMPLETED)
             if not leave.done():
-                reason = f"it did not stop within {limit_s:g} s of the cancel"
+                reason = f"the camera did not stop within {limit_s:g} s of the cancel"
                 self._end(task, BehaviorState.FAILED, "TIMEOUT", reason)
             elif (error := leave.exception()) is not None:
-                self._end(task, BehaviorState.FAILED, "", f"it would not stop: {error}")
+                self._end(task, BehaviorState.FAILED, "", f"the camera did not stop: {error}")
             else:
                 self._end(task, BehaviorState.CANCELLED)
         finally:
@@ -207,7 +207,7 @@ class CameraController:
         try:
             await task.behavior.leave()
         except CameraError as error:
-            self._logger.error("%s: does not stop: %s", self.model.resource, error)
+            self._logger.error("%s: the camera does not stop: %s", self.model.resource, error)
         self._end(task, BehaviorState.FAILED, code, reason)
 
     def _end(self, task: _Task, state: BehaviorState, code: str = "", reason: str = "") -> None:

@@ -63,7 +63,7 @@ def store_image(folder: Path, picture: CapturedImage, metadata: ImageMetadata) -
     camera keeps.
 
     Raises:
-        OSError: it cannot be stored.
+        OSError: the file cannot be written.
     """
     run, _, name = metadata.behavior.rpartition(".")
     place = folder.absolute() / _safe_name(run or "run")
@@ -113,7 +113,7 @@ def _write_whole(path: Path, content: bytes) -> bool:
         except OSError as error:
             if error.errno not in _NO_LINKS:
                 raise
-            if path.exists():  # a card of FAT knows no links; nobody else writes these names
+            if path.exists():  # FAT has no links; no other program writes these names
                 return False
             Path(temporary).replace(path)
     finally:

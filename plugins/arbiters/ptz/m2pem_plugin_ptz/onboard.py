@@ -61,7 +61,7 @@ class CameraNode:
         """Connect to the camera, and serve.
 
         Raises:
-            PluginError: what its driver needs is not installed, or its settings cannot be.
+            PluginError: a library of the driver is missing, or its settings are invalid.
         """
         await self._node.open()
 

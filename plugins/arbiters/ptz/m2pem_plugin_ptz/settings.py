@@ -1,5 +1,4 @@
-"""What a fleet says of the connection to a camera that turns (docs/ptz.md), and the reader for
-drivers.
+"""The settings of a camera in the fleet file (docs/ptz.md), and the reader for those of drivers.
 
 A camera inherits the connection of its vehicle, which may have any arbiter. So an unknown key is no
 error, unless it is similar to a key of the camera.
@@ -84,11 +83,11 @@ def _read(resource: ResourceId, given: Mapping[str, Any]) -> Settings:
     names = [str(name) for name in DriverName]
     driver = given.get("driver")
     if driver not in names:
-        found = "it is missing" if driver is None else f"{driver!r} is no way to reach a camera"
-        raise _error(resource, "driver", f"{found}; say one of {', '.join(names)}")
+        found = "it is missing" if driver is None else f"{driver!r} is not a driver of cameras"
+        raise _error(resource, "driver", f"{found}; write one of {', '.join(names)}")
     pictures = given.get("pictures", "pictures")
     if not isinstance(pictures, str) or not pictures.strip():
-        raise _error(resource, "pictures", f"{pictures!r} is no name of a folder")
+        raise _error(resource, "pictures", f"{pictures!r} is not the name of a folder")
     return Settings(
         DriverName(driver),
         _reach(resource, _map(resource, "reach", given.get("reach", {}), _REACH)),
@@ -104,7 +103,9 @@ def _reach(resource: ResourceId, given: Mapping[str, Any]) -> Reach:
     usual = Reach()
     endless = _flag(resource, "reach.endless", given.get("endless", False))
     if endless and "pan" in given:
-        raise _error(resource, "reach.pan", "an endless camera has no pan stops; leave one out")
+        raise _error(
+            resource, "reach.pan", "an endless camera has no pan stops: remove one of the two"
+        )
     turn, right = 2 * math.tau, math.pi / 2
     view = given.get("view", None)
     if view is None:
@@ -256,7 +257,7 @@ class OwnSettings:
         """Return the reader of an inner map; it is empty if the key is missing."""
         value = self.values.get(key, {})
         if not isinstance(value, Mapping):
-            raise self.error(key, f"{value!r} is no map, such as {example}")
+            raise self.error(key, f"{value!r} is not a map such as {example}")
         return OwnSettings(self._resource, value, f"{self._path}.{key}")
 
     def whole(self, key: str, default: int | None, lowest: int, highest: int, what: str) -> int:
@@ -280,7 +281,7 @@ class OwnSettings:
         """Return a text that is not empty."""
         value = self.values.get(key, default)
         if key in self.values and (not isinstance(value, str) or not value.strip()):
-            raise self.error(key, f"{value!r} is no text")
+            raise self.error(key, f"{value!r} is not a text")
         return str(value)
 
     def choice(self, key: str, choices: type[Choice], default: Choice) -> Choice:

@@ -137,7 +137,7 @@ class HeadDriver:
     async def _say(self):
         while True:
             if self.gimbal.audible:
-                self.setup.heard()
+                self.setup.on_contact()
             await self.setup.context.clock.sleep(SAYS_EVERY_S)
 
 

@@ -86,7 +86,7 @@ def test_a_silent_camera_is_lost_with_what_it_does_and_can_be_used_when_it_is_ba
         (
             "ptz_track",
             {"target": VehiclePosition("nobody")},
-            "where nobody is, is not known",
+            "the position of nobody is not known",
         ),
         ("ptz_scan_sector", {"heading": 0.0, "sector": 1.0, "speed": 99.0}, "speed"),
     ],
@@ -118,7 +118,7 @@ def test_a_lens_that_is_stuck_is_a_failure():
         end = await world.do("zoom", within_s=30, level=20.0)
         assert (end.state, end.reason) == (
             BehaviorState.FAILED,
-            "the camera does not zoom to 20: it has not within 20 s",
+            "the camera does not zoom to 20 within 20 s",
         )
 
     play(main, Gimbal(zoom_max=30.0))

@@ -248,7 +248,7 @@ def test_a_video_that_does_not_stop_is_not_said_to_be_cancelled():
         end = await world.bench.ended("r1.b1", 12)
         assert (end.state, end.reason) == (
             BehaviorState.FAILED,
-            "it would not stop: it does not record",
+            "the camera did not stop: it does not record",
         )
 
     play(main)

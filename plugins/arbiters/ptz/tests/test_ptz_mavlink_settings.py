@@ -1,4 +1,4 @@
-"""What a fleet says of a camera over MAVLink."""
+"""The settings of a MAVLink camera in the fleet file."""
 
 import pytest
 from m2pem_plugin_ptz.drivers.mavlink.settings import Yaw, read_settings

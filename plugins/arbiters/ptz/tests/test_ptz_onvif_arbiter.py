@@ -123,4 +123,4 @@ async def test_a_wrong_password_and_a_missing_recorder_reject_with_whose_fault_i
         await found.start("r1.b1", "record_video", PTZ, duration=1.0)
         end = await found.ended("r1.b1", 40)
         assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
-        assert "cannot be told to record" in end.reason
+        assert "has no recording service" in end.reason

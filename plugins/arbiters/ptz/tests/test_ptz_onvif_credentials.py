@@ -104,10 +104,13 @@ def test_a_fleet_says_where_the_camera_is_and_the_rest_has_defaults():
     [
         ({}, r"evsg2/ptz: connection\.host: an ONVIF camera needs"),
         ({"host": "http://cam/"}, r"connection\.host"),
-        ({"host": "cam", "port": 0}, r"connection\.port: 0 is no TCP port"),
-        ({"host": "cam", "port": "80"}, r"connection\.port: '80' is no TCP port"),
+        ({"host": "cam", "port": 0}, r"connection\.port: 0 is not a TCP port"),
+        ({"host": "cam", "port": "80"}, r"connection\.port: '80' is not a TCP port"),
         ({"host": "cam", "credential": "x"}, r"did you mean 'credentials'"),
-        ({"host": "cam", "password": "secret"}, r"connection\.password: fleets are read by many"),
+        (
+            {"host": "cam", "password": "secret"},
+            r"connection\.password: many people read fleet files",
+        ),
         ({"host": "cam", "timeout": "2 m"}, r"connection\.timeout: .*duration"),
         ({"host": "cam", "timeout": "2 min"}, r"connection\.timeout: 120 s is not in"),
         ({"host": "cam", "calls": 1000}, r"connection\.calls"),

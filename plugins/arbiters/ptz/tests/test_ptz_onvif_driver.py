@@ -159,10 +159,10 @@ async def test_a_camera_whose_jobs_are_all_made_uses_an_idle_one(tmp_path):
 @pytest.mark.parametrize(
     ("options", "behavior", "why"),
     [
-        ({"recording": False}, "record_video", "cannot be told to record"),
+        ({"recording": False}, "record_video", "has no recording service"),
         ({"snapshots": False}, "take_picture", "refuses GetSnapshotUri: no pictures"),
-        ({"degrees": False}, "zoom", "say reach.zoom_max in the fleet"),
-        ({"turns": False}, "ptz_point_at", "does not say where it looks"),
+        ({"degrees": False}, "zoom", "set reach.zoom_max in the fleet"),
+        ({"turns": False}, "ptz_point_at", "does not report its direction"),
     ],
 )
 async def test_what_a_camera_cannot_do_is_refused_with_the_reason(tmp_path, options, behavior, why):

@@ -155,7 +155,7 @@ async def test_a_full_storage_is_an_error_of_the_recording(tmp_path):
         server.camera.fault_state.full = True
         with pytest.raises(CameraError, match="the storage is full"):
             await bench.driver.start_recording()
-        with pytest.raises(CameraError, match="was not told to record"):
+        with pytest.raises(CameraError, match="is not recording"):
             await bench.driver.stop_recording()
 
 
@@ -181,7 +181,7 @@ async def test_what_is_no_onvif_camera_is_said_so(tmp_path):
     async with page, camera() as server:
         server.port, kept = page.sockets[0].getsockname()[1], server.port
         async with driven(server, tmp_path) as bench:
-            await until(lambda: "with what is no ONVIF" in bench.driver.refusal("zoom"))
+            await until(lambda: "with invalid ONVIF" in bench.driver.refusal("zoom"))
             assert bench.heard == 0
         server.port = kept
 

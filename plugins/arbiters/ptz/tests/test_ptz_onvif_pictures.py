@@ -59,7 +59,7 @@ async def test_what_is_no_picture_is_an_error(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
         server.camera.fault_state.picture = b"<html>Please log in</html>"
-        with pytest.raises(CameraError, match="gives 26 bytes that are no picture"):
+        with pytest.raises(CameraError, match="sent 26 bytes that are not a picture"):
             await bench.driver.take_picture()
 
 

@@ -103,7 +103,9 @@ def test_limits_that_are_set_in_the_camera_hold():
 
 
 def test_a_reach_that_does_not_meet_the_cameras_is_refused_with_both():
-    with pytest.raises(ValueError, match=r"tilt from -20 to 90 deg, the fleet says -90 to -30 deg"):
+    with pytest.raises(
+        ValueError, match=r"tilt from -20 to 90 deg, but the fleet says -90 to -30 deg"
+    ):
         read_spaces(
             degrees((-180.0, 180.0), (-20.0, 90.0)),
             Reach(tilt_rad=(math.radians(-90), math.radians(-30))),

@@ -55,7 +55,7 @@ def test_without_a_vehicle_that_is_heard_directions_still_work_but_places_do_not
         end = await world.do("ptz_point_at", id_="r1.b2", target=point(30, 40))
         assert (end.state, end.reason) == (
             BehaviorState.REJECTED,
-            "where ugv is, is not known",
+            "the position of ugv is not known",
         )
 
     play(main, moves=None)
@@ -216,7 +216,7 @@ def test_a_motor_that_is_stuck_is_a_failure_that_says_so():
         world.gimbal.stuck = True
         end = await world.do("ptz_point_at", within_s=30, bearing=rad(50), elevation=0.0)
         assert end.state is BehaviorState.FAILED
-        assert "does not get there: 50.0 deg are left" in end.reason
+        assert "does not turn to its target: 50.0 deg are left" in end.reason
 
     play(main)
 

@@ -122,9 +122,9 @@ async def test_joints_that_fall_silent_are_not_heard(ros_domain, tmp_path) -> No
 async def test_a_camera_that_is_not_there_says_what_is_missing(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path, camera=False) as it:
         told = it.driver.refusal("ptz_point_at")
-        assert told == "/evsg2/joint_states does not tell of pan_joint and tilt_joint"
+        assert told == "/evsg2/joint_states has no pan_joint and tilt_joint"
         told = it.driver.refusal("take_picture")
-        assert told == "nobody publishes images on /evsg2/camera/image_raw/compressed"
+        assert told == "no publisher of images on /evsg2/camera/image_raw/compressed"
         assert it.driver.ptz is None
         it.point(10.0, 10.0)
         it.driver.halt()
@@ -138,7 +138,7 @@ async def test_joints_of_others_are_named(ros_domain, tmp_path) -> None:
         other = make_driver(settings, tmp_path, lambda: None)
         await other.open()
         try:
-            known = "it tells of wheel, pan_joint, tilt_joint"
+            known = "it has wheel, pan_joint, tilt_joint"
             await until(lambda: known in other.refusal("ptz_track"))
             assert other.ptz is None
         finally:

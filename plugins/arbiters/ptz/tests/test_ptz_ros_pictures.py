@@ -43,7 +43,7 @@ async def test_a_camera_that_shows_nothing_is_an_error(ros_domain, tmp_path, mon
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
         await it.fault("blind")
-        with pytest.raises(CameraError, match="publishes there, but sends none"):
+        with pytest.raises(CameraError, match="its publisher sends none"):
             await it.driver.take_picture()
 
 
@@ -119,6 +119,6 @@ async def test_a_disk_that_is_full_is_told_at_the_end(ros_domain, tmp_path) -> N
                 raise OSError(28, "No space left on device")
 
         recorder._file = Full()
-        with pytest.raises(CameraError, match=r"is not whole: .*No space left"):
+        with pytest.raises(CameraError, match=r"is not complete: .*No space left"):
             await it.driver.stop_recording()
         assert failed.is_set()

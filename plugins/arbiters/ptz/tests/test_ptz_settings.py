@@ -57,8 +57,8 @@ def test_reach_and_mounting_carry_units():
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
-        ({}, "driver: it is missing; say one of ros, mavlink, onvif"),
-        ({"driver": "mavsdk"}, "driver: 'mavsdk' is no way to reach a camera; say one of "),
+        ({}, "driver: it is missing; write one of ros, mavlink, onvif"),
+        ({"driver": "mavsdk"}, "driver: 'mavsdk' is not a driver of cameras; write one of  "),
         ({"mountin": {}}, "mountin: there is no such setting; did you mean 'mounting'?"),
         ({"reach": 5}, "reach: 5 is not a map; known in it: pan, tilt"),
         ({"reach": {"pann": 1}}, "reach.pann: there is no such setting; did you mean 'pan'?"),
@@ -72,7 +72,7 @@ def test_reach_and_mounting_carry_units():
         ({"reach": {"view": ["60 deg", "200 deg"]}}, "reach.view: '200 deg' is not within"),
         ({"mounting": {"up": "2 deg"}}, "mounting.up: '2 deg' is an angle, not a distance"),
         ({"stabilized": "yes"}, "stabilized: 'yes' is neither true nor false"),
-        ({"pictures": ""}, "pictures: '' is no name of a folder"),
+        ({"pictures": ""}, "pictures: '' is not the name of a folder"),
         ({"delay": "5 s"}, "delay: '5 s' is not within 0 and 2"),
     ],
 )

@@ -16,15 +16,15 @@ STANDS_BELOW_M_S = 0.3
 
 HEIGHT_TOLERANCE_M = 1.0
 CIRCLING_HEIGHT_TOLERANCE_M = 5.0
-"""What circles climbs and sinks on its circle, in every gust."""
+"""Tolerance of heights in metres for a circling vehicle, which gusts lift and lower."""
 
 NEAR_THE_CIRCLE = 0.25
-"""Of its radius; and so many metres at least:"""
+"""Tolerance of a circle as a fraction of its radius, and the least one in metres:"""
 
 NEAR_THE_CIRCLE_M = 5.0
 
 LOOKS_FOR_S = 4.0
-"""After a restart: a vehicle that is on its way has turned and moves by then."""
+"""Seconds after a restart in which a vehicle on its way has turned and moves."""
 
 SAME_TARGET_M = 2.0
 
@@ -181,7 +181,7 @@ async def _has_target(vehicle: Vehicle, place: TargetPosition) -> bool:
     try:
         target = await position_target(vehicle.link)
     except ExchangeError:
-        return False  # it has no target, or does not say
+        return False  # the autopilot has no target, or does not report it
     if distance_m((place.latitude_deg, place.longitude_deg), target[:2]) > SAME_TARGET_M:
         return False
     height, here = height_m(vehicle.state, place.altitude_frame), vehicle.state.position

@@ -16,8 +16,8 @@ ANY_MODE: frozenset[FlightMode] = frozenset(FlightMode)
 
 
 MOVES_WITHIN_S = 60.0
-"""The usual `Behavior.max_still_s`. A vehicle may be slow to set out, or wait for an obstacle; no
-autopilot needs that long."""
+"""Default of `Behavior.max_still_s`: longer than autopilots need to start, or to wait for
+obstacles."""
 
 
 class BehaviorFailedError(Exception):

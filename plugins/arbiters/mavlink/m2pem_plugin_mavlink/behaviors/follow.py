@@ -15,11 +15,11 @@ REPEAT_S = 0.5
 STALE_S = 3.0
 MOVED_M = 0.5
 LEAD_S = 2.0
-"""The vehicle is sent to where the position will be then: it slows down before each target, and
+"""The vehicle is sent to the predicted position at this time: it slows down before each target, and
 so lags behind by about this time."""
 
 COURSE_ABOVE_M_S = 1.0
-"""Who moves faster points where it moves; its bow counts only if that is not known."""
+"""Without a yaw, the course of a target that moves faster than this counts as its heading."""
 
 
 class Follow(Behavior):
@@ -36,7 +36,7 @@ class Follow(Behavior):
         distance, bearing = self._parameters.offset_m, self._parameters.bearing_rad
         self._offset_m = OFFSET_M if distance is None else distance
         self._bearing_rad = BEHIND_RAD if bearing is None else bearing
-        self._told: LatLon | None = None
+        self._sent: LatLon | None = None
         self._course_rad: float | None = None
 
     def refusal(self) -> str:
@@ -46,12 +46,12 @@ class Follow(Behavior):
             return reason
         if self._target in ("", self.vehicle.resource):
             return "parameter 'target': another vehicle is expected"
-        return "" if self._state() is None else self._breach(self._station())
+        return "" if self._state() is None else self._breach(self._relative_position())
 
     async def begin(self) -> None:
         await self._parameters.wait_for_target()
-        self._told = None
-        await self._tell()
+        self._sent = None
+        await self._send()
 
     async def resume(self) -> None:
         await self.begin()
@@ -60,32 +60,32 @@ class Follow(Behavior):
         """Send the vehicle to its relative position twice a second."""
         while True:
             await self.vehicle.sleep(REPEAT_S)
-            await self._tell()
+            await self._send()
 
     def finished(self) -> bool:
         """Return False: the behavior continues until it is interrupted."""
         return False
 
-    async def _tell(self) -> None:
+    async def _send(self) -> None:
         if self._state() is None:
-            await self._stop(f"{self._target} has not been heard for {STALE_S:g} s")
-        station = self._station()
-        if reason := self._breach(station):
+            await self._stop(f"{self._target} has sent no position for {STALE_S:g} s")
+        position = self._relative_position()
+        if reason := self._breach(position):
             await self._stop(reason)
-        if self._told is None or distance_m(self._told, station) > MOVED_M:
-            self._told = station
-            place = TargetPosition(*station, *self._parameters.altitude())
+        if self._sent is None or distance_m(self._sent, position) > MOVED_M:
+            self._sent = position
+            place = TargetPosition(*position, *self._parameters.altitude())
             await self.vehicle.driver.go_to(place, self._parameters.speed_m_s)
 
     async def _stop(self, reason: str) -> None:
         await self.vehicle.driver.stop()
         raise BehaviorFailedError(reason)
 
-    def _breach(self, station: LatLon) -> str:
+    def _breach(self, position: LatLon) -> str:
         if self.context.fence is None:
             return ""
-        name = f"its station at {self._target}"
-        return self.context.fence.breach([station], position_of(self.vehicle), lambda _: name)
+        name = f"its position relative to {self._target}"
+        return self.context.fence.breach([position], position_of(self.vehicle), lambda _: name)
 
     def _state(self) -> VehicleState | None:
         """Return the target's last state; None if there is none that is recent."""
@@ -94,10 +94,10 @@ class Follow(Behavior):
             return None
         return state if self.context.now_s() - state.time_us / 1e6 <= STALE_S else None
 
-    def _station(self) -> LatLon:
+    def _relative_position(self) -> LatLon:
         state = self._state()
         if state is None or state.position is None:
-            raise BehaviorFailedError(f"{self._target} has not been heard")
+            raise BehaviorFailedError(f"{self._target} has sent no position")
         east, north, _ = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
         if state.yaw_rad is not None:
             self._course_rad = state.yaw_rad

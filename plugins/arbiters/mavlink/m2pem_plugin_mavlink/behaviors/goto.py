@@ -34,7 +34,7 @@ TOLERANCES_M = {"air": 2.0, "ground": 2.5, "surface": 5.0, "subsurface": 3.0}
 """The default tolerances by domain: the usual waypoint radii of autopilots."""
 
 NEAREST_M = 0.5
-"""Nearer than this a satellite receiver cannot tell."""
+"""Smallest tolerance: satellite receivers are no more precise."""
 
 SETTLED_S = 10.0
 """A vehicle that has stopped near its target for this long counts as arrived."""
@@ -131,8 +131,8 @@ class Goto(Behavior):
             return False
         if self._said:
             raise BehaviorFailedError(
-                f"it stands {away:.1f} m from its target, and tolerance is {self._tolerance_m:g} m:"
-                " its autopilot takes that for there"
+                f"it has stopped {away:.1f} m from its target, and the tolerance is "
+                f"{self._tolerance_m:g} m: its autopilot counts that as arrived"
             )
         return True
 
@@ -177,7 +177,7 @@ class Hold(Behavior):
         """Stop the vehicle; one that is not armed has stopped."""
         self._at = position_of(self.vehicle)
         if on_the_ground(self.vehicle) or self.vehicle.state.armed is False:
-            self.modes = frozenset(FlightMode)  # it has stopped, in whatever mode
+            self.modes = frozenset(FlightMode)  # a disarmed vehicle has stopped in every mode
         else:
             await self.vehicle.driver.stop()
         self._since_s = self.context.now_s()

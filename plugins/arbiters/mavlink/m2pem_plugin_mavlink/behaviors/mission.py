@@ -240,7 +240,7 @@ class MissionFlight(Behavior):
     def checkpoint(self) -> CheckpointState:
         """Return the mission's fingerprint, its last item and the position of that."""
         if not self.items or self._kept is None or self._end is None:
-            raise BehaviorFailedError("there is no way to move")
+            raise BehaviorFailedError("the mission has no waypoints")
         last, place = self._end
         kept = self._kept
         return {
@@ -332,10 +332,10 @@ class RunOnboardMission(Behavior):
     async def begin(self) -> None:
         items = await self.vehicle.driver.downloaded()
         if not items:
-            raise BehaviorFailedError("it has no mission stored")
+            raise BehaviorFailedError("no mission is stored")
         if self._first >= len(items):
             raise BehaviorFailedError(
-                f"parameter 'first': there is no item {self._first}; its mission has {len(items)}"
+                f"parameter 'first': there is no item {self._first}; the mission has {len(items)}"
             )
         self._see(items)
         await self.vehicle.driver.start_mission(self._first)
@@ -356,7 +356,7 @@ class RunOnboardMission(Behavior):
     def _see(self, items: tuple[MissionItem, ...]) -> None:
         moves = [index for index, item in enumerate(items) if is_navigation(item)]
         if not moves:
-            raise BehaviorFailedError("the mission that it has stored has no waypoint")
+            raise BehaviorFailedError("the stored mission has no waypoint")
         self._last = moves[-1]
         if self.context.fence is not None:
             placed = [items[i] for i in moves if items[i].latitude_deg or items[i].longitude_deg]

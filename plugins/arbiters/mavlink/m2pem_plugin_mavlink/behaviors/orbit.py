@@ -22,7 +22,7 @@ from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 
 RADIUS_M = 30.0
 MOST_ITEMS = 400
-"""More laps than fit are begun anew each."""
+"""Most waypoints of a mission with all laps; longer ones repeat a mission of one lap."""
 
 LOOK_EVERY_S = 0.2
 
@@ -154,7 +154,7 @@ class Orbit(MissionFlight):
         center = (self.center.latitude_deg, self.center.longitude_deg)
         here = position_of(self.vehicle)
         near_m, away = circle_tolerance_m(self._radius_m), distance_to_m(self.vehicle, center)
-        # A plane that cannot turn as tightly as it is asked to goes round as it can.
+        # A plane that cannot turn as tightly as commanded flies a larger circle.
         wide_m = max(self._radius_m, self.vehicle.state.loiter_radius_m or 0.0)
         farthest_m = max(self._radius_m + near_m, arrival_radius_m(self.vehicle, 0.0, wide_m))
         if here is None or not self._radius_m - near_m <= away <= farthest_m:
@@ -200,7 +200,7 @@ class Orbit(MissionFlight):
         super().restore(checkpoint)
         center, radius = checkpoint.get("center"), checkpoint.get("radius")
         if not isinstance(center, list) or not isinstance(radius, int | float):
-            raise BehaviorFailedError("where it circles is not known any more")
+            raise BehaviorFailedError("the centre of the circle is no longer known")
         self._center = TargetPosition(center[0], center[1], center[2], str(checkpoint.get("frame")))
         self._radius_m = float(radius)
         self.loop = bool(checkpoint.get("loop"))

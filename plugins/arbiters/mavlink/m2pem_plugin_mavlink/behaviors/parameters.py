@@ -60,7 +60,7 @@ class VehicleParameters(BehaviorParameters):
             return 0.0, RELATIVE
         present_m = self._context.vehicle.state.altitude_above_home_m
         if present_m is None:
-            raise BehaviorFailedError("its height is not known yet: say the altitude to move at")
+            raise BehaviorFailedError("its height is not known yet: set the parameter 'altitude'")
         return present_m, RELATIVE
 
     def target_position(self) -> TargetPosition:
@@ -96,7 +96,7 @@ class VehicleParameters(BehaviorParameters):
         vehicle = self._context.vehicle
         if not await vehicle.until(lambda: not self.target_is_unknown, TARGET_WITHIN_S):
             raise BehaviorFailedError(
-                f"parameter 'target': {self.target_vehicle} has not been heard"
+                f"parameter 'target': {self.target_vehicle} has sent no position"
             )
 
     def position_of_vehicle(self, vehicle: str) -> LatLon:

@@ -44,7 +44,7 @@ class Reverse(Behavior):
     def refusal(self) -> str:
         """Check that position and heading are known, and that the path is inside the fence."""
         if self._from is None or self._yaw_rad is None:
-            return "where it is, and where its bow points, is not known yet"
+            return "its position and heading are not known yet"
         if self.context.fence is None:
             return ""
         way = [self._behind(self._from, self._yaw_rad, self._distance_m)]
@@ -57,7 +57,7 @@ class Reverse(Behavior):
     async def begin(self) -> None:
         """Reverse, towards a target `BEYOND_M` behind the distance."""
         if self._from is None or self._yaw_rad is None:
-            raise BehaviorFailedError("where it is, and where its bow points, is not known")
+            raise BehaviorFailedError("its position and heading are not known")
         if self._distance_m == 0:
             self._done = True
             return

@@ -121,7 +121,7 @@ class Takeoff(ChangeAltitude):
         """Check that the height is above home."""
         altitude_m = self._above_home_m()
         if altitude_m is None:
-            return "the height of its home is not known yet: say a relative altitude"
+            return "the height of its home is not known yet: set a relative altitude"
         if altitude_m < LEAST_TAKEOFF_M:
             return (
                 f"parameter 'altitude': {self._altitude_m:g} m {self._frame} is {altitude_m:g} m "
@@ -307,12 +307,12 @@ class ReturnToLaunch(Behavior):
             return True
         home, radius_m = self.vehicle.state.home, self.vehicle.state.home_loiter_radius_m
         place = (home.latitude_deg, home.longitude_deg) if home is not None else None
-        standing_s = self._stillness.seconds(place, radius_m)
+        stopped_s = self._stillness.seconds(place, radius_m)
         if self.vehicle.domain == "air":
             near_m = arrival_radius_m(self.vehicle, self._near_m, radius_m)
             at_home = self.vehicle.state.landed is False and self._home_m() <= near_m
-            return at_home and standing_s >= HOVERS_AT_HOME_S
-        return self.vehicle.state.home is None and standing_s >= DISARMS_WITHIN_S
+            return at_home and stopped_s >= HOVERS_AT_HOME_S
+        return self.vehicle.state.home is None and stopped_s >= DISARMS_WITHIN_S
 
     async def reattach(self) -> BehaviorState:
         """Judge by the mode, or by being at home."""

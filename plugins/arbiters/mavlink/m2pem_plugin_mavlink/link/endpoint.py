@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.protocol.url import Url
 logger = logging.getLogger(__name__)
 
 MAX_UNKNOWN_SENDERS = 64
-"""The largest number of senders without a route that are counted at one peer."""
+"""Most senders without a route that one peer keeps."""
 
 
 class Endpoint(ABC):
@@ -104,7 +104,9 @@ class Endpoint(ABC):
     def idle_peers(self, before_s: float) -> Iterable[Hashable]:
         """Yield peers that have sent nothing since `before_s` and reach no vehicle in use; the
         longest silent first."""
-        idle = [(each.heard_s, key) for key, each in self.peers.items() if each.heard_s < before_s]
+        idle = [
+            (each.received_s, key) for key, each in self.peers.items() if each.received_s < before_s
+        ]
         routes = self._routes.values()
         for _, key in sorted(idle, key=lambda each: each[0]):
             if not any(route.holds(self.peers[key]) for route in routes):

@@ -2,7 +2,7 @@
 
 Equal URLs are one socket, whatever the number of vehicles and arbiters that use it. Each peer
 receives a heartbeat once a second from each source in use: an autopilot takes ten seconds without
-one for the loss of its ground station, and some radios and routers send nothing to a peer that has
+one as the loss of its ground station, and some radios and routers send nothing to a peer that has
 not sent anything yet.
 """
 
@@ -24,7 +24,7 @@ from m2pem_plugin_mavlink.protocol.url import SerialUrl, Url, Way
 US_PER_S = 1_000_000
 HEARTBEAT_US = US_PER_S
 PEERS_AT_ONCE = 64
-"""Peers that are spoken to before others get their turn."""
+"""Peers that receive heartbeats before other tasks run."""
 
 MAV_TYPE_GCS = 6
 MAV_AUTOPILOT_INVALID = 8
@@ -77,14 +77,14 @@ class Hub:
         async with self._changing:
             if not self._opened:
                 self._clock = clock
-            ours = (source.system, *(each.system for each in self._sources))
+            own_systems = (source.system, *(each.system for each in self._sources))
             taken = any(each.endpoint.has_route(source.system) for each in self._opened.values())
-            if taken or system in ours:
+            if taken or system in own_systems:
                 clash = source.system if taken else system
                 raise PluginError(
-                    f"system id {clash} is a vehicle's and our own: one of them must change"
+                    f"system id {clash} is that of a vehicle and of m2pem: change one of them"
                 )
-            self._speak_as(source)
+            self._add_source(source)
             joined: list[Url] = []
             try:
                 for url in dict.fromkeys(urls):
@@ -114,7 +114,7 @@ class Hub:
             self._beating = asyncio.create_task(self._beat())
 
     async def _leave(self, urls: Sequence[Url], source: Address) -> None:
-        self._speak_no_more_as(source)
+        self._remove_source(source)
         for url in urls:
             opened = self._opened[url]
             opened.users -= 1
@@ -126,14 +126,14 @@ class Hub:
             await asyncio.wait([self._beating])
             self._beating = None
 
-    def _speak_as(self, source: Address) -> None:
+    def _add_source(self, source: Address) -> None:
         self._sources[source] += 1
         if source.system not in self._own_systems:
             self._own_systems.add(source.system)
             for opened in self._opened.values():
                 opened.endpoint.forget(source.system)
 
-    def _speak_no_more_as(self, source: Address) -> None:
+    def _remove_source(self, source: Address) -> None:
         self._sources[source] -= 1
         if not self._sources[source]:
             del self._sources[source]
@@ -149,9 +149,7 @@ class Hub:
         while True:
             at_us += HEARTBEAT_US
             now_us = self._clock.now_us()
-            if (
-                at_us <= now_us
-            ):  # the machine was asleep: beats that were missed are not made up for
+            if at_us <= now_us:  # after a suspension of the machine, skip the missed heartbeats
                 at_us = now_us + HEARTBEAT_US
             await self._clock.sleep_until(at_us)
             for opened in list(self._opened.values()):

@@ -24,17 +24,17 @@ AdmitSender: TypeAlias = Callable[["Peer", Sender], bool]
 
 class Peer:
     """A peer of an endpoint: a UDP address, a TCP connection, or the other end of a serial line.
-    `name` is for people; `write` sends bytes at once, or drops them; `heard_s`: when it has sent
-    anything last; `open`: it has not closed the connection."""
+    `name`: for messages; `write` sends bytes at once, or drops them; `received_s`: the time of its
+    last data; `open`: it has not closed the connection."""
 
-    __slots__ = ("_sequences", "heard_s", "inbound", "name", "open", "write")
+    __slots__ = ("_sequences", "inbound", "name", "open", "received_s", "write")
 
     def __init__(
-        self, name: str, write: Callable[[bytes], None], admit: AdmitSender, heard_s: float
+        self, name: str, write: Callable[[bytes], None], admit: AdmitSender, received_s: float
     ) -> None:
         self.name = name
         self.write = write
-        self.heard_s = heard_s
+        self.received_s = received_s
         self.open = True
         self.inbound = Inbound(partial(admit, self))
         self._sequences: dict[Address, int] = {}
@@ -64,7 +64,7 @@ class _Claim:
     sender: Sender
 
     def live(self, now_s: float) -> bool:
-        return self.peer.open and now_s - self.sender.heard_s <= TAKEOVER_S
+        return self.peer.open and now_s - self.sender.received_s <= TAKEOVER_S
 
     def forget(self) -> None:
         self.peer.inbound.forget(self.sender)
@@ -105,7 +105,7 @@ class Route:
             self._wanted[type_.id] = Wanted(type_, (*listeners, listener))
 
     def unlisten(self, ids: Iterable[int], listener: Listener) -> None:
-        """Take one `listen` back."""
+        """Undo one `listen`."""
         for id_ in ids:
             wanted = self._wanted[id_]
             listeners = list(wanted.listeners)
@@ -116,8 +116,8 @@ class Route:
                 del self._wanted[id_]
 
     def claim(self, peer: Peer, sender: Sender, now_s: float) -> bool:
-        """A sender of this system has sent its first frame over a peer. Return False if there are
-        too many senders that claim to be the same component."""
+        """Add a sender of this system that has sent its first frame over a peer. Return False if
+        too many senders claim to be the same component."""
         claim = _Claim(peer, sender)
         owner = self._owners.get(sender.address.component)
         if owner is None:
@@ -137,7 +137,7 @@ class Route:
         return True
 
     def judge(self, now_s: float) -> None:
-        """Give a component whose owner is silent to a sender that is not. Forget other silent
+        """Reassign the component of a silent owner to another sender. Forget other silent
         components, but not autopilots: they may receive although nothing is received from them."""
         for component, owner in list(self._owners.items()):
             holder = owner.holder
@@ -145,8 +145,10 @@ class Route:
                 continue
             live = [competitor for competitor in owner.competitors if competitor.live(now_s)]
             if live:
-                self._give(owner, max(live, key=lambda competitor: competitor.sender.heard_s))
-            elif component not in self.autopilots and now_s - holder.sender.heard_s > FORGOTTEN_S:
+                self._give(owner, max(live, key=lambda competitor: competitor.sender.received_s))
+            elif (
+                component not in self.autopilots and now_s - holder.sender.received_s > FORGOTTEN_S
+            ):
                 for claim in (holder, *owner.competitors):
                     claim.forget()
                 del self._owners[component]
@@ -201,7 +203,7 @@ class Route:
         if not owner.warned and component in self.autopilots:
             owner.warned = True
             _logger.warning(
-                "%s: %s says to be component %d of system %d, as %s does, which is believed; "
+                "%s: %s claims to be component %d of system %d, as does %s, which is used; "
                 "do two vehicles have the same system id?",
                 self.url,
                 claim.peer.name,

@@ -23,10 +23,10 @@ GROUND_STATION = Address(255, 190)
 """The default address of this ground station, as MAVLink assigns it."""
 
 SILENT_S = 2.5
-"""Longer than this without anything, and another endpoint is tried."""
+"""Seconds of silence after which another endpoint is tried."""
 
 WORSE_LOSS = 0.1
-"""By so much more must be lost on the endpoint in use than on another one before it is left."""
+"""An endpoint is left for another one whose loss is smaller by this fraction."""
 
 US_PER_S = 1_000_000
 
@@ -37,14 +37,13 @@ async def open_link(
     """Open a link to a vehicle over one or more endpoints, the preferred one first; `source`: the
     address of this ground station.
 
-    Returns when listening: a vehicle that is silent, or a connection that does not come about yet,
-    is no error.
+    Return when listening: a silent vehicle, or a connection that is not made yet, is no error.
 
     Raises:
         PluginError: a URL is wrong, or an endpoint cannot be opened.
     """
     if not urls:
-        raise PluginError("no URL says where the vehicle is reached: udpin://127.0.0.1:14550")
+        raise PluginError("the vehicle needs a URL, such as udpin://127.0.0.1:14550")
     hub = shared_hub()
     routes = await hub.join(address.system, [parse_url(url) for url in urls], source, clock)
     return RoutedLink(hub, address, source, routes, clock)
@@ -132,8 +131,8 @@ class RoutedLink:
     def known_systems(self) -> set[int]:
         """Return every system id that sends on its endpoints; for errors, when the vehicle's own
         does not."""
-        heard = (self._hub.endpoint(route.url).known_systems() for route in self._routes)
-        return set().union(*heard)
+        systems = (self._hub.endpoint(route.url).known_systems() for route in self._routes)
+        return set().union(*systems)
 
     async def close(self) -> None:
         """Release the vehicle, and endpoints without other users. Active exchanges fail."""

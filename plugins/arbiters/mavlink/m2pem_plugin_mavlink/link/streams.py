@@ -1,4 +1,4 @@
-"""MAVLink over connections that break and are made again: TCP and serial lines."""
+"""MAVLink over connections that may break and are made again: TCP and serial lines."""
 
 import asyncio
 import socket
@@ -16,13 +16,12 @@ FIRST_PAUSE_S = 0.25
 LONGEST_PAUSE_S = 5.0
 CONNECTING_S = 10.0
 MOST_UNSENT_BYTES = 64 * 1024
-"""What is sent to a peer that reads no more than this behind is dropped, as a radio would."""
+"""Most unsent bytes of a peer; further frames are dropped, as by a radio."""
 
 MOST_CONNECTIONS = 512
 
 UNACKNOWLEDGED_MS = 10_000
-"""A connection whose other end is gone without a word breaks after so long; the heartbeats are what
-it does not acknowledge."""
+"""Seconds after which a connection breaks whose other end does not acknowledge the heartbeats."""
 
 
 class Connection(asyncio.Protocol):
@@ -52,7 +51,7 @@ class Connection(asyncio.Protocol):
         self.made.set_result(None)
 
     def data_received(self, data: bytes) -> None:
-        self.peer.heard_s = now_s = self._endpoint.now_s()
+        self.peer.received_s = now_s = self._endpoint.now_s()
         self.peer.inbound.stream(data, now_s)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -108,7 +107,7 @@ class ConnectingEndpoint(Endpoint):
                 if connection.peer.inbound.senders:
                     pause_s, silenced = FIRST_PAUSE_S, False
             if not silenced:
-                logger.warning("%s: %s; connecting again until it works", self.url, reason)
+                logger.warning("%s: %s; reconnecting", self.url, reason)
             silenced = True
             await asyncio.sleep(pause_s)
             pause_s = min(2 * pause_s, LONGEST_PAUSE_S)

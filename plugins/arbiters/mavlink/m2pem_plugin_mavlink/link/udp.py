@@ -1,7 +1,7 @@
 """MAVLink over UDP.
 
-asyncio's own datagram transport reads one datagram each time the loop goes round; here all that
-are there are read, so that bursts of many vehicles don't overflow the socket's buffer.
+The datagram transport of asyncio reads one datagram in each iteration of the loop; this module
+reads all that wait, so that bursts of many vehicles do not overflow the socket's buffer.
 """
 
 import asyncio
@@ -15,11 +15,11 @@ from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.url import SocketUrl, Way
 
 RECEIVE_BUFFER_BYTES = 8 * 2**20
-"""Asked for; the system gives no more than net.core.rmem_max."""
+"""Requested size of the receive buffer; the kernel grants at most net.core.rmem_max."""
 
 LARGEST_DATAGRAM = 65_535
 AT_ONCE = 256
-"""Datagrams that are read before others get their turn: about a millisecond's work."""
+"""Datagrams that are read before other tasks run: about a millisecond."""
 
 MAX_PEERS = 1_024
 FORGOTTEN_S = 60.0
@@ -75,7 +75,7 @@ class UdpEndpoint(Endpoint):
             if peer is None:
                 self._receive_from_new_peer(data, address, now_s)
             else:
-                peer.heard_s = now_s
+                peer.received_s = now_s
                 peer.inbound.datagram(data, now_s)
 
     def _receive_from_new_peer(self, data: bytes, address: Any, now_s: float) -> None:
@@ -137,7 +137,9 @@ def why_not(error: OSError) -> str:
     if error.errno == errno.EADDRINUSE:
         return "another program has this port; end it, or use another port"
     if error.errno == errno.EADDRNOTAVAIL:
-        return "this machine does not have that address; to listen to all others, use 0.0.0.0"
+        return (
+            "this machine does not have that address; to listen on all its addresses, use 0.0.0.0"
+        )
     if error.errno == errno.EACCES:
         return "not allowed: a port below 1024, or a broadcast address"
     return error.strerror or str(error)

@@ -39,7 +39,7 @@ class KeyedLock:
 T = TypeVar("T")
 
 Listener: TypeAlias = Callable[[Message, Address], None]
-"""Is handed a message and its sender, in the event loop; must not raise."""
+"""Called with a message and its sender in the event loop; must not raise."""
 
 
 class VehicleLink(Protocol):
@@ -97,7 +97,7 @@ class Exchange:
         Raises:
             Exception: what the transaction raised, or `abort` was given.
         """
-        stop_listening = self._link.listen(self._transaction.wants, self._hear)
+        stop_listening = self._link.listen(self._transaction.wants, self._receive)
         try:
             self._transaction.begin(self._link.now_s())
             self._go_on()
@@ -109,11 +109,11 @@ class Exchange:
                 self._waiting.cancel()
 
     def abort(self, error: Exception) -> None:
-        """End it with an error."""
+        """End the exchange with an error."""
         if not self._ended.done():
             self._ended.set_exception(error)
 
-    def _hear(self, message: Message, sender: Address) -> None:
+    def _receive(self, message: Message, sender: Address) -> None:
         if self._ended.done():
             return
         try:
@@ -123,7 +123,7 @@ class Exchange:
             self.abort(error)
 
     def _go_on(self) -> None:
-        """Send what is to be sent, and wait for the deadline."""
+        """Send the messages of the outbox, and wait for the deadline."""
         transaction = self._transaction
         outbox, transaction.outbox = transaction.outbox, []
         for message in outbox:
@@ -133,7 +133,7 @@ class Exchange:
                 self._ended.set_result(None)
             return
         deadline_s = transaction.deadline_s
-        # A deadline is mostly moved on; the wait for the earlier one then goes on by itself.
+        # Deadlines are mostly postponed: the wait for the earlier one then continues by itself.
         if deadline_s is not None and deadline_s < self._waits_until_s:
             if self._waiting is not None:
                 self._waiting.cancel()
@@ -151,7 +151,7 @@ class Exchange:
                 deadline_s = self._transaction.deadline_s
                 if deadline_s is not None and self._link.now_s() >= deadline_s:
                     self._transaction.expire(self._link.now_s())
-                    self._waits_until_s = -math.inf  # this task waits, no other
+                    self._waits_until_s = -math.inf  # only this task waits
                     self._go_on()
         except Exception as error:
             self.abort(error)

@@ -1,5 +1,5 @@
 """Vehicles over MAVSDK, for sites that standardise on it (`connection: {driver: mavsdk}`).
 
-MAVSDK owns the sockets and serial lines, sends the heartbeats and uploads missions. How autopilots
-are driven, what is exchanged with them and what is offered, is the same as without it.
+MAVSDK owns the sockets and serial lines, sends the heartbeats and uploads missions. Drivers,
+exchanges and behaviors are the same as without it.
 """

@@ -63,7 +63,8 @@ class GroundStation:
             self._search.cancel()
             await asyncio.gather(self._search, return_exceptions=True)
         if self._mavsdk is not None:
-            # In a thread, as it waits for its own. What else is MAVSDK's is held until then: were
+            # In a thread, as it waits for its own threads. Other MAVSDK objects are kept until
+            # then: were
             # it collected, and thereby destroyed, at the same time, the process would be aborted.
             await asyncio.get_running_loop().run_in_executor(None, self._mavsdk.destroy)
             self._mavsdk = None
@@ -105,7 +106,7 @@ async def open_mavsdk_link(
             one: MAVSDK would send everything to all of them.
     """
     if len(urls) != 1:
-        raise PluginError(f"`driver: mavsdk` takes one URL, and has {len(urls)}")
+        raise PluginError(f"`driver: mavsdk` takes one URL, not {len(urls)}")
     loop = asyncio.get_running_loop()
     stations = _ground_stations.get(loop)
     if stations is None:

@@ -14,7 +14,7 @@ from m2pem.errors import PluginError
 INSTALL = "pip install 'm2pem-plugin-mavlink[mavsdk]'"
 
 _LEVELS = (logging.DEBUG, logging.DEBUG, logging.WARNING, logging.ERROR)
-"""Of its levels debug, info, warning and error; its info is of interest to its makers."""
+"""Lowest level of MAVSDK's log that is read (debug, info, warning, error)."""
 
 _readers: Counter[asyncio.AbstractEventLoop] = Counter()
 _callbacks: list[Any] = []
@@ -67,7 +67,7 @@ def reason(error: Exception) -> str:
 def read_log() -> None:
     """Send its log to the logger of this module, in this event loop, instead of the terminal;
     undone by `leave_log`."""
-    # Not by its `log_subscribe`: that prints whatever is no UTF-8, as texts of vehicles may be.
+    # Its `log_subscribe` would print texts that are not UTF-8, which vehicles may send.
     log = require("mavsdk.logging")
     if not _callbacks:
         _callbacks.append(log.LogCallback(_take))

@@ -73,7 +73,7 @@ _RESULTS: dict[str, int] = {
     "DENIED": dialect.MAV_MISSION_DENIED,
     "TRANSFER_CANCELLED": dialect.MAV_MISSION_OPERATION_CANCELLED,
 }
-"""What its results mean, by their names: MAV_MISSION_RESULT."""
+"""The MAV_MISSION_RESULT of each result of MAVSDK, by its name."""
 
 
 async def upload_with_mavsdk(link: "MavsdkLink", transaction: Transaction[Any]) -> bool:
@@ -119,7 +119,7 @@ def _item(item: MissionItem, sequence: int, target: Address) -> Any:
 
 def _transaction_error(error: Exception) -> ExchangeError:
     name = error.result.name if hasattr(error, "result") else ""
-    if name not in _RESULTS:  # a time-out, or trouble of its own
+    if name not in _RESULTS:  # a timeout, or an error of MAVSDK itself
         return NoAnswerError(f"upload of the mission: MAVSDK: {library.reason(error)}")
     result = _RESULTS[name]
     reason = f"mission refused: {mission_result_words(result)}"
@@ -130,7 +130,7 @@ US_PER_S = 1_000_000
 _logger = logging.getLogger(__name__)
 
 UNSENT = 50
-"""So many messages wait to be sent; of more, the oldest are dropped."""
+"""Most messages that wait to be sent; the oldest are dropped."""
 
 
 class MavsdkLink:
@@ -234,7 +234,7 @@ class MavsdkLink:
             if self._closed:
                 raise ExchangeError("the link was closed")
             if not self.attached:
-                raise NoAnswerError(f"system {self.address.system} was not heard yet")
+                raise NoAnswerError(f"system {self.address.system} has sent no message yet")
             if not await upload_with_mavsdk(self, transaction):
                 exchange = Exchange(transaction, self, self._clock)
                 self._exchanges.add(exchange)
@@ -248,7 +248,7 @@ class MavsdkLink:
         """Return None: MAVSDK does not report lost frames."""
         return None
 
-    # --- hearing --------------------------------------------------------------------------------
+    # --- receiving ------------------------------------------------------------------------------
 
     def _read(self, id_: int) -> None:
         if id_ not in self._readers:

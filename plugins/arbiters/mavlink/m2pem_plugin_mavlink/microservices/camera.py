@@ -16,7 +16,7 @@ _NAN = math.nan
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """What CAMERA_INFORMATION says."""
+    """The content of CAMERA_INFORMATION."""
 
     address: Address
     device: int
@@ -25,26 +25,26 @@ class Camera:
     capabilities: int
 
     def has(self, capability: int) -> bool:
-        """Whether it has a CAMERA_CAP_FLAGS."""
+        """Return whether the camera has a capability (CAMERA_CAP_FLAGS)."""
         return bool(self.capabilities & capability)
 
     @property
     def takes_images(self) -> bool:
-        """Whether it can take single images."""
+        """Whether the camera can take single images."""
         return self.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_IMAGE)
 
     @property
     def records(self) -> bool:
-        """Whether it can record videos."""
+        """Whether the camera can record videos."""
         return self.has(dialect.CAMERA_CAP_FLAGS_CAPTURE_VIDEO)
 
     @property
     def zooms(self) -> bool:
-        """Whether it can zoom."""
+        """Whether the camera can zoom."""
         return self.has(dialect.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM)
 
     def mode_for(self, video: bool) -> int | None:
-        """The CAMERA_MODE that it must be in to record, or to take images; None: any will do."""
+        """Return the CAMERA_MODE that recording or taking images requires; None: no certain one."""
         if not self.has(dialect.CAMERA_CAP_FLAGS_HAS_MODES):
             return None
         if video:
@@ -58,8 +58,8 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class CaptureStatus:
-    """What a camera does (CAMERA_CAPTURE_STATUS). `images`: taken since its storage was formatted;
-    `free_mib`: space that is left."""
+    """The activity of a camera (CAMERA_CAPTURE_STATUS). `images`: taken since its storage was
+    formatted; `free_mib`: free space."""
 
     takes_images: bool
     records: bool
@@ -80,13 +80,13 @@ class Storage:
 
     @property
     def is_ready(self) -> bool:
-        """Whether images can be stored, as far as the camera knows."""
+        """Whether the camera reports that it can store images."""
         ready = (dialect.STORAGE_STATUS_READY, dialect.STORAGE_STATUS_NOT_SUPPORTED)
         return self.status in ready
 
 
 class FindCamera(RequestMessage[Camera]):
-    """The camera of a component, if that has one."""
+    """Reads the camera of a component."""
 
     def __init__(self, target: Address, device: int = 0) -> None:
         def read(message: Message) -> Camera | None:
@@ -104,7 +104,7 @@ class FindCamera(RequestMessage[Camera]):
 
 
 class ReadCaptureStatus(RequestMessage[CaptureStatus]):
-    """What a camera does now."""
+    """Reads the present activity of a camera."""
 
     def __init__(self, target: Address, device: int = 0) -> None:
         def read(message: Message) -> CaptureStatus | None:
@@ -122,7 +122,7 @@ class ReadCaptureStatus(RequestMessage[CaptureStatus]):
 
 
 class ReadZoom(RequestMessage[float]):
-    """How far a camera has zoomed: 0 is wide, 1 is narrow; NaN where it does not know
+    """Reads the zoom of a camera: 0 is wide, 1 is narrow; NaN if the camera does not know it
     (CAMERA_SETTINGS)."""
 
     def __init__(self, target: Address, device: int = 0) -> None:
@@ -135,7 +135,7 @@ class ReadZoom(RequestMessage[float]):
 
 
 class ReadStorage(RequestMessage[Storage]):
-    """One of a camera's storages, the first is 1."""
+    """Reads one of a camera's storages; the first is 1."""
 
     def __init__(self, target: Address, storage: int = 1) -> None:
         def read(message: Message) -> Storage | None:
@@ -160,26 +160,26 @@ def take_image(target: Address, sequence: int, device: int = 0) -> Command:
 
 
 def take_images(target: Address, interval_s: float, count: int = 0, device: int = 0) -> Command:
-    """Take `count` images, or with 0 go on until `stop_images`. Nothing keeps a camera from
-    counting anew when that comes twice, so a certain number is asked for only once."""
+    """Take `count` images, or with 0 continue until `stop_images`. A camera may start to count
+    again when it receives the command twice, so a command with a count is sent only once."""
     params = (device, interval_s, count, 0, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_IMAGE_START_CAPTURE, params, once=count != 0)
 
 
 def stop_images(target: Address, device: int = 0) -> Command:
-    """Take no more images."""
+    """Stop taking images."""
     params = (device, _NAN, _NAN, _NAN, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_IMAGE_STOP_CAPTURE, params)
 
 
 def start_video(target: Address, status_hz: float = 0.0, device: int = 0) -> Command:
-    """Record; `status_hz`: how often CAMERA_CAPTURE_STATUS is to be sent."""
+    """Start recording; `status_hz`: the rate of CAMERA_CAPTURE_STATUS."""
     params = (0, status_hz, device, _NAN, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_VIDEO_START_CAPTURE, params)
 
 
 def stop_video(target: Address, device: int = 0) -> Command:
-    """Record no more."""
+    """Stop recording."""
     params = (0, device, _NAN, _NAN, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_VIDEO_STOP_CAPTURE, params)
 
@@ -191,7 +191,7 @@ def zoom(target: Address, fraction: float, device: int = 0) -> Command:
 
 
 def stop_zoom(target: Address, device: int = 0) -> Command:
-    """Zoom no further."""
+    """Stop zooming."""
     params = (dialect.ZOOM_TYPE_CONTINUOUS, 0.0, device, _NAN, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_SET_CAMERA_ZOOM, params)
 
@@ -203,5 +203,5 @@ def camera_mode(target: Address, mode: int, device: int = 0) -> Command:
 
 
 def _text(characters: tuple[int, ...]) -> str:
-    """A text that travels as an array of numbers."""
+    """Return the text in an array of characters."""
     return bytes(characters).partition(b"\0")[0].decode("utf-8", "replace")

@@ -1,4 +1,4 @@
-"""The images that a camera says it has taken (mavlink.io, "Camera Protocol v2",
+"""The images that a camera reports to have taken (mavlink.io, "Camera Protocol v2",
 services/camera.html, "Still Image Capture")."""
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ _MM_PER_M = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """An image. `index` counts what a camera has taken; `taken`: False where that failed. WGS-84
-    degrees, metres above mean sea level; `time_us`: since the Unix epoch, 0 where the camera does
-    not know."""
+    """An image. `index` counts the images of the camera; `taken`: False if it failed. WGS-84
+    degrees, metres above mean sea level; `time_us`: since the Unix epoch, 0 if the camera does not
+    know it."""
 
     index: int
     taken: bool
@@ -29,7 +29,7 @@ class Image:
 
 
 class CapturedImages:
-    """Collects what one camera says. Give it each CAMERA_IMAGE_CAPTURED of its component.
+    """Collects the images of one camera. Pass each CAMERA_IMAGE_CAPTURED of its component to it.
 
     `images`: by index, each once, the last `KEPT`.
     """
@@ -38,11 +38,13 @@ class CapturedImages:
         self.images: dict[int, Image] = {}
 
     def take(self, message: Message) -> Image | None:
-        """A CAMERA_IMAGE_CAPTURED has come; None: it was known."""
+        """Return the image in a CAMERA_IMAGE_CAPTURED; None if it is known."""
         image = image_of(message)
         if self.images.get(image.index) == image:
             return None
-        self.images.pop(image.index, None)  # a camera counts anew when its storage is formatted
+        self.images.pop(
+            image.index, None
+        )  # a camera counts from 0 again when its storage is formatted
         self.images[image.index] = image
         if len(self.images) > KEPT:
             del self.images[next(iter(self.images))]
@@ -53,13 +55,13 @@ class CapturedImages:
         if not self.images:
             return ()
         indexes = range(min(self.images), max(self.images))
-        if len(indexes) > len(self.images) + MOST_GAPS:  # a camera that counted anew
+        if len(indexes) > len(self.images) + MOST_GAPS:  # a camera that counted from 0 again
             return ()
         return tuple(index for index in indexes if index not in self.images)
 
 
 class ReadImage(RequestMessage[Image]):
-    """What a camera says of an image that it has taken."""
+    """Reads the description of an image from the camera."""
 
     def __init__(self, target: Address, index: int) -> None:
         def read(message: Message) -> Image | None:
@@ -69,7 +71,7 @@ class ReadImage(RequestMessage[Image]):
 
 
 def image_of(message: Message) -> Image:
-    """What a CAMERA_IMAGE_CAPTURED says."""
+    """Return the image in a CAMERA_IMAGE_CAPTURED."""
     return Image(
         index=message.image_index,
         taken=message.capture_result == 1,

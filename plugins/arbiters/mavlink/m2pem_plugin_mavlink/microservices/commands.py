@@ -21,35 +21,35 @@ from m2pem_plugin_mavlink.protocol.transaction import (
 
 _WORDS: dict[int, str] = {
     dialect.MAV_RESULT_TEMPORARILY_REJECTED: "not possible now",
-    dialect.MAV_RESULT_DENIED: "denied, as it stands or with these values",
+    dialect.MAV_RESULT_DENIED: "denied, in this state or with these values",
     dialect.MAV_RESULT_UNSUPPORTED: "not supported",
     dialect.MAV_RESULT_FAILED: "failed",
     6: "cancelled",  # MAV_RESULT_CANCELLED, which the dialect does not have
-    dialect.MAV_RESULT_COMMAND_LONG_ONLY: "taken as COMMAND_LONG only",
-    dialect.MAV_RESULT_COMMAND_INT_ONLY: "taken as COMMAND_INT only",
+    dialect.MAV_RESULT_COMMAND_LONG_ONLY: "accepted only as COMMAND_LONG",
+    dialect.MAV_RESULT_COMMAND_INT_ONLY: "accepted only as COMMAND_INT",
 }
 MOST_TEXTS = 3
 
 
 def result_words(result: int) -> str:
-    """What a MAV_RESULT other than "accepted" means."""
+    """Return a text for a MAV_RESULT other than "accepted"."""
     return _WORDS.get(result, f"refused with result {result}")
 
 
 def command_name(command: int) -> str:
-    """A MAV_CMD as people call it: "COMPONENT_ARM_DISARM"."""
+    """Return the name of a MAV_CMD: "COMPONENT_ARM_DISARM"."""
     known = dialect.enums["MAV_CMD"].get(command)
     return str(known.name).removeprefix("MAV_CMD_") if known else f"command {command}"
 
 
 def message_name(id_: int) -> str:
-    """A message as people call it: "GLOBAL_POSITION_INT"."""
+    """Return the name of a message: "GLOBAL_POSITION_INT"."""
     known = dialect.mavlink_map.get(id_)
     return str(known.msgname) if known else f"message {id_}"
 
 
 def with_reason(what: str, texts: Sequence[Text]) -> str:
-    """What was refused, and what the vehicle said of it: "ARM: failed (PreArm: no position)"."""
+    """Return a refusal with the texts of the vehicle: "ARM: failed (PreArm: no position)"."""
     said = dict.fromkeys(each.text for each in texts if each.text)
     reasons = "; ".join(list(said)[-MOST_TEXTS:])
     return f"{what} ({reasons})" if reasons else what
@@ -61,13 +61,13 @@ PROGRESS_S = 10.0
 """A command in progress without a message for this long has failed."""
 
 LONGEST_S = 120.0
-"""A command may be in progress for so long."""
+"""Longest time in seconds for which a command may be in progress."""
 
 REASON_S = 0.5
 """A refusal is followed by a text that says why, and some autopilots send it a little later."""
 
 WORSE_THAN: int = dialect.MAV_SEVERITY_INFO
-"""Only such texts are taken for the reason of a refusal."""
+"""Only texts that are worse than this severity count as the reason of a refusal."""
 
 DEG_TO_1E7 = 1e7
 
@@ -77,7 +77,7 @@ _ACK = message_type("COMMAND_ACK").id
 _TEXT = message_type("STATUSTEXT").id
 _OTHER_FORM = (dialect.MAV_RESULT_COMMAND_LONG_ONLY, dialect.MAV_RESULT_COMMAND_INT_ONLY)
 _CLEAR = (dialect.MAV_RESULT_UNSUPPORTED, *_OTHER_FORM)
-"""Refusals that no text explains."""
+"""Results that need no further text of the vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +92,14 @@ class CommandPosition:
 
 
 class CommandExchange(Transaction[T]):
-    """Sends a command until it is acknowledged; what that means is for subclasses to say.
+    """Sends a command until it is acknowledged; subclasses process the acknowledgement.
 
     Args:
-        target: the component that is to do it.
+        target: the component that executes the command.
         command: a MAV_CMD.
         params: its param1 and so on, as many as matter; the others are 0.
         place: its param5 to param7, which are then sent as whole numbers (COMMAND_INT).
-        once: never sent again, as it would be done again; silence then says nothing.
+        once: send it only once, as a repetition would execute it again.
         progress: called with the progress in percent; None if the vehicle does not report it.
 
     Fails with `RefusedError` (a MAV_RESULT; with the texts that the vehicle sent meanwhile) or
@@ -129,13 +129,13 @@ class CommandExchange(Transaction[T]):
         self._form_changed = False
         self._progress = progress
         self._texts = StatusTexts()
-        self._asked = 0
+        self._sent_count = 0
         self._began_s = 0.0
         self._in_progress = False
         self._refused: RefusedError | None = None
 
     def begin(self, now_s: float) -> None:
-        """Send it, if it can be sent."""
+        """Send the command, if it is valid."""
         self._began_s = now_s
         problem = self._problem()
         if problem:
@@ -148,31 +148,32 @@ class CommandExchange(Transaction[T]):
         if message.TYPE.id == _TEXT:
             self._texts.take(message, sender, now_s)
         elif message.TYPE.id == _ACK and not self.done and self._refused is None:
-            is_ours = (message.command, sender) == (self.command, self.target)
-            if is_ours and self.for_us(message):
+            is_expected = (message.command, sender) == (self.command, self.target)
+            if is_expected and self.for_us(message):
                 self._acknowledged(message, now_s)
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
+        """Repeat the request, or fail."""
         if self._refused is not None:
             self._texts.give_up(now_s)
             texts = self._texts.recent(now_s, worse_than=WORSE_THAN)
             refused = self._refused
             reason = with_reason(refused.reason, texts)
             self.fail(RefusedError(reason, refused.result, temporary=refused.temporary))
-        elif self._in_progress:  # asking again might begin it again
-            self.fail(NoAnswerError(f"{self.name}: was begun, but not heard of again"))
-        elif self._asked < self.retry_policy.tries:
+        elif self._in_progress:  # a repetition might start it again
+            self.fail(NoAnswerError(f"{self.name}: in progress, but no more messages about it"))
+        elif self._sent_count < self.retry_policy.tries:
             self._ask(now_s)
         else:
             self.fail(NoAnswerError(self._silence()))
 
     @abstractmethod
     def accepted(self, ack: Message, now_s: float) -> None:
-        """It was accepted."""
+        """Process the acceptance of the command."""
 
     def refused(self, result: int, now_s: float) -> None:
-        """It was not. Unless a subclass knows better, it fails as soon as the reason is here."""
+        """Process a refusal: fail when the reason was received, unless a subclass does something
+        else."""
         temporary = result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
         words = f"{self.name}: {result_words(result)}"
         self._refused = RefusedError(words, result, temporary=temporary)
@@ -181,9 +182,9 @@ class CommandExchange(Transaction[T]):
             self.fail(self._refused)
 
     def ask_anew(self, params: Sequence[float], now_s: float) -> None:
-        """Send it with other parameters, as a command of its own."""
+        """Send the command with other parameters, as a new one."""
         self._params = tuple(float(each) for each in params) + (0.0,) * (7 - len(params))
-        self._asked = 0
+        self._sent_count = 0
         self._ask(now_s)
 
     def _acknowledged(self, ack: Message, now_s: float) -> None:
@@ -198,21 +199,21 @@ class CommandExchange(Transaction[T]):
         elif result in _OTHER_FORM and not self._form_changed and self._has_other_form(result):
             self._form_changed = True
             self._as_int = not self._as_int
-            self._asked = 0
+            self._sent_count = 0
             self._ask(now_s)
         else:
             self.refused(result, now_s)
 
     def _has_other_form(self, result: int) -> bool:
-        """Whether it can be said as COMMAND_INT, which cannot say NaN."""
+        """Return whether the command has another form: COMMAND_INT cannot have NaN."""
         if self._as_int:
             return bool(result == dialect.MAV_RESULT_COMMAND_LONG_ONLY)
         whole = all(math.isfinite(each) for each in self._params[4:6])
         return whole and bool(result == dialect.MAV_RESULT_COMMAND_INT_ONLY)
 
     def _ask(self, now_s: float) -> None:
-        self.outbox.append(self._message(self._asked))
-        self._asked += 1
+        self.outbox.append(self._message(self._sent_count))
+        self._sent_count += 1
         self.deadline_s = now_s + self.retry_policy.answer_s
 
     def _message(self, confirmation: int) -> Message:
@@ -239,7 +240,7 @@ class CommandExchange(Transaction[T]):
         return made
 
     def _problem(self) -> str:
-        """Why it cannot be sent; "" if it can."""
+        """Return why the command cannot be sent; "" if it can."""
         if len(self._params) > 7:
             return f"has seven parameters, not {len(self._params)}"
         if any(math.isinf(each) for each in self._params):
@@ -248,19 +249,19 @@ class CommandExchange(Transaction[T]):
         if place is None:
             return ""
         if not (abs(place.latitude_deg) <= 90.0 and abs(place.longitude_deg) <= 180.0):
-            return f"there is no place {place.latitude_deg}, {place.longitude_deg}"
+            return f"{place.latitude_deg}, {place.longitude_deg} is not a position"
         return "the altitude is infinite" if math.isinf(place.altitude_m) else ""
 
     def _silence(self) -> str:
-        often = "once" if self._asked == 1 else f"{self._asked} times"
-        return f"{self.name}: no answer, though sent {often} in {self.retry_policy.bound_s:g} s"
+        often = "once" if self._sent_count == 1 else f"{self._sent_count} times"
+        return f"{self.name}: no answer; sent {often} in {self.retry_policy.bound_s:g} s"
 
 
 class Command(CommandExchange[Message]):
     """A command; its result is the COMMAND_ACK that accepted it."""
 
     def accepted(self, ack: Message, now_s: float) -> None:
-        """It is done, or what it begins has begun."""
+        """End: the command is executed, or its execution has begun."""
         self.succeed(ack)
 
 
@@ -270,7 +271,7 @@ class Request(CommandExchange[T]):
 
     Args:
         answer: the id of the message.
-        read: makes the result of the message; None: it is not the one that was meant.
+        read: returns the result in the message; None: it is not the requested one.
     """
 
     def __init__(
@@ -298,10 +299,10 @@ class Request(CommandExchange[T]):
             super().receive(message, sender, now_s)
 
     def accepted(self, ack: Message, now_s: float) -> None:
-        """The message should follow; if it does not, it is asked for again."""
+        """Wait for the message; `expire` requests it again."""
         self._accepted_s = now_s
 
     def _silence(self) -> str:
         if self._accepted_s is None:
             return super()._silence()
-        return f"{self.name}: accepted, but the answer does not come"
+        return f"{self.name}: accepted, but no answer was received"

@@ -19,22 +19,22 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_typ
 ALL = 0
 UNCHANGED = -1
 LET_GO = -3
-"""For the one in control: be it no more."""
+"""Value of the controller's ids that releases control."""
 
 _SET_PITCHYAW = message_type("GIMBAL_MANAGER_SET_PITCHYAW")
 _LEVEL: int = dialect.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | dialect.GIMBAL_MANAGER_FLAGS_PITCH_LOCK
 
 
 class YawFrame(Enum):
-    """What yaw is measured from."""
+    """The direction from which yaw is measured."""
 
-    VEHICLE = "vehicle"  # its bow; the gimbal turns with it
+    VEHICLE = "vehicle"  # its forward direction; the gimbal turns with the vehicle
     NORTH = "north"  # true north; the gimbal stays when the vehicle turns
 
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """Where to point, with the camera level. None: as it is.
+    """A direction to point to, with the camera level. None: the present angle.
 
     Raises:
         ValueError: an angle is not finite.
@@ -47,7 +47,7 @@ class Aim:
     def __post_init__(self) -> None:
         for angle_rad in (self.pitch_rad, self.yaw_rad):
             if angle_rad is not None and not math.isfinite(angle_rad):
-                raise ValueError(f"a gimbal cannot point to {angle_rad}")
+                raise ValueError(f"{angle_rad} is not an angle of a gimbal")
 
     @property
     def flags(self) -> int:
@@ -58,8 +58,8 @@ class Aim:
 
 @dataclass(frozen=True, slots=True)
 class Gimbal:
-    """What GIMBAL_MANAGER_INFORMATION says. `device`: its id towards the manager; ranges are from
-    lowest to highest, `yaw_rad` from the bow."""
+    """The content of GIMBAL_MANAGER_INFORMATION. `device`: the id of the gimbal at the manager;
+    ranges are (lowest, highest), `yaw_rad` from the vehicle's heading."""
 
     manager: Address
     device: int
@@ -68,24 +68,24 @@ class Gimbal:
     yaw_rad: tuple[float, float]
 
     def has(self, capability: int) -> bool:
-        """Whether it has a GIMBAL_MANAGER_CAP_FLAGS."""
+        """Return whether the gimbal has a capability (GIMBAL_MANAGER_CAP_FLAGS)."""
         return bool(self.capabilities & capability)
 
     @property
     def has_endless_yaw(self) -> bool:
-        """Whether it can pan on and on in one direction."""
+        """Whether the gimbal can turn without end in one direction."""
         return self.has(dialect.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_INFINITE_YAW)
 
     @property
     def locks_yaw(self) -> bool:
-        """Whether it can point to somewhere from north (`YawFrame.NORTH`)."""
+        """Whether the gimbal can point relative to north (`YawFrame.NORTH`)."""
         return self.has(dialect.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK)
 
 
 class FindGimbal(RequestMessage[Gimbal]):
-    """The gimbal of a component, if that manages one.
+    """Reads the gimbal of a manager.
 
-    `device`: which, of several; 0: whichever it tells of first.
+    `device`: its id; 0: the first gimbal that the manager reports.
     """
 
     def __init__(self, target: Address, device: int = ALL) -> None:
@@ -104,7 +104,7 @@ class FindGimbal(RequestMessage[Gimbal]):
 
 
 def take_control(manager: Address, controller: Address, device: int = ALL) -> Command:
-    """Have the manager listen to `controller` (which may be us) before all others."""
+    """Give primary control to `controller`, which may be this ground station."""
     system, component = controller
     params = (system, component, UNCHANGED, UNCHANGED, 0, 0, device)
     return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, params)
@@ -117,14 +117,16 @@ def release(manager: Address, device: int = ALL) -> Command:
 
 
 def point(manager: Address, aim: Aim, device: int = ALL) -> Command:
-    """Point it, and hear that it was accepted. Where it points then, its attitude tells."""
+    """Point the gimbal. The result is the acknowledgement; the attitude message has the
+    direction."""
     pitch_deg, yaw_deg = (math.degrees(each) for each in _angles(aim))
     params = (pitch_deg, yaw_deg, math.nan, math.nan, aim.flags, 0, device)
     return Command(manager, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, params)
 
 
 def pointing(manager: Address, aim: Aim, device: int = ALL) -> Message:
-    """The same without an answer, to be sent over and over (GIMBAL_MANAGER_SET_PITCHYAW)."""
+    """Return `point` as a message without an answer, to send repeatedly
+    (GIMBAL_MANAGER_SET_PITCHYAW)."""
     pitch_rad, yaw_rad = _angles(aim)
     message: Message = _SET_PITCHYAW.make(
         flags=aim.flags,

@@ -1,4 +1,4 @@
-"""Where gimbals point and who controls them, as they say it (mavlink.io, "Gimbal Protocol v2",
+"""The direction and the controller that gimbals report (mavlink.io, "Gimbal Protocol v2",
 services/gimbal_v2.html)."""
 
 import math
@@ -13,7 +13,7 @@ WANTED = frozenset(
     message_type(name).id for name in ("GIMBAL_DEVICE_ATTITUDE_STATUS", "GIMBAL_MANAGER_STATUS")
 )
 MOST_GIMBALS = 16
-"""Of one vehicle: more are not believed."""
+"""Most gimbals of one vehicle."""
 
 _ATTITUDE = message_type("GIMBAL_DEVICE_ATTITUDE_STATUS").id
 _STATUS = message_type("GIMBAL_MANAGER_STATUS").id
@@ -21,12 +21,13 @@ _STATUS = message_type("GIMBAL_MANAGER_STATUS").id
 
 @dataclass(frozen=True, slots=True)
 class GimbalAttitude:
-    """Where a gimbal points. Pitch: upwards from the horizon. Yaw: to the right, from the bow and
-    from true north; None where it is not known. `failures`: GIMBAL_DEVICE_ERROR_FLAGS."""
+    """The attitude of a gimbal. Pitch: upwards from the horizon. Yaw: to the right, from the
+    vehicle's heading and from true north; None if it is not known. `failures`:
+    GIMBAL_DEVICE_ERROR_FLAGS."""
 
     roll_rad: float
     pitch_rad: float
-    yaw_from_bow_rad: float | None
+    yaw_from_vehicle_rad: float | None
     yaw_from_north_rad: float | None
     failures: int
     at_s: float
@@ -35,8 +36,7 @@ class GimbalAttitude:
 class GimbalStatus:
     """The last state of each gimbal of a vehicle. Pass each message of `WANTED` to it.
 
-    Gimbals are told apart by who sends of them, and by the id of the device (0: a gimbal with an
-    address of its own).
+    The sender and the id of the device identify a gimbal (0: one with an address of its own).
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class GimbalStatus:
         self.controllers: dict[tuple[Address, int], Address] = {}
 
     def take(self, message: Message, sender: Address, now_s: float) -> None:
-        """A message of `WANTED` has come."""
+        """Process a message of `WANTED`."""
         gimbal = sender, message.gimbal_device_id
         if message.TYPE.id == _ATTITUDE:
             attitude = attitude_of(message, now_s)
@@ -60,7 +60,7 @@ class GimbalStatus:
         return max(found, key=lambda each: each.at_s, default=None)
 
     def controller(self, manager: Address, device: int = 0) -> Address | None:
-        """The address in control; system 0: none is, None: the manager has not reported it."""
+        """Return the address in control; system 0: none, None: the manager has not reported it."""
         return next(
             (
                 each
@@ -72,7 +72,7 @@ class GimbalStatus:
 
 
 def attitude_of(message: Message, now_s: float) -> GimbalAttitude | None:
-    """What a GIMBAL_DEVICE_ATTITUDE_STATUS says; None where its quaternion is none."""
+    """Return the attitude in a GIMBAL_DEVICE_ATTITUDE_STATUS; None if its quaternion is invalid."""
     angles = _roll_pitch_yaw(message.q)
     if angles is None:
         return None
@@ -86,9 +86,9 @@ def attitude_of(message: Message, now_s: float) -> GimbalAttitude | None:
     if says_frame and math.isfinite(message.delta_yaw):
         delta = -message.delta_yaw if from_north else message.delta_yaw
         other = math.remainder(yaw_rad + delta, math.tau)
-    from_bow_rad, from_north_rad = (other, yaw_rad) if from_north else (yaw_rad, other)
+    from_vehicle_rad, from_north_rad = (other, yaw_rad) if from_north else (yaw_rad, other)
     return GimbalAttitude(
-        roll_rad, pitch_rad, from_bow_rad, from_north_rad, message.failure_flags, now_s
+        roll_rad, pitch_rad, from_vehicle_rad, from_north_rad, message.failure_flags, now_s
     )
 
 

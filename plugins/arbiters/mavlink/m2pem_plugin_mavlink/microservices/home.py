@@ -1,4 +1,4 @@
-"""Where a vehicle returns to, and the origin of its local frame (HOME_POSITION,
+"""The home of a vehicle, and the origin of its local frame (HOME_POSITION,
 GPS_GLOBAL_ORIGIN; mavlink.io, messages/common.html)."""
 
 from dataclasses import dataclass
@@ -32,22 +32,23 @@ class GroundPlace:
 
 
 class ReadHome(RequestMessage[GroundPlace]):
-    """Where the vehicle returns to; refused before it has a position."""
+    """Reads the home; the vehicle refuses before it has a position."""
 
     def __init__(self, target: Address) -> None:
         super().__init__(target, "HOME_POSITION", place_of)
 
 
 class ReadOrigin(RequestMessage[GroundPlace]):
-    """Where its local frame begins; refused before it has a position."""
+    """Reads the origin of the local frame; the vehicle refuses before it has a position."""
 
     def __init__(self, target: Address) -> None:
         super().__init__(target, "GPS_GLOBAL_ORIGIN", place_of)
 
 
 class SetOrigin(Transaction[GroundPlace]):
-    """Let its local frame begin at a place (SET_GPS_GLOBAL_ORIGIN), which it does only once, before
-    it has a position. The result is what it says then, which may be another place."""
+    """Sets the origin of the local frame (SET_GPS_GLOBAL_ORIGIN). A vehicle accepts it once, before
+    it has a position. The result is the origin that the vehicle reports, which may be another
+    one."""
 
     wants = frozenset({_ORIGIN.id})
 
@@ -57,11 +58,11 @@ class SetOrigin(Transaction[GroundPlace]):
         self._tries = 0
 
     def begin(self, now_s: float) -> None:
-        """Ask, if there is such a place."""
+        """Send the origin, if it is a position."""
         place = self.place
         is_place = abs(place.latitude_deg) <= 90.0 and abs(place.longitude_deg) <= 180.0
         if not (is_place and abs(place.altitude_amsl_m) < 1e6):
-            self.fail(ExchangeError(f"there is no place {place}"))
+            self.fail(ExchangeError(f"{place} is not a position"))
             return
         self._tries += 1
         self.outbox.append(
@@ -75,21 +76,21 @@ class SetOrigin(Transaction[GroundPlace]):
         self.deadline_s = now_s + RETRIES.answer_s
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """It says where its origin is."""
+        """Process the origin that the vehicle reports."""
         if sender == self.target:
             self.succeed(place_of(message))
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
+        """Repeat the request, or fail."""
         if self._tries < RETRIES.tries:
             self.begin(now_s)
         else:
-            asked = f"no answer, though asked {self._tries} times"
+            asked = f"no answer after {self._tries} requests"
             self.fail(NoAnswerError(f"setting the origin: {asked}"))
 
 
 def set_home(target: Address, place: GroundPlace | None) -> Command:
-    """Return to a place from now on; None: to where it is."""
+    """Set the home; None: to the present position."""
     command = dialect.MAV_CMD_DO_SET_HOME
     if place is None:
         return Command(target, command, (1,))
@@ -103,7 +104,7 @@ def set_home(target: Address, place: GroundPlace | None) -> Command:
 
 
 def place_of(message: Message) -> GroundPlace:
-    """What a HOME_POSITION or GPS_GLOBAL_ORIGIN says."""
+    """Return the place in a HOME_POSITION or GPS_GLOBAL_ORIGIN."""
     return GroundPlace(
         message.latitude / _DEG_TO_1E7,
         message.longitude / _DEG_TO_1E7,

@@ -1,4 +1,4 @@
-"""How often messages are sent, and single ones on request (mavlink.io, "Command Protocol" and
+"""Intervals of messages, and single messages on request (mavlink.io, "Command Protocol" and
 "Requesting Messages", mavgen_c/howto_requestmessages.html)."""
 
 from collections.abc import Callable
@@ -17,16 +17,16 @@ T = TypeVar("T")
 US_PER_S = 1_000_000
 SLOWER = 2.0
 SLOWER_TRIES = 4
-"""A rate that is refused is tried slower by `SLOWER` so often: autopilots deny what is faster than
-their main loop allows."""
+"""Attempts after a refused rate, each slower by the factor `SLOWER`: autopilots deny rates that are
+faster than their main loop allows."""
 
 _INTERVAL = message_type("MESSAGE_INTERVAL").id
 
 
 class SetMessageInterval(CommandExchange[float]):
-    """Have a message sent every so many seconds, by the vehicle's clock; the result is the interval
-    that was accepted, which is longer where the one asked for was denied. An unknown message is
-    denied just as well, at last.
+    """Sets the interval of a message in seconds of the vehicle's clock. The result is the accepted
+    interval, which is longer if the requested one was denied. An unknown message is denied at any
+    interval.
 
     `interval_s`: 0 for what the vehicle sends by itself, -1 for never.
     """
@@ -47,11 +47,11 @@ class SetMessageInterval(CommandExchange[float]):
         self.name = f"{self.name} of {message_name(message_id)}"
 
     def accepted(self, ack: Message, now_s: float) -> None:
-        """This often, then."""
+        """End with the accepted interval."""
         self.succeed(self._interval_s)
 
     def refused(self, result: int, now_s: float) -> None:
-        """Slower, if that may help."""
+        """Try a slower rate if that may be accepted."""
         if result == dialect.MAV_RESULT_DENIED and self._slower_left:
             self._slower_left -= 1
             self._interval_s *= SLOWER
@@ -65,8 +65,8 @@ class SetMessageInterval(CommandExchange[float]):
 
 
 class ReadMessageInterval(Request[float]):
-    """The seconds between two messages of one kind; -1 where they are not sent, 0 where the vehicle
-    has no such message. (GET_MESSAGE_INTERVAL, which more autopilots know than its successor.)"""
+    """Reads the seconds between two messages of one kind; -1: not sent, 0: the vehicle has no such
+    message. (GET_MESSAGE_INTERVAL, which more autopilots know than its successor.)"""
 
     def __init__(
         self, target: Address, message_id: int, *, retry_policy: RetryPolicy = RETRIES
@@ -82,11 +82,11 @@ class ReadMessageInterval(Request[float]):
 
 
 class RequestMessage(Request[T]):
-    """One message once, as `read` makes it out.
+    """Requests one message once; the result is that of `read`.
 
     Args:
         name: of the message: "HOME_POSITION".
-        index: where there is one for each of several things (cameras, images), which.
+        index: of the camera or image, if there are several.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class RequestMessage(Request[T]):
 
 
 def as_it_is(message: Message) -> Message:
-    """For `RequestMessage`: the message itself."""
+    """Return the message itself; for `RequestMessage`."""
     return message
 
 
@@ -132,12 +132,12 @@ class AutopilotVersion:
         return ".".join(str(each) for each in self.version) + self.stage
 
     def has(self, capability: int) -> bool:
-        """Whether it has a MAV_PROTOCOL_CAPABILITY."""
+        """Return whether the autopilot has a MAV_PROTOCOL_CAPABILITY."""
         return bool(self.capabilities & capability)
 
     @property
     def parameter_encoding(self) -> ParameterEncoding | None:
-        """How it carries whole numbers in parameters; None: it does not say."""
+        """The encoding of whole numbers in parameters; None: not reported."""
         if self.has(dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE):
             return ParameterEncoding.BYTEWISE
         if self.has(dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST):
@@ -146,14 +146,14 @@ class AutopilotVersion:
 
 
 class ReadAutopilotVersion(RequestMessage[AutopilotVersion]):
-    """The version of an autopilot's firmware, and what it can do."""
+    """Reads the version and the capabilities of an autopilot's firmware."""
 
     def __init__(self, target: Address) -> None:
         super().__init__(target, "AUTOPILOT_VERSION", version_of)
 
 
 def version_of(message: Message) -> AutopilotVersion:
-    """What an AUTOPILOT_VERSION says."""
+    """Return the content of an AUTOPILOT_VERSION."""
     major, minor, patch, stage = message.flight_sw_version.to_bytes(4, "big")
     words = _STAGES.get(stage, f"-{stage}")
     return AutopilotVersion((major, minor, patch), words, message.capabilities, message.uid)

@@ -1,6 +1,6 @@
 """Downloading a mission, a fence or rally points (mavlink.io, "Mission Protocol",
-services/mission.html, "Download a Mission from the Vehicle"): one item after the other, each asked
-for until it comes."""
+services/mission.html, "Download a Mission from the Vehicle"): one item after the other, each
+requested until it is received."""
 
 from m2pem_plugin_mavlink.microservices.mission_items import (
     ACCEPTED,
@@ -22,17 +22,17 @@ from m2pem_plugin_mavlink.protocol.transaction import (
     Transaction,
 )
 
-COUNT_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
-ITEM_PATIENCE = RetryPolicy(tries=8, answer_s=0.75)
+COUNT_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
+ITEM_RETRIES = RetryPolicy(tries=8, answer_s=0.75)
 """mavlink.io has 0.25 s and five times, which is too short for most radios."""
 
 PASSES = 3
-"""So often is it begun, when the vehicle's mission changes or the vehicle cancels."""
+"""Attempts, if the vehicle's mission changes or the vehicle cancels."""
 
 BASE_S = 60.0
 PER_ITEM_S = 3.0
 MOST_ITEMS = 5000
-"""What says that it has more is not believed; autopilots have room for some hundreds."""
+"""Most items of a vehicle; autopilots store some hundreds."""
 
 _LIST = message_type("MISSION_REQUEST_LIST")
 _COUNT = message_type("MISSION_COUNT")
@@ -41,10 +41,10 @@ _ACK = message_type("MISSION_ACK")
 
 
 class DownloadMission(Transaction[tuple[MissionItem, ...]]):
-    """The items that a vehicle has stored, as it has stored them (ArduPilot: item 0 is home).
+    """Downloads the stored items of a vehicle (ArduPilot: item 0 is home).
 
-    Fails with `RefusedError` (a MAV_MISSION_RESULT), `NoAnswerError`, or `ExchangeError` for a
-    count that cannot be; at the latest after `BASE_S` and `PER_ITEM_S` for each item.
+    Fails with `RefusedError` (a MAV_MISSION_RESULT), `NoAnswerError`, or `ExchangeError` for an
+    impossible count; at the latest after `BASE_S` and `PER_ITEM_S` for each item.
     """
 
     wants = frozenset({_COUNT.id, ITEM_INT.id, ITEM_FLOAT.id, _ACK.id})
@@ -60,14 +60,14 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
         self._items: dict[int, MissionItem] = {}
 
     def begin(self, now_s: float) -> None:
-        """Ask how many items there are."""
+        """Request the number of items."""
         self._began_s = now_s
         self._pass(now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """The count, an item, or a refusal."""
-        is_ours = sender == self.target and message.mission_type == self.mission_type
-        if self.done or not is_ours or not self.for_us(message):
+        """Process the count, an item, or a refusal."""
+        is_expected = sender == self.target and message.mission_type == self.mission_type
+        if self.done or not is_expected or not self.for_us(message):
             return
         if message.TYPE is _COUNT:
             self._counted(message.count, now_s)
@@ -80,17 +80,17 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
                 self._go_on(now_s)
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
+        """Repeat the request, or fail."""
         if now_s >= self._ends_s:
             self._stop(NoAnswerError(f"{self._title}: not done in time"))
-        elif self._count is None and self._tries >= COUNT_PATIENCE.tries:
-            asked = f"no answer, though asked {self._tries} times"
+        elif self._count is None and self._tries >= COUNT_RETRIES.tries:
+            asked = f"no answer after {self._tries} requests"
             self._stop(NoAnswerError(f"{self._title}: {asked}"))
         elif self._count is None:
             self._ask_count(now_s)
-        elif self._tries >= ITEM_PATIENCE.tries:
-            asked = f"item {self._next} of {self._count} does not come"
-            self._stop(NoAnswerError(f"{self._title}: {asked}, though asked {self._tries} times"))
+        elif self._tries >= ITEM_RETRIES.tries:
+            asked = f"item {self._next} of {self._count} was not received"
+            self._stop(NoAnswerError(f"{self._title}: {asked} after {self._tries} requests"))
         else:
             self._ask_item(now_s)
 
@@ -113,19 +113,21 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
         if count == self._count:
             return
         if count > MOST_ITEMS:
-            self._stop(ExchangeError(f"{self._title}: {count} items cannot be"))
+            self._stop(ExchangeError(f"{self._title}: {count} items are impossible"))
         elif self._count is not None and not self._passes_left:
             changed = f"{self._count} items, then {count}"
-            self._stop(ExchangeError(f"{self._title}: it changes while it is read: {changed}"))
+            self._stop(
+                ExchangeError(f"{self._title}: the mission changes during the download: {changed}")
+            )
         else:
-            if self._count is not None:  # the first count may have been a late one
+            if self._count is not None:  # the first count may be from an earlier exchange
                 self._passes_left -= 1
             self._count, self._tries, self._next = count, 0, 0
             self._items.clear()
             self._go_on(now_s)
 
     def _acknowledged(self, result: int, now_s: float) -> None:
-        if result == ACCEPTED:  # a late one, of an upload
+        if result == ACCEPTED:  # from an earlier upload
             return
         if result == CANCELLED and self._passes_left:
             self._pass(now_s)
@@ -152,19 +154,19 @@ class DownloadMission(Transaction[tuple[MissionItem, ...]]):
                 mission_type=self.mission_type,
             )
         )
-        self.deadline_s = min(now_s + COUNT_PATIENCE.answer_s, self._ends_s)
+        self.deadline_s = min(now_s + COUNT_RETRIES.answer_s, self._ends_s)
 
     def _ask_item(self, now_s: float) -> None:
         self._tries += 1
         self.outbox.append(item_request(self.target, self._next, self.mission_type))
-        self.deadline_s = min(now_s + ITEM_PATIENCE.answer_s, self._ends_s)
+        self.deadline_s = min(now_s + ITEM_RETRIES.answer_s, self._ends_s)
 
     def _stop(self, error: ExchangeError) -> None:
         self._end(CANCELLED)
         self.fail(error)
 
     def _end(self, result: int) -> None:
-        """Have the vehicle stop waiting for requests."""
+        """Send an acknowledgement, so that the vehicle stops waiting for requests."""
         self.outbox.append(
             _ACK.make(
                 target_system=self.target.system,

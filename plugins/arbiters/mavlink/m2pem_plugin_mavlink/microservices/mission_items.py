@@ -28,7 +28,7 @@ _WORDS: dict[int, str] = {
     dialect.MAV_MISSION_INVALID_PARAM6_Y: "param6 or longitude is not valid",
     dialect.MAV_MISSION_INVALID_PARAM7: "param7 or altitude is not valid",
     dialect.MAV_MISSION_INVALID_SEQUENCE: "out of sequence",
-    dialect.MAV_MISSION_DENIED: "denied to us: perhaps another ground station is uploading",
+    dialect.MAV_MISSION_DENIED: "denied: another ground station may be uploading",
     dialect.MAV_MISSION_OPERATION_CANCELLED: "cancelled by the vehicle",
 }
 _OF_ONE_ITEM = frozenset(
@@ -42,17 +42,17 @@ _TEMPORARY = frozenset({dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_DENIED, C
 
 
 def mission_result_words(result: int) -> str:
-    """What a MAV_MISSION_RESULT other than "accepted" means."""
+    """Return a text for a MAV_MISSION_RESULT other than "accepted"."""
     return _WORDS.get(result, f"refused with result {result}")
 
 
 def is_of_one_item(result: int) -> bool:
-    """Whether the item that was sent last is to blame."""
+    """Return whether a result concerns the item that was sent last."""
     return result in _OF_ONE_ITEM
 
 
 def is_temporary(result: int) -> bool:
-    """Whether asking again later may help."""
+    """Return whether a later request may succeed."""
     return result in _TEMPORARY
 
 
@@ -66,13 +66,13 @@ _SAME_FRAME: dict[int, int] = {
     dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT: dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
-"""Frames that autopilots give back for others."""
+"""Frames that autopilots return in place of others."""
 
 _GLOBAL = frozenset({*_SAME_FRAME, *_SAME_FRAME.values()})
 
 
 class MissionType(IntEnum):
-    """What is stored apart from each other: MAV_MISSION_TYPE."""
+    """The kinds of stored items: MAV_MISSION_TYPE."""
 
     MISSION = dialect.MAV_MISSION_TYPE_MISSION
     FENCE = dialect.MAV_MISSION_TYPE_FENCE
@@ -82,9 +82,9 @@ class MissionType(IntEnum):
 @dataclass(frozen=True, slots=True)
 class MissionItem:
     """One item. `frame`: a MAV_FRAME; `command`: a MAV_CMD; `params`: its param1..param4, NaN for
-    "as it is"; `latitude_deg`, `longitude_deg` (WGS-84), `altitude_m`: its x, y, z where it has a
-    place, and its param5..param7 as they are where `frame` is MAV_FRAME_MISSION. `autocontinue`: go
-    on by itself afterwards."""
+    "as it is"; `latitude_deg`, `longitude_deg` (WGS-84), `altitude_m`: its x, y, z if it has a
+    place, else its param5..param7 (`frame` MAV_FRAME_MISSION). `autocontinue`: continue with the
+    next item."""
 
     command: int
     frame: int
@@ -95,9 +95,9 @@ class MissionItem:
     autocontinue: bool = True
 
     def same_as(self, other: "MissionItem") -> bool:
-        """Whether they say the same, but for what storing them may change: an autopilot keeps
-        coordinates in 1e-7 degrees and altitudes as floats of 32 or fewer bits, and gives back a
-        frame that means the same."""
+        """Return whether both are the same, except for changes by storing them: an autopilot keeps
+        coordinates in 1e-7 degrees and altitudes as floats of 32 or fewer bits, and returns an
+        equivalent frame."""
         return (
             self.command == other.command
             and _SAME_FRAME.get(self.frame, self.frame) == _SAME_FRAME.get(other.frame, other.frame)
@@ -107,9 +107,9 @@ class MissionItem:
         )
 
     def problem(self) -> str:
-        """Why it cannot be uploaded; "" if it can."""
+        """Return why the item cannot be uploaded; "" if it can."""
         if not 0 <= self.command <= 0xFFFF:
-            return f"there is no command {self.command}"
+            return f"command {self.command} does not exist"
         if any(math.isinf(each) for each in self.params):
             return "a parameter is infinite"
         if not math.isfinite(self.altitude_m):
@@ -117,7 +117,7 @@ class MissionItem:
         x, y = self.latitude_deg, self.longitude_deg
         if self.frame in _GLOBAL:
             sound = abs(x) <= 90.0 and abs(y) <= 180.0  # False for NaN
-            return "" if sound else f"there is no place {x}, {y}"
+            return "" if sound else f"{x}, {y} is not a position"
         if self.frame != _NO_FRAME:
             return f"frame {self.frame} is not a global one"
         whole = math.isfinite(x) and math.isfinite(y) and max(abs(x), abs(y)) < 2**31
@@ -127,8 +127,8 @@ class MissionItem:
 def item_message(
     item: MissionItem, sequence: int, target: Address, mission_type: MissionType
 ) -> Message:
-    """MISSION_ITEM_INT. The first item of a mission is its current one: PX4 begins there, and some
-    ground stations insist on exactly one."""
+    """Return a MISSION_ITEM_INT. The first item of a mission is marked as current: PX4 begins
+    there, and some ground stations require exactly one."""
     scale = 1.0 if item.frame == _NO_FRAME else _DEG_TO_1E7
     named = {f"param{number}": float(each) for number, each in enumerate(item.params, 1)}
     message: Message = ITEM_INT.make(
@@ -149,7 +149,7 @@ def item_message(
 
 
 def item_of(message: Message) -> MissionItem:
-    """What a MISSION_ITEM_INT or MISSION_ITEM says. What it says need not make sense: see
+    """Return the item in a MISSION_ITEM_INT or MISSION_ITEM. It may be invalid: see
     `MissionItem.problem`."""
     is_scaled = message.TYPE is ITEM_INT and message.frame != _NO_FRAME
     scale = _DEG_TO_1E7 if is_scaled else 1.0

@@ -1,10 +1,10 @@
 """Uploading a mission, a fence or rally points (mavlink.io, "Mission Protocol",
 services/mission.html, "Upload a Mission to the Vehicle").
 
-The vehicle asks for the items, and asks again for one that is lost. When it falls silent before it
-has acknowledged all of them, nobody here knows what it has stored; the upload is then begun anew,
-which stores the same again. It succeeds by an acknowledgement after all items, and in no other way;
-if it fails, what the vehicle has must be looked at before it is used.
+The vehicle requests the items, and requests a lost one again. If it falls silent before it has
+acknowledged all of them, its stored items are not known; the upload then starts again, which stores
+the same items again. It succeeds only by an acknowledgement after all items. After a failure, the
+stored items must be checked before they are used.
 """
 
 from collections.abc import Sequence
@@ -31,22 +31,22 @@ from m2pem_plugin_mavlink.protocol.transaction import (
     Transaction,
 )
 
-COUNT_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
+COUNT_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
 """For the first request; mavlink.io: 1.5 s, five times."""
 
 SILENCE_S = 5.0
-"""Autopilots ask again after 0.25 to 1 s. What is silent for so long has heard no item any more, or
-its acknowledgement was lost."""
+"""Autopilots repeat a request after 0.25 to 1 s. After this silence, an item or the acknowledgement
+was lost."""
 
 TOO_SOON_S = 0.1
-"""What asks again for an item sooner than that has not waited for it: it was sent something twice.
-If that is answered, and the answer doubled again, they multiply."""
+"""A request that is repeated sooner than this is a duplicate. An answer to it could be duplicated,
+too, and so on."""
 
 PASSES = 3
-"""So often is it begun."""
+"""Most attempts of an upload."""
 
 REPEATS = 20
-"""So often is one item sent in one pass."""
+"""Most times that one attempt sends an item."""
 
 BASE_S = 60.0
 PER_ITEM_S = 3.0
@@ -59,11 +59,11 @@ _ACK = message_type("MISSION_ACK")
 
 
 class UploadMission(Transaction[None]):
-    """Store these items, in place of what is stored there.
+    """Stores items in place of the stored ones.
 
     Fails with `RefusedError` (a MAV_MISSION_RESULT, and which item; `temporary` where it is busy or
-    has cancelled) or `NoAnswerError`, at the latest after `bound_s`. Items that cannot be sent fail
-    before anything is.
+    has cancelled) or `NoAnswerError`, at the latest after `bound_s`. Invalid items fail before
+    anything is sent.
     """
 
     wants = frozenset({_REQUEST.id, _REQUEST_INT.id, _ACK.id})
@@ -88,7 +88,7 @@ class UploadMission(Transaction[None]):
         self._oddity = ""
 
     def begin(self, now_s: float) -> None:
-        """Say how many items there are, if all can be sent."""
+        """Send the number of items, if all are valid."""
         self._ends_s = now_s + self.bound_s
         problem = self._problem()
         if problem:
@@ -97,9 +97,9 @@ class UploadMission(Transaction[None]):
             self._pass(now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """The vehicle wants an item, or it has them all, or does not want them."""
-        is_ours = sender == self.target and message.mission_type == self.mission_type
-        if self.done or not is_ours or not self.for_us(message):
+        """Process a request for an item, or the acknowledgement."""
+        is_expected = sender == self.target and message.mission_type == self.mission_type
+        if self.done or not is_expected or not self.for_us(message):
             return
         if message.TYPE is _ACK:
             self._acknowledged(message.type, now_s)
@@ -107,17 +107,17 @@ class UploadMission(Transaction[None]):
             self._wanted(message.seq, now_s)
 
     def expire(self, now_s: float) -> None:
-        """Say again how many there are; begin anew; or give up."""
+        """Send the number of items again; start the upload again; or fail."""
         if now_s >= self._ends_s:
             self._give_up(f"not done within {self.bound_s:g} s")
-        elif self._last is None and self._counts_sent < COUNT_PATIENCE.tries:
+        elif self._last is None and self._counts_sent < COUNT_RETRIES.tries:
             self._send_count(now_s)
         elif self._last is None:
-            self._give_up(f"no answer, though asked {self._counts_sent} times")
+            self._give_up(f"no answer after {self._counts_sent} attempts")
         elif self._passes_left:
             self._pass(now_s)
         else:
-            self._give_up(f"silent after item {self._last}; what it has stored is not known")
+            self._give_up(f"no answer after item {self._last}; the stored items are not known")
 
     def _pass(self, now_s: float) -> None:
         self._passes_left -= 1
@@ -136,18 +136,18 @@ class UploadMission(Transaction[None]):
                 mission_type=self.mission_type,
             )
         )
-        self._wait(COUNT_PATIENCE.answer_s, now_s)
+        self._wait(COUNT_RETRIES.answer_s, now_s)
 
     def _wanted(self, sequence: int, now_s: float) -> None:
         if sequence >= len(self.items):
-            self._oddity = f"it asked for item {sequence} of {len(self.items)}"
+            self._oddity = f"the vehicle requested item {sequence} of {len(self.items)}"
             return
         if now_s - self._sent_s[sequence] < TOO_SOON_S:
             return
         self._sent[sequence] += 1
         self._sent_s[sequence] = now_s
         if self._sent[sequence] > REPEATS:
-            self._give_up(f"item {sequence} does not arrive, though sent {REPEATS} times")
+            self._give_up(f"the vehicle requested item {sequence} {REPEATS} times")
             return
         self._last = sequence
         self._never_sent.discard(sequence)
@@ -157,12 +157,14 @@ class UploadMission(Transaction[None]):
 
     def _acknowledged(self, result: int, now_s: float) -> None:
         if result == ACCEPTED:
-            if not self._never_sent:  # or it is a late one, of an earlier upload
+            if not self._never_sent:  # or the acknowledgement of an earlier upload
                 self.succeed(None)
-        elif result == OUT_OF_SEQUENCE:  # an item came twice, or too late; it will say which
-            self._oddity = "it said that an item was out of sequence"
+        elif (
+            result == OUT_OF_SEQUENCE
+        ):  # an item came twice, or too late: the vehicle requests the right one
+            self._oddity = "the vehicle reported an item out of sequence"
         elif result == CANCELLED and self._passes_left:
-            self._oddity = "it cancelled the upload"
+            self._oddity = "the vehicle cancelled the upload"
             self._pass(now_s)
         else:
             self._refuse(result)
@@ -178,7 +180,7 @@ class UploadMission(Transaction[None]):
         self.fail(RefusedError(error, result, temporary=is_temporary(result)))
 
     def _give_up(self, reason: str) -> None:
-        """Have the vehicle stop waiting for items, and say that it is over."""
+        """Make the vehicle stop waiting for items, and fail."""
         self.outbox.append(
             _ACK.make(
                 target_system=self.target.system,
@@ -195,6 +197,6 @@ class UploadMission(Transaction[None]):
 
     def _problem(self) -> str:
         if len(self.items) > MOST_ITEMS:
-            return f"{len(self.items)} items, and {MOST_ITEMS} are possible"
+            return f"{len(self.items)} items; at most {MOST_ITEMS} are possible"
         problems = ((n, item.problem()) for n, item in enumerate(self.items))
         return next((f"item {n}: {problem}" for n, problem in problems if problem), "")

@@ -1,4 +1,4 @@
-"""Clearing what is stored, choosing the current item, and reading a single one (mavlink.io,
+"""Clearing stored items, setting the current one, and reading a single one (mavlink.io,
 "Mission Protocol", services/mission.html)."""
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -25,7 +25,7 @@ from m2pem_plugin_mavlink.protocol.transaction import (
     Transaction,
 )
 
-CLEAR_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
+CLEAR_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
 
 _CLEAR = message_type("MISSION_CLEAR_ALL")
 _ACK = message_type("MISSION_ACK")
@@ -34,7 +34,7 @@ _SET_CURRENT = message_type("MISSION_SET_CURRENT")
 
 
 class ClearMission(Transaction[None]):
-    """Remove all items. ArduPilot refuses it while it flies them.
+    """Removes all items. ArduPilot refuses while it executes them.
 
     Fails with `RefusedError` (a MAV_MISSION_RESULT) or `NoAnswerError`.
     """
@@ -56,32 +56,32 @@ class ClearMission(Transaction[None]):
                 mission_type=self.mission_type,
             )
         )
-        self.deadline_s = now_s + CLEAR_PATIENCE.answer_s
+        self.deadline_s = now_s + CLEAR_RETRIES.answer_s
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """Done or refused."""
-        is_ours = sender == self.target and message.mission_type == self.mission_type
-        if not is_ours or not self.for_us(message):
+        """Process the acknowledgement or refusal."""
+        is_expected = sender == self.target and message.mission_type == self.mission_type
+        if not is_expected or not self.for_us(message):
             return
         if message.type == ACCEPTED:
             self.succeed(None)
-        elif message.type != CANCELLED:  # of an upload that was given up
+        elif message.type != CANCELLED:  # from an upload that has failed
             reason = f"clearing the {self.mission_type.name.lower()}: "
             reason += mission_result_words(message.type)
             self.fail(RefusedError(reason, message.type, temporary=is_temporary(message.type)))
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
-        if self._tries < CLEAR_PATIENCE.tries:
+        """Repeat the request, or fail."""
+        if self._tries < CLEAR_RETRIES.tries:
             self.begin(now_s)
             return
         what = f"clearing the {self.mission_type.name.lower()}"
-        self.fail(NoAnswerError(f"{what}: no answer, though asked {self._tries} times"))
+        self.fail(NoAnswerError(f"{what}: no answer after {self._tries} requests"))
 
 
 class SetCurrentItem(CommandExchange[None]):
-    """Have the stored mission go on at an item: by DO_SET_MISSION_CURRENT, or where that is not
-    known by its predecessor, of which MISSION_CURRENT shows what it did."""
+    """Sets the current item of the stored mission by DO_SET_MISSION_CURRENT or, if that is not
+    supported, by its predecessor; MISSION_CURRENT then confirms it."""
 
     wants = CommandExchange.wants | {_CURRENT.id}
 
@@ -96,11 +96,11 @@ class SetCurrentItem(CommandExchange[None]):
         self._tries = 0
 
     def accepted(self, ack: Message, now_s: float) -> None:
-        """It is done."""
+        """End: the command is executed."""
         self.succeed(None)
 
     def refused(self, result: int, now_s: float) -> None:
-        """An autopilot that does not know the command knows the message."""
+        """Send the message to an autopilot that does not support the command."""
         if result == dialect.MAV_RESULT_UNSUPPORTED and not self._by_message:
             self._by_message = True
             self._send(now_s)
@@ -115,14 +115,14 @@ class SetCurrentItem(CommandExchange[None]):
             self.succeed(None)
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
+        """Repeat the request, or fail."""
         if not self._by_message:
             super().expire(now_s)
         elif self._tries < self.retry_policy.tries:
             self._send(now_s)
         else:
-            shown = "it does not show it, though asked"
-            self.fail(NoAnswerError(f"{self.name}: {shown} {self._tries} times"))
+            shown = "MISSION_CURRENT does not confirm it after"
+            self.fail(NoAnswerError(f"{self.name}: {shown} {self._tries} requests"))
 
     def _send(self, now_s: float) -> None:
         self._tries += 1
@@ -137,7 +137,7 @@ class SetCurrentItem(CommandExchange[None]):
 
 
 class ReadMissionItem(Transaction[MissionItem]):
-    """One stored item outside of a download, which ArduPilot allows (its item 0 is home) and PX4
+    """Reads one stored item without a download, which ArduPilot allows (its item 0 is home) and PX4
     does not.
 
     Fails with `RefusedError` (a MAV_MISSION_RESULT) or `NoAnswerError`.
@@ -165,21 +165,21 @@ class ReadMissionItem(Transaction[MissionItem]):
         self.deadline_s = now_s + self.retry_policy.answer_s
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """The item, or a refusal."""
-        is_ours = sender == self.target and message.mission_type == self.mission_type
-        if not is_ours or not self.for_us(message):
+        """Process the item, or a refusal."""
+        is_expected = sender == self.target and message.mission_type == self.mission_type
+        if not is_expected or not self.for_us(message):
             return
         if message.TYPE is not _ACK:
             if message.seq == self._sequence:
                 self.succeed(item_of(message))
-        elif message.type not in (ACCEPTED, CANCELLED):  # those are of earlier exchanges
+        elif message.type not in (ACCEPTED, CANCELLED):  # these are from earlier exchanges
             reason = f"item {self._sequence}: {mission_result_words(message.type)}"
             self.fail(RefusedError(reason, message.type, temporary=is_temporary(message.type)))
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
+        """Repeat the request, or fail."""
         if self._tries < self.retry_policy.tries:
             self.begin(now_s)
         else:
-            asked = f"no answer, though asked {self._tries} times"
+            asked = f"no answer after {self._tries} requests"
             self.fail(NoAnswerError(f"item {self._sequence}: {asked}"))

@@ -35,7 +35,7 @@ _FLOAT = struct.Struct("<f")
 
 
 class ParameterEncoding(Enum):
-    """How whole numbers are carried."""
+    """The encoding of whole numbers."""
 
     C_CAST = "c_cast"
     BYTEWISE = "bytewise"
@@ -43,7 +43,7 @@ class ParameterEncoding(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter as its vehicle has it. `type`: a MAV_PARAM_TYPE; `value` is an int where that is
+    """A parameter of a vehicle. `type`: a MAV_PARAM_TYPE; `value` is an int where that is
     a whole number; `index` of `count`: None and 0 where it was sent without being listed."""
 
     name: str
@@ -54,19 +54,19 @@ class Parameter:
 
 
 def encoded_name(name: str) -> bytes:
-    """A name as it travels.
+    """Return a name as the bytes of a message.
 
     Raises:
-        ValueError: no parameter can have it.
+        ValueError: the name is not valid.
     """
     encoded = name.encode("ascii", "replace")
     if not name or len(encoded) > NAME_BYTES or not name.isascii() or not name.isprintable():
-        raise ValueError(f"'{name}' is no name of a parameter: 1 to {NAME_BYTES} ASCII characters")
+        raise ValueError(f"'{name}' is not a parameter name: 1 to {NAME_BYTES} ASCII characters")
     return encoded
 
 
 def parameter_of(message: Message, encoding: ParameterEncoding) -> Parameter:
-    """What a PARAM_VALUE says."""
+    """Return the parameter in a PARAM_VALUE."""
     value: float = message.param_value
     whole = _WHOLE.get(message.param_type)
     if whole is not None and encoding is ParameterEncoding.BYTEWISE:
@@ -84,10 +84,10 @@ def parameter_of(message: Message, encoding: ParameterEncoding) -> Parameter:
 
 
 def carried(value: float, type_: int, encoding: ParameterEncoding) -> float:
-    """The float that carries a value of a MAV_PARAM_TYPE in PARAM_SET.
+    """Return the float that encodes a value of a MAV_PARAM_TYPE in PARAM_SET.
 
     Raises:
-        ValueError: the type has no such value, or it cannot be carried.
+        ValueError: the type does not have the value, or it cannot be encoded.
     """
     if not math.isfinite(value):
         raise ValueError(f"{value} is not a finite number")
@@ -106,7 +106,7 @@ def carried(value: float, type_: int, encoding: ParameterEncoding) -> float:
     if encoding is ParameterEncoding.C_CAST:
         result = float(_FLOAT.unpack(_FLOAT.pack(value))[0])
         if result != value:
-            raise ValueError(f"{value:.0f} has more digits than this autopilot can be sent")
+            raise ValueError(f"{value:.0f} has more digits than this autopilot can receive")
         return result
     result = float(_FLOAT.unpack(raw)[0])
     if _FLOAT.pack(result) != raw:  # the bytes of a NaN that Python does not keep
@@ -115,7 +115,7 @@ def carried(value: float, type_: int, encoding: ParameterEncoding) -> float:
 
 
 def same_value(kept: Parameter, value: float) -> bool:
-    """Whether a parameter has a value, but for what floats of 32 bits lose."""
+    """Return whether a parameter has a value, within the precision of floats of 32 bits."""
     if kept.type == _REAL32 or kept.type not in _WHOLE:
         return math.isclose(kept.value, value, rel_tol=1e-6, abs_tol=1e-9)
     return kept.value == value
@@ -131,17 +131,17 @@ _ERROR = message_type("PARAM_ERROR")
 _ERRORS: dict[int, str] = {
     dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST: "it has no such parameter",
     dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE: "the value is out of range",
-    dialect.MAV_PARAM_ERROR_PERMISSION_DENIED: "we may not set it",
+    dialect.MAV_PARAM_ERROR_PERMISSION_DENIED: "m2pem may not set it",
     dialect.MAV_PARAM_ERROR_COMPONENT_NOT_FOUND: "there is no such component",
     dialect.MAV_PARAM_ERROR_READ_ONLY: "it cannot be set",
 }
 
 
 class ReadParameter(Transaction[Parameter]):
-    """The value of a parameter.
+    """Reads the value of a parameter.
 
-    An autopilot says nothing of a parameter that it does not have: `NoAnswerError`. Newer ones do:
-    `RefusedError` with a MAV_PARAM_ERROR.
+    For a parameter that it does not have, an autopilot sends no answer: `NoAnswerError`. Newer ones
+    send a MAV_PARAM_ERROR: `RefusedError`.
     """
 
     wants = frozenset({_VALUE.id, _ERROR.id})
@@ -165,7 +165,7 @@ class ReadParameter(Transaction[Parameter]):
         self._tries = 0
 
     def begin(self, now_s: float) -> None:
-        """Ask, if it can be asked for."""
+        """Send the request, if the name is valid."""
         try:
             self._encoded = encoded_name(self.name)
         except ValueError as error:
@@ -175,8 +175,8 @@ class ReadParameter(Transaction[Parameter]):
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """Receive a value or an error; other parameters and components are ignored."""
-        is_ours = (message.param_id, sender) == (self._encoded, self.target)
-        if self.done or not is_ours or not self.for_us(message):
+        is_expected = (message.param_id, sender) == (self._encoded, self.target)
+        if self.done or not is_expected or not self.for_us(message):
             return
         if message.TYPE is _VALUE:
             self.has(parameter_of(message, self.encoding), now_s)
@@ -185,7 +185,7 @@ class ReadParameter(Transaction[Parameter]):
             self.fail(RefusedError(reason, message.error))
 
     def expire(self, now_s: float) -> None:
-        """Ask again, or give up."""
+        """Repeat the request, or fail."""
         if self._tries < self.retry_policy.tries:
             self._ask(now_s)
         else:
@@ -193,7 +193,7 @@ class ReadParameter(Transaction[Parameter]):
             self.fail(NoAnswerError(f"parameter {self.name}: {silence}"))
 
     def has(self, parameter: Parameter, now_s: float) -> None:
-        """This is its value."""
+        """Process the value."""
         self.succeed(parameter)
 
     def _ask(self, now_s: float) -> None:
@@ -203,11 +203,11 @@ class ReadParameter(Transaction[Parameter]):
 
 
 class SetParameter(ReadParameter):
-    """Give a parameter a value, and see that it has it; the result is what it has then. It is read
-    first, as its type must be known; one that has the value already is not written again.
+    """Sets a parameter, and checks its value; the result is the value afterwards. It is read first,
+    as its type must be known; a parameter that has the value is not written again.
 
     Fails as `ReadParameter`, with `ExchangeError` if its type has no such value, and with
-    `RefusedError` (result VALUE_OUT_OF_RANGE) if it keeps another one.
+    `RefusedError` (result VALUE_OUT_OF_RANGE) if the vehicle keeps another value.
     """
 
     def __init__(
@@ -225,18 +225,18 @@ class SetParameter(ReadParameter):
         self._answered = False
 
     def has(self, parameter: Parameter, now_s: float) -> None:
-        """Its value, before or after it was set."""
+        """Process the value, before or after it was set."""
         if same_value(parameter, self.value):
             self.succeed(parameter)
         elif self._kept is None:
             self._kept = parameter
             self._tries = 0
             self._ask(now_s)
-        else:  # perhaps a late answer to the reading; the deadline stays
+        else:  # it may answer the earlier read request; the deadline stays
             self._kept, self._answered = parameter, True
 
     def expire(self, now_s: float) -> None:
-        """Set it again, or give up."""
+        """Set the parameter again, or fail."""
         kept = self._kept
         if kept is None or self._tries < self.retry_policy.tries:
             super().expire(now_s)
@@ -245,7 +245,7 @@ class SetParameter(ReadParameter):
             result = dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
             self.fail(RefusedError(f"{reason} {self.value:g}", result))
         else:
-            unknown = "set, but there is no answer; its value is not known"
+            unknown = "set, but not answered; its value is not known"
             self.fail(NoAnswerError(f"parameter {self.name}: {unknown}"))
 
     def _ask(self, now_s: float) -> None:
@@ -271,7 +271,7 @@ class SetParameter(ReadParameter):
 
 
 def read_request(target: Address, name: bytes, index: int) -> Message:
-    """PARAM_REQUEST_READ, by name (`BY_NAME`) or index."""
+    """Return a PARAM_REQUEST_READ by name (`BY_NAME`) or by index."""
     message: Message = _READ.make(
         param_index=index,
         target_system=target.system,
@@ -281,23 +281,23 @@ def read_request(target: Address, name: bytes, index: int) -> Message:
     return message
 
 
-LIST_PATIENCE = RetryPolicy(tries=5, answer_s=1.5)
-"""For the first one, and between one and the next; then the missing ones are asked for."""
+LIST_RETRIES = RetryPolicy(tries=5, answer_s=1.5)
+"""Longest wait for the first and for the next parameter; then the missing ones are requested."""
 
-GAP_PATIENCE = RetryPolicy(tries=6, answer_s=1.0)
+GAP_RETRIES = RetryPolicy(tries=6, answer_s=1.0)
 GAPS_AT_ONCE = 20
 BASE_S = 60.0
 PER_PARAMETER_S = 0.5
 MOST = 10_000
-"""What says that it has more is not believed; autopilots have some 1,500."""
+"""Most parameters of a component; autopilots have about 1,500."""
 
 _LIST = message_type("PARAM_REQUEST_LIST")
 
 
 class ReadParameters(Transaction[dict[str, Parameter]]):
-    """All parameters of a component, by name.
+    """Reads all parameters of a component, by name.
 
-    Fails with `NoAnswerError`, or `ExchangeError` for a count that cannot be; at the latest after
+    Fails with `NoAnswerError`, or `ExchangeError` for an impossible count; at the latest after
     `BASE_S` and `PER_PARAMETER_S` for each parameter.
     """
 
@@ -312,68 +312,68 @@ class ReadParameters(Transaction[dict[str, Parameter]]):
         self._tries = 0
         self._count = 0
         self._had: dict[int, Parameter] = {}
-        self._asked: set[int] = set()
+        self._requested: set[int] = set()
 
     def begin(self, now_s: float) -> None:
-        """Ask for all."""
+        """Request all parameters."""
         self._began_s = now_s
         self._ends_s = now_s + BASE_S
         self._ask(now_s)
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
-        """A parameter. One that is not of the list, but was read or set, comes without an index."""
+        """Process a parameter. One that is not of this list, but was read or set, has no index."""
         if self.done or sender != self.target:
             return
         parameter = parameter_of(message, self.encoding)
         if parameter.index is None:
             return
         if parameter.count > MOST:
-            self._give_up(ExchangeError, f"{parameter.count} of them cannot be")
+            self._give_up(ExchangeError, f"{parameter.count} parameters are impossible")
             return
-        if parameter.count != self._count:  # some parameters bring others with them
+        if parameter.count != self._count:  # setting some parameters enables others
             self._count = parameter.count
             self._ends_s = self._began_s + BASE_S + PER_PARAMETER_S * self._count
             self._had = {n: each for n, each in self._had.items() if n < self._count}
         self._had[parameter.index] = parameter
         if len(self._had) == self._count:
             self.succeed({each.name: self._had[n] for n, each in sorted(self._had.items())})
-        elif not self._asked:
-            self.deadline_s = min(now_s + LIST_PATIENCE.answer_s, self._ends_s)
-        elif parameter.index in self._asked:
-            self._asked.remove(parameter.index)
+        elif not self._requested:
+            self.deadline_s = min(now_s + LIST_RETRIES.answer_s, self._ends_s)
+        elif parameter.index in self._requested:
+            self._requested.remove(parameter.index)
             self._tries = 0
-            if not self._asked:
+            if not self._requested:
                 self._ask_missing(now_s)
 
     def expire(self, now_s: float) -> None:
-        """Ask for what is missing, or give up."""
+        """Request the missing parameters, or fail."""
         if now_s >= self._ends_s:
             self._give_up(NoAnswerError, "not done in time")
-        elif not self._count and self._tries < LIST_PATIENCE.tries:
+        elif not self._count and self._tries < LIST_RETRIES.tries:
             self._ask(now_s)
         elif not self._count:
-            self._give_up(NoAnswerError, f"no answer, though asked {self._tries} times")
-        elif not self._asked or self._tries < GAP_PATIENCE.tries:
-            if not self._asked:
+            self._give_up(NoAnswerError, f"no answer after {self._tries} requests")
+        elif not self._requested or self._tries < GAP_RETRIES.tries:
+            if not self._requested:
                 self._tries = 0
             self._ask_missing(now_s)
         else:
-            self._give_up(NoAnswerError, "the others do not come")
+            self._give_up(NoAnswerError, "the others were not received")
 
     def _ask(self, now_s: float) -> None:
         self._tries += 1
         system, component = self.target
         self.outbox.append(_LIST.make(target_system=system, target_component=component))
-        self.deadline_s = min(now_s + LIST_PATIENCE.answer_s, self._ends_s)
+        self.deadline_s = min(now_s + LIST_RETRIES.answer_s, self._ends_s)
 
     def _ask_missing(self, now_s: float) -> None:
         self._tries += 1
         missing = (index for index in range(self._count) if index not in self._had)
-        self._asked = set(islice(missing, GAPS_AT_ONCE))
-        for index in sorted(self._asked):
+        self._requested = set(islice(missing, GAPS_AT_ONCE))
+        for index in sorted(self._requested):
             self.outbox.append(read_request(self.target, b"", index))
-        self.deadline_s = min(now_s + GAP_PATIENCE.answer_s, self._ends_s)
+        self.deadline_s = min(now_s + GAP_RETRIES.answer_s, self._ends_s)
 
     def _give_up(self, error: type[ExchangeError], reason: str) -> None:
-        had = f" ({len(self._had)} of {self._count} came)" if self._count else ""
+        had = f" ({len(self._had)} of {self._count} received)" if self._count else ""
         self.fail(error(f"reading the parameters: {reason}{had}"))

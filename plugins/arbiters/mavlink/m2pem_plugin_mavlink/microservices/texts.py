@@ -1,7 +1,7 @@
-"""What a vehicle says in words (STATUSTEXT; mavlink.io, "STATUSTEXT", messages/common.html).
+"""The texts of a vehicle (STATUSTEXT; mavlink.io, "STATUSTEXT", messages/common.html).
 
-Long texts come in chunks with an id of their own, which may be lost, doubled or out of order. What
-is not whole after `GIVE_UP_S` is shown with "..." where something is missing. The id 0 says that a
+Long texts come in chunks with an id of their own, which may be lost, doubled or out of order. A
+text that is incomplete after `GIVE_UP_S` is shown with "..." in the gaps. The id 0 says that a
 text has one chunk; but PX4 numbers its texts from 0 on (streams/STATUSTEXT.hpp), so that its first
 text may be long and have the id 0, too.
 """
@@ -20,10 +20,10 @@ KEPT_S = 60.0
 KEPT = 100
 GIVE_UP_S = 1.0
 LATE_S = 5.0
-"""Chunks of a text that is complete, or given up, may come so much later; after that an id is used
-anew (by a vehicle that was switched off and on)."""
+"""Seconds for which late chunks of a finished text are ignored; after that the id may be that of a
+new text, as of a vehicle that was restarted."""
 AT_ONCE = 16
-"""Texts that come in chunks at one time; with one more, the oldest is given up."""
+"""Most incomplete texts at one time; one more ends the oldest."""
 MOST_CHUNKS = 20
 GAP = "..."
 ANY: int = dialect.MAV_SEVERITY_ENUM_END
@@ -32,7 +32,7 @@ ANY: int = dialect.MAV_SEVERITY_ENUM_END
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """What was said. `severity`: a MAV_SEVERITY, 0 is the worst; `at_s`: when it began to come."""
+    """A text. `severity`: a MAV_SEVERITY, 0 is the worst; `at_s`: when its first chunk came."""
 
     text: str
     severity: int
@@ -48,7 +48,7 @@ class _Pieces:
     chunks: dict[int, bytes] = field(default_factory=dict)
 
     def end(self) -> int | None:
-        """How many chunks there are; the last one is not full."""
+        """The number of chunks: the last one is not full."""
         return next((n + 1 for n, each in self.chunks.items() if len(each) < CHUNK_BYTES), None)
 
     def whole(self) -> bool:
@@ -56,7 +56,7 @@ class _Pieces:
         return end is not None and all(n in self.chunks for n in range(end))
 
     def text(self) -> str:
-        """All that has come, with "..." for what has not."""
+        """The received text, with "..." for missing chunks."""
         end = len(self.chunks) if self.may_be_one_chunk and list(self.chunks) == [0] else self.end()
         said, expected = b"", 0
         for n in sorted(self.chunks):
@@ -67,7 +67,7 @@ class _Pieces:
 
 class StatusTexts:
     """Collects the texts of one vehicle. Pass each received STATUSTEXT to it; `read` is called
-    with each text that is whole, or given up."""
+    with each text that is complete, or that stays incomplete."""
 
     def __init__(self, read: Callable[[Text], None] = lambda _: None) -> None:
         self._read = read
@@ -76,7 +76,7 @@ class StatusTexts:
         self._closed_s: dict[tuple[Address, int], float] = {}
 
     def take(self, message: Message, sender: Address, now_s: float) -> None:
-        """A STATUSTEXT has come."""
+        """Process a STATUSTEXT."""
         self.give_up(now_s - GIVE_UP_S)
         key = sender, message.id
         if message.id == 0 and message.chunk_seq == 0 and key in self._coming:
@@ -94,7 +94,7 @@ class StatusTexts:
             self._close(key)
 
     def give_up(self, begun_before_s: float) -> None:
-        """Wait no longer for the missing chunks of texts that began to come before then."""
+        """End incomplete texts whose first chunk came before this time."""
         late = [key for key, each in self._coming.items() if each.at_s <= begun_before_s]
         for key in late:
             self._close(key)
@@ -102,7 +102,7 @@ class StatusTexts:
     def recent(
         self, now_s: float, within_s: float = KEPT_S, worse_than: int = ANY
     ) -> tuple[Text, ...]:
-        """What was said within the last seconds with a severity worse than a MAV_SEVERITY, the
+        """Return the texts of the last seconds with a severity worse than a MAV_SEVERITY, the
         newest last."""
         self.give_up(now_s - GIVE_UP_S)
         kept_s = min(within_s, KEPT_S)

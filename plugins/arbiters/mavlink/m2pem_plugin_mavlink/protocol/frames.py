@@ -1,8 +1,8 @@
 """Frames of MAVLink 1 and 2: found, checked and made (mavlink.io, "Packet Serialization").
 
-A frame is only looked into as far as somebody needs: of a datagram that consists of frames and
-nothing else the headers are read, and UDP has protected the rest. What comes out of a stream, or of
-a datagram with anything else in it, has a right checksum.
+A frame is decoded only as far as needed: of a datagram that consists of frames alone, only headers
+are read, as UDP protects the rest. Frames from a stream, or from a datagram with other bytes, have
+a valid checksum.
 """
 
 import re
@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message
 V1 = 0xFE
 V2 = 0xFD
 SIGNED = 0x01
-"""The only incompatibility flag: 13 bytes of signature follow. Frames with others are not read."""
+"""The incompatibility flag of a signature of 13 bytes. Frames with other flags are not read."""
 
 HEADER_V1 = Struct("<xBBHB")  # length, sequence, sender, id
 HEADER_V2 = Struct("<xBBxBHHB")  # length, flags, sequence, sender, lower and upper part of the id
@@ -31,7 +31,7 @@ NEVER = sys.maxsize
 EXTRA: dict[int, bytes] = {
     id_: bytes((each.crc_extra,)) for id_, each in dialect.mavlink_map.items()
 }
-"""By message id: what the checksum goes on with after the frame. Others cannot be checked."""
+"""CRC_EXTRA by message id. The checksum of other messages cannot be checked."""
 
 _MAGIC = re.compile(b"[\xfd\xfe]")
 _MADE = Struct("<BBBBBBBHB")
@@ -39,7 +39,7 @@ _CRC = Struct("<H")
 
 
 class Frame(NamedTuple):
-    """What is known of a frame. `sender`: system + 256 * component; `checked`: its checksum is
+    """The header of a frame. `sender`: system + 256 * component; `checked`: its checksum is
     right (False: the message is unknown, or it was not checked)."""
 
     sequence: int
@@ -50,13 +50,13 @@ class Frame(NamedTuple):
 
 
 def right(frame: bytes, id_: int) -> bool:
-    """Whether a whole frame, without a signature, has the checksum of its message."""
+    """Return whether a frame without a signature has a valid checksum."""
     sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(frame[1:-2], CRC_START))
     return frame[-2] == sum_ & 255 and frame[-1] == sum_ >> 8
 
 
 def encode(message: Message, sequence: int, source: Address) -> bytes:
-    """A message as a frame of MAVLink 2, without the zeros at its end. `sequence`: 0..255.
+    """Return a message as a frame of MAVLink 2, without trailing zeros. `sequence`: 0..255.
 
     Raises:
         struct.error: a field's value does not fit its type.
@@ -70,7 +70,7 @@ def encode(message: Message, sequence: int, source: Address) -> bytes:
 
 
 def clean(data: bytes) -> list[bytes] | None:
-    """The frames of a datagram that has nothing else in it, without signatures; else None."""
+    """Return the frames of a datagram without signatures; None if it has other bytes."""
     found = []
     start, size = 0, len(data)
     while start < size:
@@ -92,7 +92,7 @@ def clean(data: bytes) -> list[bytes] | None:
 
 
 def read(frame: bytes) -> Frame | None:
-    """One of the frames that `clean` has found; None: it has a flag that is not known."""
+    """Return the header of a frame of `clean`; None if it has an unknown flag."""
     if frame[0] == V1:
         _, sequence, sender, id_ = HEADER_V1.unpack_from(frame)
         return Frame(sequence, sender, id_, frame[6:-2], False)
@@ -103,16 +103,16 @@ def read(frame: bytes) -> Frame | None:
 
 
 def scan(data: bytes, unfinished_from: int = NEVER) -> tuple[list[Frame], int, int]:
-    """All frames among other bytes: those with a right checksum; and those that cannot be checked,
-    if another frame or nothing follows them and no right frame is inside of them.
+    """Return the frames among other bytes: those with a valid checksum, and those that cannot be
+    checked if another frame or nothing follows and no valid frame is inside of them.
 
-    Then the number of bytes that belong to none; and where a frame begins whose end is not there
-    yet. What begins before `unfinished_from` and does not end is none.
+    Also return the number of bytes outside of frames, and the start of an incomplete frame. An
+    incomplete frame that starts before `unfinished_from` is ignored.
     """
     found: list[Frame] = []
     junk = position = 0
     size = len(data)
-    doubt: Frame | None = None  # cannot be checked, and ends at `doubt_end` if that is not 0
+    doubt: Frame | None = None  # an unchecked frame that ends at `doubt_end`, if that is not 0
     doubt_end = junk_before = 0
     while True:
         if doubt_end and position >= doubt_end:

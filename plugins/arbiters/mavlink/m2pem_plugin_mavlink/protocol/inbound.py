@@ -26,13 +26,13 @@ from m2pem_plugin_mavlink.protocol.quality import Reception
 _logger = logging.getLogger(__name__)
 
 UNFINISHED_S = 1.0
-"""A frame in a stream whose end has not come after so long, or up to twice as long, is none."""
+"""Seconds after which an incomplete frame in a stream is dropped, at most twice as many."""
 
 MOST_SENDERS = 1_024
-"""Of one peer; those that were silent for longest are forgotten first."""
+"""Most senders of one peer; those that were silent for longest are forgotten first."""
 
 Listener: TypeAlias = Callable[[Message, Address], None]
-"""Is handed a message and its sender."""
+"""Called with a message and its sender."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Inbound:
     def __init__(self, admit: AdmitSender) -> None:
         self._admit = admit
         self._rest = b""
-        self._marked = 0  # so many bytes of the rest were there at `_marked_s`
+        self._marked = 0  # bytes of the rest at `_marked_s`
         self._marked_s = 0.0
         self.senders: dict[int, Sender] = {}
         self.junk_bytes = 0
@@ -85,7 +85,7 @@ class Inbound:
     def datagram(self, data: bytes, now_s: float) -> None:
         """Receive a datagram."""
         size = len(data)
-        # Nearly all have one frame of MAVLink 2: no call, no object more than is needed for it.
+        # Nearly all datagrams have one frame of MAVLink 2: this path avoids calls and objects.
         if size >= AROUND_V2 and data[0] == V2 and size == data[1] + AROUND_V2:
             _, flags, sequence, source, low, high = HEADER_V2.unpack_from(data)
             if not flags:
@@ -104,7 +104,7 @@ class Inbound:
                     sender.expected += 1
                 else:
                     sender.astray(sequence, now_s)
-                sender.heard_s = now_s
+                sender.received_s = now_s
                 if wanted is not None:
                     self._hand_over(wanted, data[10:-2], sender.address)
                 return
@@ -135,7 +135,7 @@ class Inbound:
             self._frame(frame, b"", now_s)
 
     def _frame(self, frame: Frame, raw: bytes, now_s: float) -> None:
-        """`raw`: the frame, if it has not been checked."""
+        """Process a frame. `raw`: its bytes, if it has not been checked."""
         sequence, source, id_, payload, checked = frame
         sender = self.senders.get(source)
         if sender is None:
@@ -165,7 +165,7 @@ class Inbound:
         if not self._admit(sender):
             return None
         if len(self.senders) >= MOST_SENDERS:
-            del self.senders[min(self.senders, key=lambda each: self.senders[each].heard_s)]
+            del self.senders[min(self.senders, key=lambda each: self.senders[each].received_s)]
         self.senders[source] = sender
         return sender
 

@@ -38,7 +38,7 @@ class Message(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MessageType:
-    """What is known of all messages with one id.
+    """The type of all messages with one id.
 
     `make(field=value, ...)` makes a message; `struct` is the whole payload, extensions included;
     `spans` has where the items of each field are among those of the struct (None: each field is one
@@ -54,8 +54,8 @@ class MessageType:
     texts: tuple[int, ...]
 
     def unpack(self, payload: bytes) -> Any:
-        """The message in a payload: one that was cut short at its zeros, or of an older or newer
-        version of the message with fewer or more extension fields, is read all the same."""
+        """Return the message in a payload. The payload may lack trailing zeros, or have the fewer
+        or more extension fields of an older or newer version."""
         size = self.struct.size
         if len(payload) != size:
             payload = payload[:size].ljust(size, b"\0")
@@ -69,7 +69,7 @@ class MessageType:
         return self.make._make(items)
 
     def pack(self, message: Message) -> bytes:
-        """The payload of a message, whole.
+        """Return the complete payload of a message.
 
         Raises:
             struct.error: a field's value does not fit its type.

@@ -7,18 +7,18 @@ Serialization").
 from dataclasses import dataclass
 
 WINDOW_S = 5.0
-"""Loss and rate are those of about so many seconds."""
+"""Loss and rate are measured over about this many seconds."""
 
 RESTART_S = 1.0
-"""After a silence as long as this, whatever comes is new: nothing is late by so much."""
+"""A frame after this silence is new: no frame is late by so much."""
 
 LATE = 128
-"""So far back a number is late; farther, it is ahead."""
+"""A number that is behind by at most this is late; otherwise it is ahead."""
 
 _LATE_BITS = (1 << LATE) - 1
 
 RESTART_FRAMES = 32
-"""A sender began anew if so many frames on end seem to be late."""
+"""A sender has restarted if this many successive frames seem to be late."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +32,10 @@ class LinkQuality:
 
 
 class Reception:
-    """Counts what comes from one sender over one path, from the frame with number `sequence` on.
+    """Counts the frames of one sender over one path, from the number `sequence` on.
 
     `expected`: the number of the next frame, counted on beyond 255; `lost`, `doubled`: so many
-    frames; `heard_s`: when the last one came.
+    frames; `received_s`: when the last one came.
     """
 
     __slots__ = (
@@ -46,13 +46,13 @@ class Reception:
         "_start",
         "doubled",
         "expected",
-        "heard_s",
         "lost",
+        "received_s",
     )
 
     def __init__(self, sequence: int, now_s: float) -> None:
         self.expected = sequence
-        self.heard_s = now_s
+        self.received_s = now_s
         self.lost = 0
         self.doubled = 0
         self._start = sequence
@@ -63,7 +63,7 @@ class Reception:
 
     @property
     def sent(self) -> int:
-        """The number of frames that were sent, as far as the sequence numbers tell."""
+        """The number of sent frames, by the sequence numbers."""
         return self.expected - self._start
 
     def count(self, sequence: int, now_s: float) -> None:
@@ -72,14 +72,14 @@ class Reception:
             self.expected += 1
         else:
             self.astray(sequence, now_s)
-        self.heard_s = now_s
+        self.received_s = now_s
 
     def astray(self, sequence: int, now_s: float) -> None:
-        """Count a frame that is not the next one: some are missing, or it is late or doubled."""
+        """Count a frame out of sequence: some are missing, or it is late or doubled."""
         ahead = (sequence - self.expected) & 255
         missing = self._missing << min(self.expected - self._marked, LATE)
         self._marked = self.expected
-        if ahead >= LATE and now_s - self.heard_s < RESTART_S:
+        if ahead >= LATE and now_s - self.received_s < RESTART_S:
             bit = 1 << 255 - ahead
             self._missing = missing & ~bit & _LATE_BITS
             if missing & bit:
@@ -90,7 +90,7 @@ class Reception:
             if self._late < RESTART_FRAMES:
                 self.doubled += 1
                 return
-            self._start += ahead  # it skipped these numbers, rather than that they were lost
+            self._start += ahead  # the sender skipped these numbers: the frames are not lost
             missing = 0
         else:
             self.lost += ahead
@@ -112,7 +112,7 @@ class Reception:
         since_s, sent_before, lost_before = self._samples[0]
         sent = self.sent - sent_before
         lost = min(max(self.lost - lost_before, 0), sent)
-        age_s = max(now_s - self.heard_s, 0.0)
+        age_s = max(now_s - self.received_s, 0.0)
         loss = lost / sent if sent else float(age_s > WINDOW_S)
         rate_hz = (sent - lost) / (now_s - since_s) if now_s > since_s else 0.0
         return LinkQuality(loss, rate_hz, age_s)

@@ -1,8 +1,8 @@
-"""An exchange with one vehicle, as a machine without I/O: messages and time in, messages out.
+"""An exchange with one vehicle, as a state machine without I/O: messages and time in, messages out.
 
 `link.perform` runs it: it calls `begin` once, `receive` for each message that the exchange wants
-from its vehicle, and `expire` when `deadline_s` has passed; after each of them it sends what is in
-`outbox`. All times are seconds of one clock that never goes back.
+from its vehicle, and `expire` when `deadline_s` has passed; after each of them it sends the
+messages of `outbox`. All times are seconds of one clock that never goes back.
 """
 
 from abc import ABC, abstractmethod
@@ -40,7 +40,7 @@ class RefusedError(ExchangeError):
 class Transaction(ABC, Generic[T]):
     """One exchange. It ends by `succeed` or `fail`, once; what comes after that changes nothing.
 
-    `wants`: ids of the messages that it is to be handed. `key`: of two exchanges with the same key
+    `wants`: ids of the messages that it receives. `key`: of two exchanges with the same key
     with one vehicle, the second waits for the first to end. `source`: the address of this
     ground station, set by the link before `begin`; None: all answers are for it.
     """
@@ -100,8 +100,7 @@ class Transaction(ABC, Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class RetryPolicy:
-    """How often a request is sent (`tries`), and how long each time its answer is waited for
-    (`answer_s`, seconds)."""
+    """The number of requests (`tries`), and the seconds to wait for each answer (`answer_s`)."""
 
     tries: int
     answer_s: float

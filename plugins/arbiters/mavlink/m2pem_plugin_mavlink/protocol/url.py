@@ -1,7 +1,7 @@
-"""Where vehicles are reached: URLs as MAVSDK writes them.
+"""URLs of vehicles, in the notation of MAVSDK.
 
 udpin://HOST:PORT          listen; many vehicles may send here, and are answered where they are
-udpout://HOST:PORT         send to one address, and hear what it answers
+udpout://HOST:PORT         send to one address, and receive its answers
 tcpin://HOST:PORT          let vehicles connect
 tcpout://HOST:PORT         connect, and again whenever the connection breaks
 serial://PATH[:BAUDRATE]   a serial line: serial:///dev/ttyACM0:57600
@@ -20,7 +20,7 @@ HIGHEST_BAUDRATE = 4_000_000
 
 
 class UrlError(PluginError):
-    """A URL that cannot be used; the message says what would be right."""
+    """A URL that cannot be used; the message gives the remedy."""
 
 
 class Way(StrEnum):
@@ -86,7 +86,7 @@ def parse_url(text: str) -> Url:
         raise UrlError(f"{text}: a serial line is written {meant}")
     parts = _PARTS.fullmatch(text)
     if parts is None:
-        raise UrlError(f"{text!r} is no URL: write, for example, udpin://127.0.0.1:14550")
+        raise UrlError(f"{text!r} is not a URL: write, for example, udpin://127.0.0.1:14550")
     scheme, rest = parts["scheme"].lower(), parts["rest"]
     if scheme not in _SCHEMES:
         raise UrlError(f"{text}: {_meant(scheme, rest)}")
@@ -107,17 +107,19 @@ def _meant(scheme: str, rest: str) -> str:
 def _socket(text: str, way: Way, rest: str) -> SocketUrl:
     place = _PLACE.fullmatch(rest)
     if place is None:
-        raise UrlError(f"{text}: after {way}:// stand a host and a port, as in 127.0.0.1:14550")
+        raise UrlError(f"{text}: write a host and a port after {way}://, as in 127.0.0.1:14550")
     if not place["host"]:
         one = f"{way}://127.0.0.1:{place['port'] or 14550}"
         if way in (Way.UDP_IN, Way.TCP_IN):
             every = f"{way}://0.0.0.0:{place['port'] or 14550}"
-            raise UrlError(f"{text}: no host; {one} listens to this machine, {every} to all others")
+            raise UrlError(
+                f"{text}: no host; {one} listens on this machine only, {every} on all its addresses"
+            )
         raise UrlError(f"{text}: no host; did you mean {one}?")
     try:
         place["host"].encode("idna")
     except UnicodeError:
-        raise UrlError(f"{text}: '{place['host']}' is no name of a machine") from None
+        raise UrlError(f"{text}: '{place['host']}' is not a host name") from None
     if place["port"] is None or not re.fullmatch(r"[0-9]{1,5}", place["port"]):
         raise UrlError(f"{text}: its port must be a number, as in {way}://{place['host']}:14550")
     port = int(place["port"])

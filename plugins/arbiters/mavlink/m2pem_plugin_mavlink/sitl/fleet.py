@@ -53,7 +53,7 @@ class SitlSettings:
 
 
 def read_sitl_settings(resource: ResourceId, value: Any) -> SitlSettings:
-    """The settings in the map `connection.sitl`.
+    """Read the settings in the map `connection.sitl`.
 
     Raises:
         PluginError: one of them is wrong; the text names the resource and the key.
@@ -119,11 +119,11 @@ def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
 
 ARBITER = "mavlink"
 APART_M = 5.0
-"""Vehicles whose home the fleet does not say stand in a row to the east, so far from each other."""
+"""Distance in metres of vehicles without a home in the fleet file, in a row to the east."""
 
 HERE = ("127.0.0.1", "localhost")
 PX4_GROUND_STATION_PORT = 14550
-"""Where every PX4 sends for ground stations, whatever its instance."""
+"""The UDP port to which every instance of PX4 sends for ground stations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ class Vehicle:
 
 
 def read_vehicles(fleet: Fleet, speed: float) -> list[Vehicle]:
-    """The vehicles, in the order of the file; `speed`: simulated seconds per second.
+    """Return the vehicles, in the order of the file; `speed`: simulated seconds per second.
 
     Raises:
         PluginError: a vehicle cannot be simulated as the fleet says; the text names the key.
@@ -184,9 +184,9 @@ def read_vehicles(fleet: Fleet, speed: float) -> list[Vehicle]:
 def launches(
     vehicles: list[Vehicle], ardupilot: Path | None, px4: Path | None, folder: Path
 ) -> Iterator[Launch]:
-    """How the programs of the vehicles are started, each in `folder` / its name.
+    """Return how to start the programs of the vehicles, each in `folder` / its name.
 
-    `ardupilot`, `px4`: where the programs are; None: not said.
+    `ardupilot`, `px4`: the folders of the programs; None: not given.
 
     Raises:
         PluginError: a vehicle needs programs of which the place is not known.
@@ -197,7 +197,7 @@ def launches(
         if isinstance(each.frame, Frame):
             if ardupilot is None:
                 raise PluginError(
-                    f"{each.resource} flies ArduPilot: say where its programs are with --ardupilot "
+                    f"{each.resource} runs ArduPilot: give its programs with --ardupilot "
                     "FOLDER, or `sitl: {firmware: px4}` in its connection"
                 )
             yield ardupilot_launch(
@@ -213,7 +213,7 @@ def launches(
             instance += 1
         else:
             if px4 is None:
-                raise PluginError(f"{each.resource} flies PX4: say where it is with --px4 FOLDER")
+                raise PluginError(f"{each.resource} runs PX4: give its folder with --px4 FOLDER")
             program = find_px4(px4)
             if each.frame not in program.models():
                 known = ", ".join(program.models())
@@ -290,7 +290,7 @@ def _start(fleet: Fleet, sitl: SitlSettings, number: int, speed: float) -> Start
 
 
 def _refuse_same_systems(vehicles: list[Vehicle]) -> None:
-    """Every PX4 sends to the port for ground stations, too."""
+    """Refuse equal system ids: every PX4 also sends to the port for ground stations."""
     px4 = {each.settings.system_id: each for each in vehicles if isinstance(each.frame, str)}
     for each in vehicles:
         other = px4.get(each.settings.system_id)

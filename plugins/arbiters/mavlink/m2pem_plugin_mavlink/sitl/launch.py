@@ -24,7 +24,7 @@ OWN_PARAMETERS = "m2pem.parm"
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where a vehicle stands at first: WGS-84 degrees, metres above mean sea level, degrees from
+    """The start position of a vehicle: WGS-84 degrees, metres above mean sea level, degrees from
     true north, clockwise. `speed`: simulated seconds per second."""
 
     latitude_deg: float
@@ -36,8 +36,8 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """How one program is started, in a folder of its own. `files`: what that has at first, by name;
-    `environment`: what is added to that of m2pem."""
+    """The command of one program, in a folder of its own. `files`: the first content of the folder,
+    by name; `environment`: variables in addition to those of m2pem."""
 
     name: str
     command: tuple[str, ...]
@@ -108,7 +108,7 @@ def px4_launch(
 
 
 def px4_port(instance: int) -> int:
-    """Where an instance of PX4 sends for programs such as m2pem (its API link)."""
+    """Return the port of an instance of PX4 for programs such as m2pem (its API link)."""
     return 14540 + instance if instance < 10 else 14549
 
 
@@ -116,7 +116,7 @@ OUTPUT = "output"
 """The file with what a program prints."""
 
 ENDS_WITHIN_S = 10.0
-"""A program that has not ended so long after SIGTERM gets SIGKILL."""
+"""Seconds between SIGTERM and SIGKILL."""
 
 LOOK_EVERY_S = 0.2
 LAST_LINES = 12
@@ -126,14 +126,14 @@ _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A program that was started."""
+    """A started program."""
 
     name: str
     process: subprocess.Popen[bytes]
     folder: Path
 
     def how_it_ended(self) -> str:
-        """For people: how, and the last lines of what it printed."""
+        """Return how the program ended, with the last lines that it printed."""
         status = self.process.poll()
         if status is None:
             return f"{self.name} (pid {self.process.pid}) runs"
@@ -147,8 +147,8 @@ class Program:
 
 @contextmanager
 def running(launches: Iterable[Launch], folder: Path) -> Iterator[list[Program]]:
-    """The programs, in `folder` / their names, until they are ended: SIGTERM, then SIGKILL. They
-    end with this process, too, however it ends.
+    """Run the programs in `folder` / their names, then end them: SIGTERM, then SIGKILL. They also
+    end with this process.
 
     Raises:
         OSError: a folder is there already, or a program cannot be started; none is left running.
@@ -190,8 +190,8 @@ def _start(launch: Launch, folder: Path) -> Program:
 
 
 def _end_with_parent() -> None:
-    """Have the kernel end this process with the one that has started it (Linux): an m2pem that is
-    killed leaves no vehicle behind that goes on sending to its port."""
+    """Make the kernel end this process with its parent (Linux): after an m2pem that was killed, no
+    vehicle continues to send to its port."""
     if _LIBC is not None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
@@ -200,7 +200,7 @@ def _end(programs: Sequence[Program]) -> None:
     running_ones = [each for each in programs if each.process.poll() is None]
     for each in running_ones:
         _signal(each, signal.SIGTERM)
-        _signal(each, signal.SIGCONT)  # one that was stopped does not end otherwise
+        _signal(each, signal.SIGCONT)  # a stopped process does not end otherwise
     until_s = time.monotonic() + ENDS_WITHIN_S
     for each in running_ones:
         with suppress(subprocess.TimeoutExpired):
@@ -211,6 +211,6 @@ def _end(programs: Sequence[Program]) -> None:
 
 
 def _signal(program: Program, number: signal.Signals) -> None:
-    """To its process group, as PX4 has a shell for its start script; it has one of its own."""
+    """Signal the process group of a program: PX4 has a shell for its start script."""
     with suppress(ProcessLookupError):
         os.killpg(program.process.pid, number)

@@ -1,4 +1,4 @@
-"""Whether the vehicles of a fleet may be armed, seen on the ports that the executive will use."""
+"""Waits until the vehicles of a fleet may be armed, on the ports that the executive will use."""
 
 import asyncio
 import time
@@ -18,13 +18,13 @@ READY_WITHIN_S = 300.0
 REPORT_EVERY_S = 5.0
 LOOK_EVERY_S = 0.2
 LOST_AFTER_S = 10.0
-"""Of simulated time: a program that hangs is not ready, whatever it said before."""
+"""Seconds of simulated time after which a silent program is not ready."""
 
 HIGHEST_SYSTEM = 255
 
 
 class NotReadyError(M2pemError):
-    """Vehicles that were started do not become ready; the text says why not."""
+    """Started vehicles do not become ready; the text gives the reason."""
 
 
 class SimulatedClock:
@@ -38,7 +38,7 @@ class SimulatedClock:
         return int(time.monotonic() * self._speed * 1e6)
 
     async def sleep(self, seconds: float) -> None:
-        """Wait for so many simulated seconds."""
+        """Wait for simulated seconds."""
         await asyncio.sleep(max(seconds, 0.0) / self._speed)
 
     async def sleep_until(self, time_us: int) -> None:
@@ -53,8 +53,9 @@ async def connected(
 ) -> AsyncIterator[list[Vehicle]]:
     """Listen on the ports of the fleet, as the executive will, until the end of the block.
 
-    m2pem speaks here as another ground station than the executive does: ArduPilot's failsafe counts
-    the heartbeats of that one alone, and must not take it for lost before it is there.
+    m2pem uses another system id than the executive here: ArduPilot's failsafe monitors the
+    heartbeats of the executive alone, and must not detect their loss before the executive has
+    started.
 
     Raises:
         PluginError: a port is in use.
@@ -84,11 +85,10 @@ async def connected(
 
 
 async def ready(vehicles: Sequence[Vehicle], report: Callable[[str], None]) -> None:
-    """Wait until all vehicles may be armed; `report` is called every few seconds with what is
-    waited for.
+    """Wait until all vehicles may be armed; `report` is called every few seconds with the reasons.
 
     Raises:
-        NotReadyError: they may not for too long.
+        NotReadyError: they do not become ready in time.
     """
     began_s = reported_s = time.monotonic()
     while waiting := _waiting(vehicles):
@@ -102,7 +102,7 @@ async def ready(vehicles: Sequence[Vehicle], report: Callable[[str], None]) -> N
 
 
 def _waiting(vehicles: Sequence[Vehicle]) -> str:
-    """Which vehicles may not be armed, and why not; "" if all may."""
+    """Return which vehicles may not be armed, with the reasons; "" if all may."""
     reasons = {each.resource: _reasons(each) for each in vehicles}
     return "; ".join(f"{name}: {why}" for name, why in reasons.items() if why)
 

@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing_
 from m2pem_plugin_mavlink.vehicle.identity import Kind
 
 STOP_WITHIN_S = 3.0
-"""The mode in which it stops is commanded for so long before another one is tried."""
+"""Seconds for which a mode to stop is commanded before another one is tried."""
 
 TAKEOFF_ATTEMPTS = 3
 PLANE_PITCH_DEG = 15.0
@@ -27,7 +27,7 @@ _FRAMES = {
     "terrain": dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT,
 }
 _STOP_MODES = {
-    # BRAKE stops hardest, and whatever the sticks say: from 10 m/s within 4 s, from 5 m/s within 3.
+    # BRAKE stops fastest and ignores the sticks: from 10 m/s within 4 s, from 5 m/s within 3.
     Kind.COPTER: ("BRAKE", "LOITER"),
     Kind.PLANE: ("LOITER",),  # it cannot stop: it circles where it was
     Kind.VTOL: ("LOITER",),
@@ -154,7 +154,7 @@ class ArdupilotDriver(Autopilot):
         speed, also that of the command for the target."""
         await self._arm_to_drive()
         await self.set_mode(FlightMode.GUIDED)
-        # Without a radius a plane uses the one of the place before.
+        # Without a radius a plane uses that of its last target.
         await self._reposition(place, self.state.loiter_radius_m or 0.0)
         if speed_m_s is not None:
             await self.set_speed(speed_m_s)

@@ -1,5 +1,4 @@
-"""What the drivers of all autopilots share: send commands until the vehicle's own messages confirm
-them."""
+"""The base class of drivers: sends commands until the vehicle's own messages confirm them."""
 
 import contextlib
 import re
@@ -30,7 +29,7 @@ CHECKED_WITHIN_S = 20.0
 MODE_WITHIN_S = 10.0
 ARM_WITHIN_S = 20.0
 SHOWS_WITHIN_S = 2.5
-"""A heartbeat comes every second, and one of them may be lost."""
+"""Seconds to wait for a heartbeat: it comes every second, and one may be lost."""
 
 BEGINS_WITHIN_S = 5.0
 """A mission that is started is flown; MISSION_CURRENT comes every second."""
@@ -70,7 +69,7 @@ def not_now(reason: str) -> RefusedError:
 
 
 class DrivenVehicle(Protocol):
-    """What a driver needs of its vehicle."""
+    """The interface of a vehicle for its driver."""
 
     link: VehicleLink
     state: AutopilotState
@@ -98,7 +97,7 @@ class Autopilot(ABC):
         self.state = vehicle.state
         self.commanded = vehicle.commanded
 
-    # --- what it says ---------------------------------------------------------------------------
+    # --- state ------------------------------------------------------------------------------------
 
     def mode_name(self, custom_mode: int) -> str:
         return self.modes.name(custom_mode)
@@ -134,10 +133,10 @@ class Autopilot(ABC):
         `MODE_WITHIN_S`.
 
         Raises:
-            ExchangeError: it does not; one in which a person steers is never commanded.
+            ExchangeError: the mode does not change, or it is one of manual control.
         """
         if mode in (FlightMode.MANUAL, FlightMode.OTHER):
-            raise cannot(f"mode {mode} is for people")
+            raise cannot(f"mode {mode} is a mode of manual control")
         custom_mode = self.modes.for_purpose(mode)
         if custom_mode is None:
             raise cannot(f"a {self.kind} with {self.name} has no mode for {mode}")
@@ -190,7 +189,7 @@ class Autopilot(ABC):
         been in this state before."""
         end_s = self.link.now_s() + within_s
         while True:
-            error: ExchangeError = NoAnswerError(f"{what} was accepted, but does not come")
+            error: ExchangeError = NoAnswerError(f"{what} was accepted, but was not confirmed")
             accepted, wait_s = False, RETRY_S
             try:
                 await command()
@@ -221,7 +220,7 @@ class Autopilot(ABC):
         if self.state.armed:
             return
         await self._locate()
-        # What its other checks say may be of the mode that it is in: some cannot be armed.
+        # Other checks may fail because of the present mode: some modes cannot be armed.
         await self._enter_arming_mode()
         if not self.readiness().ready:
             await self._have_it_checked()
@@ -260,7 +259,7 @@ class Autopilot(ABC):
     async def _have_it_checked(self) -> None:
         """Request the reasons against arming now; unasked, ArduPilot sends them every 30 s, and PX4
         when they change."""
-        with contextlib.suppress(ExchangeError):  # older ones do not know the command
+        with contextlib.suppress(ExchangeError):  # older autopilots do not have the command
             await exchanges.command(self.link, dialect.MAV_CMD_RUN_PREARM_CHECKS)
 
     @abstractmethod
@@ -285,7 +284,7 @@ class Autopilot(ABC):
             self.commanded.disarming = False
             raise
         if not await self.vehicle.until(lambda: self.state.armed is False, 2 * SHOWS_WITHIN_S):
-            raise NoAnswerError("disarming was accepted, but does not come")
+            raise NoAnswerError("disarming was accepted, but was not confirmed")
 
     async def _arm_to_drive(self) -> None:
         """Arm a vehicle that drives; one that flies must take off first."""
@@ -346,18 +345,18 @@ class Autopilot(ABC):
 
     async def _mission_begins(self) -> None:
         """Wait until MISSION_CURRENT shows that the mission is active or complete. An autopilot
-        that does not report this is trusted.
+        that does not report this is assumed to begin.
 
         Raises:
-            ExchangeError: it is not.
+            ExchangeError: the mission does not begin.
         """
-        self.state.mission_state = None  # what was said before may be of the mission before
+        self.state.mission_state = None  # an earlier message may concern the earlier mission
         begun = lambda: self.state.mission_state in _BEGUN  # noqa: E731
         if not await self.vehicle.until(begun, BEGINS_WITHIN_S):
             state = self.state.mission_state
             if state is not None:
                 raise NoAnswerError(
-                    f"its mission does not begin: {_MISSION_STATES.get(state, state)} for "
+                    f"the mission does not begin: {_MISSION_STATES.get(state, state)} for "
                     f"{BEGINS_WITHIN_S:g} s in {self.modes.name(self.state.custom_mode or 0)}"
                 )
 

@@ -1,4 +1,4 @@
-"""The interface of drivers: the commands of an autopilot, whatever its make."""
+"""The interface of drivers: the commands that all autopilots have."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class FlightMode(StrEnum):
     LAND = "land"
     TAKEOFF = "takeoff"
     ORBIT = "orbit"  # CIRCLE; PX4 ORBIT
-    MANUAL = "manual"  # anything in which a person steers
+    MANUAL = "manual"  # all modes of manual control
     OTHER = "other"
 
 
@@ -115,8 +115,8 @@ class Driver(Protocol):
         ...
 
     async def rally_points(self) -> Sequence[LatLon]:
-        """Return where it may land instead of at home when it returns: latitudes and longitudes in
-        deg."""
+        """Return the places where the vehicle may land instead of at home: latitudes and longitudes
+        in degrees."""
         ...
 
     async def start_mission(self, first: int = 0) -> None:
@@ -135,7 +135,7 @@ class Driver(Protocol):
         ...
 
     async def stop(self) -> None:
-        """Stop at once (HOLD, LOITER, BRAKE), whatever it does; idempotent."""
+        """Stop at once (HOLD, LOITER, BRAKE) from any motion; idempotent."""
         ...
 
     async def return_home(self) -> None:

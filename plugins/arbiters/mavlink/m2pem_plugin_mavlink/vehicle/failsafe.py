@@ -38,15 +38,15 @@ class FailsafeFinding:
 
 @dataclass(frozen=True, slots=True)
 class _Setting:
-    """A parameter of which each value is an action: those that are as good as a word of the fleet's
-    (the one to set first), and what the values mean."""
+    """A parameter whose values are actions: the values that fit each word of the fleet file (the
+    one to set comes first), and the meanings of all values."""
 
     names: tuple[str, ...]
     fits: Mapping[str, tuple[int, ...]]
     meanings: Mapping[int, str]
 
     def value(self, values: Values) -> tuple[str, int] | None:
-        """Its name on this vehicle (it was renamed over the years) and its value."""
+        """Return its name on this vehicle (firmware releases renamed it) and its value."""
         for name in self.names:
             if name in values:
                 return name, round(values[name])
@@ -152,15 +152,15 @@ def parameters_of_interest(identity: Identity) -> tuple[str, ...]:
 
 
 def link_parameters(word: str, identity: Identity, own_system: int) -> dict[str, float]:
-    """What to set so that a vehicle does what its fleet's `failsafe` says when its link is lost;
-    nothing for a word that a vehicle of this kind cannot be set to. ArduPilot ignores a name that
+    """Return the parameters that make a vehicle execute the fleet's `failsafe` when its link is
+    lost; none for a word that a vehicle of this kind cannot execute. ArduPilot ignores a name that
     it does not have. `own_system`: the system id of the ground station whose loss counts."""
     parameters: dict[str, float] = {}
     for setting in _LINK[identity.firmware, identity.kind]:
         if word not in setting.fits:
             return {}
         parameters.update(dict.fromkeys(setting.names, float(setting.fits[word][0])))
-        if word == CONTINUE:  # it is off: what it would do does not matter
+        if word == CONTINUE:  # the failsafe is off: its action does not matter
             break
     if parameters and identity.firmware is Firmware.ARDUPILOT:
         parameters.update(dict.fromkeys(_OUR_STATION, float(own_system)))
@@ -176,8 +176,8 @@ def findings(
     values: Values,
     own_system: int | None = None,
 ) -> tuple[FailsafeFinding, ...]:
-    """Return where a vehicle is set to something else than the `failsafe` of its fleet; "" finds
-    nothing. `own_system`: the system id that this arbiter sends with."""
+    """Return the differences between a vehicle's parameters and the `failsafe` of its fleet; "" has
+    none. `own_system`: the system id that this arbiter sends with."""
     if not word:
         return ()
     if word not in WORDS:
@@ -199,7 +199,7 @@ def _link_findings(word: str, identity: Identity, values: Values) -> _Found:
     for setting in _LINK[identity.firmware, identity.kind]:
         fits = setting.fits.get(word)
         if fits is None:
-            yield "", f"fleet says {word} on loss of link, which no {identity} can be set to"
+            yield "", f"fleet says {word} on loss of link, which no {identity} supports"
             return
         has = setting.value(values)
         if has is None:
@@ -213,7 +213,7 @@ def _link_findings(word: str, identity: Identity, values: Values) -> _Found:
                 f"set it to {fits[0]}",
             )
         elif word == CONTINUE and setting is not _PLANE_ACTION and setting is not _ROVER_ACTION:
-            return  # it is off: what it would do does not matter
+            return  # the failsafe is off: its action does not matter
 
 
 def _station_findings(identity: Identity, values: Values, own_system: int | None) -> _Found:
@@ -224,7 +224,7 @@ def _station_findings(identity: Identity, values: Values, own_system: int | None
         if name in values and round(values[name]) != own_system:
             yield (
                 name,
-                f"its failsafe watches the ground station with system id {values[name]:.0f} "
+                f"its failsafe monitors the ground station with system id {values[name]:.0f} "
                 f"({name}), m2pem has {own_system}: set one of them to the other",
             )
 

@@ -49,7 +49,7 @@ async def read_radii(state: AutopilotState, identity: Identity, link: VehicleLin
     elsewhere.
 
     Raises:
-        ExchangeError: it does not tell.
+        ExchangeError: the vehicle does not answer.
     """
     radii = _RADII[identity.firmware]
     elsewhere_m = abs(await exchanges.parameter(link, identity.firmware, radii.name))
@@ -58,7 +58,7 @@ async def read_radii(state: AutopilotState, identity: Identity, link: VehicleLin
     try:
         home_m = abs(await exchanges.parameter(link, identity.firmware, radii.home_name))
     except NoAnswerError:
-        return  # older ones have no such parameter
+        return  # older autopilots do not have this parameter
     if home_m > 0:
         state.home_loiter_radius_m = home_m
 

@@ -1,4 +1,4 @@
-"""Modes of autopilots: their numbers (HEARTBEAT.custom_mode), names and purposes."""
+"""The modes of autopilots: numbers (HEARTBEAT.custom_mode), names and purposes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ def modes_of(identity: Identity) -> Modes:
     return _PX4 if identity.firmware is Firmware.PX4 else _ARDUPILOT[identity.kind]
 
 
-# --- ArduPilot: numbers and names stand in the dialect ------------------------------------------
+# --- ArduPilot: numbers and names are in the dialect ------------------------------------------
 
 
 def _ardupilot(enum: str, purposes: Mapping[str, FlightMode]) -> Modes:
@@ -70,7 +70,7 @@ _COPTER = _ardupilot(
     {
         "GUIDED": _GUIDED,
         "AUTO": _MISSION,
-        # Not LOITER, which obeys the throttle stick: with a stick that lies low it would descend.
+        # Not LOITER, which obeys the throttle stick: with a low stick the vehicle would descend.
         "BRAKE": _HOLD,
         "LOITER": _HOLD,
         "RTL": _RETURN,

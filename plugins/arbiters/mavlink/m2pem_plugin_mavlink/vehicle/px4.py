@@ -149,14 +149,14 @@ class Px4Driver(Autopilot):
         return self._amsl(place.altitude_m, place.altitude_frame)
 
     def _amsl(self, altitude_m: float, frame: str) -> float:
-        """Return a height above mean sea level: PX4 takes no other, whatever the frame of the
+        """Return a height above mean sea level: PX4 accepts no other, in any frame of the
         command."""
         if frame == "amsl":
             return altitude_m
         if frame == "terrain":
-            raise cannot("PX4 goes to no height above terrain")
+            raise cannot("PX4 has no heights above terrain")
         if self.state.home is None:
-            raise not_now("its home is not known, and so no height above it")
+            raise not_now("its home is not known, which heights count from")
         return self.state.home.altitude_m + altitude_m
 
     async def move(self, velocity_ned_m_s: tuple[float, float, float]) -> None:

@@ -13,10 +13,10 @@ from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from m2pem_plugin_mavlink.vehicle.state import AutopilotState
 
 LOW_BATTERY = 0.15
-"""Below this share a vehicle does not set out."""
+"""Least battery charge for arming, as a fraction."""
 
 TEXTS_WITHIN_S = 35.0
-"""An autopilot that cannot be armed says why every 30 s."""
+"""Seconds for which texts count: an autopilot repeats the reasons every 30 s."""
 
 _HAS_POSITION = dialect.EKF_POS_HORIZ_ABS
 _NO_POSITION = dialect.EKF_CONST_POS_MODE
@@ -55,7 +55,7 @@ def _reasons(firmware: Firmware, state: AutopilotState, texts: Iterable[str]) ->
         said = list(dict.fromkeys(_refusals(firmware, texts)))
         yield from (f"prearm: {text}" for text in said)
         if not said:
-            yield "prearm: a check fails, the vehicle does not say which"
+            yield "prearm: a check fails, the vehicle does not report which"
     if state.battery_fraction is not None and state.battery_fraction < LOW_BATTERY:
         yield f"battery at {state.battery_fraction:.0%}".replace("%", " %")
 
@@ -67,7 +67,7 @@ def _position_reasons(firmware: Firmware, state: AutopilotState, now_s: float) -
     flags = state.estimator_flags
     if flags is None:
         if firmware is Firmware.ARDUPILOT or state.prearm_passed is None:
-            yield f"EKF: nothing heard of it yet, {waited_s:.0f} s"
+            yield f"EKF: no status yet, {waited_s:.0f} s"
     elif not flags & _HAS_POSITION or (flags & _NO_POSITION and firmware is Firmware.ARDUPILOT):
         yield f"EKF: no position yet, {waited_s:.0f} s"
     if firmware is Firmware.PX4 and state.home is None:

@@ -13,8 +13,8 @@ class AutopilotState:
     VehicleState.
 
     `changes` counts the messages that were taken in. By the link's clock: `at_s` and `heartbeat_s`
-    are when the last message and the last heartbeat came, `boot_s` when it was first heard since it
-    was switched on; `boots` counts how often that was. `landed`: it is on the ground
+    are when the last message and the last heartbeat came, `boot_s` when the first message since the
+    last boot came; `boots` counts the boots. `landed`: it is on the ground
     (EXTENDED_SYS_STATE, or where that is not sent, what the heights and speeds say).
     """
 
@@ -29,16 +29,16 @@ class AutopilotState:
     home: GeoPosition | None = None
     landed: bool | None = None
     battery_fraction: float | None = None
-    # What it is about
+    # Its activity
     custom_mode: int | None = None
     mode: FlightMode = FlightMode.OTHER
     armed: bool | None = None
     mission_sequence: int | None = None
     mission_total: int | None = None
     mission_state: int | None = None
-    """MISSION_STATE of MISSION_CURRENT; None also of an autopilot that does not say it."""
+    """MISSION_STATE of MISSION_CURRENT; None also for an autopilot that does not report it."""
     reached_sequence: int | None = None
-    # How far it circles from a place where it is to stay, and from home; None: it can stand still
+    # The radii of its circles around a place and around home; None: it can stop
     loiter_radius_m: float | None = None
     home_loiter_radius_m: float | None = None
     # Whether it is ready: GPS_FIX_TYPE, EKF_STATUS_FLAGS (the same as ESTIMATOR_STATUS_FLAGS as far
@@ -49,14 +49,14 @@ class AutopilotState:
     # Its fence: what was breached ("boundary"), "" while it is inside, and since when
     fence_breach: str = ""
     fence_breached_s: float | None = None
-    # The hearing itself
+    # The reception
     changes: int = 0
     at_s: float | None = None
     heartbeat_s: float | None = None
     boot_s: float | None = None
     boots: int = 0
     clock_s: float | None = None
-    """When it sent its own clock last (`time_boot_ms`)."""
+    """When a message with its own clock (`time_boot_ms`) came last."""
     messages_s: dict[int, float] = field(default_factory=dict)
     """When each kind of message came last, by its id."""
 
@@ -69,7 +69,7 @@ class AutopilotState:
         return float((east * east + north * north + up * up) ** 0.5)
 
     def forget_the_last_boot(self) -> None:
-        """Clear what need not hold after the autopilot was switched off and on."""
+        """Clear the values that a restart of the autopilot changes."""
         self.gps_fix = self.estimator_flags = self.prearm_passed = None
         self.position = self.home = self.velocity_enu_m_s = self.yaw_rad = None
         self.altitude_above_home_m = self.altitude_above_terrain_m = None
@@ -82,10 +82,10 @@ class AutopilotState:
 class CommandedState:
     """Kept by the driver. None, and False: not since this arbiter was started.
 
-    `custom_mode`: the mode asked for last; `changing`: how many commands that change it are on
+    `custom_mode`: the mode commanded last; `changing`: how many commands that change it are on
     their way. `mission`: what was uploaded last, as the driver's `upload` takes it; `exchanging`:
     how many exchanges of missions go on; `first_item`: with which item a mission was started last.
-    `disarming`: it was asked to disarm.
+    `disarming`: a disarm command was sent.
     """
 
     custom_mode: int | None = None

@@ -1,4 +1,4 @@
-"""The messages that a vehicle is asked to stream: intervals, and when to request them again."""
+"""The streams that are requested from a vehicle: intervals, and when to request them again."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -39,45 +39,45 @@ def telemetry_streams(firmware: Firmware) -> Mapping[int, float]:
 class RequestedStreams:
     """The requested streams and whether they arrive, without I/O.
 
-    A vehicle forgets what it was asked for when it is switched off, and that may go unnoticed: so
-    what has stopped coming is asked for again, until it is refused. `refused` is not asked for
-    again until the next boot.
+    A vehicle that restarts forgets requests, and the restart may go unnoticed: so a stream that has
+    stopped is requested again until it is refused. `refused` is not requested again until the next
+    boot.
     """
 
     def __init__(self, wanted: Mapping[int, float]) -> None:
         self.wanted = dict(wanted)
         self.refused: set[int] = set()
-        self._asked_s: dict[int, float] = {}
+        self._requested_s: dict[int, float] = {}
 
     def forget(self) -> None:
         """The vehicle has restarted and lost all requests."""
         self.refused.clear()
-        self._asked_s.clear()
+        self._requested_s.clear()
 
     def due(self, came_s: Mapping[int, float], now_s: float) -> list[int]:
-        """The messages that must be asked for now; `came_s`: when each came last.
+        """Return the messages to request now; `came_s`: when each came last.
 
-        One that was asked for and never came is given time: it comes when there is something to
-        say (a home position, say).
+        A requested message that never came is not requested again: it comes when its content
+        exists, such as a home position.
         """
         due: list[int] = []
         for id_, interval_s in self.wanted.items():
-            asked_s = self._asked_s.get(id_)
+            requested_s = self._requested_s.get(id_)
             if id_ in self.refused:
                 continue
-            if asked_s is None:
+            if requested_s is None:
                 due.append(id_)
                 continue
             came = came_s.get(id_)
             silent_s = max(SILENT_INTERVALS * interval_s, SILENT_AT_LEAST_S)
-            if came is not None and now_s - max(came, asked_s) > max(silent_s, ASK_AGAIN_S):
+            if came is not None and now_s - max(came, requested_s) > max(silent_s, ASK_AGAIN_S):
                 due.append(id_)
         return due
 
-    def asked(self, id_: int, now_s: float) -> None:
-        """The vehicle has accepted a request."""
-        self._asked_s[id_] = now_s
+    def requested(self, id_: int, now_s: float) -> None:
+        """Note that the vehicle has accepted a request."""
+        self._requested_s[id_] = now_s
 
     def unanswered(self, id_: int) -> None:
         """The vehicle has not answered a request; it will be repeated."""
-        self._asked_s.pop(id_, None)
+        self._requested_s.pop(id_, None)

@@ -23,14 +23,14 @@ from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 SETTLES_S = 1.5
-"""A change is judged so long after it was seen: the text that explains it may come after it."""
+"""Seconds between a change and its judgement: a text that explains it may come later."""
 
 RESTART_SHOWS_WITHIN_S = 12.0
-"""A vehicle that is suddenly disarmed may have restarted, which shows when it tells its clock: its
-streams are asked for again after 5 s of silence."""
+"""A vehicle that is suddenly disarmed may have restarted, which its clock shows: its streams are
+requested again after 5 s of silence."""
 
 TEXTS_BEFORE_S = 3.0
-"""A text that came so long before a change may explain it."""
+"""Seconds before a change in which a text may explain it."""
 
 _FAILSAFE = re.compile(
     r"failsafe|fail-safe|fence|battery.*(low|critical|emergency)|low battery|EKF variance|"
@@ -45,7 +45,7 @@ _FOLLOWS = {
     FlightMode.RETURN: frozenset({FlightMode.LAND, FlightMode.HOLD}),
     FlightMode.MISSION: frozenset({FlightMode.HOLD, FlightMode.RETURN, FlightMode.LAND}),
 }
-"""What autopilots go over to by themselves when a mode has done its work."""
+"""The modes that autopilots enter by themselves when a mode is complete."""
 
 _COUNT = message_type("MISSION_COUNT").id
 _ACK = message_type("MISSION_ACK").id
@@ -53,7 +53,7 @@ _REQUESTS = (message_type("MISSION_REQUEST").id, message_type("MISSION_REQUEST_I
 
 
 class Cause(StrEnum):
-    """Who or what has taken a vehicle over, as far as is known."""
+    """The cause of a takeover, as far as known."""
 
     FAILSAFE = "failsafe"
     PILOT = "pilot"
@@ -63,7 +63,7 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Takeover:
-    """A vehicle does what was not commanded here. `reason`: for people."""
+    """A vehicle does something that m2pem did not command. `reason`: for operators."""
 
     cause: Cause
     reason: str
@@ -107,7 +107,7 @@ class TakeoverMonitor:
             self._check.cancel()
             await asyncio.wait([self._check])
 
-    # --- the answer -----------------------------------------------------------------------------
+    # --- judgement ------------------------------------------------------------------------------
 
     def begin(self) -> None:
         """A new command follows: the present state is no takeover."""
@@ -139,12 +139,12 @@ class TakeoverMonitor:
     def mode_is_commanded(self, modes: Collection[FlightMode]) -> bool:
         """Return whether the vehicle is in the commanded mode, or in one of these modes that it
         enters by itself afterwards."""
-        state, asked_for = self.vehicle.state, self.vehicle.commanded.custom_mode
-        if asked_for is None or state.custom_mode == asked_for:
-            return asked_for is not None or state.mode in modes
-        asked = self.vehicle.driver.flight_mode(asked_for)
-        follows = state.mode in modes and state.mode in _FOLLOWS.get(asked, ())
-        return follows and (asked is not FlightMode.MISSION or self._mission_is_over())
+        state, commanded = self.vehicle.state, self.vehicle.commanded.custom_mode
+        if commanded is None or state.custom_mode == commanded:
+            return commanded is not None or state.mode in modes
+        purpose = self.vehicle.driver.flight_mode(commanded)
+        follows = state.mode in modes and state.mode in _FOLLOWS.get(purpose, ())
+        return follows and (purpose is not FlightMode.MISSION or self._mission_is_over())
 
     def _mode_by(self, modes: Collection[FlightMode]) -> Takeover | None:
         state, commanded = self.vehicle.state, self.vehicle.commanded
@@ -159,11 +159,14 @@ class TakeoverMonitor:
         return self._explained(
             self._mode_s,
             changed,
-            Takeover(Cause.PILOT, f"a person has taken over: {changed}, not asked for here")
+            Takeover(
+                Cause.PILOT, f"a person has taken over: {changed}, which m2pem did not command"
+            )
             if state.mode is FlightMode.MANUAL
             else Takeover(
                 Cause.STATION,
-                f"another ground station or a switch has taken over: {changed}, not asked for here",
+                f"another ground station or a switch has taken over: {changed}, "
+                "which m2pem did not command",
             ),
         )
 
@@ -181,7 +184,7 @@ class TakeoverMonitor:
         return self._explained(
             at_s,
             changed,
-            Takeover(Cause.STATION, f"{changed}, not from here: by somebody else or by itself"),
+            Takeover(Cause.STATION, f"{changed}: by another ground station or by its autopilot"),
         )
 
     def _mission_by(self, modes: Collection[FlightMode]) -> Takeover | None:
@@ -229,7 +232,7 @@ class TakeoverMonitor:
         last = len(mission) - 1
         return (driver.reached_item or 0) >= last or (driver.current_item or 0) >= last
 
-    # --- what is seen ---------------------------------------------------------------------------
+    # --- observation ----------------------------------------------------------------------------
 
     def _update(self) -> None:
         state, commanded, now_s = (
@@ -249,7 +252,7 @@ class TakeoverMonitor:
             self._mission, self._replaced, self._checked = commanded.mission, "", None
             self._mission_s = now_s
         self._landing_s = (self._landing_s or now_s) if self._lands_unasked() else None
-        # What it said before it was stored may still come in.
+        # Messages from before the upload may still come.
         settled = now_s - self._mission_s > SETTLES_S
         if commanded.mission is not None and settled and not commanded.exchanging:
             self._check_mission(commanded.mission)
@@ -296,7 +299,7 @@ class TakeoverMonitor:
         try:
             found = await exchanges.mission_item(self.vehicle.link, item + 1)
         except ExchangeError:
-            return  # what is not answered proves nothing
+            return  # a missing answer proves nothing
         if self.vehicle.commanded.mission is mission and not _same(found, mission[item]):
             self._replaced = f"replaced the mission: its item {item + 1} was not uploaded here"
 

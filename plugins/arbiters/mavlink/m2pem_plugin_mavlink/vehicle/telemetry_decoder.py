@@ -168,7 +168,7 @@ class TelemetryDecoder:
     def _mission_current(self, message: Any) -> None:
         state = self.state
         state.mission_sequence = message.seq
-        if message.total:  # 0: an autopilot that does not say it
+        if message.total:  # 0: the autopilot does not report it
             state.mission_total = 0 if message.total == _UNKNOWN_UINT16 else message.total
         state.mission_state = message.mission_state or None
 
@@ -192,7 +192,7 @@ class TelemetryDecoder:
             self.state.altitude_above_terrain_m = message.current_height
 
     def _altitude(self, message: Any) -> None:
-        if 0.0 <= message.bottom_clearance < math.inf:  # below 0: it does not know
+        if 0.0 <= message.bottom_clearance < math.inf:  # below 0: not known
             self.state.altitude_above_terrain_m = message.bottom_clearance
 
     def _fence(self, message: Any) -> None:

@@ -86,17 +86,17 @@ SAID_AGAIN_S = 300.0
 """A warning of the autopilot that comes again within this time is not shown again."""
 
 RADII_EVERY_S = 10.0
-"""A vehicle that does not tell how far it circles is asked again so often."""
+"""Seconds between two requests for the radii of a vehicle's circles."""
 
 HOME_EVERY_S = 5.0
-"""A home position that is not sent by itself is asked for so often, until it is there."""
+"""Seconds between two requests for a home position."""
 
 
 class Vehicle:
     """A vehicle of the fleet behind its link, between `open` and `close`.
 
-    Nothing is sent before its heartbeat has identified it; then it is asked for the messages that
-    `state` is made of, and again when they stop coming. All times are of the arbiter's clock.
+    Nothing is sent before its heartbeat has identified it; then the messages for `state` are
+    requested, and again when they stop. All times are of the arbiter's clock.
     """
 
     def __init__(
@@ -125,26 +125,26 @@ class Vehicle:
         self._streams: RequestedStreams | None = None
         self._waiters = ConditionWaiters(clock)
         self._watchers: list[Callable[[], None]] = []
-        self._deafen: list[Callable[[], None]] = []
+        self._stop_listening: list[Callable[[], None]] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._asking = False
         self._boots = 0
-        self._stranger = False
-        self._home_asked_s = -math.inf
+        self._unsupported = False
+        self._home_requested_s = -math.inf
 
     # --- life -----------------------------------------------------------------------------------
 
     def open(self) -> None:
         """Subscribe to the vehicle's messages."""
-        self._deafen.append(self.link.listen((_HEARTBEAT,), self._identify))
-        self._deafen.append(self.link.listen((_STATUSTEXT,), self._read_text))
+        self._stop_listening.append(self.link.listen((_HEARTBEAT,), self._identify))
+        self._stop_listening.append(self.link.listen((_STATUSTEXT,), self._read_text))
         self._go(self._watch_silence())
 
     async def close(self) -> None:
         """Unsubscribe; the vehicle continues what it does."""
-        for deafen in self._deafen:
+        for deafen in self._stop_listening:
             deafen()
-        self._deafen.clear()
+        self._stop_listening.clear()
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
@@ -156,7 +156,7 @@ class Vehicle:
         self._watchers.append(watcher)
         return lambda: self._watchers.remove(watcher) if watcher in self._watchers else None
 
-    # --- what is known --------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------
 
     @property
     def driver(self) -> Driver:
@@ -166,7 +166,7 @@ class Vehicle:
             NoAnswerError: it has not sent a heartbeat yet.
         """
         if self._driver is None:
-            raise NoAnswerError(f"{self.resource} was not heard yet")
+            raise NoAnswerError(f"{self.resource} has sent no message yet")
         return self._driver
 
     @property
@@ -216,10 +216,10 @@ class Vehicle:
         """Request a stream of a message that is not part of telemetry (a gimbal's attitude,
         say)."""
         if self._streams is None:
-            raise NoAnswerError(f"{self.resource} was not heard yet")
+            raise NoAnswerError(f"{self.resource} has sent no message yet")
         self._streams.wanted[message_type(message).id] = interval_s
 
-    # --- hearing --------------------------------------------------------------------------------
+    # --- receiving ------------------------------------------------------------------------------
 
     def _identify(self, message: Message, sender: Address) -> None:
         if sender != self.link.address:
@@ -228,12 +228,12 @@ class Vehicle:
         if self.identity is not None:
             if found != self.identity:
                 self._logger.warning(
-                    "%s: was %s and now says that it is %s; do two vehicles have system id %d?",
-                    self.resource, self.identity, found or "none that is known", sender.system,
+                    "%s: was %s and now reports that it is %s; do two vehicles have system id %d?",
+                    self.resource, self.identity, found or "an unknown vehicle", sender.system,
                 )  # fmt: skip
             return
         if found is None:
-            self._tell_of_stranger(message.autopilot, message.type)
+            self._warn_of_unsupported(message.autopilot, message.type)
             return
         self._logger.info("%s: %s, system id %d", self.resource, found, sender.system)
         self.identity = found
@@ -248,18 +248,18 @@ class Vehicle:
         if fixed_wing.must_circle(found):
             fixed_wing.assume_default_radii(self.state, found)
             self._go(self._ask_for_radii(found))
-        self._hear(message, sender)
-        self._deafen.append(self.link.listen(self._decoder.wants, self._hear))
+        self._receive(message, sender)
+        self._stop_listening.append(self.link.listen(self._decoder.wants, self._receive))
 
-    def _tell_of_stranger(self, autopilot: int, type_: int) -> None:
-        if not self._stranger:
-            self._stranger = True
+    def _warn_of_unsupported(self, autopilot: int, type_: int) -> None:
+        if not self._unsupported:
+            self._unsupported = True
             self._logger.warning(
-                "%s: system id %d is no vehicle with ArduPilot or PX4: autopilot %d, type %d",
+                "%s: system id %d is not a vehicle with ArduPilot or PX4: autopilot %d, type %d",
                 self.resource, self.link.address.system, autopilot, type_,
             )  # fmt: skip
 
-    def _hear(self, message: Message, sender: Address) -> None:
+    def _receive(self, message: Message, sender: Address) -> None:
         if sender != self.link.address or self._decoder is None or self._streams is None:
             return
         self._decoder.take(message, self.link.now_s())
@@ -269,12 +269,12 @@ class Vehicle:
         if message.TYPE.id == _HEARTBEAT:
             self._ask_for_streams()
             self.texts.give_up(self.link.now_s() - GIVE_UP_S)
-        self._tell()
+        self._notify_watchers()
 
     def _read_text(self, message: Message, sender: Address) -> None:
         if sender == self.link.address:
             self.texts.take(message, sender, self.link.now_s())
-            self._tell()
+            self._notify_watchers()
 
     def _warn_of(self, text: Text) -> None:
         """Show operators the warnings of the autopilot. It repeats the reasons against arming every
@@ -293,7 +293,7 @@ class Vehicle:
         """Show operators a text about the vehicle."""
         self._logger.warning("%s %s", self.resource, text)
 
-    def _tell(self) -> None:
+    def _notify_watchers(self) -> None:
         self._waiters.check()
         for watcher in tuple(self._watchers):
             watcher()
@@ -310,9 +310,9 @@ class Vehicle:
             ahead_s = min(bound - silent_s for bound in bounds_s if bound > silent_s)
             await self._clock.sleep(max(ahead_s, 0.001))
             if self.link_state is not LinkState.CONNECTED:
-                self._tell()
+                self._notify_watchers()
 
-    # --- asking for streams ---------------------------------------------------------------------
+    # --- requests of streams --------------------------------------------------------------------
 
     def _ask_for_streams(self) -> None:
         assert self._streams is not None
@@ -326,9 +326,9 @@ class Vehicle:
         elif (
             _HOME in self._streams.refused
             and self.state.home is None
-            and now_s - self._home_asked_s >= HOME_EVERY_S
+            and now_s - self._home_requested_s >= HOME_EVERY_S
         ):
-            self._home_asked_s, self._asking = now_s, True
+            self._home_requested_s, self._asking = now_s, True
             self._go(self._ask_for_home())
 
     async def _ask(self, streams: RequestedStreams, due: list[int]) -> None:
@@ -344,7 +344,7 @@ class Vehicle:
                     streams.unanswered(id_)
                     self._logger.debug("%s: message %d: %s", self.resource, id_, error)
                 else:
-                    streams.asked(id_, self.link.now_s())
+                    streams.requested(id_, self.link.now_s())
         finally:
             self._asking = False
 
@@ -352,7 +352,7 @@ class Vehicle:
         try:
             await exchanges.request_message(self.link, "HOME_POSITION")
         except ExchangeError as error:
-            self._logger.debug("%s: does not tell its home: %s", self.resource, error)
+            self._logger.debug("%s: its home is not known: %s", self.resource, error)
         finally:
             self._asking = False
 
@@ -361,7 +361,9 @@ class Vehicle:
             try:
                 await fixed_wing.read_radii(self.state, found, self.link)
             except ExchangeError as error:
-                self._logger.debug("%s: does not tell how it circles: %s", self.resource, error)
+                self._logger.debug(
+                    "%s: the radii of its circles are not known: %s", self.resource, error
+                )
                 await self._clock.sleep(RADII_EVERY_S)
             else:
                 return

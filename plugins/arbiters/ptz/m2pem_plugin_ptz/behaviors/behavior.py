@@ -52,7 +52,7 @@ class Behavior(ABC):
         return ""
 
     async def begin(self) -> None:  # noqa: B027  # most begin with their first step
-        """Begin. The camera was received."""
+        """Begin. The camera has reported its direction."""
 
     @abstractmethod
     async def step(self, elapsed_s: float) -> bool:

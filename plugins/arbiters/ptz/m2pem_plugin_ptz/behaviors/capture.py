@@ -25,7 +25,8 @@ class TakePicture(Behavior):
         interval_s = self.context.parameters.interval_s
         taken = len(self._files)
         if elapsed_s >= taken * interval_s:
-            # Where it looked when it was told to; that is nearer to the truth than afterwards.
+            # The pose at the request is nearer to that of the picture than the pose after the
+            # answer.
             metadata = ImageMetadata.of(self.model, self.context.id, taken + 1)
             picture = await self.driver.take_picture()
             metadata = metadata.taken(picture)
@@ -59,12 +60,12 @@ class RecordVideo(Behavior):
 
     def __init__(self, context: BehaviorContext) -> None:
         super().__init__(context)
-        self._asked = self._records = False
+        self._requested = self._records = False
         self._began_us = 0
         self._file: str | None = None
 
     async def begin(self) -> None:
-        self._asked, self._began_us = True, self.model.now_us
+        self._requested, self._began_us = True, self.model.now_us
         await self.driver.start_recording()
         self._records = True
 
@@ -74,14 +75,14 @@ class RecordVideo(Behavior):
 
     async def leave(self) -> None:
         """Stop recording, if it was started."""
-        if not self._asked:
+        if not self._requested:
             return
         try:
             self._file = await self.driver.stop_recording()
         except CameraError:
-            if self._records:  # else nobody knows whether there was anything to stop
+            if self._records:  # otherwise the camera may have recorded nothing
                 raise
-        self._asked = False
+        self._requested = False
 
     def outputs(self) -> Mapping[str, Value]:
         """Return the file of the video, and when it began."""

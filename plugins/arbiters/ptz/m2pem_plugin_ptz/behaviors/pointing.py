@@ -25,8 +25,8 @@ STUCK_S = 10.0
 """A camera that comes no nearer to its target for this time is stuck."""
 
 LONGEST_STEP_S = 0.5
-"""A longer step counts as this: the process was suspended, and has not read the camera's
-messages."""
+"""Longest time that one step counts. After a longer one the process was suspended, and has not read
+the messages of the camera."""
 
 _NEARER_RAD = math.radians(0.1)
 _SLOWEST_RAD_S = 0.02
@@ -49,7 +49,7 @@ class Pointing(Behavior):
         """Return pan and tilt that point at the target at a time, within reach or not.
 
         Raises:
-            BehaviorFailedError: nobody can tell.
+            BehaviorFailedError: a position, a heading or an attitude is not known.
         """
 
     def point_ahead(self, slack_rad: float = 0.0) -> Reachable:
@@ -99,8 +99,8 @@ class Pointing(Behavior):
             self._unmoved_s = 0.0
         elif self._unmoved_s >= STUCK_S:
             raise BehaviorFailedError(
-                f"the camera does not get there: {math.degrees(off_rad):.1f} deg are left, and it "
-                f"has come no nearer for {STUCK_S:g} s"
+                f"the camera does not turn to its target: {math.degrees(off_rad):.1f} deg are "
+                f"left, and it has come no nearer for {STUCK_S:g} s"
             )
 
     def unreachable(self, bound_rad: float = THERE_RAD) -> str:
@@ -123,14 +123,14 @@ class _PointingAtTarget(Pointing):
         place = self.model.place(target, at_us)
         if place is None:
             assert isinstance(target, VehiclePosition)
-            raise BehaviorFailedError(f"where {target.vehicle} is, is not known")
+            raise BehaviorFailedError(f"the position of {target.vehicle} is not known")
         camera_pose = self.model.camera_pose(at_us)
         if camera_pose is None:
             raise BehaviorFailedError(self.model.vehicle_pose.missing())
         return camera_pose.at(place)
 
     def refusal(self) -> str:
-        """The target must be within reach now."""
+        """Return why the target is not within reach now."""
         return self.unreachable()
 
     def _direction(self, at_us: int) -> tuple[float, float]:
@@ -142,8 +142,8 @@ class _PointingAtTarget(Pointing):
         assert elevation is not None
         # Headings are from north, clockwise; yaw is from east, counter-clockwise.
         _, _, yaw = self.model.vehicle_pose.attitude(at_us)
-        bow = math.pi / 2 - (yaw or 0.0)
-        return self.model.mount_frame(at_us).towards(bow + bearing, elevation)
+        heading = math.pi / 2 - (yaw or 0.0)
+        return self.model.mount_frame(at_us).towards(heading + bearing, elevation)
 
 
 class PointAt(_PointingAtTarget):
@@ -157,7 +157,7 @@ class PointAt(_PointingAtTarget):
         self._last = (math.inf, math.inf)
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done when the camera points at the target, or rests near it."""
+        """Return whether the camera points at the target, or rests near it."""
         reachable = self.point_ahead()
         if not self.check_reach(reachable, elapsed_s):
             return False
@@ -174,7 +174,7 @@ class PointAt(_PointingAtTarget):
         return False
 
     def state_after_restart(self) -> BehaviorState:
-        """SUCCEEDED, or RUNNING: it does no harm to point there twice."""
+        """Return SUCCEEDED if the camera points there, else RUNNING: a repetition does no harm."""
         return (
             BehaviorState.SUCCEEDED
             if self.pointing_error_rad() <= THERE_RAD
@@ -188,7 +188,7 @@ class Track(_PointingAtTarget):
     name = "ptz_track"
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done after `duration`."""
+        """Return whether `duration` is over."""
         duration_s = self.context.parameters.duration_s
         if duration_s is not None and elapsed_s >= duration_s:
             return True
@@ -197,7 +197,7 @@ class Track(_PointingAtTarget):
         return False
 
     def state_after_restart(self) -> BehaviorState:
-        """RUNNING if the target is in view."""
+        """Return RUNNING if the target is in view; otherwise UNKNOWN."""
         in_view = self.pointing_error_rad() <= self._in_view_rad()
         return BehaviorState.RUNNING if in_view else BehaviorState.UNKNOWN
 
@@ -219,7 +219,7 @@ class Zoom(Behavior):
 
     name = "zoom"
 
-    _told_s = -_ZOOM_AGAIN_S
+    _commanded_s = -_ZOOM_AGAIN_S
 
     def refusal(self) -> str:
         most = self.driver.reach.zoom_max
@@ -227,21 +227,20 @@ class Zoom(Behavior):
         return f"parameter 'level': {level:g} is above {most:g}" if level > most + 1e-9 else ""
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done at the level."""
+        """Return whether the zoom level is reached."""
         if self._is_there():
             return True
         if elapsed_s >= _ZOOM_STUCK_S:
             raise BehaviorFailedError(
-                f"the camera does not zoom to {self._level():g}: it has not within"
-                f" {_ZOOM_STUCK_S:g} s"
+                f"the camera does not zoom to {self._level():g} within {_ZOOM_STUCK_S:g} s"
             )
-        if elapsed_s - self._told_s >= _ZOOM_AGAIN_S:
-            self._told_s = elapsed_s
+        if elapsed_s - self._commanded_s >= _ZOOM_AGAIN_S:
+            self._commanded_s = elapsed_s
             self.driver.zoom(self._level())
         return False
 
     def state_after_restart(self) -> BehaviorState:
-        """SUCCEEDED, or RUNNING: it does no harm to zoom there twice."""
+        """Return SUCCEEDED at the level; otherwise RUNNING: zooming again does no harm."""
         return BehaviorState.SUCCEEDED if self._is_there() else BehaviorState.RUNNING
 
     def _level(self) -> float:

@@ -16,13 +16,13 @@ from m2pem_plugin_ptz.camera_model.pose import CameraPose
 from m2pem_plugin_ptz.gimbal import PanTiltZoom
 
 _VIEWS_PER_S = 0.5
-"""Default speed in fields of view: what is scanned stays in the picture for two seconds."""
+"""Default speed in fields of view per second: a point stays in the picture for two seconds."""
 
 _LINGERS_S = 1.0
-"""Longest wait at the end of a sweep for a camera that does not get there exactly."""
+"""Longest wait at the end of a sweep for a camera that stops beside it."""
 
 _BEHIND = 0.25
-"""If the camera is farther behind than this part of the field of view, the sweep waits for it."""
+"""The sweep waits for a camera that is behind by more than this fraction of the field of view."""
 
 
 class Sweep(Pointing):
@@ -49,10 +49,10 @@ class Sweep(Pointing):
 
     def speed_rad_s(self) -> float:
         """Return the speed of the sweep."""
-        wished = (
+        rate_rad_s = (
             self.context.parameters.turn_rate_rad_s or _VIEWS_PER_S * self.field_of_view.width_rad
         )
-        return min(wished, self.driver.reach.rate_rad_s)
+        return min(rate_rad_s, self.driver.reach.rate_rad_s)
 
     def start_sweep(self, start_rad: float, end_rad: float, elevation_rad: float) -> None:
         """Start a sweep."""
@@ -86,14 +86,14 @@ class Sweep(Pointing):
         """Return heading and elevation of the camera."""
         ptz = self.driver.ptz
         if ptz is None:
-            raise BehaviorFailedError("the camera does not say where it looks")
+            raise BehaviorFailedError("the camera does not report its direction")
         return self.model.mount_frame(self.model.now_us).heading(ptz.pan_rad, ptz.tilt_rad)
 
     def needs_heading(self) -> str:
         """Return why headings cannot be computed now; "" if they can."""
         _, _, yaw = self.model.vehicle_pose.attitude(self.model.now_us)
         vehicle = self.model.vehicle_pose.vehicle
-        return f"where {vehicle} heads, is not known" if yaw is None else ""
+        return f"the heading of {vehicle} is not known" if yaw is None else ""
 
 
 _PROBES = 72
@@ -106,7 +106,7 @@ class ScanSector(Sweep):
     name = "ptz_scan_sector"
 
     def refusal(self) -> str:
-        """Each heading of the sector must be within reach."""
+        """Return which heading of the sector is not within reach."""
         if reason := self.needs_heading():
             return reason
         mount_frame, middle, half = self.model.mount_frame(self.model.now_us), *self._sector()
@@ -132,7 +132,7 @@ class ScanSector(Sweep):
         self.start_sweep(middle + near, middle - near, elevation)
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done at the other edge."""
+        """Return whether the sweep has reached the other edge."""
         return self.sweep(elapsed_s)
 
     def _sector(self) -> tuple[float, float]:
@@ -141,24 +141,25 @@ class ScanSector(Sweep):
 
     def _elevation(self) -> float:
         """Return the elevation of the mission; otherwise the current one."""
-        wished = self.context.parameters.elevation_rad
-        if wished is not None or self.driver.ptz is None:
-            return wished or 0.0
+        elevation_rad = self.context.parameters.elevation_rad
+        if elevation_rad is not None or self.driver.ptz is None:
+            return elevation_rad or 0.0
         return self.heading()[1]
 
 
 OVERLAP = 0.2
 ENOUGH = 0.99
-"""The area has been scanned when this part was seen and the rest cannot be."""
+"""An area counts as scanned when this fraction was seen and the rest is out of reach."""
 
 _SURE = 0.9
-"""The border of the picture does not count, as a point stands for the ground around it."""
+"""Fraction of the picture that counts: a point stands for the ground around it, which must be in
+the picture too."""
 
 _ROW = 0.88
-"""Greatest height of a row, in parts of the picture, so that all of it counts."""
+"""Greatest height of a row, as a fraction of the picture, so that the whole row counts."""
 
 _MOVED = 0.25
-"""When the rest of a row has shifted by this part of the field of view, it is planned again."""
+"""A row that has shifted by this fraction of the field of view is planned again."""
 
 
 class ScanPolygon(Sweep):
@@ -177,7 +178,7 @@ class ScanPolygon(Sweep):
         self._planned_from: Vector = np.zeros(3)
 
     def refusal(self) -> str:
-        """Nearly all of the area must be within reach from the current pose."""
+        """Return why too much of the area is out of reach from the current pose."""
         if reason := self.model.vehicle_pose.missing():
             return reason
         self._make_points()
@@ -200,7 +201,7 @@ class ScanPolygon(Sweep):
         return f"only {_percent(share)} of the area is within reach: pan {pan}, tilt {tilt} deg"
 
     async def step(self, elapsed_s: float) -> bool:
-        """Done when all points were in the picture."""
+        """Return whether all points were in the picture."""
         camera_pose = self._camera_pose()
         self._mark_seen(camera_pose)
         left = np.flatnonzero(~self._seen & ~self._given_up)
@@ -214,7 +215,8 @@ class ScanPolygon(Sweep):
             self._mark_seen(camera_pose)
             row = self._row
             if row is not None and int((~self._seen[row]).sum()) == self._left_at_start:
-                # The camera was there, and saw nothing more of it: nor would it the next time.
+                # The camera pointed at the row and saw no new point; another sweep would not
+                # either.
                 self._given_up[row] = True
             self._row = None
         return False
@@ -296,7 +298,7 @@ class ScanPolygon(Sweep):
         if share >= ENOUGH:
             return True
         raise BehaviorFailedError(
-            f"only {_percent(share)} of the area could be looked over: the rest is out of reach"
+            f"only {_percent(share)} of the area could be scanned: the rest is out of reach"
         )
 
 

@@ -41,8 +41,8 @@ def nearest_reachable(
         why = f"tilt {_degrees(tilt_rad)} is beyond its limits, {_range(reach.tilt_rad)}"
     pan, stopped = _pan(reach, pan_rad, from_pan_rad, slack_rad)
     if stopped:
-        asked = 180 - (180 - round(math.degrees(pan_rad))) % 360
-        why = f"pan {asked} deg is beyond its stops, {_range(reach.pan_rad)}"
+        pan_deg = 180 - (180 - round(math.degrees(pan_rad))) % 360
+        why = f"pan {pan_deg} deg is beyond its stops, {_range(reach.pan_rad)}"
     missing = angle_between((pan, tilt), (pan_rad, tilt_rad)) if why else 0.0
     # Straight up and down, no pan misses anything.
     return Reachable(pan, tilt, missing, why) if missing > _ROUNDING_RAD else Reachable(pan, tilt)

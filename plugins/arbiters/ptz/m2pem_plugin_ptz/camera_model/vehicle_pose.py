@@ -97,9 +97,9 @@ class TrackedVehicle:
         """Return what is not known of the pose; "" if all is."""
         state = self.state()
         if state is None or state.position is None:
-            return f"where {self.vehicle} is, is not known"
+            return f"the position of {self.vehicle} is not known"
         if state.yaw_rad is None:
-            return f"where {self.vehicle} heads, is not known"
+            return f"the heading of {self.vehicle} is not known"
         return ""
 
     @staticmethod

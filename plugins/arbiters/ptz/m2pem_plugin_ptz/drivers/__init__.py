@@ -6,7 +6,7 @@ from typing import cast
 from m2pem_plugin_ptz.drivers.driver import CameraDriver, DriverSetup
 from m2pem_plugin_ptz.settings import DriverName
 
-# Loaded for the camera that needs it: not everyone has the library of each.
+# A driver is imported when a camera needs it: its library may not be installed.
 _DRIVERS = {
     DriverName.ONVIF: ("onvif", "OnvifDriver"),
     DriverName.MAVLINK: ("mavlink", "MavlinkDriver"),

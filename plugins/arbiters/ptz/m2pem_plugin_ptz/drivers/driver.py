@@ -1,4 +1,4 @@
-"""The interface of drivers. A driver is one way to reach one camera.
+"""The interface of drivers. A driver connects to one camera.
 
 A driver imports its transport in `open`. `point`, `zoom` and `halt` return at once, and the last
 call counts: they are called repeatedly while a target or the vehicle moves.
@@ -14,8 +14,8 @@ from m2pem_plugin_ptz.settings import Settings
 
 
 class CameraError(Exception):
-    """The camera refused, or did not answer; the text is for the operator. `code` is the error code
-    for the mission."""
+    """The camera refused, or did not answer; operators read the text. `code` is the error code for
+    the mission."""
 
     def __init__(self, reason: str, code: str = "FAILED") -> None:
         super().__init__(reason)
@@ -25,24 +25,24 @@ class CameraError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class DriverSetup:
-    """The arguments of a driver. `heard` is to be called with each message of the camera. A
-    camera that is silent is LOST. `context.clock` is used for all times, except timeouts of
+    """The arguments of a driver. `on_contact` must be called with each message of the camera;
+    a camera that is silent is LOST. `context.clock` is used for all times, except timeouts of
     network calls."""
 
     connection: Connection
     settings: Settings
     context: ArbiterContext
-    heard: Callable[[], None]
+    on_contact: Callable[[], None]
 
 
 class CameraDriver(Protocol):
-    """One way to reach one camera. It is made as `Driver(setup)`."""
+    """The connection to one camera. It is created as `Driver(setup)`."""
 
     async def open(self) -> None:
         """Connect. The camera need not be there yet.
 
         Raises:
-            PluginError: what it needs is not installed, or the settings cannot be.
+            PluginError: a library is missing, or the settings are invalid.
         """
         ...
 
@@ -57,7 +57,7 @@ class CameraDriver(Protocol):
         ...
 
     def refusal(self, behavior: str) -> str:
-        """Return why the camera cannot do a behavior, now or ever; "" if it can."""
+        """Return why the camera cannot do a behavior; "" if it can."""
         ...
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None = None) -> None:
@@ -74,7 +74,7 @@ class CameraDriver(Protocol):
         """Take one picture.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         ...
 
@@ -82,7 +82,7 @@ class CameraDriver(Protocol):
         """Begin a video.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         ...
 
@@ -90,7 +90,7 @@ class CameraDriver(Protocol):
         """End the video, and return its file, or the name that the camera has for it.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         ...
 

@@ -27,7 +27,7 @@ FIND_SELDOM_S = 60.0
 FIND_OFTEN = 5
 """After this many requests without an answer, a camera is requested rarely: an autopilot without a
 camera acknowledges each request and never answers it."""
-TOLD_WITHIN_S = 2.0
+REPORTED_WITHIN_S = 2.0
 """After this time without a message about a new picture, it is requested."""
 
 TAKEN_WITHIN_S = 10.0
@@ -77,7 +77,7 @@ class CameraComponent:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    # --- what is known --------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------
 
     @property
     def level(self) -> float:
@@ -99,7 +99,7 @@ class CameraComponent:
             "record_video": (self._found.records, "record videos"),
         }
         is_able, what = can.get(behavior, (True, ""))
-        return "" if is_able else f"the camera says that it cannot {what}"
+        return "" if is_able else f"the camera reports that it cannot {what}"
 
     # --- zoom -----------------------------------------------------------------------------------
 
@@ -137,7 +137,9 @@ class CameraComponent:
         until_s = self._context.now_s() + ZOOMED_WITHIN_S
         while self._context.now_s() < until_s:
             if not await self._read_zoom(found):
-                self._fraction = fraction  # it does not say: then where it was sent
+                self._fraction = (
+                    fraction  # the camera does not report its zoom: assume the commanded one
+                )
             if self._fraction is not None and abs(self._fraction - fraction) < ZOOMED:
                 return
             await self._context.clock.sleep(ZOOM_LOOK_S)
@@ -165,16 +167,16 @@ class CameraComponent:
         """Take a picture, and wait for the camera's message about it.
 
         Raises:
-            CameraError: it could not, or does not say.
+            CameraError: the camera took no picture, or did not report it.
         """
         found = self._known("take_picture")
         async with self._taking:
             try:
                 image = await self._take(found)
             except ExchangeError as error:
-                raise CameraError(f"the camera takes no picture: {error}") from error
+                raise CameraError(f"the camera refuses to take a picture: {error}") from error
         if not image.taken:
-            raise CameraError("the camera says that the picture could not be taken")
+            raise CameraError("the camera reports that it could not take the picture")
         return CapturedImage(
             taken_us=image.time_us or self._context.clock.now_us(),
             suffix=PurePosixPath(image.url).suffix or ".jpg",
@@ -196,13 +198,13 @@ class CameraComponent:
             except RefusedError as error:
                 if not error.temporary or self._context.now_s() >= until_s:
                     raise
-            await self._context.clock.sleep(BUSY_S)  # it is busy with another one
+            await self._context.clock.sleep(BUSY_S)  # the camera is busy with another picture
         while self._context.now_s() < until_s:
             image = await self._wait_for_image(before) or await self._request_image(found, before)
             if image is not None:
                 return image
         raise CameraError(
-            f"the camera accepted to take a picture, and had none after {TAKEN_WITHIN_S:g} s"
+            f"the camera accepted to take a picture, but has taken none in {TAKEN_WITHIN_S:g} s"
         )
 
     async def _count(self, found: camera.Camera) -> int | None:
@@ -215,7 +217,7 @@ class CameraComponent:
 
     async def _wait_for_image(self, before: int | None) -> camera_images.Image | None:
         """Return the new picture, if the camera reports it in time."""
-        limit = asyncio.ensure_future(self._context.clock.sleep(TOLD_WITHIN_S))
+        limit = asyncio.ensure_future(self._context.clock.sleep(REPORTED_WITHIN_S))
         try:
             while True:
                 for image in self._images.images.values():
@@ -240,7 +242,7 @@ class CameraComponent:
             return await self._context.link.perform(camera_images.ReadImage(found.address, before))
         except RefusedError as error:
             raise CameraError(
-                f"the camera took a picture, and does not say which: {error}"
+                f"the camera took a picture, but does not report its index: {error}"
             ) from error
 
     # --- videos ---------------------------------------------------------------------------------
@@ -249,7 +251,7 @@ class CameraComponent:
         """Begin a video.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         found = self._known("record_video")
         try:
@@ -257,15 +259,14 @@ class CameraComponent:
             device = self._context.settings.camera_device
             await self._context.link.perform(camera.start_video(found.address, device=device))
         except ExchangeError as error:
-            raise CameraError(f"the camera does not record: {error}") from error
+            raise CameraError(f"the camera does not start recording: {error}") from error
         self._began = datetime.fromtimestamp(self._context.now_s(), UTC)
 
     async def stop_recording(self) -> str:
-        """End the video, and return a text that tells which one it is, as MAVLink has no names for
-        them.
+        """End the video, and return a text that identifies it: MAVLink has no names for videos.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         found = self._known("record_video")
         try:
@@ -294,12 +295,12 @@ class CameraComponent:
         if self._found is None or sender != self._found.address:
             return
         if message.TYPE.id == _HEARTBEAT:
-            self._context.heard()
+            self._context.on_contact()
         elif self._images.take(message) is not None:
             self._news.set()
 
     async def _poll(self) -> None:
-        asked = 0
+        requests = 0
         while True:
             try:
                 if self._found is None:
@@ -312,8 +313,8 @@ class CameraComponent:
             if self._found is not None:
                 await self._context.clock.sleep(ATTEND_S)
             else:
-                asked += 1
-                seldom = asked >= FIND_OFTEN
+                requests += 1
+                seldom = requests >= FIND_OFTEN
                 await self._context.clock.sleep(FIND_SELDOM_S if seldom else FIND_EVERY_S)
 
     async def _find(self) -> camera.Camera:
@@ -327,5 +328,5 @@ class CameraComponent:
                 )
             except ExchangeError as error:
                 failure = failure or error
-        assert failure is not None, "there is a component to ask"
+        assert failure is not None, "`camera_components` is not empty"
         raise failure

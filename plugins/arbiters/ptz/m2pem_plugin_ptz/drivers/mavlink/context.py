@@ -1,5 +1,4 @@
-"""What the parts of a MAVLink camera share: their context, and the rotation between mount and
-horizon.
+"""The context of the parts of a MAVLink camera, and the rotation between mount and horizon.
 
 MAVLink gimbals are level whatever the vehicle does, and are commanded so. `roll_rad` and
 `pitch_rad` are those of a VehicleState (REP-103): roll is positive when the right side is down,
@@ -92,8 +91,8 @@ class VehicleAttitude:
 
 @dataclass(frozen=True, slots=True)
 class CameraContext:
-    """The context of the parts of a camera. `reach` is that of the fleet. `heard` is called with
-    each message that shows that the part is there."""
+    """The context of the parts of a camera. `reach` is that of the fleet. `on_contact` is called
+    with each message that shows that the part is there."""
 
     resource: ResourceId
     settings: MavlinkSettings
@@ -102,7 +101,7 @@ class CameraContext:
     link: "VehicleLink"
     clock: Clock
     logger: logging.Logger
-    heard: Callable[[], None]
+    on_contact: Callable[[], None]
 
     def now_s(self) -> float:
         return self.clock.now_us() / 1e6

@@ -1,5 +1,4 @@
-"""The driver of a camera over the MAVLink connection of its vehicle, which its arbiter uses,
-too."""
+"""The driver of a camera over the MAVLink connection that it shares with its vehicle."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -71,12 +70,12 @@ class MavlinkDriver:
             self._link,
             context.clock,
             context.logger,
-            self._setup.heard,
+            self._setup.on_contact,
         )
         if own.gimbal:
             self._gimbal = GimbalDriver(camera_context)
             self._gimbal.open()
-        self._camera = CameraComponent(replace(camera_context, heard=self._camera_received))
+        self._camera = CameraComponent(replace(camera_context, on_contact=self._camera_received))
         self._camera.open()
 
     async def close(self) -> None:
@@ -87,7 +86,7 @@ class MavlinkDriver:
         if self._link is not None:
             await self._link.close()
 
-    # --- what is known --------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------
 
     @property
     def ptz(self) -> PanTiltZoom | None:
@@ -111,7 +110,7 @@ class MavlinkDriver:
         if behavior in OF_THE_CAMERA:
             return self._camera.refusal(behavior)
         if self._gimbal is None:
-            return "the fleet says that it has no gimbal, so that it cannot be turned"
+            return "the camera cannot turn: the fleet sets `gimbal: false`"
         return self._gimbal.refusal
 
     # --- orders ---------------------------------------------------------------------------------
@@ -134,7 +133,7 @@ class MavlinkDriver:
         """Take one picture, which the camera keeps.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         return await self._opened.take_picture()
 
@@ -145,7 +144,7 @@ class MavlinkDriver:
         """End the video, and return the camera's name for it.
 
         Raises:
-            CameraError: it could not.
+            CameraError: the camera refused, or did not answer.
         """
         return await self._opened.stop_recording()
 
@@ -165,4 +164,4 @@ class MavlinkDriver:
         """Report a message of the camera, unless there is a gimbal, whose silence must not be
         hidden."""
         if self._gimbal is None or not self._gimbal.is_received:
-            self._setup.heard()
+            self._setup.on_contact()

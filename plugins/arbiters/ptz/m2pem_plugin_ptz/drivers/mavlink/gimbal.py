@@ -24,7 +24,7 @@ from m2pem_plugin_ptz.gimbal import Ramp, Reach
 RELEASE_WITHIN_S = 1.0
 """Real seconds to release the control of the gimbal."""
 
-NOBODY = 0
+NO_CONTROLLER = 0
 
 
 class GimbalControl:
@@ -55,7 +55,7 @@ class GimbalControl:
         if controller is None:
             return
         before = self._other
-        is_other = controller.system != NOBODY and controller != self._own
+        is_other = controller.system != NO_CONTROLLER and controller != self._own
         self._other = controller if is_other else None
         if controller != self._own:
             self._in_control = False
@@ -63,16 +63,16 @@ class GimbalControl:
             self._context.logger.warning("%s: %s", self._context.resource, self.refusal)
 
     async def take(self) -> None:
-        """Acquire the control. Concurrent callers wait for the same answer.
+        """Acquire control of the gimbal. Concurrent callers wait for the same answer.
 
         Raises:
-            ExchangeError: the manager refuses, or does not answer.
+            ExchangeError: the manager refused, or did not answer.
         """
         if self._in_control:
             return
         if self._taking is None or self._taking.done():
             self._taking = asyncio.get_running_loop().create_task(self._take())
-            # Whoever asked may be gone by now, with another order.
+            # The task that requested control may have been replaced by another command.
             self._taking.add_done_callback(lambda done: done.cancelled() or done.exception())
         await asyncio.shield(self._taking)
 
@@ -82,7 +82,7 @@ class GimbalControl:
         self._in_control = True
 
     async def close(self) -> None:
-        """Release the control."""
+        """Release control of the gimbal."""
         if self._taking is not None:
             self._taking.cancel()
             await asyncio.gather(self._taking, return_exceptions=True)
@@ -91,7 +91,9 @@ class GimbalControl:
                 async with asyncio.timeout(RELEASE_WITHIN_S):
                     await self._context.link.perform(gimbal.release(self._manager, self._device))
             except (ExchangeError, TimeoutError) as error:
-                self._context.logger.debug("%s: not released: %s", self._context.resource, error)
+                self._context.logger.debug(
+                    "%s: control of the gimbal not released: %s", self._context.resource, error
+                )
 
 
 ATTITUDE_EVERY_S, STATUS_EVERY_S = 0.1, 1.0
@@ -107,7 +109,7 @@ QUIET_S = 0.3
 which the messages before do not have."""
 
 FORGOTTEN_S = 1.0
-"""A command older than this no longer tells where the gimbal is turning from."""
+"""A turn begins at the direction of the last command, unless the command is older than this."""
 
 HIGHEST_DEVICE = 6
 """Gimbals with higher ids are components of their own, whose device id is 0."""
@@ -140,7 +142,7 @@ class GimbalDriver:
         self._stop_listening = self._context.link.listen(gimbal_status.WANTED, self._on_message)
         self._attending = asyncio.get_running_loop().create_task(self._poll())
 
-    # --- what is known --------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------
 
     @property
     def direction(self) -> Direction | None:
@@ -151,7 +153,7 @@ class GimbalDriver:
         attitude, is_searching = self._attitude, self._found is None and not self._last_error
         if attitude is None or is_searching:
             return None
-        yaw_rad = attitude.yaw_from_bow_rad
+        yaw_rad = attitude.yaw_from_vehicle_rad
         if yaw_rad is None:
             heading_rad = self._context.attitude.heading_rad
             if attitude.yaw_from_north_rad is None or heading_rad is None:
@@ -186,7 +188,7 @@ class GimbalDriver:
         if self._found is None:
             settings = self._context.settings
             what = f"component {settings.gimbal_component} of system {settings.system_id}"
-            return f"{what} has not said that it manages a gimbal{self._last_error}"
+            return f"{what} has not reported a gimbal{self._last_error}"
         return self._found.control.refusal
 
     # --- orders ---------------------------------------------------------------------------------
@@ -209,13 +211,13 @@ class GimbalDriver:
         if self._found is not None:
             await self._found.control.close()
 
-    # --- finding and hearing --------------------------------------------------------------------
+    # --- discovery and messages -----------------------------------------------------------------
 
     def _on_message(self, message: Message, sender: Address) -> None:
         self._status.take(message, sender, self._context.now_s())
         if message.TYPE.id == _ATTITUDE:
             if self._attitude is not None:
-                self._context.heard()
+                self._context.on_contact()
         elif self._found is not None:
             known = self._found.gimbal
             self._found.control.control_changed(
@@ -233,7 +235,7 @@ class GimbalDriver:
                 if self._found is None:
                     await self._find()
                 if self._found is not None:
-                    await self._keep_hearing(self._found.gimbal.manager)
+                    await self._request_messages(self._found.gimbal.manager)
             except ExchangeError as error:
                 self._last_error = f" ({error})"
                 self._context.logger.debug("%s: gimbal: %s", self._context.resource, error)
@@ -245,14 +247,14 @@ class GimbalDriver:
         known = await self._context.link.perform(gimbal.FindGimbal(manager, settings.gimbal_device))
         self._found = _Found(known, GimbalControl(self._context, manager, known.device))
 
-    async def _keep_hearing(self, manager: Address) -> None:
+    async def _request_messages(self, manager: Address) -> None:
         attitude = self._attitude
         if attitude is not None and self._context.now_s() - attitude.at_s < SILENT_S:
             return
         await self._context.link.perform(SetMessageInterval(manager, _ATTITUDE, ATTITUDE_EVERY_S))
         try:
             await self._context.link.perform(SetMessageInterval(manager, _STATUS, STATUS_EVERY_S))
-        except RefusedError as error:  # then nobody can be seen to take control, but can be felt to
+        except RefusedError as error:  # changes of control are then not reported
             self._context.logger.debug("%s: gimbal status: %s", self._context.resource, error)
 
     # --- turning --------------------------------------------------------------------------------

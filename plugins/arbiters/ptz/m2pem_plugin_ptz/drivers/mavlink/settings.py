@@ -1,4 +1,4 @@
-"""What a fleet says of a camera over MAVLink."""
+"""The settings of a MAVLink camera in the fleet file."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,7 +15,7 @@ MOST_DEVICES = 255
 
 
 class Yaw(StrEnum):
-    """What a gimbal keeps between two commands."""
+    """The direction that a gimbal keeps between two commands."""
 
     VEHICLE = "vehicle"
     NORTH = "north"
@@ -25,7 +25,7 @@ class Yaw(StrEnum):
 class MavlinkSettings:
     """`system_id`, `component_id`: of the vehicle's autopilot. `gimbal`: without one, the camera
     points ahead. `gimbal_component`: of the gimbal manager. `camera_component` None: a camera of
-    its own, or else the autopilot. Device 0 is the one that is there."""
+    its own, or else the autopilot. Device 0: the only one."""
 
     urls: tuple[str, ...]
     system_id: int
@@ -94,6 +94,7 @@ def _urls(own: OwnSettings) -> tuple[str, ...]:
     urls = value if isinstance(value, list | tuple) else [value]
     if not urls or not all(isinstance(url, str) and "://" in url for url in urls):
         raise own.error(
-            "url", f"{value!r} is no URL such as udpin://127.0.0.1:14550: that of the vehicle"
+            "url",
+            f"{value!r} is not a URL; write that of the vehicle, such as udpin://127.0.0.1:14550",
         )
     return tuple(urls)

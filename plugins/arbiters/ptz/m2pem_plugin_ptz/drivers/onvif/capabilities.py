@@ -41,7 +41,7 @@ async def read_capabilities(session: Session, reach: Reach) -> Capabilities:
     """Request the capabilities. `reach` is that of the fleet.
 
     Raises:
-        CameraError: it did not answer, or what it says does not fit the fleet.
+        CameraError: the camera did not answer, or its answer contradicts the fleet file.
     """
     profile = await _profile(session)
     spaces = await _spaces(session, profile, reach) if profile.configuration else None
@@ -49,7 +49,7 @@ async def read_capabilities(session: Session, reach: Reach) -> Capabilities:
     try:
         answer = await session.call(profile.service, "GetSnapshotUri", ProfileToken=profile.token)
         snapshot = str(getattr(answer, "Uri", answer) or "")
-        why = "" if snapshot else f"{camera(session.settings)} says no address of its pictures"
+        why = "" if snapshot else f"{camera(session.settings)} reports no URL of its pictures"
     except RefusedError as error:
         why = error.reason
     records = session.has("recording")
@@ -70,7 +70,9 @@ async def _profile(session: Session) -> _Profile:
             "REJECTED",
         )
     if not known:
-        raise RefusedError(f"{camera(session.settings)} has no media profile: make one in it")
+        raise RefusedError(
+            f"{camera(session.settings)} has no media profile: create one in the camera"
+        )
     return next((each for each in known if each.configuration), known[0])
 
 

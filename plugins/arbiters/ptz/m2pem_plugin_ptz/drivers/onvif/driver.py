@@ -45,7 +45,7 @@ class OnvifDriver:
         self._name = f"{setup.connection.resource}: {camera(self._settings)}"
         self._fleet_reach = setup.settings.reach
         self._clock, self._logger = setup.context.clock, setup.context.logger
-        self._mover = Mover(self._clock, self._logger, setup.heard, camera(self._settings))
+        self._mover = Mover(self._clock, self._logger, setup.on_contact, camera(self._settings))
         self._session: Session | None = None
         self._capabilities: Capabilities | None = None
         self._recording: Recording | None = None
@@ -93,7 +93,7 @@ class OnvifDriver:
                 await self._clock.sleep(retry_s)
                 retry_s = min(2 * retry_s, LONGEST_RETRY_S)
             except Exception as error:
-                # A camera's strange answer must not end its driver for ever.
+                # An invalid answer of the camera must not end its driver.
                 self._logger.exception("%s", self._name)
                 self._report(f"{self._name}: {type(error).__name__}: {error}")
                 await self._clock.sleep(LONGEST_RETRY_S)
@@ -104,8 +104,7 @@ class OnvifDriver:
                 await self._until_file_changes(LONGEST_RETRY_S)
 
     def _may_be_the_clock(self) -> bool:
-        """Whether the clock of the camera may have been set, as the password was right a moment
-        ago."""
+        """Whether the password may be refused because the clock of the camera has changed."""
         now_us = self._clock.now_us()
         if not self._mover.answered or now_us - self._clock_doubted_us < REFUSED_RETRY_S * 1e6:
             return False
@@ -141,7 +140,7 @@ class OnvifDriver:
             said = None
         return (said.st_mtime_ns, said.st_ctime_ns, said.st_ino) if said is not None else (0, 0, 0)
 
-    # --- what is known --------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------
 
     @property
     def ptz(self) -> PanTiltZoom | None:
@@ -159,12 +158,12 @@ class OnvifDriver:
             return self._problem
         who = camera(self._settings)
         if not self._mover.says_position:
-            return f"{who} does not say where it looks (GetStatus without a known position)"
+            return f"{who} does not report its direction (GetStatus has no known position)"
         if behavior == "take_picture":
             return capabilities.no_snapshot
         if behavior == "record_video":
             return (
-                "" if capabilities.records else f"{who} cannot be told to record (ONVIF Profile G)"
+                "" if capabilities.records else f"{who} has no recording service (ONVIF Profile G)"
             )
         spaces = capabilities.spaces
         if spaces is None:
@@ -172,13 +171,13 @@ class OnvifDriver:
             return f"{who} does not turn: its profile {profile!r} has no PTZ configuration"
         if behavior == "zoom":
             if not spaces.zooms:
-                return f"{who} does not say how far it zooms: say reach.zoom_max in the fleet"
+                return f"{who} does not report its zoom range: set reach.zoom_max in the fleet"
             return self._mover.problem
         if not spaces.positions:
-            return f"{who} does not say where it looks: it has no positions, only velocities"
+            return f"{who} does not report its direction: it has velocities, but no positions"
         return self._mover.problem
 
-    # --- what is done ---------------------------------------------------------------------------
+    # --- execution ------------------------------------------------------------------------------
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None = None) -> None:
         self._mover.point(pan_rad, tilt_rad, rate_rad_s)
@@ -202,7 +201,7 @@ class OnvifDriver:
         if not capabilities.records:
             raise CameraError(self.refusal("record_video"), "REJECTED")
         if self._recording is not None:
-            # It was to be ended when the camera was away.
+            # The last video could not be ended while the camera was not connected.
             with contextlib.suppress(CameraError):
                 await stop_recording(session, self._recording)
         self._recording = None
@@ -211,12 +210,13 @@ class OnvifDriver:
     async def stop_recording(self) -> str:
         recording = self._recording
         if recording is None:
-            raise CameraError(f"{camera(self._settings)} was not told to record")
+            raise CameraError(f"{camera(self._settings)} is not recording")
         session, _ = self._connected()
         try:
             where = await stop_recording(session, recording)
         except RefusedError:
-            # The camera does not know of it: it was switched off, or somebody else ended it.
+            # The camera has no such job: it was switched off, or another client ended the
+            # recording.
             self._recording = None
             raise
         self._recording = None
@@ -224,5 +224,7 @@ class OnvifDriver:
 
     def _connected(self) -> tuple[Session, Capabilities]:
         if self._session is None or self._capabilities is None:
-            raise CameraError(self._problem or f"{camera(self._settings)} is away", "LINK_LOST")
+            raise CameraError(
+                self._problem or f"{camera(self._settings)} is not connected", "LINK_LOST"
+            )
         return self._session, self._capabilities

@@ -19,7 +19,7 @@ TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording that goes on. `own`: the job was made for it. `begun`: by the camera's clock."""
+    """An active recording. `own`: its job was created for it. `begun`: by the camera's clock."""
 
     token: str
     job: str
@@ -31,13 +31,11 @@ async def start_recording(session: Session, profile: str) -> Recording:
     """Start recording.
 
     Raises:
-        CameraError: it does not.
+        CameraError: the camera refused, or did not answer.
     """
     found = await session.call("recording", "GetRecordings")
     if not found:
-        raise RefusedError(
-            f"{camera(session.settings)} has no recording to write to: make one in the camera"
-        )
+        raise RefusedError(f"{camera(session.settings)} has no recording: create one in the camera")
     token = str(found[0].RecordingToken)
     begun = session.camera_time.strftime(TIME)
     try:
@@ -53,7 +51,7 @@ async def start_recording(session: Session, profile: str) -> Recording:
         )
         recording = Recording(token, str(job.JobToken), True, begun)
     except RefusedError:
-        # It may have all its jobs already, one of which can be used.
+        # The camera may have as many jobs as it can: use an idle one.
         idle = await _idle_job(session, token)
         if idle is None:
             raise
@@ -63,7 +61,7 @@ async def start_recording(session: Session, profile: str) -> Recording:
     if state.State not in ("Active", "PartiallyActive"):
         await stop_recording(session, recording)
         raise RefusedError(
-            f"{camera(session.settings)} took the recording job, but its state is {state.State}"
+            f"{camera(session.settings)} accepted the recording job, but its state is {state.State}"
         )
     return recording
 
@@ -72,7 +70,7 @@ async def stop_recording(session: Session, recording: Recording) -> str:
     """Stop recording, and return the camera's URI of it, with times of the camera's clock.
 
     Raises:
-        CameraError: it could not be told.
+        CameraError: the camera refused, or did not answer.
     """
     ended = session.camera_time.strftime(TIME)
     job = recording.job
@@ -109,7 +107,7 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
     """Return a picture, and the suffix of its file.
 
     Raises:
-        CameraError: there is none; the text says why.
+        CameraError: the camera sent no picture; the text says why.
     """
     import aiohttp  # noqa: PLC0415  # comes with the library
 
@@ -122,13 +120,12 @@ async def fetch_snapshot(session: Session, url: str) -> tuple[bytes, str]:
         raise translate_error(error, "a picture", settings, session.user) from error
     suffix = next((kind for start, kind in KINDS.items() if content.startswith(start)), None)
     if suffix is None:
-        raise RefusedError(f"{camera(settings)} gives {len(content)} bytes that are no picture")
+        raise RefusedError(f"{camera(settings)} sent {len(content)} bytes that are not a picture")
     return content, suffix
 
 
 async def _ask(client: Any, session: Session, url: str) -> bytes:
-    """Request the picture with digest authentication; with basic only if the camera accepts nothing
-    else."""
+    """Request the picture with digest authentication, or basic if the camera knows no other."""
     import aiohttp  # noqa: PLC0415
 
     account = session.credentials
@@ -155,5 +152,5 @@ async def _read(answer: Any, session: Session) -> bytes:
     async for chunk in answer.content.iter_chunked(CHUNK):
         content += chunk
         if len(content) > LARGEST:
-            raise RefusedError(f"{camera(settings)} gives a picture of more than {LARGEST} bytes")
+            raise RefusedError(f"{camera(settings)} sent a picture of more than {LARGEST} bytes")
     return bytes(content)

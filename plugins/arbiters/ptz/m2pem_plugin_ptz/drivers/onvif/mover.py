@@ -1,4 +1,4 @@
-"""Executes the moves of one camera: sends those of `Steering`, polls its direction, stops it."""
+"""Executes the moves of one camera: sends those of `Steering`, polls the direction, stops turns."""
 
 import asyncio
 import logging
@@ -41,9 +41,9 @@ class Mover:
     """
 
     def __init__(
-        self, clock: Clock, logger: logging.Logger, heard: Callable[[], None], name: str
+        self, clock: Clock, logger: logging.Logger, on_contact: Callable[[], None], name: str
     ) -> None:
-        self._clock, self._logger, self._heard, self._name = clock, logger, heard, name
+        self._clock, self._logger, self._on_contact, self._name = clock, logger, on_contact, name
         self.ptz: PanTiltZoom | None = None
         self.says_position = True
         self.answered = False
@@ -65,7 +65,9 @@ class Mover:
         if self._request is None and self._zoom is None:
             return ""
         if self._steering.stuck:
-            return f"{self._name} takes moves, but does not turn: see whether its head is free"
+            return (
+                f"{self._name} accepts moves, but does not turn: check whether its head is blocked"
+            )
         return self._fault
 
     def point(self, pan_rad: float, tilt_rad: float, rate_rad_s: float | None) -> None:
@@ -96,7 +98,7 @@ class Mover:
         """Poll and turn the camera as long as it answers.
 
         Raises:
-            CameraError: it does not any more, or answers strangely.
+            CameraError: the camera stopped answering, or its answer is invalid.
         """
         spaces = capabilities.spaces
         self._spaces, self._profile, self._session = spaces, capabilities.profile, session
@@ -120,7 +122,7 @@ class Mover:
                 task.cancel()
             await asyncio.gather(*tasks, *self._stops, return_exceptions=True)
 
-    # --- watching -------------------------------------------------------------------------------
+    # --- polling --------------------------------------------------------------------------------
 
     async def _watch(self, session: Session) -> None:
         silent_error = 0
@@ -129,7 +131,7 @@ class Mover:
             try:
                 await self._ask(session)
                 silent_error, self.answered = 0, True
-                self._heard()
+                self._on_contact()
             except SilentError:
                 silent_error += 1
                 if silent_error >= SILENT_CALLS:
@@ -140,7 +142,7 @@ class Mover:
     async def _ask(self, session: Session) -> None:
         if self._spaces is None:
             await session.call("devicemgmt", "GetSystemDateAndTime")
-            self.ptz = PanTiltZoom(0.0, 0.0)  # what does not turn looks ahead
+            self.ptz = PanTiltZoom(0.0, 0.0)  # a camera that does not turn points ahead
             return
         started_s = self._now_s
         status = await session.call("ptz", "GetStatus", ProfileToken=self._profile)
@@ -172,7 +174,7 @@ class Mover:
                     continue
                 self._fault = ""
             except SilentError:
-                # What watches notices it, too, and says so.
+                # `_watch` notices it too, and reports it.
                 self._steering.forget()
             except RefusedError as error:
                 self._steering.forget()
@@ -189,12 +191,12 @@ class Mover:
             self._halting = False
             return True
         if self._stops:
-            # A stop that is overtaken by a move would stop that.
+            # A stop that arrives after a later move would stop that move.
             await asyncio.wait(self._stops)
         spaces = self._spaces
         if spaces is None:
             return False
-        level = self._zoom_to_tell(spaces)
+        level = self._zoom_to_send(spaces)
         if level is not None:
             self._zoomed_s = self._now_s
             space = spaces.zooms[0]
@@ -217,7 +219,7 @@ class Mover:
 
     def _continuous(self, spaces: Spaces, move: ContinuousMove) -> dict[str, object]:
         space = spaces.velocity
-        assert space is not None, "nothing drives a camera that takes no velocities"
+        assert space is not None, "`Steering` sends velocities only to a camera that accepts them"
         seconds = max(RUNS_ON_S, LAGS_ON * self._steering.lag_s)
         velocity = {
             "x": space.pan.to_units(move.pan_rad_s),
@@ -226,7 +228,7 @@ class Mover:
         }
         return {"Velocity": {"PanTilt": velocity}, "Timeout": f"PT{seconds:.1f}S"}
 
-    def _zoom_to_tell(self, spaces: Spaces) -> float | None:
+    def _zoom_to_send(self, spaces: Spaces) -> float | None:
         if self._zoom is None or not spaces.zooms:
             return None
         level = min(max(self._zoom, 1.0), spaces.reach.zoom_max)
@@ -241,7 +243,7 @@ class Mover:
         try:
             await self._stop(session)
         except CameraError as error:
-            # It is told again, in its turn.
+            # `_do` sends the stop again.
             self._logger.debug("%s", error.reason)
 
     async def _stop(self, session: Session) -> None:

@@ -24,7 +24,7 @@ def require(module: str = "onvif.client") -> ModuleType:
     """Import and return a module of the package.
 
     Raises:
-        PluginError: the package is not installed, or another one of the same name is.
+        PluginError: the package is missing, or another package has its name.
     """
     root = logging.getLogger()
     handlers, level = root.handlers[:], root.level
@@ -37,7 +37,7 @@ def require(module: str = "onvif.client") -> ModuleType:
             f"`driver: onvif` needs onvif-zeep-async 4.3 or newer: {INSTALL}"
         ) from error
     finally:
-        # When it is imported, it has all loggers of the process write to the terminal.
+        # Its import makes all loggers of the process write to the terminal.
         root.handlers[:] = handlers
         root.setLevel(level)
     if not hasattr(found, "DigestAuthMiddleware") and module == "onvif.client":
@@ -87,7 +87,7 @@ def unauthorized_error(settings: OnvifSettings, user: str | None) -> Unauthorize
     """Make the error of a wrong or missing user or password."""
     if user is None or settings.credentials is None:
         return UnauthorizedError(
-            f"{camera(settings)} asks for a user and a password: write them into a file, and name "
+            f"{camera(settings)} requires a user and a password: write them into a file, and name "
             "it as connection.credentials",
             "REJECTED",
         )
@@ -118,7 +118,7 @@ def translate_error(
     if isinstance(error, zeep.exceptions.TransportError) and error.status_code in (401, 403):
         return unauthorized_error(settings, user)
     text = " ".join(str(error).split())[:200]
-    return RefusedError(f"{camera(settings)} answers {operation} with what is no ONVIF: {text}")
+    return RefusedError(f"{camera(settings)} answers {operation} with invalid ONVIF: {text}")
 
 
 def fault_text(fault: Any) -> str:
@@ -138,8 +138,10 @@ NAMESPACES = {
 
 
 class Session:
-    """A session with one camera, which is opened and closed once. All calls raise CameraError. It
-    is made again after a lost connection, as the camera may have another clock then."""
+    """A session with one camera, which is opened and closed once. All calls raise CameraError.
+
+    A lost connection needs a new session, as the clock of the camera may have changed.
+    """
 
     def __init__(self, settings: OnvifSettings, credentials: Credentials | None) -> None:
         self.settings = settings
@@ -178,7 +180,7 @@ class Session:
         await self._bounded("GetServices", self._camera.update_xaddrs)
         found = self._camera.xaddrs
         self._camera.xaddrs = {uri: self.near(url) for uri, url in found.items()}
-        # The library forgot it when it asked for the services.
+        # The library dropped the time difference when it requested the services.
         self._camera.dt_diff = self._ahead
 
     async def close(self) -> None:
@@ -242,7 +244,7 @@ class Session:
         middle = before + (datetime.now(UTC) - before) / 2
         self._ahead = _moment(said, middle) - middle
         self._camera.dt_diff = self._ahead
-        # What was made before does not know of it.
+        # Services that were created before have the old time difference.
         await self._camera.services.pop(("devicemgmt", None)).close()
 
     async def _bounded(self, operation: str, ask: Callable[[], Awaitable[Any]]) -> Any:

@@ -1,4 +1,4 @@
-"""What a fleet says of the connection to an ONVIF camera, and the file with user and password."""
+"""The settings of an ONVIF camera in the fleet file, and the file with user and password."""
 
 import configparser
 import difflib
@@ -58,7 +58,7 @@ def read_onvif(resource: ResourceId, own: Mapping[str, Any]) -> OnvifSettings:
         raise _error(resource, "host", "an ONVIF camera needs its name or IP address")
     calls_s = own.get("calls", 16.0)
     if isinstance(calls_s, bool) or not isinstance(calls_s, int | float) or not 2 <= calls_s <= 100:
-        raise _error(resource, "calls", f"{calls_s!r} is no number of calls per second, 2 to 100")
+        raise _error(resource, "calls", f"{calls_s!r} is not a number from 2 to 100")
     return OnvifSettings(
         host.strip().strip("[]"),
         _port(resource, own.get("port", 80)),
@@ -72,7 +72,7 @@ def read_onvif(resource: ResourceId, own: Mapping[str, Any]) -> OnvifSettings:
 
 def _port(resource: ResourceId, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 65535:
-        raise _error(resource, "port", f"{value!r} is no TCP port, 1 to 65535")
+        raise _error(resource, "port", f"{value!r} is not a TCP port from 1 to 65535")
     return value
 
 
@@ -82,7 +82,7 @@ def _path(resource: ResourceId, own: Mapping[str, Any]) -> Path | None:
             raise _error(
                 resource,
                 key,
-                "fleets are read by many: write user and password into a file of their own, and "
+                "many people read fleet files: write user and password into a separate file, and "
                 "name it as connection.credentials",
             )
     text = _text(resource, own, "credentials")
@@ -92,7 +92,7 @@ def _path(resource: ResourceId, own: Mapping[str, Any]) -> Path | None:
 def _text(resource: ResourceId, own: Mapping[str, Any], key: str) -> str:
     value = own.get(key, "")
     if key in own and (not isinstance(value, str) or not value.strip()):
-        raise _error(resource, key, f"{value!r} is no text")
+        raise _error(resource, key, f"{value!r} is not a text")
     return str(value).strip()
 
 
@@ -118,7 +118,7 @@ def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
 
 
 LONGEST = 64 * 1024
-"""In bytes. A longer file is not one with a password."""
+"""In bytes. A file with a password is shorter."""
 
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
 EXAMPLE = "two lines, user: NAME and password: SECRET"
@@ -135,35 +135,37 @@ def read_credentials(path: Path) -> Credentials:
     `password: secret`), or INI with these two in one section.
 
     Raises:
-        PluginError: it is not there, others may read it, or it is something else.
+        PluginError: the file is missing, other users may read it, or its content is invalid.
     """
     text = _read_file(path)
     try:
         values = _ini(text) if text.lstrip().startswith("[") else YAML(typ="safe").load(text)
     except (YAMLError, configparser.Error):
-        # Not with its cause: that quotes the line, and the password may stand in it.
-        raise PluginError(f"{path}: this is neither YAML nor INI: {EXAMPLE}") from None
+        # Raised without its cause, which quotes the line: the password may be in it.
+        raise PluginError(f"{path}: the file is neither YAML nor INI; write {EXAMPLE}") from None
     if not isinstance(values, Mapping):
-        raise PluginError(f"{path}: user and password are missing: {EXAMPLE}")
+        raise PluginError(f"{path}: user and password are missing; write {EXAMPLE}")
     found = []
     for key in ("user", "password"):
         value = values.get(key)
         if isinstance(value, bool) or not isinstance(value, str | int) or not str(value):
-            raise PluginError(f"{path}: `{key}` is missing or no text (use quotes): {EXAMPLE}")
+            raise PluginError(
+                f"{path}: `{key}` is missing or not a text (use quotes); write {EXAMPLE}"
+            )
         found.append(str(value))
     return Credentials(found[0], found[1])
 
 
 def _read_file(path: Path) -> str:
     try:
-        # What is no file must not be waited for.
+        # Opening a FIFO would block.
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
         raise PluginError(f"{path}: cannot be read: {error.strerror}") from error
     try:
         mode = os.fstat(handle).st_mode
         if not stat.S_ISREG(mode):
-            raise PluginError(f"{path}: this is no file; it should hold {EXAMPLE}")
+            raise PluginError(f"{path}: this is not a file; it should hold {EXAMPLE}")
         if mode & OTHERS:
             raise PluginError(
                 f"{path}: others may read this password (mode {stat.S_IMODE(mode):04o}): "
@@ -177,7 +179,7 @@ def _read_file(path: Path) -> str:
             raise ValueError
         return content.decode()
     except ValueError:
-        raise PluginError(f"{path}: this is no short text: it should hold {EXAMPLE}") from None
+        raise PluginError(f"{path}: this is not a short text; it should hold {EXAMPLE}") from None
 
 
 def _ini(text: str) -> Mapping[str, str]:

@@ -165,7 +165,7 @@ def read_spaces(offer: PtzSpaces, fleet: Reach, inverted: frozenset[str] = froze
     """Read the spaces. `inverted`: "pan" and "tilt" if they run the other way.
 
     Raises:
-        ValueError: what the camera reaches and what the fleet says do not meet.
+        ValueError: the limits of the camera and those of the fleet do not overlap.
     """
     signs = (-1.0 if "pan" in inverted else 1.0, -1.0 if "tilt" in inverted else 1.0)
     whole = _whole(offer.positions, fleet, signs)
@@ -209,7 +209,7 @@ def read_spaces(offer: PtzSpaces, fleet: Reach, inverted: frozenset[str] = froze
 
 
 def _usable(spaces: Iterable[SpaceDescription]) -> list[SpaceDescription]:
-    """Return the known spaces, those in degrees first, as they need no range from the fleet."""
+    """Return the known spaces. Those in degrees come first: they need no range from the fleet."""
     known = [each for each in spaces if each.in_degrees or each.in_shares]
     return sorted(known, key=lambda each: not each.in_degrees)
 
@@ -312,6 +312,6 @@ def _shared(axis: str, own: Interval, fleet: Interval) -> Interval:
             f"{math.degrees(a):.0f} to {math.degrees(b):.0f} deg" for a, b in (own, fleet)
         )
         raise ValueError(
-            f"the camera can {axis} from {camera}, the fleet says {said}: correct `reach`"
+            f"the camera can {axis} from {camera}, but the fleet says {said}: correct `reach`"
         )
     return low, high

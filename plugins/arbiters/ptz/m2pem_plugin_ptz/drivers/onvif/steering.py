@@ -1,6 +1,6 @@
 """The moves that make a camera with slow answers point at its target.
 
-A target that stands gets an absolute move. A moving target is first met by absolute moves to where
+A target at rest gets an absolute move. A moving target is first met by absolute moves to where
 it will be, and then followed by velocities: that of the target plus a part of the error. Error and
 part are computed for the time when the move takes effect; `measure_call` measures the delay.
 """

@@ -15,7 +15,7 @@ from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
 if TYPE_CHECKING:
     from m2pem_plugin_ros import RosRuntime
 
-    from m2pem_plugin_ptz.drivers.ros.images import ImageFeed, Recorder
+    from m2pem_plugin_ptz.drivers.ros.images import ImageTopic, Recorder
     from m2pem_plugin_ptz.drivers.ros.steering import JointController
 
 
@@ -34,7 +34,7 @@ def join_runtime(domain_id: int | None, name: str) -> "RosRuntime":
     """Return the connection to a domain; a new one is named `name`.
 
     Raises:
-        RosError: ROS cannot be used; the text says what would be right.
+        RosError: ROS cannot be used; the text gives the remedy.
     """
     from m2pem_plugin_ros import RosRuntime  # noqa: PLC0415  # it needs rclpy
 
@@ -74,7 +74,7 @@ class RosDriver:
         self._positions: dict[Axis, float] = {}
         self._other_joints: tuple[str, ...] = ()
         self._joint_controller: JointController | None = None
-        self._images: ImageFeed | None = None
+        self._images: ImageTopic | None = None
         self._recorder: Recorder | None = None
 
     # --- life -----------------------------------------------------------------------------------
@@ -100,9 +100,11 @@ class RosDriver:
         if self._setup.connection.sitl:
             try:
                 keep_on_loopback()
-            except PluginError:  # other vehicles are reached over other networks already
+            except (
+                PluginError
+            ):  # the arbiter of other vehicles may have set up DDS for other networks
                 self._setup.context.logger.info("%s: DDS is not on 127.0.0.1 alone", self._resource)
-        # Two executives on one network have two journals, and so two names.
+        # The name of the journal distinguishes executives on one network.
         name = f"m2pem_ptz_{self._setup.context.journal.hex[:8]}"
         return join_runtime(self._settings.domain_id, name)
 
@@ -112,15 +114,15 @@ class RosDriver:
         from std_msgs.msg import Float64MultiArray  # noqa: PLC0415
         from trajectory_msgs.msg import JointTrajectory  # noqa: PLC0415
 
-        from m2pem_plugin_ptz.drivers.ros.images import ImageFeed, Recorder  # noqa: PLC0415
+        from m2pem_plugin_ptz.drivers.ros.images import ImageTopic, Recorder  # noqa: PLC0415
         from m2pem_plugin_ptz.drivers.ros.steering import JointController  # noqa: PLC0415
 
         own, clock = self._settings, self._setup.context.clock
         as_trajectory = own.command is Command.TRAJECTORY
         kind = JointTrajectory if as_trajectory else Float64MultiArray
         publisher = ros.node.create_publisher(kind, own.command_topic, qos.COMMANDS)
-        heard = ros.subscribe(JointState, own.joint_states, self._on_message, qos.TELEMETRY)
-        self._made = [publisher, heard]
+        subscription = ros.subscribe(JointState, own.joint_states, self._on_message, qos.TELEMETRY)
+        self._made = [publisher, subscription]
         self._joint_controller = JointController(
             own.joints,
             self.reach,
@@ -129,7 +131,7 @@ class RosDriver:
             publisher.publish,
             as_trajectory=as_trajectory,
         )
-        self._images = ImageFeed(ros, own.image, clock)
+        self._images = ImageTopic(ros, own.image, clock)
         folder = self._setup.settings.pictures
         self._recorder = Recorder(self._images, folder, self._resource, clock)
 
@@ -150,7 +152,7 @@ class RosDriver:
             self._made = []
             await leave_runtime(self._settings.domain_id)
 
-    # --- what is known --------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------
 
     @property
     def ptz(self) -> PanTiltZoom | None:
@@ -167,13 +169,13 @@ class RosDriver:
             return NOT_OPEN
         if behavior in ("take_picture", "record_video"):
             is_there = self._images.has_publisher
-            return "" if is_there else f"nobody publishes images on {self._images.topic}"
+            return "" if is_there else f"no publisher of images on {self._images.topic}"
         if behavior == "zoom" and not self._settings.joints.zooms:
             return "the fleet names no joint that zooms (connection.joints.zoom)"
         if self.ptz is None:
-            return self._unheard()
+            return self._missing_joints()
         if not self._ros.node.count_subscribers(self._settings.command_topic):
-            return f"nobody listens to {self._settings.command_topic}, which moves its joints"
+            return f"no subscriber to {self._settings.command_topic}, which commands the joints"
         return ""
 
     # --- orders ---------------------------------------------------------------------------------
@@ -194,7 +196,7 @@ class RosDriver:
         """Return the next image.
 
         Raises:
-            CameraError: none comes.
+            CameraError: no image was received.
         """
         if self._images is None:
             raise CameraError(NOT_OPEN)
@@ -205,7 +207,7 @@ class RosDriver:
         """Start to store images.
 
         Raises:
-            CameraError: there are none, or they cannot be stored.
+            CameraError: no images were received, or they cannot be stored.
         """
         if self._recorder is None:
             raise CameraError(NOT_OPEN)
@@ -215,7 +217,7 @@ class RosDriver:
         """End the video, and return its file.
 
         Raises:
-            CameraError: none was begun, or not all could be stored.
+            CameraError: no video was begun, or not all images could be stored.
         """
         if self._recorder is None:
             raise CameraError(NOT_OPEN)
@@ -233,9 +235,9 @@ class RosDriver:
         if self.ptz is None:
             self._other_joints = tuple(message.name)
         elif found:
-            self._setup.heard()
+            self._setup.on_contact()
 
-    def _unheard(self) -> str:
+    def _missing_joints(self) -> str:
         names = " and ".join(list(self._settings.joints.names.values())[:2])
-        others = f"; it tells of {', '.join(self._other_joints)}" if self._other_joints else ""
-        return f"{self._settings.joint_states} does not tell of {names}{others}"
+        others = f"; it has {', '.join(self._other_joints)}" if self._other_joints else ""
+        return f"{self._settings.joint_states} has no {names}{others}"

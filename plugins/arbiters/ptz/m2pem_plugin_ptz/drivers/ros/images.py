@@ -37,7 +37,7 @@ class ImageFrame:
     taken_us: int
 
 
-class ImageFeed:
+class ImageTopic:
     """The images of one topic of sensor_msgs/CompressedImage."""
 
     def __init__(self, ros: "RosRuntime", topic: str, clock: Clock) -> None:
@@ -78,7 +78,7 @@ class ImageFeed:
         """Return the next image.
 
         Raises:
-            CameraError: none comes, or it is of no known kind.
+            CameraError: no image was received, or its format is not known.
         """
         came: asyncio.Future[ImageFrame] = asyncio.get_running_loop().create_future()
 
@@ -91,15 +91,15 @@ class ImageFeed:
             async with asyncio.timeout(WITHIN_S):
                 frame = await came
         except TimeoutError:
-            who = "its publisher" if self.has_publisher else "nobody"
+            cause = "its publisher sends none" if self.has_publisher else "it has no publisher"
             raise CameraError(
-                f"no image came on {self.topic} within {WITHIN_S:g} s: {who} publishes there"
+                f"no image was received on {self.topic} within {WITHIN_S:g} s: {cause}"
                 f"{', but sends none' if self.has_publisher else ''}"
             ) from None
         finally:
             end()
         if not frame.suffix:
-            raise CameraError(f"what came on {self.topic} is neither a JPEG nor a PNG")
+            raise CameraError(f"the image on {self.topic} is neither a JPEG nor a PNG")
         return frame
 
     def close(self) -> None:
@@ -122,14 +122,16 @@ class ImageFeed:
 
 
 MOST_WAITING = 60
-"""Images that wait for a slow disk. Of more, the oldest are dropped."""
+"""Most images that wait for a slow disk; the oldest are dropped."""
 
 
 class Recorder:
     """Records images to a file of Motion JPEG, one video at a time."""
 
-    def __init__(self, feed: ImageFeed, folder: Path, resource: ResourceId, clock: Clock) -> None:
-        self._feed = feed
+    def __init__(
+        self, images: ImageTopic, folder: Path, resource: ResourceId, clock: Clock
+    ) -> None:
+        self._images = images
         self._folder = folder
         self._name = resource.replace("/", "_")
         self._clock = clock
@@ -142,16 +144,16 @@ class Recorder:
         self._failure = ""
 
     async def start(self) -> None:
-        """Start a video. A video that goes on is kept.
+        """Start a video. An active one is kept.
 
         Raises:
             CameraError: there are no images, or no file can be written.
         """
         if self._file is not None:
             return
-        first = await self._feed.next()
+        first = await self._images.next()
         if first.suffix != ".jpg":
-            raise CameraError(f"only JPEG images make a video, and {self._feed.topic} has others")
+            raise CameraError(f"only JPEG images make a video, and {self._images.topic} has others")
         began = datetime.fromtimestamp(self._clock.now_us() / 1e6, UTC)
         try:
             self._file = await asyncio.to_thread(self._create, f"{began:%Y%m%dT%H%M%SZ}")
@@ -159,14 +161,14 @@ class Recorder:
             raise CameraError(f"no video can be stored in {self._folder}: {error}") from error
         self._failure = ""
         self._take(first)
-        self._end_reading = self._feed.read(self._take)
+        self._end_reading = self._images.read(self._take)
         self._writing = asyncio.get_running_loop().create_task(self._write(self._file))
 
     async def stop(self) -> str:
         """End the video, and return its file.
 
         Raises:
-            CameraError: none was begun, or not all could be written.
+            CameraError: no video was begun, or not all images could be written.
         """
         file, self._file = self._file, None
         if file is None:
@@ -180,7 +182,7 @@ class Recorder:
         except OSError as error:
             self._failure = self._failure or str(error)
         if self._failure:
-            raise CameraError(f"the video {self._path} is not whole: {self._failure}")
+            raise CameraError(f"the video {self._path} is not complete: {self._failure}")
         return str(self._path)
 
     async def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What a fleet says of a camera over ROS, and the joints of its pan-tilt unit.
+"""The settings of a ROS camera in the fleet file, and the joints of its pan-tilt unit.
 
 The position of a joint is positive counter-clockwise as seen from above, and upwards (REP-103);
 `PanTiltZoom` pans clockwise. The position of a zoom joint is the factor.
@@ -128,12 +128,12 @@ def read_settings(connection: Connection) -> RosSettings:
     command = own.choice("command", Command, Command.TRAJECTORY)
     namespace = own.text("namespace", "/").strip("/")
     if namespace and not _NAME.fullmatch(namespace):
-        raise own.error("namespace", f"'{namespace}' is no ROS namespace, such as /evsg1")
+        raise own.error("namespace", f"'{namespace}' is not a ROS namespace such as /evsg1")
 
     def topic(key: str, default: str) -> str:
         name = own.text(key, default)
         if not _NAME.fullmatch(name):
-            raise own.error(key, f"'{name}' is no name of a ROS topic, such as {default}")
+            raise own.error(key, f"'{name}' is not the name of a ROS topic such as {default}")
         return name if name.startswith("/") else f"/{namespace}/{name}".replace("//", "/")
 
     domain_id = None
@@ -159,9 +159,9 @@ def _joints(own: OwnSettings) -> Joints:
     if "zoom" in inner.values:
         names[Axis.ZOOM] = inner.text("zoom", "zoom_joint")
     if len(set(names.values())) < len(names):
-        raise own.error("joints", "two of them have the same name")
+        raise own.error("joints", "two joints have the same name")
     backwards = inner.values.get("reversed", [])
     known = [str(axis) for axis in (Axis.PAN, Axis.TILT)]
     if not isinstance(backwards, list | tuple) or not set(backwards) <= set(known):
-        raise inner.error("reversed", f"{backwards!r} is no list of {' and '.join(known)}")
+        raise inner.error("reversed", f"{backwards!r} is not a list of {' and '.join(known)}")
     return Joints(names, frozenset(Axis(each) for each in backwards))

@@ -18,8 +18,8 @@ STEP_S = 0.1
 """Slow turns by positions are commanded in steps of this time."""
 
 REPEAT_S = 1.0
-"""A unit that is not there this long after the expected time is commanded again, as its controller
-may have started only now."""
+"""A unit that has not arrived this long after the expected time is commanded again, as its
+controller may have started later than the command."""
 
 SHORTEST_S = 0.1
 """Shortest duration of a trajectory."""
