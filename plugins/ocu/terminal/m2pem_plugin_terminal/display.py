@@ -53,11 +53,11 @@ THEME = Theme(
     panel="#2a333e",
     dark=True,
 )
-"""Slate, with green for work, amber for what waits for the operator, red for STOP."""
+"""Slate; green: work, amber: waits for the operator, red: STOP."""
 
 
 class RunLog:
-    """The log of a run, and its tokens that left lately."""
+    """The log of a run, and its tokens that have finished lately."""
 
     def __init__(self) -> None:
         self.lines: deque[Line] = deque(maxlen=LOG_LINES)
@@ -86,7 +86,7 @@ class Display(App[None], Listener, inherit_bindings=False):
 
     CSS_PATH = "terminal.tcss"
     ENABLE_COMMAND_PALETTE = False
-    AUTO_FOCUS = ""  # keys are commands until a field is asked for
+    AUTO_FOCUS = ""  # keys are commands until the operator opens a field
     TITLE = "m2pem"
 
     def __init__(
@@ -108,7 +108,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._holders: Mapping[ResourceId, str] = {}
         self._asking_holders = False
         self.own_answers: set[tuple[RunId, str]] = set()
-        # Held, not looked up: while the screen is being taken down they can no longer be found.
+        # Stored, not queried: Textual cannot find them while it closes the screen.
         self._header = Static(id="header")
         self._tree = Static(id="tree")
         self._mission = VerticalScroll(self._tree, id="mission", can_focus=False)
@@ -144,16 +144,16 @@ class Display(App[None], Listener, inherit_bindings=False):
             await self.follower.run()
             self.say("The executive has ended.", alarm=True)
         except M2pemError as error:
-            self.say(f"The executive cannot be followed any more: {error}", alarm=True)
+            self.say(f"The connection to the executive has failed: {error}", alarm=True)
 
     async def _follow_telemetry(self) -> None:
         try:
             async for state in self.control.telemetry():
                 self._vehicles.update(state, self.now())
         except M2pemError as error:
-            self.say(f"No telemetry any more: {error}", alarm=True)
+            self.say(f"The telemetry has failed: {error}", alarm=True)
 
-    # --- what is shown --------------------------------------------------------------------------
+    # --- panes ----------------------------------------------------------------------------------
 
     @property
     def view(self) -> RunView | None:
@@ -197,7 +197,7 @@ class Display(App[None], Listener, inherit_bindings=False):
 
     @work(exit_on_error=False)
     async def _ask_holders(self) -> None:
-        # Not folded from records: what is taken or given back while no run is active leaves none.
+        # Not derived from records: without an active run, acquiring control writes none.
         try:
             self._holders = await self.control.holders()
         except M2pemError:
@@ -231,7 +231,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         """Show a text to the operator for some seconds."""
         self._notice.say(text, alarm=alarm)
 
-    # --- what happens ---------------------------------------------------------------------------
+    # --- events ---------------------------------------------------------------------------------
 
     def run_added(self, view: RunView) -> None:
         """Show a new run, unless one that has not ended is shown."""
@@ -240,7 +240,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         if shown is None or shown.status.ended:
             self.look_at(view.run)
         elif not view.status.ended:
-            self.say(f"{view.run} has begun; press r to look at it")
+            self.say(f"{view.run} has begun; press r to show it")
 
     def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
         """Log a record."""
@@ -253,18 +253,18 @@ class Display(App[None], Listener, inherit_bindings=False):
         return self.logs.setdefault(run, RunLog())
 
     def status_changed(self, view: RunView) -> None:
-        """Say how a run ended."""
+        """Show how a run ended."""
         if view.status.ended:
             detail = f": {view.summary.detail}" if view.summary.detail else ""
             bad = view.status in (RunStatus.FAILED, RunStatus.STOPPED)
             self.say(f"{view.run} {view.status.value}{detail}", alarm=bad)
 
     def prompt_opened(self, prompt: OpenPrompt) -> None:
-        """Show it at once."""
+        """Show the prompt at once."""
         self.show()
 
     def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
-        """Say who answered, unless it was the operator here."""
+        """Show who answered, unless it was this operator."""
         key = (prompt.run, prompt.prompt)
         if key in self.own_answers:
             self.own_answers.discard(key)
@@ -273,10 +273,10 @@ class Display(App[None], Listener, inherit_bindings=False):
             who = closed.by or "Another operator"
             self.say(f"{who} answered {self._label(prompt)}: {label or closed.decision}")
         elif not self.follower.views[prompt.run].status.ended:
-            self.say(f"{self._label(prompt)} is no longer asked")
+            self.say(f"{self._label(prompt)} was withdrawn")
         self.show()
 
     def alerted(self, alert: Alert) -> None:
-        """Show it as an alarm, unless the log is shown as one, too."""
+        """Show an alert as an alarm, unless the log shows it."""
         if alert.code != LOGGED:
             self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)

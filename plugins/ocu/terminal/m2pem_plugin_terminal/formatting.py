@@ -1,10 +1,10 @@
-"""Times and long names as they fit on a screen."""
+"""Format times and names for the screen."""
 
 from rich.cells import cell_len, set_cell_size
 
 
 def clock_time(seconds: float) -> str:
-    """Hours, minutes and whole seconds: "3:07", "1:02:09"."""
+    """Format hours, minutes and whole seconds: "3:07", "1:02:09"."""
     whole = max(0, int(seconds))
     hours, rest = divmod(whole, 3600)
     minutes, last = divmod(rest, 60)
@@ -12,7 +12,7 @@ def clock_time(seconds: float) -> str:
 
 
 def shortened(text: str, width: int) -> str:
-    """The text on one line of at most `width` cells; what is left out leaves a "…"."""
+    """Shorten a text to one line of at most `width` cells; "…" marks what is cut off."""
     text = " ".join(text.split())
     text = "".join(each for each in text if each.isprintable())
     if cell_len(text) <= width:

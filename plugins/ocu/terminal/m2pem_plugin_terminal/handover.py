@@ -1,4 +1,4 @@
-"""Taking vehicles and payloads from the missions, and giving them back: the list and its texts."""
+"""Acquiring and releasing control of vehicles and payloads: the list and its texts."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
 
 TITLE = "Take, or give back"
-TEXT = "Takes what is free or with a mission; gives back yours. Asks before it does."
+TEXT = "Take a resource that is free or in a mission, or give one of yours back."
 RETURNED = "Missions may command it again from then on: it may move."
 REMARK_CELLS = 34
 BEHAVIOR = re.compile(r"r\d+\.b\d+")
-"""An id of a behavior, as MissionControl.holders has it in place of an operator's name."""
+"""The id of a behavior: `MissionControl.holders` has one, or the name of an operator."""
 
 
 def with_operator(holder: str) -> bool:
-    """Whether a holder is an operator, not a behavior."""
+    """Return whether a holder is an operator, not a behavior."""
     return bool(holder) and BEHAVIOR.fullmatch(holder) is None
 
 
@@ -35,7 +35,7 @@ def taken(holders: Mapping["ResourceId", str]) -> dict[str, str]:
 def choices(
     fleet: "Fleet", holders: Mapping["ResourceId", str], by: str, task: Callable[[str], str]
 ) -> list[Choice]:
-    """Vehicles, each with its payloads, and who has them.
+    """Return the choices: vehicles, each with its payloads, and who controls them.
 
     `by` is the operator here; `task` gives the label of a behavior's task by the behavior's id.
     """

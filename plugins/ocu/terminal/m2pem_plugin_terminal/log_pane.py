@@ -1,4 +1,4 @@
-"""The log: what happened in the run that is shown, all of it or the lines with some text."""
+"""The log pane: the events of the shown run, or only the lines with a text."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ LOGGED = frozenset(
         r.ErrorThrown,
     )
 )
-"""Records that are logged; what tokens do is in the mission pane."""
+"""Records that the log shows; the mission pane shows tokens."""
 
 TIME_CELLS = 9
 
@@ -70,7 +70,7 @@ def line_of(view: RunView, stamped: StampedRecord) -> Line | None:
 
 
 class LogPane(Vertical):
-    """Newest line last; the filter is typed below it."""
+    """Shows the newest line last, and the field of the filter below."""
 
     def __init__(self) -> None:
         super().__init__(id="log")
@@ -83,7 +83,7 @@ class LogPane(Vertical):
         self._asked.display = False
 
     def compose(self) -> ComposeResult:
-        """The lines, and the filter, hidden until asked for."""
+        """Compose the lines, and the hidden field of the filter."""
         yield self._shown
         yield self._asked
 
@@ -103,7 +103,7 @@ class LogPane(Vertical):
             self._shown.write(_styled(line, self._width), scroll_end=self._following)
 
     def move(self, lines: int) -> None:
-        """Scroll; at its end, the log follows new lines again."""
+        """Scroll; at the end, follow new lines again."""
         end = self._shown.max_scroll_y
         target = max(0, min(end, round(self._shown.scroll_target_y) + lines))
         self._following = target == end
@@ -140,7 +140,7 @@ class LogPane(Vertical):
 
     @property
     def _width(self) -> int:
-        # The scroll bar's cell is kept free, so that nothing moves when it comes.
+        # A free cell for the scroll bar, so that lines do not move when it appears.
         return self.content_size.width - 1
 
     def on_resize(self) -> None:
@@ -158,7 +158,7 @@ class LogPane(Vertical):
 
 
 def _styled(line: Line, width: int) -> Text:
-    """The time, and the text beside it on as many lines as it takes."""
+    """Return the time, and beside it the text on as many lines as needed."""
     parts = wrap(" ".join(line.text.split()), max(20, width - TIME_CELLS)) or [""]
     text = Text(f"{line.time:>{TIME_CELLS - 2}}  ", "#747c86")
     for place, part in enumerate(parts):

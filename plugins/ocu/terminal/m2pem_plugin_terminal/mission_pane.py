@@ -1,4 +1,4 @@
-"""The mission pane: a tree of active elements; those that have just finished fade away."""
+"""The mission pane: a tree of active elements; finished ones fade away."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ SHOWN_WHEN_DONE = frozenset(
         "BoundaryEvent",
     }
 )
-"""Kinds of elements in which something happens; gateways and start events only pass tokens on."""
+"""Kinds of elements that are shown when done; gateways and start events only pass tokens on."""
 
 FADES_FOR_S = 10.0
 FRESH_FOR_S = 2.0
@@ -55,7 +55,7 @@ class Done:
 
 
 def shown_when_done(view: RunView, token: FinishedToken) -> bool:
-    """Whether the element that a token has left is shown for a while."""
+    """Return whether the element of a finished token is shown for a while."""
     found = view.mission.elements.get(token.element) if view.mission is not None else None
     return type(found).__name__ in SHOWN_WHEN_DONE
 
@@ -63,7 +63,7 @@ def shown_when_done(view: RunView, token: FinishedToken) -> bool:
 def mission_tree(
     view: RunView, done: Sequence[Done], now: float, time_s: float, width: int
 ) -> Text:
-    """Return the tree of what is active.
+    """Return the tree of active elements.
 
     `done`: tokens that have left lately. `now`: seconds of the operator's clock. `time_s`: mission
     time. `width`: in cells.
@@ -79,7 +79,7 @@ def mission_tree(
         if view.status.ended:
             detail = f": {view.summary.detail}" if view.summary.detail else ""
             text = f"{view.status.value} after {clock_time(view.t_s)}{detail}"
-            # A screen that is being set up or taken down has no width yet, or no longer.
+            # While Textual opens or closes the screen, it has no width.
             lines += [Text(line, "#c8d0d9") for line in wrap(text, max(1, width))]
         lines += [_done_line(view, each, now, width) for each in recent]
     return Text("\n").join(lines)
@@ -117,7 +117,7 @@ def _children(
 
 
 def _scope_shown(view: RunView, done: Done) -> int | None:
-    """Return the scope to show it in: its own, or, when that has ended, the first that is left."""
+    """Return the scope of a finished token, or the nearest active one around it."""
     if done.token.scope in view.scopes:
         return done.token.scope
     return next((number for number, s in view.scopes.items() if s.parent is None), None)
@@ -134,7 +134,7 @@ def _done_line(view: RunView, done: Done, now: float, width: int) -> Text:
 
 
 def _active_lines(view: RunView, active: Token, time_s: float, width: int) -> list[Text]:
-    """Its name and what it does: on one line if there is room, else on two."""
+    """Return the name of an element and its activity, on one line or two."""
     inside = any(scope.token == active.id for scope in view.scopes.values())
     kind = "asking" if active.prompts else "doing" if active.work or inside else "waiting"
     symbol, colour = SYMBOLS[kind]

@@ -1,4 +1,4 @@
-"""The terminal as an operator control unit."""
+"""The operator control unit in a terminal."""
 
 import asyncio
 import logging
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from m2pem_plugin_terminal.app import TerminalApp
 
 LINGERS_FOR_S = 2.0
-"""How long the end of a mission is still shown after the unit was cancelled."""
+"""Seconds for which the end of a mission stays on the screen after `serve` is cancelled."""
 
 
 class TerminalOcu:
-    """Takes the whole terminal while it serves, and gives it back as it was."""
+    """Uses the whole terminal while it serves, and restores it afterwards."""
 
     capabilities = OcuCapabilities(takes_terminal=True)
-    """The command line prints nothing meanwhile."""
+    """The command line prints nothing while this unit serves."""
 
     def __init__(self, control: "MissionControl") -> None:
         self._control = control
 
     async def serve(self) -> None:
-        """Show and ask until cancelled, or until the operator leaves.
+        """Serve the operator until cancelled, or until the operator quits.
 
         Raises:
-            OperatorError: this is no terminal.
-            PluginError: the screen broke; Textual has printed how.
+            OperatorError: standard input or output is not a terminal.
+            PluginError: the screen failed; Textual has printed the error.
         """
         from m2pem_plugin_terminal.app import TerminalApp  # noqa: PLC0415  # half a second
 
@@ -46,7 +46,8 @@ class TerminalOcu:
         task_factory = loop.get_task_factory()
         serving = asyncio.create_task(app.run_async(mouse=False))
         with _log_to(app):
-            # Textual makes tasks of the whole loop eager; the executive's are not its own.
+            # Textual makes all tasks of the event loop eager, also those of the executive: undo
+            # that.
             loop.call_soon(lambda: loop.set_task_factory(task_factory))
             try:
                 await asyncio.shield(serving)
@@ -57,12 +58,12 @@ class TerminalOcu:
                 await serving
                 raise
         if app.return_code:
-            raise PluginError("the terminal's screen broke")
+            raise PluginError("the screen of the terminal unit failed")
 
 
 @contextmanager
 def _log_to(app: "TerminalApp") -> Iterator[None]:
-    """Warnings are shown on the screen, which they would spoil otherwise."""
+    """Show warnings on the screen; printed, they would damage it."""
     logger = logging.getLogger("m2pem")
     before = logger.handlers[:]
     logger.handlers[:] = [_ToScreen(app)]

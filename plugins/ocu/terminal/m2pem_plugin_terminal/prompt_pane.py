@@ -10,7 +10,7 @@ from textual.widgets import Static
 from m2pem.api.control import OpenPrompt, RunId
 
 SETTLES_IN_S = 0.7
-"""A prompt that has just appeared takes no key: it may have been meant for the one before."""
+"""Seconds in which a new prompt ignores keys: they may be meant for the prompt before it."""
 
 MOST_DECISIONS = 9
 
@@ -28,7 +28,7 @@ class PromptPane(Vertical):
         self._since = 0.0
 
     def compose(self) -> ComposeResult:
-        """The text, which scrolls if it is long, and the decisions, which are always seen."""
+        """Compose the text, which scrolls if it is long, and the decisions, which stay visible."""
         yield VerticalScroll(self._text, id="question-text", can_focus=False)
         yield self._decisions
 
@@ -39,7 +39,7 @@ class PromptPane(Vertical):
 
     @property
     def settled(self) -> bool:
-        """Whether the prompt has been shown long enough to be answered."""
+        """Whether keys answer the prompt: it has been visible long enough."""
         return self._now() - self._since >= SETTLES_IN_S
 
     def show(

@@ -1,6 +1,6 @@
 """The lines around the panes: the header, the notice line and the STOP bar.
 
-STOP is on every screen and over every dialog; it is done by a second press.
+STOP is on every screen and over every dialog; a second press confirms it.
 """
 
 from collections.abc import Callable
@@ -70,7 +70,7 @@ def header(view: RunView | None, others: int, time_s: float, width: int) -> Text
 
 
 class NoticeLine(Static):
-    """The newest notice. Its line stays empty when there is none, so that nothing moves."""
+    """Shows the newest notice. Without one the line stays empty, so that the panes do not move."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         super().__init__(id="notice")
@@ -85,7 +85,7 @@ class NoticeLine(Static):
         self.show()
 
     def show(self) -> None:
-        """Clear the text when its time is over."""
+        """Clear a text that has expired."""
         if self._now() - self._since >= SHOWN_FOR_S:
             self._text = ""
         style = "bold #e07a6a" if self._alarm else "#e8c468"
@@ -106,7 +106,7 @@ class DoublePress:
         return self._armed_at is not None and self._now() - self._armed_at < ARMED_FOR_S
 
     def press(self, what: str) -> bool:
-        """Take a press of the key for `what`. True: it was the second."""
+        """Process a press of the key for `what`; return whether it was the second one."""
         if self.armed and self.what == what:
             self._armed_at = None
             return True

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
 
 SILENT_AFTER_S = 3.0
-"""Where the fleet does not say when a vehicle counts as lost."""
+"""Default of `lost_after`, in seconds."""
 
 GREY = "#5f6771"
 DETAIL = "#9aa4af"
@@ -32,12 +32,12 @@ LINKS = {
 }
 NAME_CELLS = 9
 MARCH_FOR_S = 2.0
-"""The latest state of a march is shown for so long."""
+"""Seconds for which the latest state of a march is shown."""
 
 AT_ITS_PLACE_M = 1.0
 LOW_BATTERY = 0.2
 ASIDE_DEG, ZOOMED = 0.5, 1.05
-"""Nearer to straight ahead and to the widest view, nothing is shown."""
+"""Smaller angles and zooms are not shown."""
 
 
 @dataclass(slots=True)
@@ -64,10 +64,10 @@ class Vehicles:
     def table(
         self, now: float, width: int, named: Callable[[str], str], taken: Mapping[str, str]
     ) -> Text:
-        """All vehicles, each on two or three lines of `width` cells, and who took them.
+        """Return all vehicles, each on two or three lines of `width` cells, with their operators.
 
-        `named` gives the name of a behavior by its id; `taken`, by resource, the operators who
-        have something.
+        `named` gives the name of a behavior by its id; `taken`: the operators, by
+        resource.
         """
         lines: list[Text] = []
         for vehicle in self._fleet.vehicles.values():
@@ -75,7 +75,7 @@ class Vehicles:
             latest = self._latest.get(vehicle.id)
             holders = _taken((vehicle.id, *vehicle.payloads), taken, width)
             if latest is None or not isinstance(latest.state, VehicleState):
-                lines += [Text(f"○ {_name(vehicle.id)} not heard of yet", GREY), *holders]
+                lines += [Text(f"○ {_name(vehicle.id)} no telemetry yet", GREY), *holders]
                 continue
             age_s = now - latest.at
             payloads = [self._latest[p].state for p in vehicle.payloads if p in self._latest]
@@ -88,7 +88,7 @@ class Vehicles:
         return Text("\n").join(lines)
 
     def _place(self, vehicle: str, now: float) -> list[Text]:
-        """Return how well a member of a march keeps its place, while its state is recent."""
+        """Return the deviation of a member of a march, while its state is recent."""
         member, at = self._marching.get(vehicle, (None, 0.0))
         if member is None or member.along_m is None or now - at > MARCH_FOR_S:
             return []
@@ -166,13 +166,13 @@ def _position(state: VehicleState) -> str:
 
 
 def payload_text(state: PayloadState, named: Callable[[str], str]) -> str:
-    """Such as "ptz: 30°→ 10°↓ x4 ptz_track"; "" if there is nothing to say.
+    """Return a text such as "ptz: 30°→ 10°↓ x4 ptz_track"; "" without information.
 
     `named` gives the name of a behavior by its id. Pan is from the vehicle's heading; "→" is
     clockwise.
     """
     if state.link is LinkState.LOST:
-        parts = ["not heard"]
+        parts = ["no telemetry"]
     else:
         parts = _look(state)
         if state.behavior:
@@ -189,7 +189,7 @@ def _look(state: PayloadState) -> list[str]:
 
 
 def _turned(angle_rad: float | None, arrows: str) -> str:
-    """`arrows`: for an angle above 0, and below."""
+    """Return an angle in degrees with its arrow. `arrows`: for positive and negative angles."""
     if angle_rad is None or not math.isfinite(angle_rad):
         return ""
     angle_deg = math.degrees(angle_rad)

@@ -105,7 +105,7 @@ async def test_the_filter_leaves_out_other_lines(world: World) -> None:
 async def test_vehicles_are_shown_with_all_that_matters(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()
-        await terminal.until_shown("● DRIVE", "○ scout     not heard of yet")
+        await terminal.until_shown("● DRIVE", "○ scout     no telemetry yet")
         world.fake.say(scout(0.75, behavior="r1.b1"))
         uav = ResourceId("uav")
         place = GeoPosition(38.2, -77.4, 100.0)
@@ -124,7 +124,7 @@ async def test_a_camera_is_shown_with_what_it_does_and_where_it_looks(world: Wor
         world.fake.say(PayloadState(eye, 0, 0.5, -0.25, 4.0, behavior="zoom"))
         await terminal.until_shown("eye: 29°→ 14°↓ x4 zoom")
         world.fake.say(PayloadState(eye, 0, link=LinkState.LOST))
-        await terminal.until_shown("eye: not heard")
+        await terminal.until_shown("eye: no telemetry")
 
 
 async def test_a_member_of_a_march_is_shown_with_its_place(world: World) -> None:

@@ -128,7 +128,7 @@ async def test_taking_what_another_took_meanwhile_is_refused(world: World) -> No
 async def test_who_attaches_late_sees_what_is_taken(world: World) -> None:
     await world.control.take("scout", by="bob@gcs2")
     async with world.terminal() as terminal:
-        await terminal.until_shown("○ scout     not heard of yet", "with bob@gcs2")
+        await terminal.until_shown("○ scout     no telemetry yet", "with bob@gcs2")
         await world.control.give_back("scout", by="bob@gcs2")
         await terminal.until_gone("with bob@gcs2")
 

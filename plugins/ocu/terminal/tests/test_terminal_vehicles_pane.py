@@ -25,7 +25,7 @@ from m2pem.mission.catalogue import ResourceId
             {"pan_rad": 0.5, "tilt_rad": -0.25, "zoom": 4.0, "behavior": "b1"},
             "ptz: 29°→ 14°↓ x4 track",
         ),
-        ({"link": LinkState.LOST, "behavior": "b1", "pan_rad": 0.5}, "ptz: not heard"),
+        ({"link": LinkState.LOST, "behavior": "b1", "pan_rad": 0.5}, "ptz: no telemetry"),
         ({"pan_rad": math.nan, "tilt_rad": math.inf}, ""),
     ],
 )

@@ -39,7 +39,7 @@ OPENAPI = "/api/openapi.json"
 def routers_of(
     services: Services, settings: Settings, hub: Hub, entry: Entry, recorder: Recorder
 ) -> list[APIRouter]:
-    """Return all routers."""
+    """Return the routers of the REST interface, the WebSocket and the page."""
     control, folder = services.control, services.folder
     tiles = map_tiles.Tiles(settings.tiles) if settings.tiles is not None else None
     return [
@@ -65,8 +65,8 @@ def routers_of(
 def create_app(
     routers: Iterable[APIRouter], entry: Entry, settings: Settings, slots: Slots
 ) -> ASGIApp:
-    """The app. `entry` signs users in; `slots` are the server's connections."""
-    # The pages of FastAPI about an API load scripts from elsewhere.
+    """Create the app. `entry` signs users in; `slots` are the server's connections."""
+    # FastAPI's pages about an API load scripts from other hosts.
     app = FastAPI(title="m2pem", openapi_url=OPENAPI, docs_url=None, redoc_url=None)
     for router in routers:
         app.include_router(router)

@@ -24,7 +24,7 @@ users_option = click.option(
 
 @click.group()
 def web() -> None:
-    """Name the users of the web page, and find its address."""
+    """Manage the users of the web page, and print its address."""
 
 
 @web.command("add-user")
@@ -33,13 +33,13 @@ def web() -> None:
     "--role",
     type=click.Choice([each.value for each in Role]),
     required=True,
-    help="What they may do.",
+    help="The user's role.",
 )
 @users_option
 def add_user(name: str, role: str, path: Path) -> None:
-    """Name a user, or give one another role and password.
+    """Add a user, or change the role and password of one.
 
-    The password is asked for; without a terminal it is the first line of standard input.
+    The command asks for the password; without a terminal it reads the first line of standard input.
     """
     from m2pem_plugin_web.access.passwords import hash_password  # noqa: PLC0415  # start fast
     from m2pem_plugin_web.access.users import (  # noqa: PLC0415
@@ -82,20 +82,22 @@ def remove_user(name: str, path: Path) -> None:
     if users.pop(name, None) is None:
         raise OperatorError(f"{path} has no user {name!r}")
     write_users(path, users)
-    click.echo(f"{name} is no user in {path} any more")
+    click.echo(f"{name} is removed from {path}")
 
 
 @web.command()
 def url() -> None:
     """Print the address of each page that this user's executives serve.
 
-    It has a token that signs in the browser that opens it, once; then another one is printed.
+    The address has a token that signs in one browser; the next call prints another token.
     """
     from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
 
     found = list(page_addresses.pages(page_addresses.folder(os.environ)))
     if not found:
-        raise OperatorError("no page is served by this user: m2pem serve --fleet FLEET --ocu web")
+        raise OperatorError(
+            "this user serves no page: start one with m2pem serve --fleet FLEET --ocu web"
+        )
     for page in found:
         click.echo(page.url)
 
@@ -108,5 +110,5 @@ def _ask_for_password(name: str) -> str:
 
 
 def add_to(commands: MutableMapping[str, click.Command]) -> None:
-    """Add the group to the command line's."""
+    """Add the group `web` to the command line."""
     commands["web"] = web

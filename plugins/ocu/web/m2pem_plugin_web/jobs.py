@@ -16,7 +16,7 @@ from m2pem_plugin_web.problems import ProblemError
 T = TypeVar("T")
 
 AT_ONCE = 2
-"""Jobs of a kind that run at once, as each takes a processor. Others wait."""
+"""Jobs of a kind that run at once, as each uses a processor; others wait."""
 MOST_WAITING = 20
 KEPT = 20
 """Results of a kind that are kept; the oldest are dropped."""
@@ -59,11 +59,11 @@ class Jobs(Generic[T]):
         """Begin a job, now or when others have ended. `work` is called with its id.
 
         Raises:
-            ProblemError: too many wait already.
+            ProblemError: too many jobs wait.
         """
         running = [each for each in self._jobs.values() if each.state is JobState.RUNNING]
         if len(running) >= AT_ONCE + MOST_WAITING:
-            raise ProblemError(429, f"too many {self._kind}s wait: come back later")
+            raise ProblemError(429, f"too many {self._kind}s wait: try again later")
         job: Job[T] = Job(secrets.token_hex(8), by)
         self._jobs[job.id] = job
         job.task = asyncio.get_running_loop().create_task(
@@ -76,7 +76,7 @@ class Jobs(Generic[T]):
         """Return a job by its id.
 
         Raises:
-            ProblemError: 404, there is none.
+            ProblemError: 404, it does not exist.
         """
         job = self._jobs.get(identifier)
         if job is None:
@@ -87,7 +87,7 @@ class Jobs(Generic[T]):
         """Cancel a job; one that has ended stays as it is.
 
         Raises:
-            ProblemError: 404, there is none.
+            ProblemError: 404, it does not exist.
         """
         job = self.get(identifier)
         if job.task is not None and not job.task.done():
@@ -115,9 +115,9 @@ class Jobs(Generic[T]):
             job.findings = self._called.findings(error.findings)
         except M2pemError as error:
             job.state, job.problem = JobState.FAILED, self._called.text(str(error))
-        except Exception:  # one job must not end the page
+        except Exception:  # a failed job must not end the server
             log.exception("%s %s", self._kind, job.id)
-            job.state, job.problem = JobState.FAILED, "the server failed; its log says how"
+            job.state, job.problem = JobState.FAILED, "the server failed; its log has the error"
 
     def _forget(self) -> None:
         over = [each.id for each in self._jobs.values() if each.state is not JobState.RUNNING]

@@ -1,4 +1,4 @@
-"""The web page as an operator control unit."""
+"""The operator control unit in a browser."""
 
 import os
 from collections.abc import Mapping
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 class WebOcu:
     """Serves browsers until cancelled. `environment`: the variables of `settings`.
 
-    It listens from the moment it is made, and answers when it serves.
+    It listens as soon as it is created, and answers during `serve`.
 
     Raises:
-        PluginError: a variable has a value that it may not have, the address is taken, or files
-            of secrets are not what they ought to be.
+        PluginError: a variable has an invalid value, the address is in use, or a file with secrets
+            is not private.
     """
 
     capabilities = OcuCapabilities(imports=("m2pem_plugin_web.app",))
@@ -42,7 +42,7 @@ class WebOcu:
         self._where = page_addresses.folder(environment)
         self._server = Server(settings)
         self.url = ""
-        """Where it is served; with the token that is valid, if there is one."""
+        """The address of the page, with the valid token if there is one."""
         try:
             entry = self._entry(settings)
             self.hub = Hub(control)
@@ -69,7 +69,7 @@ class WebOcu:
 
         click.echo(f"m2pem: the page is at {self.url}", err=True)
         try:
-            # In a thread, as it takes half a second of the processor, and STOP must not wait.
+            # In a thread: the import takes half a second, and STOP must not wait.
             app = await asyncio.to_thread(self._make_app)
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self.hub.run(), name="web: hub")
@@ -81,7 +81,7 @@ class WebOcu:
             await self._services.close()
 
     def _entry(self, settings: Settings) -> "Entry":
-        """Return who may sign in; `m2pem web url` finds the address."""
+        """Return the entry, and store the address for `m2pem web url`."""
         from m2pem.api.operator import operator_name  # noqa: PLC0415
         from m2pem_plugin_web.access import page_addresses  # noqa: PLC0415
         from m2pem_plugin_web.access.sign_in import Entry, owner_of  # noqa: PLC0415

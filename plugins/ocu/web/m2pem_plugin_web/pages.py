@@ -22,7 +22,7 @@ ADDRESSES = (
     "/runs/{run}",
     "/rehearsals/{rehearsal}",
 )
-"""Addresses of the page; its own router shows what belongs there."""
+"""Addresses of the page; the router in the browser shows their content."""
 
 FOR_EVER = "public, max-age=31536000, immutable"
 """Files below assets/ have a hash of their content in their names."""
@@ -52,7 +52,7 @@ class Pages:
         """Return a file of the folder.
 
         Raises:
-            ProblemError: 404, there is none.
+            ProblemError: 404, it does not exist.
         """
         file = await self._file(self._find(name))
         said = {
@@ -73,9 +73,9 @@ class Pages:
             path = (self._folder / name).resolve()
             if path.is_relative_to(self._folder) and path.is_file():
                 return path, path.stat().st_mtime_ns
-        except (OSError, ValueError):  # a name that no file can have
+        except (OSError, ValueError):  # the name is not valid for a file
             pass
-        raise ProblemError(404, "there is no such page")
+        raise ProblemError(404, "this page does not exist")
 
     async def _file(self, found: tuple[Path, int]) -> _File:
         if found not in self._files:
@@ -94,7 +94,7 @@ def _read(path: Path) -> _File:
 
 
 def router(pages: Pages) -> APIRouter:
-    """The routes of the page. `?token=` in any of its addresses is for the page: it signs in."""
+    """The routes of the page. The page signs in with `?token=` of its address."""
     routes = APIRouter(include_in_schema=False)
 
     async def page(request: Request) -> Response:

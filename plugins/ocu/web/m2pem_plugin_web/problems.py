@@ -44,7 +44,7 @@ STATUS_OF: tuple[tuple[type[M2pemError], int], ...] = (
 
 
 class ProblemModel(BaseModel):
-    """What went wrong. `findings`: all that is wrong with a file."""
+    """A refusal or failure. `findings`: all problems of a file."""
 
     model_config = ConfigDict(extra="allow", title="Problem")
 
@@ -56,11 +56,11 @@ class ProblemModel(BaseModel):
 
 RESPONSES: dict[int | str, dict[str, Any]] = {
     "default": {
-        "description": "It was refused, or failed.",
+        "description": "The request was refused, or it failed.",
         "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
     }
 }
-"""The responses of every route for what goes wrong."""
+"""The responses of every route for refusals and failures."""
 
 
 class ProblemError(HTTPException):
@@ -76,7 +76,7 @@ class ProblemError(HTTPException):
 def problem(
     status: int, detail: str, headers: Mapping[str, str] | None = None, **more: Any
 ) -> JSONResponse:
-    """Return a response for what went wrong."""
+    """Return the response for a refusal or a failure."""
     content = {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
@@ -122,11 +122,11 @@ def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
 
     @app.exception_handler(Exception)
     def broke(_: Request, error: Exception) -> JSONResponse:
-        return problem(500, "the server failed; its log says how")
+        return problem(500, "the server failed; its log has the error")
 
 
 def _methods_at(app: FastAPI, request: Request) -> list[str]:
-    """What may be asked at an address; of several routes there, a router names those of one."""
+    """Return the methods of all routes at an address; a router names those of one route only."""
     scope = {key: value for key, value in request.scope.items() if key in ("type", "path")}
     return [
         method

@@ -1,6 +1,6 @@
-"""uvicorn in an event loop that it does not own: it handles no signals, and ends when cancelled.
+"""Runs uvicorn in the executive's event loop: without its signal handlers, until cancelled.
 
-Connections are bounded, so that strangers who open many lock out no user who has signed in.
+Connections are bounded, so that other clients cannot lock out signed-in users.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ MOST_OF_AN_ADDRESS = 32
 """Connections without a signed-in user: of all addresses, and of one."""
 
 MOST_KNOWN = 256
-"""Connections of people who have signed in; then all is refused to them but STOP."""
+"""Connections of signed-in users; beyond that, only STOP is accepted."""
 
 Peer = tuple[str, int]
 
@@ -42,7 +42,7 @@ class Slots:
     """Open connections by their peers (address and port), the oldest first.
 
     A new connection always has a slot: the oldest one without a signed-in user is closed, first
-    of those from the same address. That is most likely a request that never came whole.
+    of those from the same address. That is most likely an incomplete request.
     """
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class Slots:
 
     @property
     def full(self) -> bool:
-        """Whether there are too many connections even of people who have signed in."""
+        """Whether signed-in users have too many connections."""
         return sum(slot.known for slot in self._open.values()) > MOST_KNOWN
 
     def _drop(self, peer: Peer) -> None:
@@ -85,10 +85,10 @@ HEADERS_S = 10.0
 
 
 def listen(settings: Settings) -> socket.socket:
-    """A socket that listens where the settings say.
+    """Return a socket that listens at the address of the settings.
 
     Raises:
-        PluginError: it cannot.
+        PluginError: the address cannot be used.
     """
     try:
         found = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)
@@ -111,27 +111,27 @@ def listen(settings: Settings) -> socket.socket:
 
 
 class _Http(H11Protocol):
-    """Closes connections on which no head of a request comes."""
+    """Closes connections that send no complete head of a request in time."""
 
     slots: Slots
-    _patience: asyncio.TimerHandle | None = None
+    _timeout: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         if self.client is not None:
             self.slots.opened(self.client, transport.abort)
-        self._patience = self.loop.call_later(HEADERS_S, transport.abort)
+        self._timeout = self.loop.call_later(HEADERS_S, transport.abort)
 
     def data_received(self, data: bytes) -> None:
         before = self.scope
         super().data_received(data)
         if self.scope is not before:
-            self._be_patient()
-        elif self._patience is None and (self.cycle is None or self.cycle.response_complete):
-            self._patience = self.loop.call_later(HEADERS_S, self.transport.abort)
+            self._cancel_timeout()
+        elif self._timeout is None and (self.cycle is None or self.cycle.response_complete):
+            self._timeout = self.loop.call_later(HEADERS_S, self.transport.abort)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self._be_patient()
+        self._cancel_timeout()
         self._leave()
         super().connection_lost(exc)
 
@@ -143,15 +143,15 @@ class _Http(H11Protocol):
         if self.client is not None:
             self.slots.closed(self.client)
 
-    def _be_patient(self) -> None:
-        if self._patience is not None:
-            self._patience.cancel()
-            self._patience = None
+    def _cancel_timeout(self) -> None:
+        if self._timeout is not None:
+            self._timeout.cancel()
+            self._timeout = None
 
 
 class _WebSocket(WebSocketsSansIOProtocol):
     async def run_asgi(self) -> None:
-        """Let the app abort a connection that receives nothing any more."""
+        """Let the app abort a connection whose browser receives nothing."""
         self.scope[ABORT] = self.transport.abort  # type: ignore[literal-required]
         await super().run_asgi()
 
@@ -164,10 +164,10 @@ class _Uvicorn(uvicorn.Server):
 
 
 class Server:
-    """Listens from the moment it is made.
+    """Listens as soon as it is created.
 
     Raises:
-        PluginError: the address cannot be had, or the certificate and its key cannot be used.
+        PluginError: the address, or the certificate with its key, cannot be used.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -184,7 +184,7 @@ class Server:
         self._listener.close()
 
     async def serve(self, app: ASGIApp) -> None:
-        """Serve an app until cancelled, and close what is open then."""
+        """Serve an app until cancelled, then close all connections."""
         server = _Uvicorn(
             uvicorn.Config(
                 app,
@@ -217,5 +217,5 @@ def _refuse_bad_certificate(certificate: Path, key: Path) -> None:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
     except (OSError, ValueError) as error:
         raise PluginError(
-            f"{certificate} and {key} are no certificate with its key: {error}"
+            f"{certificate} and {key} are not a certificate with its key: {error}"
         ) from error

@@ -1,4 +1,4 @@
-"""What the routers share: the executive, the folder of missions, and jobs."""
+"""The objects that routers share."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the environment says of this unit: where it serves, whom, and where missions are."""
+"""The settings of this unit in environment variables."""
 
 import ipaddress
 import os
@@ -26,21 +26,21 @@ LOCAL_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 
 
 class SettingError(PluginError):
-    """A variable of the environment is not what it may be."""
+    """An environment variable has an invalid value."""
 
     exit_status = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Where and whom to serve. `port` 0: any free one. `users` None: who has the token."""
+    """The settings. `port` 0: any free one. `users` None: the owner of the token signs in."""
 
     host: str = DEFAULT_HOST
     port: int = DEFAULT_PORT
     names: frozenset[str] = LOCAL_NAMES
-    """By which browsers may call this machine, without ports."""
+    """Host names in requests that are accepted, without ports."""
     called: str = DEFAULT_HOST
-    """The name that is shown to people."""
+    """The host name in printed addresses."""
     missions: Path = Path(DEFAULT_MISSIONS)
     users: Path | None = None
     certificate: Path | None = None
@@ -53,16 +53,16 @@ class Settings:
         return "https" if self.certificate else "http"
 
     def address(self, port: int) -> str:
-        """What to open in a browser."""
+        """Return the address of the page at a port."""
         name = f"[{self.called}]" if ":" in self.called else self.called
         return f"{self.scheme}://{name}:{port}/"
 
 
 def read_settings(environment: Mapping[str, str] = os.environ) -> Settings:
-    """The settings that an environment gives.
+    """Read the settings from environment variables.
 
     Raises:
-        SettingError: one is not what it may be, or they do not fit together.
+        SettingError: a variable has an invalid value, or two contradict each other.
     """
 
     def said(name: str) -> str:
@@ -92,7 +92,9 @@ def _port(text: str) -> int:
     if not text:
         return DEFAULT_PORT
     if not (text.isascii() and text.isdigit() and int(text) < 65536):
-        raise SettingError(f"{PORT}={text!r} is no port: a number up to 65535, or 0 for any")
+        raise SettingError(
+            f"{PORT}={text!r} is not a port: write a number up to 65535, or 0 for any free one"
+        )
     return int(text)
 
 
@@ -105,7 +107,7 @@ def _names_of(host: str) -> frozenset[str]:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address is this machine's own, that no other reaches."""
+    """Return whether a host is a loopback address."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -128,24 +130,24 @@ def _refuse_what_is_unsafe(settings: Settings) -> None:
         (TILES, settings.tiles),
     ):
         if path is not None and not path.is_file():
-            raise SettingError(f"{name}={path}: there is no such file")
+            raise SettingError(f"{name}={path}: the file does not exist")
     if is_loopback(settings.host):
         return
     missing = [
         what
         for what, there in (
             (f"TLS ({CERTIFICATE}, {KEY})", settings.certificate),
-            (f"named users ({USERS}, made by `m2pem web add-user`)", settings.users),
+            (f"named users ({USERS}, created by `m2pem web add-user`)", settings.users),
         )
         if there is None
     ]
     if missing:
         raise SettingError(
-            f"{HOST}={settings.host} can be reached from other machines: "
-            f"that needs {' and '.join(missing)}"
+            f"other machines can reach {HOST}={settings.host}: "
+            f"that requires {' and '.join(missing)}"
         )
     if _is_unspecified(settings.host) and settings.names == LOCAL_NAMES:
         raise SettingError(
-            f"{HOST}={settings.host} means every address of this machine: say in {NAMES} by which "
-            "names browsers call it, such as gcs1.example.org,10.0.0.5"
+            f"{HOST}={settings.host} is every address of this machine: list in {NAMES} the names "
+            "in the addresses of browsers, such as gcs1.example.org,10.0.0.5"
         )

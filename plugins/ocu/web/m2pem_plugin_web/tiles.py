@@ -1,4 +1,4 @@
-"""Pictures below the map, from one file of this machine: MBTiles 1.3 (a table of tiles in SQLite,
+"""Map tiles from a local file: MBTiles 1.3 (a table of tiles in SQLite,
 github.com/mapbox/mbtiles-spec), which QGIS, GDAL and tile servers write."""
 
 import asyncio
@@ -25,7 +25,7 @@ MEDIA_TYPES = {
     "webp": "image/webp",
 }
 DEEPEST = 24
-"""Zoom levels of which the page may ask."""
+"""Zoom levels that the page may request."""
 
 KEPT = "private, max-age=3600"
 
@@ -34,7 +34,7 @@ _MARKUP = re.compile(r"<[^>]*>")
 
 @dataclass(frozen=True, slots=True)
 class Pictured:
-    """What a file says of its tiles. `attribution`: whom to name, without markup."""
+    """The metadata of a file of tiles. `attribution`: text without markup."""
 
     media_type: str
     max_zoom: int
@@ -45,7 +45,7 @@ class Tiles:
     """The tiles of a file.
 
     Raises:
-        SettingError: it cannot be read, is no MBTiles, or has vector data, not images.
+        SettingError: the file cannot be read, is not MBTiles, or has vector data instead of images.
     """
 
     def __init__(self, file: Path) -> None:
@@ -57,9 +57,7 @@ class Tiles:
             said = dict(self._database.execute("SELECT name, value FROM metadata"))
             deepest = self._database.execute("SELECT max(zoom_level) FROM tiles").fetchone()[0]
         except sqlite3.Error as error:
-            raise SettingError(
-                f"{TILES}={file} is no MBTiles file that can be read: {error}"
-            ) from error
+            raise SettingError(f"{TILES}={file} is not a readable MBTiles file: {error}") from error
         kind = str(said.get("format", "png")).lower()
         if kind not in MEDIA_TYPES:
             self.close()
@@ -71,11 +69,11 @@ class Tiles:
         self.pictured = Pictured(MEDIA_TYPES[kind], int(deepest or 0), attribution.strip())
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._database.close()
 
     def tile(self, zoom: int, column: int, row: int) -> bytes | None:
-        """A tile, whose row counts from the north; None: the file has none there."""
+        """Return a tile; rows count from the north. None: the file does not have it."""
         from_south = (1 << zoom) - 1 - row
         with self._lock:
             found = self._database.execute(
@@ -91,13 +89,16 @@ Step = Annotated[int, InPath(ge=0, lt=1 << DEEPEST)]
 
 
 def router(tiles: Tiles | None) -> APIRouter:
-    """The route of tiles; without a file there are none anywhere."""
+    """Return the route of tiles. Without a file, all of them are missing."""
     routes = APIRouter(tags=["tiles"], responses=RESPONSES)
 
     @routes.get(
         "/tiles/{zoom}/{column}/{row}.png",
         response_class=Response,
-        responses={200: {"content": {"image/*": {}}}, 204: {"description": "No tile is there."}},
+        responses={
+            200: {"content": {"image/*": {}}},
+            204: {"description": "The file does not have this tile."},
+        },
     )
     async def tile(_: Viewer, zoom: Zoom, column: Step, row: Step) -> Response:
         """An image of 256 x 256 pixels, in the web Mercator projection; rows from the north."""

@@ -82,7 +82,7 @@ async def test_the_address_of_a_page_has_the_token_that_is_valid(
         assert await here.stranger().open(second)
     done = invoke("url", **state)
     assert isinstance(done.exception, M2pemError)
-    assert "no page is served" in str(done.exception)
+    assert "this user serves no page" in str(done.exception)
 
 
 def test_addresses_are_in_the_runtime_directory_where_there_is_one(tmp_path: Path) -> None:

@@ -313,7 +313,7 @@ async def test_a_body_that_does_not_come_is_given_up() -> None:
             return each
         await asyncio.Event().wait()
 
-    with pytest.raises(Exception, match="did not come within"):
+    with pytest.raises(Exception, match="was not received within"):
         await app(scope, receive, lambda _: None)  # type: ignore[arg-type, return-value]
 
 

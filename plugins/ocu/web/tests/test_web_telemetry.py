@@ -158,7 +158,7 @@ async def test_a_broken_disk_is_said_once_and_stops_nothing(
                     break
                 await asyncio.sleep(0.05)
             assert (await here.control.wait(run)).status is RunStatus.COMPLETED
-        assert f"where vehicles are in {run} cannot be kept" in page["problem"]
+        assert f"the track of {run} cannot be written" in page["problem"]
         assert str(tmp_path) not in page["problem"]
         assert page["samples"] == []
     said = [each for each in caplog.records if "cannot be kept" in each.getMessage()]

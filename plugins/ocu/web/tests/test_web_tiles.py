@@ -63,11 +63,13 @@ def test_rows_are_counted_from_the_north(tmp_path: Path) -> None:
 
 
 def test_what_is_no_file_of_pictures_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match=r"M2PEM_WEB_TILES=.*none\.mbtiles: there is no such"):
+    with pytest.raises(
+        SettingError, match=r"M2PEM_WEB_TILES=.*none\.mbtiles: the file does not exist"
+    ):
         read_settings({"M2PEM_WEB_TILES": str(tmp_path / "none.mbtiles")})
     text = tmp_path / "text.mbtiles"
     text.write_text("no database, but a text that is long enough to be taken for one" * 20)
-    with pytest.raises(SettingError, match=r"text\.mbtiles is no MBTiles file"):
+    with pytest.raises(SettingError, match=r"text\.mbtiles is not a readable MBTiles file"):
         Tiles(text)
     with pytest.raises(SettingError, match=r"'pbf': the map shows images only"):
         Tiles(mbtiles(tmp_path / "shapes.mbtiles", format_="pbf"))

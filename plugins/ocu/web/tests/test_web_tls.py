@@ -56,6 +56,6 @@ async def test_a_certificate_that_is_none_is_refused(world: MakeWorld, tmp_path:
     files = tmp_path / "cert.pem", tmp_path / "key.pem"
     for file in files:
         file.write_text("nothing")
-    with pytest.raises(PluginError, match="no certificate with its key"):
+    with pytest.raises(PluginError, match="not a certificate with its key"):
         async with world(users={"otto": Role.OPERATOR}, **settings(files)):
             pass

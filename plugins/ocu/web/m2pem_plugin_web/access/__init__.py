@@ -1,1 +1,1 @@
-"""Who may do what over HTTP: people and roles, sessions, tokens, passwords, hosts and origins."""
+"""Access over HTTP: users and roles, sessions, tokens, passwords, hosts and origins."""

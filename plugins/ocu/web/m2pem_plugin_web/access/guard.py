@@ -15,20 +15,20 @@ from m2pem_plugin_web.server import Slots
 API = "/api"
 SIGN_IN = "/api/session"
 TILES = "/tiles/"
-"""Pictures below the map: a browser sends no header of the page with a request for an image."""
+"""Map tiles: a browser sends no headers of the page with a request for an image."""
 
 STOPS = ("/stop", "/stop-all")
 NO_KEY = (
-    f"the cookie is that of a session, but the session's key ({KEY_HEADER}), which signing in "
-    "gives, is missing or another: sign in again"
+    f"the cookie of the session is valid, but its key ({KEY_HEADER}) is missing or wrong: "
+    "sign in again"
 )
 
 
 class Guard:
-    """Below /api it refuses requests without a session, but for signing in. `names`: this server's.
+    """Refuses requests below /api without a session, except signing in. `names`: of this server.
 
-    The cookie alone is not enough there: browsers send it to other ports of this host, whose
-    servers could send it here.
+    The cookie alone does not suffice: browsers also send it to other servers on this host, which
+    could send it here.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """Addresses of served pages, each with its valid token, for `m2pem web url`.
 
-A file a page, in a folder of this user's own.
+Each page has a file in a private folder of this user.
 """
 
 import os
@@ -19,7 +19,7 @@ from m2pem_plugin_web.access.private_files import (
 
 
 class Page(msgspec.Struct, frozen=True):
-    """A page that is served. `token` "": people sign in with names."""
+    """A served page. `token` "": users sign in with names."""
 
     pid: int
     port: int
@@ -36,7 +36,7 @@ def folder(environment: Mapping[str, str] = os.environ) -> Path:
     """Return the folder of page files: the runtime directory of the user, else the state directory.
 
     Raises:
-        NotPrivateError: it cannot be made, or is another's.
+        NotPrivateError: it cannot be created, or belongs to another user.
     """
     runtime = environment.get("XDG_RUNTIME_DIR", "")
     if runtime and Path(runtime).is_dir():
@@ -65,13 +65,13 @@ def announce(where: Path, page: Page) -> None:
 
 
 def withdraw(where: Path, port: int) -> None:
-    """Remove the file of a page that is served no more."""
+    """Remove the file of a page that is no longer served."""
     with suppress(OSError):
         file_of(where, port).unlink()
 
 
 def pages(where: Path) -> Iterator[Page]:
-    """Yield the pages that are served; remove the files of dead ones."""
+    """Yield the served pages; remove the files of processes that have ended."""
     for path in sorted(where.glob("page-*.json")):
         try:
             page = msgspec.json.decode(read_private(path), type=Page)

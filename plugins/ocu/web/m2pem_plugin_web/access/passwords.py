@@ -9,7 +9,7 @@ from argon2.exceptions import InvalidHashError, VerificationError
 SHORTEST = 8
 LONGEST = 1000
 AT_ONCE = 2
-"""More would take the processor from the engine."""
+"""Passwords that are checked at once: more would slow the engine down."""
 
 WAITING = 8
 
@@ -19,10 +19,10 @@ class BusyError(Exception):
 
 
 def hash_password(password: str) -> str:
-    """What is kept of a password.
+    """Return the hash of a password.
 
     Raises:
-        ValueError: it is too short, or too long.
+        ValueError: the password is too short or too long.
     """
     if not SHORTEST <= len(password) <= LONGEST:
         raise ValueError(f"a password has {SHORTEST} to {LONGEST} characters")
@@ -30,20 +30,20 @@ def hash_password(password: str) -> str:
 
 
 class PasswordChecker:
-    """Checks passwords in threads, few at once. It takes as long for a name that is not known."""
+    """Checks passwords in threads, few at once. An unknown name takes as long as a known one."""
 
     def __init__(self) -> None:
         self._hasher = _hasher()
-        self._nobody = ""
-        """A hash that no password has; made when it is needed first."""
+        self._hash_of_no_password = ""
+        """Verified for unknown names; computed at the first use."""
         self._turn = asyncio.Semaphore(AT_ONCE)
         self._waiting = 0
 
     async def matches(self, hashed: str | None, password: str) -> bool:
-        """Whether a password is that of a hash; None: no user has that name.
+        """Return whether a password has this hash; None: no user has that name.
 
         Raises:
-            BusyError: too many are being checked.
+            BusyError: too many passwords are being checked.
         """
         if self._waiting >= WAITING:
             raise BusyError
@@ -56,13 +56,15 @@ class PasswordChecker:
         return found and hashed is not None
 
     def _verify(self, hashed: str | None, password: str) -> bool:
-        self._nobody = self._nobody or self._hasher.hash(secrets.token_urlsafe())
+        self._hash_of_no_password = self._hash_of_no_password or self._hasher.hash(
+            secrets.token_urlsafe()
+        )
         try:
-            return self._hasher.verify(hashed or self._nobody, password)
+            return self._hasher.verify(hashed or self._hash_of_no_password, password)
         except (VerificationError, InvalidHashError):
             return False
 
 
 def _hasher() -> PasswordHasher:
-    """46 MiB and one pass (OWASP's first choice), on one processor: the others are the engine's."""
+    """Return a hasher with 46 MiB and one pass (OWASP's first choice), on one processor only."""
     return PasswordHasher(time_cost=1, memory_cost=46 * 1024, parallelism=1)

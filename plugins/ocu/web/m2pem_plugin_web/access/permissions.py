@@ -1,6 +1,6 @@
-"""Which role a request needs: dependencies of FastAPI that give a router the user who asks.
+"""The role that a request needs: FastAPI dependencies that return the user of a request.
 
-They are apart from the roles themselves, which the command line reads without loading FastAPI.
+The roles are in another module: the command line imports them without FastAPI.
 """
 
 from collections.abc import Callable
@@ -14,17 +14,17 @@ from m2pem_plugin_web.access.requests import refuse_late
 from m2pem_plugin_web.access.roles import Person, Role
 
 SCOPE_KEY = "m2pem.person"
-"""Where the guard puts who asks, in the ASGI scope of a connection."""
+"""The key of the user in the ASGI scope of a connection, set by the guard."""
 
 
 def person_of(connection: HTTPConnection) -> Person | None:
-    """Return the user of a connection; None: they have not signed in."""
+    """Return the user of a connection; None: the user has not signed in."""
     person = connection.scope.get(SCOPE_KEY)
     return person if isinstance(person, Person) else None
 
 
 def needs(role: Role, *, however_late: bool = False) -> Callable[[HTTPConnection], Person]:
-    """A dependency of FastAPI: the person who asks, if their role covers `role`.
+    """Return a FastAPI dependency: the user of a request, if the user's role covers `role`.
 
     It is resolved when the body of a request is complete. A command that arrives too late by then
     is refused, but not if `however_late`.

@@ -1,4 +1,4 @@
-"""Files that only their owner may read: passwords' hashes, tokens, sessions."""
+"""Files that only their owner may read: password hashes, tokens, sessions."""
 
 import os
 import stat
@@ -17,10 +17,10 @@ class NotPrivateError(PluginError):
 
 
 def private_folder(path: Path) -> Path:
-    """Make a folder that only its owner may enter, if it is missing.
+    """Create a folder that only its owner may enter, if it is missing.
 
     Raises:
-        NotPrivateError: it is another's, or cannot be made.
+        NotPrivateError: it belongs to another user, or cannot be created.
     """
     try:
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -61,16 +61,16 @@ def read_private(path: Path) -> str:
     """Return the text of a file that only its owner may read.
 
     Raises:
-        FileNotFoundError: there is none.
-        NotPrivateError: others may read or write it, or it cannot be read.
+        FileNotFoundError: the file does not exist.
+        NotPrivateError: other users may read or write it, or it cannot be read.
     """
     try:
         with path.open(encoding="utf-8") as file:
             found = os.fstat(file.fileno())
             if found.st_uid != os.geteuid() or found.st_mode & OTHERS:
                 raise NotPrivateError(
-                    f"{path} can be read or written by others: `chmod 600 {path}`, and have it "
-                    "belong to the user who starts the executive"
+                    f"other users can read or write {path}: `chmod 600 {path}`, and make the "
+                    "user who starts the executive its owner"
                 )
             return file.read()
     except FileNotFoundError:

@@ -21,26 +21,26 @@ OWN_SITES = frozenset({"same-origin", "none"})
 
 
 def name_of(host: str) -> str:
-    """The name in a Host header: without the port, and without the brackets of IPv6."""
+    """Return the name in a Host header, without the port and without the brackets of IPv6."""
     if host.startswith("["):
         return host[1:].partition("]")[0].lower()
     return host.partition(":")[0].lower()
 
 
 def wrong_host(headers: Headers, names: Collection[str]) -> str:
-    """Why the Host header is refused; "": it is not."""
+    """Return why the Host header is refused; "" if it is accepted."""
     hosts = headers.getlist("host")
     if len(hosts) != 1:
         return "a request has one Host header"
     if name_of(hosts[0]) not in names:
-        return f"this page is not called {name_of(hosts[0])[:100]!r} here"
+        return f"this server does not have the name {name_of(hosts[0])[:100]!r}"
     return ""
 
 
 def foreign(headers: Headers, scheme: str, *, strict: bool) -> str:
-    """Why a request may come from a foreign page; "": it does not.
+    """Return why a request may come from another site; "" if it does not.
 
-    `strict`: it changes something or opens a WebSocket, so that a browser says its origin.
+    `strict`: the request changes something or opens a WebSocket, so a browser sends its origin.
     """
     site = headers.get("sec-fetch-site")
     if site is not None and site not in OWN_SITES:
@@ -55,25 +55,25 @@ def foreign(headers: Headers, scheme: str, *, strict: bool) -> str:
 
 
 GIVEN = "M2pem-Given"
-"""The header: seconds of the executive's clock."""
+"""The header with the time of a command, in seconds of the executive's clock."""
 
 LATEST_S = 5.0
-"""Age beyond which a command is refused, and a STOP is said to be late."""
+"""Age in seconds beyond which a command is refused, and a STOP is reported as late."""
 
 AHEAD_S = 1.0
-"""A command cannot be from the future: then its clock is that of another start of the machine."""
+"""A command that is further in the future has the clock of another start of the machine."""
 
 
 def now_s() -> float:
-    """The executive's clock: seconds, which only rise."""
+    """Return the monotonic time of the executive's clock in seconds."""
     return time.monotonic()
 
 
 def age_s(connection: HTTPConnection) -> float:
-    """Seconds since a command was given; 0 if the request does not say when.
+    """Return the seconds since a command was given; 0 if the request has no time.
 
     Raises:
-        ProblemError: 400, the header is no number; 409, it is from another clock.
+        ProblemError: 400, the header is not a number; 409, its time is from another clock.
     """
     said = connection.headers.get(GIVEN)
     if said is None:
@@ -83,7 +83,7 @@ def age_s(connection: HTTPConnection) -> float:
     except ValueError:
         given_s = math.nan
     if not math.isfinite(given_s):
-        raise ProblemError(400, f"{GIVEN} is a number of seconds")
+        raise ProblemError(400, f"{GIVEN} must be a number of seconds")
     age = now_s() - given_s
     if age < -AHEAD_S:
         raise ProblemError(
@@ -93,7 +93,7 @@ def age_s(connection: HTTPConnection) -> float:
 
 
 def refuse_late(connection: HTTPConnection) -> None:
-    """Let a command pass that was given just now.
+    """Refuse a command that was not given just now.
 
     Raises:
         ProblemError: 409, it arrived too late, with its age; or as `age_s`.
@@ -103,7 +103,7 @@ def refuse_late(connection: HTTPConnection) -> None:
         raise ProblemError(
             409,
             f"this was given {age:.1f} s before it arrived, and is refused after {LATEST_S:g} s: "
-            "look at what is so now, and give it again",
+            "check the present state, and give it again",
             age_s=round(age, 1),
             limit_s=LATEST_S,
         )
@@ -114,7 +114,7 @@ BODY_WITHIN_S = 30.0
 
 
 class BoundedBodies:
-    """Refuses what is too large before reading it, or as soon as that is seen."""
+    """Refuses bodies that are too large: by their header, or while reading them."""
 
     def __init__(
         self, app: ASGIApp, *, largest: int = LARGEST_BYTES, longest_s: float = BODY_WITHIN_S
@@ -131,7 +131,7 @@ class BoundedBodies:
         headers = Headers(scope=scope)
         refused = self._refused(scope["method"], headers)
         if refused is not None:
-            # The rest of the body is not read: the connection is of no more use.
+            # The rest of the body stays unread, so the connection cannot be used again.
             status, why = refused
             await problem(status, why, {"connection": "close"})(scope, receive, send)
             return
@@ -140,7 +140,7 @@ class BoundedBodies:
     def _refused(self, method: str, headers: Headers) -> tuple[int, str] | None:
         said = headers.get("content-length", "")
         if said and not (said.isascii() and said.isdigit()):
-            return 400, "Content-Length is a number"
+            return 400, "Content-Length must be a number"
         if said and int(said) > self._largest:
             return 413, self._too_large()
         comes = said not in ("", "0") or "transfer-encoding" in headers
@@ -166,7 +166,7 @@ class BoundedBodies:
                     message = await receive()
             except TimeoutError:
                 raise HTTPException(
-                    408, f"the body did not come within {self._longest_s:g} s"
+                    408, f"the body was not received within {self._longest_s:g} s"
                 ) from None
             taken += len(message.get("body", b""))
             if taken > self._largest:
@@ -177,7 +177,7 @@ class BoundedBodies:
         return bounded
 
     def _too_large(self) -> str:
-        return f"{self._largest / 1_000_000:g} MB are the most that may be sent"
+        return f"the body is larger than {self._largest / 1_000_000:g} MB"
 
 
 # Styles: bpmn-js sets some on elements. `self` covers a WebSocket of the same origin.
@@ -209,7 +209,7 @@ HEADERS = {
 
 
 class SafeHeaders:
-    """Puts safe headers on every response; responses of /api are not cached."""
+    """Adds security headers to every response; responses of /api are not cached."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

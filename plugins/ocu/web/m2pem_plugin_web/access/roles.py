@@ -5,21 +5,21 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """A role may do all that those before it may."""
+    """A role has all permissions of the roles before it."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
     COMMANDER = "commander"
 
     def covers(self, other: "Role") -> bool:
-        """Whether this role may do what `other` may."""
+        """Return whether this role has all permissions of `other`."""
         order = list(Role)
         return order.index(self) >= order.index(other)
 
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A user who has signed in; `name` is journaled with what they do."""
+    """A user who has signed in; `name` is journaled with the user's commands."""
 
     name: str
     role: Role

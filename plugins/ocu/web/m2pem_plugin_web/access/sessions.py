@@ -1,7 +1,7 @@
 """Sessions of signed-in users: two random secrets in the browser, and their hashes here.
 
-One is in a cookie. Browsers send cookies to every port of a host, so to servers of other programs
-and users as well. The other, the key, is known to the page's own origin alone, which has the port.
+One secret is in a cookie. Browsers send cookies to every port of a host, and so to servers of other
+programs. The other secret, the key, is known only to the page's origin, which includes the port.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ LONGEST_S = 7 * 24 * 3600.0
 """A session ends after a week, however much it is used."""
 
 MOST = 1000
-"""Beyond that, the session that was not used for longest ends."""
+"""Most sessions; one more ends the session that was unused for longest."""
 
 KEY_BYTES = 32
 
@@ -39,10 +39,10 @@ class Secrets(NamedTuple):
 
 
 class Session(msgspec.Struct):
-    """`name`: who signed in. `proof`: what they knew; if that has changed, it is over.
+    """`name`: who signed in. `proof`: the hash of the secret; a new one ends the session.
 
     Times are seconds since the Unix epoch. `key_hash` "": an older release began the session
-    without a key, and no key is the right one.
+    without a key, and no key is valid.
     """
 
     name: str
@@ -53,9 +53,9 @@ class Session(msgspec.Struct):
 
 
 class Sessions:
-    """Sessions by the hashes of their cookies: to read them is not enough to use them.
+    """Sessions by the hashes of their cookies: a reader of the file cannot use them.
 
-    `kept`: a file, so that a page that is open goes on after the executive was started again.
+    `kept`: a file, so that sessions continue after a restart of the executive.
     """
 
     def __init__(self, kept: Path | None = None, clock: Callable[[], float] = time.time) -> None:
@@ -75,7 +75,7 @@ class Sessions:
         return made
 
     def of_cookie(self, cookie: str) -> Session | None:
-        """Return the session of a cookie, also without its key. It does not last longer by this."""
+        """Return the session of a cookie, without its key. This does not prolong the session."""
         session = self._sessions.get(hash_of(cookie))
         return None if session is None or self._is_over(session) else session
 
@@ -109,7 +109,7 @@ class Sessions:
         try:
             write_private(self._kept, msgspec.json.encode(self._sessions).decode())
         except NotPrivateError as error:
-            log.warning("who has signed in is forgotten at the next start: %s", error)
+            log.warning("the next start will not know who is signed in: %s", error)
 
 
 def _read(path: Path) -> dict[str, Session]:
@@ -118,7 +118,7 @@ def _read(path: Path) -> dict[str, Session]:
     except FileNotFoundError:
         return {}
     except (NotPrivateError, msgspec.DecodeError) as error:
-        log.warning("everybody has to sign in again: %s", error)
+        log.warning("all users must sign in again: %s", error)
         return {}
 
 

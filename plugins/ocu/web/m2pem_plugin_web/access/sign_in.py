@@ -1,4 +1,4 @@
-"""Signing in: by a one-time token, or by a name with its password; who guesses is slowed down."""
+"""Signing in by a one-time token, or by name and password; repeated failures are delayed."""
 
 import hmac
 import logging
@@ -28,7 +28,7 @@ class Throttle:
         self._failures: dict[Hashable, deque[float]] = {}
 
     def wait_s(self, bounds: Mapping[Hashable, int]) -> float:
-        """Seconds until another attempt is looked at; 0: now. `bounds`: failures by key."""
+        """Return the seconds until an attempt is allowed; 0: now. `bounds`: failures by key."""
         now = self._clock()
         waits = [0.0]
         for key, bound in bounds.items():
@@ -38,7 +38,7 @@ class Throttle:
         return max(waits)
 
     def failed(self, bounds: Mapping[Hashable, int]) -> None:
-        """An attempt under these keys has failed."""
+        """Count a failed attempt under these keys."""
         now = self._clock()
         for key, bound in bounds.items():
             times = self._recent(key, now)
@@ -48,13 +48,13 @@ class Throttle:
             del self._failures[next(iter(self._failures))]
 
     def succeeded(self, bounds: Mapping[Hashable, int]) -> None:
-        """The attempt that was counted last has not failed after all."""
+        """Remove the attempt that was counted last: it has succeeded."""
         for key in bounds:
             if times := self._failures.get(key):
                 times.pop()
 
     def forget(self, key: Hashable) -> None:
-        """What failed under this key was forgetfulness."""
+        """Forget the failures under this key."""
         self._failures.pop(key, None)
 
     def _recent(self, key: Hashable, now: float) -> list[float]:
@@ -65,7 +65,7 @@ TOKEN_BYTES = 24
 
 
 class OneTimeToken:
-    """There is always one that was not used. `renewed` is called with each."""
+    """A token that is replaced when it was used. `renewed` is called with each new one."""
 
     def __init__(self, renewed: Callable[[str], None] = lambda _: None) -> None:
         self._renewed = renewed
@@ -74,11 +74,11 @@ class OneTimeToken:
 
     @property
     def value(self) -> str:
-        """The token that signs in the next one who has it."""
+        """The token that is valid for the next sign-in."""
         return self._token
 
     def redeem(self, token: str) -> bool:
-        """Whether this was the token; if so, it is none any more."""
+        """Return whether the token is valid; a valid one is replaced."""
         if not hmac.compare_digest(token.encode(), self._token.encode()):
             return False
         self._renew()
@@ -105,7 +105,7 @@ log = logging.getLogger("m2pem.ocu.web")
 
 
 class ThrottledError(Exception):
-    """Nothing is looked at for a while."""
+    """Sign-in attempts are refused for a while."""
 
     def __init__(self, wait_s: float) -> None:
         self.wait_s = wait_s
@@ -115,7 +115,7 @@ class ThrottledError(Exception):
 class Entry:
     """Either `users` sign in by name, or `owner`, who started the executive, by a token.
 
-    `port` is part of the cookie's name: browsers do not tell the ports of a machine apart.
+    `port` is part of the cookie's name: browsers send a cookie to all ports of a host.
     `renewed` is called with each token. `kept`: a file for sessions.
     """
 
@@ -140,7 +140,7 @@ class Entry:
         self._throttle = Throttle()
 
     def redeem(self, token: str, address: str) -> tuple[Person, Secrets] | None:
-        """Return the owner and a new session for who has the token; None: it is not the token.
+        """Return the owner and a new session; None: the token is not valid.
 
         Raises:
             ThrottledError: there were too many attempts.
@@ -155,7 +155,7 @@ class Entry:
     async def sign_in(
         self, name: str, password: str, address: str
     ) -> tuple[Person, Secrets] | None:
-        """Return who signs in, and a new session; None: the name or the password is wrong.
+        """Return the user and a new session; None: the name or the password is wrong.
 
         Raises:
             ThrottledError: there were too many attempts.
@@ -171,7 +171,7 @@ class Entry:
         }
         self._wait(bounds)
         user = self._users.all().get(name)
-        # Counted before it is checked: many at once must not all slip through.
+        # Counted before the check, so that concurrent attempts are bounded, too.
         self._throttle.failed(bounds)
         try:
             matches = await self._checker.matches(user.password if user else None, password)
@@ -190,11 +190,11 @@ class Entry:
             self._sessions.end(cookie)
 
     def person(self, cookies: Mapping[str, str], key: str) -> Person | None:
-        """Return who asks, by the cookies of their browser and the key of their page."""
+        """Return the user of a request, by the browser's cookies and the page's key."""
         return self._person(self._sessions.find(cookies.get(self.cookie, ""), key))
 
     def person_of_cookie(self, cookies: Mapping[str, str]) -> Person | None:
-        """Return whose session a cookie is. Servers at other ports of this host receive it, too."""
+        """Return the user of a cookie, which servers at other ports of this host receive, too."""
         return self._person(self._sessions.of_cookie(cookies.get(self.cookie, "")))
 
     def _person(self, session: Session | None) -> Person | None:
@@ -219,7 +219,7 @@ class Entry:
 
 
 def key_of(connection: HTTPConnection) -> str:
-    """Return the key that a request or a WebSocket's handshake has; "": none."""
+    """Return the key that a request or a WebSocket's handshake has; "" without one."""
     if key := connection.headers.get(KEY_HEADER):
         return key
     offered: list[str] = connection.scope.get("subprotocols", [])
@@ -228,5 +228,5 @@ def key_of(connection: HTTPConnection) -> str:
 
 
 def owner_of(name: str) -> Person:
-    """Who started the executive may do everything."""
+    """Return the user who started the executive, with all permissions."""
     return Person(name, Role.COMMANDER)

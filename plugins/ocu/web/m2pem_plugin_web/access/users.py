@@ -21,7 +21,7 @@ class User(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Users:
-    """Read again when the file has changed, so that a removed user is signed out at once."""
+    """The users of a file, read again when it changes: a removed user is signed out at once."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -29,7 +29,7 @@ class Users:
         self._users: dict[str, User] = {}
 
     def all(self) -> dict[str, User]:
-        """All users by name.
+        """Return all users by name.
 
         Raises:
             NotPrivateError: the file is missing, damaged, or can be read by others.
@@ -42,12 +42,12 @@ class Users:
                 self._seen = seen
         except OSError as error:
             raise NotPrivateError(
-                f"{self.path}: {os.strerror(error.errno or 0)}; `m2pem web add-user` makes it"
+                f"{self.path}: {os.strerror(error.errno or 0)}; create it with `m2pem web add-user`"
             ) from error
         return self._users
 
     def person(self, name: str) -> Person | None:
-        """The user of a name.
+        """Return the user with a name.
 
         Raises:
             NotPrivateError: as `all`.
@@ -60,7 +60,7 @@ def _parsed(path: Path) -> dict[str, User]:
     try:
         users = msgspec.json.decode(read_private(path), type=dict[str, User])
     except msgspec.DecodeError as error:
-        raise NotPrivateError(f"{path} is no file of users: {error}") from error
+        raise NotPrivateError(f"{path} is not a file of users: {error}") from error
     for name in users:
         if not NAME.fullmatch(name):
             raise NotPrivateError(f"{path}: {name!r}: {NAME_IN_WORDS}")
@@ -68,7 +68,7 @@ def _parsed(path: Path) -> dict[str, User]:
 
 
 def write_users(path: Path, users: dict[str, User]) -> None:
-    """Write the file anew.
+    """Write the file.
 
     Raises:
         NotPrivateError: it cannot be written.

@@ -1,4 +1,4 @@
-"""Sends every browser what is new, at a pace that it keeps up with; the engine waits for none.
+"""Sends updates to every browser at a pace that the browser can follow; the engine never waits.
 
 Records are applied to views as they come. 25 times a second, the names of what changed are added to
 each viewer that watches; its message is made when the browser is ready for it.
@@ -53,7 +53,8 @@ _encode = msgspec.json.Encoder().encode
 
 
 class Hub(Listener):
-    """All browsers, and what they look at. Made before the executive runs, so nothing is missed."""
+    """All browsers and their watched runs. It needs all records: create it before the executive
+    runs."""
 
     def __init__(self, control: MissionControl) -> None:
         self.viewers: set[Viewer] = set()
@@ -69,7 +70,7 @@ class Hub(Listener):
         self._encoded_elements = msgspec.Raw(b"{}")
 
     async def run(self) -> None:
-        """Go on until cancelled."""
+        """Send updates until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._follow(), name="web: records")
             tasks.create_task(self.fleet.follow(), name="web: telemetry")
@@ -100,37 +101,37 @@ class Hub(Listener):
     # --- at once --------------------------------------------------------------------------------
 
     def run_added(self, view: RunView) -> None:
-        """Keep a run; forget those that the follower has forgotten."""
+        """Add a run; drop those that the follower has dropped."""
         for run in self.runs.keys() - self.follower.views.keys():
             del self.runs[run]
         self.runs[view.run] = LiveRun(view)
 
     def recorded(self, view: RunView, stamped: StampedRecord, *, is_new: bool) -> None:
-        """Send what the mission does not handle to every page."""
+        """Send faults that the mission does not handle to every page."""
         if is_new and type(stamped.record) in FAULT_RECORDS and _is_fault(stamped.record):
             text = describe(stamped, view).text
             own = text.startswith(f"{view.run} ")
             self._send_to_all(messages.fault(text if own else f"{view.run}: {text}"))
 
     def status_changed(self, view: RunView) -> None:
-        """Send it with the next frame."""
+        """Send the status with the next frame."""
         self._changed_status.add(view.run)
 
     def prompt_opened(self, prompt: OpenPrompt) -> None:
-        """Send it at once."""
+        """Send the prompt at once."""
         self._send_to_all(messages.prompt_opened(prompt, self.place(prompt)))
 
     def prompt_closed(self, prompt: OpenPrompt, closed: PromptClosed) -> None:
-        """Send it at once."""
+        """Send the answer or withdrawal at once."""
         self._send_to_all(messages.prompt_closed(closed))
 
     def alerted(self, alert: Alert) -> None:
-        """Send it at once."""
+        """Send the alert at once."""
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
         self._send_to_all(messages.fault(text))
 
     def announce(self, text: str) -> None:
-        """Send a text that all operators have to know."""
+        """Send a text to all operators."""
         self._send_to_all(messages.fault(text))
 
     def _lost(self, resource: ResourceId) -> None:
@@ -152,7 +153,7 @@ class Hub(Listener):
         loop = asyncio.get_running_loop()
         at = loop.time()
         while True:
-            # What was late once must not be late for ever, nor be made up for in a rush.
+            # After a delay, continue at the usual pace: skip the missed ticks.
             at = max(at + FRAME_S, loop.time())
             await asyncio.sleep(at - loop.time())
             if self.viewers:
@@ -209,7 +210,7 @@ class Hub(Listener):
         self._times[view.run] = t_s
 
     def _distribute_changes(self) -> None:
-        """Add the names of what changed to the viewers that watch it."""
+        """Add the names of changed elements to the viewers that watch them."""
         for viewer in self.viewers:
             if viewer.live is not None and (changes := viewer.live.view.changes) is not None:
                 viewer.unsent.elements |= changes.elements
@@ -228,11 +229,11 @@ class Hub(Listener):
     # --- messages ---------------------------------------------------------------------------
 
     def next_messages(self, viewer: Viewer, now: float) -> list[dict[str, Any]]:
-        """Return what to send to a viewer now, in order; it counts as sent."""
+        """Return the messages to send to a viewer now, in order; they count as sent."""
         due = [viewer.numbered(each) for each in viewer.urgent]
         viewer.urgent.clear()
         if viewer.may_send and (viewer.wants_snapshot or viewer.frame_due):
-            # Records may have come since the names were added: all that is counted is shown.
+            # Records may have come since the names were added: the frame includes all of them.
             self._distribute_changes()
             state = self._snapshot(viewer) if viewer.wants_snapshot else self._frame(viewer)
             viewer.wants_snapshot = viewer.frame_due = False
@@ -316,7 +317,7 @@ def _encoded(latest: LatestStates, names: Any) -> Mapping[str, msgspec.Raw]:
 
 
 def _is_fault(record: r.Record) -> bool:
-    """Whether it is something that the mission does not handle."""
+    """Return whether a record is a fault that the mission does not handle."""
     match record:
         case r.BehaviorEnded(state=BehaviorState.LOST):
             return True

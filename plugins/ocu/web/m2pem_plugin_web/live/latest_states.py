@@ -1,4 +1,4 @@
-"""The latest states of vehicles, payloads and teams, and which of them are new."""
+"""The latest states of vehicles, payloads and teams."""
 
 from collections.abc import Callable
 
@@ -15,13 +15,13 @@ from m2pem.api import (
 )
 
 BACKLOG = 1000
-"""States that may wait; of one resource, only the last counts."""
+"""Most states that wait; of each resource only the last one counts."""
 
 _encode = msgspec.json.Encoder().encode
 
 
 class LatestStates:
-    """The latest state by name, each encoded once for however many browsers."""
+    """The latest state by name, encoded once for all browsers."""
 
     def __init__(self) -> None:
         self.states: dict[str, Telemetry] = {}
@@ -48,13 +48,13 @@ class LatestStates:
 
 
 class FleetStates:
-    """`lost` is called with each vehicle or payload of which the link is lost."""
+    """The latest states of a fleet. `lost` is called with each resource whose link is lost."""
 
     def __init__(self, control: MissionControl, lost: Callable[[ResourceId], None]) -> None:
         self.vehicles = LatestStates()
         self.payloads = LatestStates()
         self.teams = LatestStates()
-        """By the behavior that they do."""
+        """By the id of the team's behavior."""
         self._lost = lost
         self._telemetry = control.telemetry(size=BACKLOG)
 

@@ -1,4 +1,4 @@
-"""A run as it is sent to browsers: its view, and its elements as JSON."""
+"""The view of a run, with its elements as JSON for browsers."""
 
 from typing import Any
 
@@ -11,27 +11,27 @@ _encode = msgspec.json.Encoder().encode
 
 
 class LiveRun:
-    """What changes is noted only while a browser watches, so that nothing grows unwatched."""
+    """Notes changes only while a browser watches, so that memory is bounded."""
 
     def __init__(self, view: RunView) -> None:
         self.view = view
         self._encoded: dict[Place, msgspec.Raw] = {}
 
     def begin_changes(self) -> None:
-        """Note what changes from now on, if that is not noted already."""
+        """Start to note changes."""
         if self.view.changes is None:
             self.view.changes = Changes()
             self._encoded.clear()
 
     def clear_changes(self) -> None:
-        """Forget the changes, which all who watch know."""
+        """Drop the changes: all viewers have received them."""
         if self.view.changes is not None:
             for place in self.view.changes.elements:
                 self._encoded.pop(place, None)
             self.view.changes.clear()
 
     def end_changes(self) -> None:
-        """Note no changes any more: no browser watches."""
+        """Stop noting changes: no browser watches."""
         self.view.changes = None
 
     def encoded(self, place: Place) -> msgspec.Raw:

@@ -32,7 +32,7 @@ def record_of(stamped: StampedRecord, view: RunView, **more: Any) -> bytes:
 
 
 def prompt_of(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
-    """A prompt as JSON. `place`: where it was asked, if that is known."""
+    """Return a prompt as JSON. `place`: its element, if known."""
     return {
         "run": prompt.run,
         "prompt": prompt.prompt,
@@ -47,7 +47,7 @@ def prompt_of(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
 
 
 def prompt_record_of(run: RunId, record: PromptOpened) -> dict[str, Any]:
-    """A prompt as JSON, from its record."""
+    """Return the prompt of a record as JSON."""
     return {
         "run": run,
         "prompt": record.prompt,
@@ -60,37 +60,37 @@ def prompt_record_of(run: RunId, record: PromptOpened) -> dict[str, Any]:
 
 
 def prompt_opened(prompt: OpenPrompt, place: Place | None) -> dict[str, Any]:
-    """A prompt opened."""
+    """Return the message that a prompt has opened."""
     return {"type": "prompt", "prompt": prompt_of(prompt, place)}
 
 
 def prompt_closed(closed: PromptClosed) -> dict[str, Any]:
-    """A prompt was answered or withdrawn."""
+    """Return the message that a prompt was answered or withdrawn."""
     return {"type": "prompt_closed", **asdict(closed)}
 
 
 def run(summary: RunSummary) -> dict[str, Any]:
-    """The status of a run changed."""
+    """Return the message of a run's new status."""
     return {"type": "run", "run": asdict(summary)}
 
 
 def fault(text: str) -> dict[str, Any]:
-    """Something went wrong."""
+    """Return the message of a fault."""
     return {"type": "fault", "text": text}
 
 
 def alive() -> dict[str, Any]:
-    """The server goes on; what was asked for takes longer."""
+    """Return the message that an answer takes longer."""
     return {"type": "alive"}
 
 
 def log(records: Iterable[StampedRecord], view: RunView) -> dict[str, Any]:
-    """The newest records of the watched run."""
+    """Return the message with the newest records of the watched run."""
     return {"type": "log", "records": [msgspec.Raw(record_of(each, view)) for each in records]}
 
 
 def nested(states: Iterable[tuple[Place, State]]) -> dict[str, dict[str, State]]:
-    """States of elements by process and element."""
+    """Return states of elements, nested by process and element."""
     found: dict[str, dict[str, State]] = {}
     for (process, element), state in states:
         found.setdefault(process, {})[element] = state

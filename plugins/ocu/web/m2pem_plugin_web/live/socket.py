@@ -17,10 +17,11 @@ from m2pem_plugin_web.live.hub import MOST_VIEWERS, Hub
 from m2pem_plugin_web.live.viewer import HEARTBEAT_S, Viewer
 
 LONGEST_MESSAGE = 4096
-"""Bytes of a message of a browser; the server refuses more."""
+"""Most bytes of a message from a browser."""
 
 ABORT = "m2pem.abort"
-"""What ends a connection at once, in the ASGI scope: one that takes nothing cannot be closed."""
+"""The key in the ASGI scope of a function that ends a connection at once: a browser that receives
+nothing cannot be disconnected by a close message."""
 
 LAST_WORDS_S = 1.0
 
@@ -52,7 +53,7 @@ _decoder: msgspec.json.Decoder[_Watch | _Ack] = msgspec.json.Decoder(_Watch | _A
 
 
 class _Leave(Exception):  # noqa: N818  # nothing went wrong here
-    """The connection is to be closed, with a code and a reason."""
+    """Close the connection with a code and a reason."""
 
     def __init__(self, code: int, reason: str) -> None:
         self.code = code
@@ -61,7 +62,7 @@ class _Leave(Exception):  # noqa: N818  # nothing went wrong here
 
 
 def router(hub: Hub, entry: Entry) -> APIRouter:
-    """The WebSocket's route. Everybody who has signed in may see everything."""
+    """Return the route of the WebSocket, for all signed-in users."""
     routes = APIRouter()
 
     @routes.websocket("/api/live")
@@ -92,7 +93,7 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
 async def _converse(
     socket: WebSocket, hub: Hub, viewer: Viewer, may_stay: Callable[[], bool]
 ) -> None:
-    """Until the browser goes, or has to."""
+    """Exchange messages until the browser disconnects or must be disconnected."""
     tasks = [
         asyncio.create_task(_speak(socket, hub, viewer)),
         asyncio.create_task(_listen(socket, hub, viewer)),
@@ -103,7 +104,7 @@ async def _converse(
         for task in done:
             task.result()
     except (WebSocketDisconnect, WebSocketDisconnected):
-        return  # the second: one task asked after the other had found that the browser is gone
+        return  # RuntimeError: another task has already found the browser disconnected
     finally:
         for task in tasks:
             task.cancel()
@@ -145,7 +146,7 @@ async def _listen(socket: WebSocket, hub: Hub, viewer: Viewer) -> None:
 
 
 async def _watch(hub: Hub, viewer: Viewer, run: str | None) -> None:
-    """Watch a run; while a long one is read, the page gets signs of life."""
+    """Watch a run; send `alive` while a long one is being read."""
     watching = asyncio.ensure_future(hub.watch(viewer, run))
     try:
         while not (await asyncio.wait({watching}, timeout=HEARTBEAT_S))[0]:
@@ -160,7 +161,7 @@ async def _look_after(viewer: Viewer, may_stay: Callable[[], bool]) -> None:
     while True:
         await asyncio.sleep(LOOK_EVERY_S)
         if viewer.is_silent(loop.time()):
-            raise _Leave(SILENT, "it takes nothing in any more")
+            raise _Leave(SILENT, "the browser acknowledges nothing")
         if not may_stay():
             raise _Leave(SIGNED_OUT, "signed out")
 

@@ -1,7 +1,7 @@
-"""One browser: what it has not been sent yet, and how much it has not acknowledged yet.
+"""One browser: the changes that are not sent yet, and the messages that are not acknowledged yet.
 
-It holds names of what changed, never a queue of changes: however slow a browser is, what waits
-for it is bounded by the size of the mission and the fleet.
+It holds the names of changed elements, not a queue of changes: the memory for a slow browser is
+bounded by the size of the mission and the fleet.
 """
 
 import asyncio
@@ -12,7 +12,7 @@ from m2pem.api.run_view import NEWEST, Place
 from m2pem_plugin_web.live.live_run import LiveRun
 
 WINDOW = 2
-"""Paced messages that a browser may have on its way or before it."""
+"""Most paced messages that a browser has not acknowledged."""
 
 SILENT_S = 10.0
 """A browser that acknowledges no message for so long is disconnected; it may connect again."""
@@ -21,13 +21,13 @@ URGENT = 1000
 """Messages that may wait unpaced; a browser that is further behind is disconnected."""
 
 HEARTBEAT_S = 1.0
-"""Without a change: so that the page knows the mission time, and that it is still connected."""
+"""Seconds between frames without a change: they have the mission time, and show the connection."""
 
 LOG_EVERY_S = 0.25
 
 
 class Unsent:
-    """Names of what has changed since the browser was sent it."""
+    """Names of changed elements and states that the browser has not received."""
 
     def __init__(self) -> None:
         self.elements: set[Place] = set()
@@ -49,12 +49,12 @@ class Unsent:
 
 
 class Viewer:
-    """Times are of the event loop's clock, in seconds."""
+    """The connection to a browser. Times are of the event loop's clock, in seconds."""
 
     def __init__(self) -> None:
         self.live: LiveRun | None = None
         self.watches = False
-        """Whether it has asked for anything yet."""
+        """Whether the browser has sent a request."""
         self.unsent = Unsent()
         self.wants_snapshot = False
         self.frame_due = False
@@ -66,7 +66,7 @@ class Viewer:
         self._framed_at = 0.0
         self._logged_at = 0.0
         self.sent_seq = 0
-        """Of the watched run: the last record that was counted in a frame."""
+        """The last record of the watched run that a frame has included."""
         self.logged_seq = 0
 
     def watch(self, live: LiveRun | None) -> None:
@@ -79,7 +79,7 @@ class Viewer:
         self.wake.set()
 
     def send_soon(self, message: dict[str, Any]) -> None:
-        """Queue a message before all that is paced."""
+        """Queue a message before all paced ones."""
         if not self.watches:
             return
         if len(self.urgent) >= URGENT:
@@ -94,17 +94,17 @@ class Viewer:
         self.wake.set()
 
     def numbered(self, message: dict[str, Any]) -> dict[str, Any]:
-        """A message with its number on this connection."""
+        """Return a message with its number on this connection."""
         self._seq += 1
         return {"type": message["type"], "seq": self._seq, **message}
 
     def sent_paced(self, now: float) -> None:
-        """The message that was numbered last is one that the browser takes in at its own pace."""
+        """Note that the message that was numbered last is a paced one."""
         self._unacked.append((self._seq, now))
         self._framed_at = now
 
     def acknowledge(self, seq: int) -> None:
-        """The browser has taken in all up to `seq`."""
+        """Process the browser's acknowledgement of all messages up to `seq`."""
         while self._unacked and self._unacked[0][0] <= seq:
             self._unacked.popleft()
         if self.frame_due or self.wants_snapshot:
@@ -112,22 +112,22 @@ class Viewer:
 
     @property
     def may_send(self) -> bool:
-        """Whether it can take another paced message."""
+        """Whether the browser can receive another paced message."""
         return len(self._unacked) < WINDOW
 
     def is_silent(self, now: float) -> bool:
-        """Whether it has not acknowledged a message for too long."""
+        """Return whether the browser has not acknowledged a message for too long."""
         return bool(self._unacked) and now - self._unacked[0][1] > SILENT_S
 
     def due(self, now: float) -> bool:
-        """Whether a frame is due now."""
+        """Return whether a frame is due now."""
         if not self.watches or self.wants_snapshot:
             return False
         counted = self.live is not None and self.live.view.seq != self.sent_seq
         return bool(self.unsent) or counted or now - self._framed_at >= HEARTBEAT_S
 
     def log_due(self, now: float) -> bool:
-        """Whether records are due now."""
+        """Return whether records are due now."""
         if self.live is None or self.live.view.seq <= self.logged_seq:
             return False
         if now - self._logged_at < LOG_EVERY_S:

@@ -1,1 +1,1 @@
-"""The folder of missions: what is in it, who saved it when, and what was there before."""
+"""The folder of missions, and the versions of each."""

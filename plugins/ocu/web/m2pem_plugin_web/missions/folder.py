@@ -1,6 +1,6 @@
 """The folder of missions: reads and saves them, and lists each with its title.
 
-A save never replaces what another user has changed since, and deletes nothing for good.
+A save never overwrites the changes of another user; deleted content is kept as a version.
 """
 
 import fcntl
@@ -29,7 +29,7 @@ LARGEST_BYTES = 20 * 1024 * 1024
 
 
 class NoMissionError(M2pemError):
-    """There is no such mission, or version of it."""
+    """The mission or the version does not exist."""
 
 
 class BadNameError(M2pemError):
@@ -37,7 +37,7 @@ class BadNameError(M2pemError):
 
 
 class ChangedError(M2pemError):
-    """The mission on the disk has changed. `current`: as it is now; None if it was deleted."""
+    """The mission on the disk has changed. `current`: the present one; None if it was deleted."""
 
     def __init__(self, name: str, current: "Saved | None") -> None:
         what = "was changed" if current is not None else "was deleted"
@@ -51,7 +51,7 @@ class FolderError(M2pemError):
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """A mission on the disk. `by`: the user who saved it; "" if it came in another way."""
+    """A mission on the disk. `by`: the user who saved it; "" if another program wrote it."""
 
     name: str
     path: Path
@@ -62,7 +62,7 @@ class Saved:
 
 
 class MissionFolder:
-    """`path`: of the folder; it is made when something is saved. Calls block: use threads."""
+    """A folder of missions, created at the first save. Calls block: use threads."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -72,7 +72,7 @@ class MissionFolder:
         """Return the path of a mission, which need not exist.
 
         Raises:
-            BadNameError: no mission can be called that.
+            BadNameError: the name is not allowed.
         """
         reason = why_not(name)
         if reason:
@@ -94,7 +94,7 @@ class MissionFolder:
         """Read a mission from the disk.
 
         Raises:
-            NoMissionError: there is none.
+            NoMissionError: the mission or version does not exist.
         """
         path = self.file(name)
         try:
@@ -117,7 +117,7 @@ class MissionFolder:
         """Save a mission that was edited from version `base`; None for a new one.
 
         Raises:
-            ChangedError: another version is there.
+            ChangedError: the disk has another version.
             FolderError: it cannot be written.
         """
         path = self.file(name)
@@ -143,7 +143,7 @@ class MissionFolder:
         """Delete a mission; its last content is kept as a version.
 
         Raises:
-            NoMissionError: there is none.
+            NoMissionError: the mission or version does not exist.
         """
         path = self.file(name)
         with self._alone():
@@ -165,7 +165,7 @@ class MissionFolder:
         """Return a version with its content.
 
         Raises:
-            NoMissionError: there is none.
+            NoMissionError: the mission or version does not exist.
         """
         found = next((each for each in self.versions(name) if each.number == number), None)
         source = Versions(self.path, name).source(number) if found is not None else None
@@ -177,7 +177,7 @@ class MissionFolder:
         """Return the content of a mission: the one on the disk, or that of a version.
 
         Raises:
-            NoMissionError: there is none.
+            NoMissionError: the mission or version does not exist.
         """
         if version is not None:
             for each in reversed(self.versions(name)):
@@ -212,7 +212,7 @@ class MissionFolder:
 
 
 _USES_OTHERS = (b"callActivity", b"import")
-"""A file with one of these may depend on other files of the folder."""
+"""A file with one of these texts may depend on other files of the folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +242,7 @@ class Summaries:
         for name in self._folder.names():
             try:
                 found.append(self._folder.read(name))
-            except (NoMissionError, FolderError):  # it went in the meantime, or is locked away
+            except (NoMissionError, FolderError):  # it was deleted meanwhile, or is not readable
                 continue
         together = tuple(f"{each.name} {each.version}" for each in found)
         known: dict[tuple[str, str, tuple[str, ...]], tuple[str, bool]] = {}

@@ -1,4 +1,4 @@
-"""Names of missions: a file's name on any system, never a path; and names in place of paths."""
+"""Names of missions, which are valid file names on any system; and file names instead of paths."""
 
 import re
 import unicodedata
@@ -11,13 +11,13 @@ from m2pem.api import Finding
 SUFFIX = ".bpmn"
 LONGEST = 100
 LONGEST_BYTES = 200
-"""File systems count bytes: 255 at most, with the suffix and what is added for a moment."""
+"""Longest name: file systems allow 255 bytes, with the suffix and that of a temporary file."""
 
 _SIGNS = r"\x3a-\x40\x5b-\x5e\x60\x7b-\x7f"
 PATTERN = rf"^[^\x00-\x2c\x2e\x2f{_SIGNS}][^\x00-\x1f\x21-\x2c\x2f{_SIGNS}]*$"
-"""Of ASCII, letters, digits, - _ . and spaces; the first is no point and no space.
+"""A name has letters, digits, - _ . and spaces; the first character is no point and no space.
 
-It says what is left out: what a letter is beyond ASCII is not the same in all regular expressions.
+The pattern lists what it excludes: regular expressions differ about letters outside ASCII.
 """
 
 _NAME = re.compile(r"[\w\-][\w\-. ]*")
@@ -29,13 +29,13 @@ def why_not(name: str) -> str:
     if not name or len(name) > LONGEST or len(name.encode("utf-8", "replace")) > LONGEST_BYTES:
         return f"a name has 1 to {LONGEST} letters"
     if _NAME.fullmatch(name) is None:
-        return "a name has letters, digits, - _ . and spaces, and begins with none of the last two"
+        return "a name has letters, digits, - _ . and spaces, and begins with no point or space"
     if name.endswith((" ", ".")) or unicodedata.normalize("NFC", name) != name:
         return "a name does not end with a point or a space"
     if name.lower().endswith(SUFFIX):
         return f"a name is written without {SUFFIX}"
     if _DEVICES.fullmatch(name):
-        return "some systems have a device of that name"
+        return "Windows has a device of that name"
     return ""
 
 

@@ -17,10 +17,10 @@ _NEW_FILES_MODE = 0o666
 
 
 def write(path: Path, content: bytes, *, new: bool = False) -> None:
-    """Replace a file. `new`: fail if there is one.
+    """Replace a file. `new`: fail if the file exists.
 
     Raises:
-        FileExistsError: there is one.
+        FileExistsError: the file exists.
         OSError: it cannot be written.
     """
     handle, name = tempfile.mkstemp(prefix=".m2pem-", suffix=".part", dir=path.parent)
@@ -120,7 +120,7 @@ class Versions:
         number = newest.number + 1 if newest is not None else 1
         self._folder.mkdir(parents=True, exist_ok=True)
         kept = Version(number, version, at_us, by, deleted)
-        # The content comes first: what has a description is there.
+        # The content comes first, so that a description always has its content.
         write(self._path(number, "bpmn"), source)
         write(self._path(number, "json"), msgspec.json.encode(kept))
         return kept

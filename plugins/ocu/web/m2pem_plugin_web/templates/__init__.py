@@ -1,4 +1,4 @@
-"""Missions to begin with: BPMN files of this folder, each with its title and what it does in it."""
+"""Templates for new missions: the BPMN files of this folder, with title and documentation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SUFFIX = ".bpmn"
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A mission to begin with: `title` is its process's name, `doc` its documentation."""
+    """A template. `title`: the name of its process; `doc`: the documentation of it."""
 
     name: str
     title: str
@@ -22,7 +22,7 @@ class Template:
 
 @cache
 def templates() -> Sequence[Template]:
-    """All of them, in the order of the alphabet."""
+    """Return all templates in alphabetical order."""
     found = [
         _read(each.name.removesuffix(SUFFIX), each.read_text(encoding="utf-8"))
         for each in files(__name__).iterdir()
@@ -32,7 +32,7 @@ def templates() -> Sequence[Template]:
 
 
 def find(name: str) -> Template | None:
-    """The one of a name."""
+    """Return the template with a name; None if it does not exist."""
     return next((each for each in templates() if each.name == name), None)
 
 

@@ -1,1 +1,1 @@
-"""Where vehicles and payloads were in each run: what the journal, which has no telemetry, lacks."""
+"""Tracks: the positions of vehicles and payloads in each run, which the journal does not have."""

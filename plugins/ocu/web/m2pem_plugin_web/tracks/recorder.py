@@ -1,7 +1,7 @@
 """Records tracks of every run that this executive drives, while the page is served.
 
 The executive does not wait for it. It reads the latest states of the fleet a few times in a second
-of mission time, and hands what is new to a thread, which writes it once a second.
+of mission time; a thread writes the new ones once a second.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ AGAIN_S = 2.0
 """Seconds until a retry."""
 
 MOST_WAITING = 2000
-"""Samples of a run that may wait for the disk."""
+"""Most samples of a run that wait for the disk."""
 
 MOST_PROBLEMS = 100
 
@@ -41,7 +41,7 @@ log = logging.getLogger("m2pem.ocu.web")
 
 @dataclass(slots=True, eq=False)
 class _Writing:
-    """A track that is open for writing, and the samples that wait for it."""
+    """An open track, and the samples to write."""
 
     track: Track
     waiting: list[Sample] = field(default_factory=list)
@@ -49,7 +49,7 @@ class _Writing:
 
 
 class Recorder:
-    """`views` and `fleet`: runs, and the latest states of vehicles and payloads."""
+    """Records tracks. `views`: the runs; `fleet`: the latest states of vehicles and payloads."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class Recorder:
     ) -> None:
         self.store = store
         self.problems: dict[RunId, str] = {}
-        """Why tracks of runs have gaps, for people."""
+        """Why tracks of runs have gaps, as text."""
         self._control = control
         self._views = views
         self._fleet = fleet
@@ -71,20 +71,20 @@ class Recorder:
         self._not_before: dict[RunId, float] = {}
 
     async def run(self) -> None:
-        """Record until cancelled; at the end, write what waits."""
+        """Record until cancelled, then write the remaining samples."""
         try:
             await self._forget_runs_of_before()
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._look(), name="web: where vehicles are")
                 tasks.create_task(self._write(), name="web: tracks")
-        except* Exception as group:  # the page is of more use than this
-            log.error("where vehicles are is kept no more", exc_info=group)
+        except* Exception as group:  # the page works without tracks
+            log.error("tracks are no longer recorded", exc_info=group)
         finally:
             for run in list(self._writing):
                 await self._close(run)
 
     async def flush(self, run: RunId) -> None:
-        """Write the samples of a run that wait."""
+        """Write the remaining samples of a run."""
         writing = self._writing.get(run)
         if writing is None:
             return
@@ -100,9 +100,9 @@ class Recorder:
             try:
                 await _to_the_end(write)
             except OSError as error:
-                self._complain(run, error)
+                self._log_once(run, error)
 
-    # --- looking --------------------------------------------------------------------------------
+    # --- sampling -------------------------------------------------------------------------------
 
     async def _look(self) -> None:
         loop = asyncio.get_running_loop()
@@ -129,7 +129,7 @@ class Recorder:
                 if writing is not None and writing.track.is_new and t_s <= self._soon_s:
                     self._take(writing, 0.0, self._before)
         except M2pemError:
-            self._leave_alone(run)  # another executive drives it, or it has just ended
+            self._leave_alone(run)  # another executive executes the run, or it has just ended
             return
         if writing is not None and len(writing.waiting) < MOST_WAITING:
             self._take(writing, t_s, self._states())
@@ -158,7 +158,7 @@ class Recorder:
             self._leave_alone(run)
             return None
         except OSError as error:
-            self._complain(run, error)
+            self._log_once(run, error)
             self._leave_alone(run)
             return None
         self._writing[run] = _Writing(track)
@@ -182,12 +182,12 @@ class Recorder:
             async with writing.turn:
                 await asyncio.to_thread(writing.track.close)
 
-    def _complain(self, run: RunId, error: OSError) -> None:
+    def _log_once(self, run: RunId, error: OSError) -> None:
         """Log an error once; the path of the file is in the log only."""
-        text = f"where vehicles are in {run} cannot be kept: {error.strerror}"
+        text = f"the track of {run} cannot be written: {error.strerror}"
         if self.problems.get(run) == text:
             return
-        log.warning("where vehicles are in %s cannot be kept: %s", run, error)
+        log.warning("the track of %s cannot be written: %s", run, error)
         self.problems[run] = text
         while len(self.problems) > MOST_PROBLEMS:
             del self.problems[next(iter(self.problems))]
@@ -201,7 +201,7 @@ class Recorder:
                 if run not in there or (started_us and started_us != there[run]):
                     await asyncio.to_thread(self.store.remove, run)
         except (OSError, M2pemError) as error:
-            log.warning("tracks of runs that are gone cannot be removed: %s", error)
+            log.warning("tracks of removed runs cannot be deleted: %s", error)
 
     def _heads(self) -> dict[RunId, int]:
         """Return when each run with a track began; 0 if the head of its track cannot be read."""
@@ -210,7 +210,7 @@ class Recorder:
 
 
 async def _to_the_end(work: Callable[[], None]) -> None:
-    """Call it in a thread; a task that is cancelled meanwhile ends when the call is done."""
+    """Call `work` in a thread; a cancelled task ends only when the call has returned."""
     doing = asyncio.ensure_future(asyncio.to_thread(work))
     try:
         await asyncio.shield(doing)

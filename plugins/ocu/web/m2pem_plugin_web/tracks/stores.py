@@ -1,6 +1,6 @@
 """Stores of tracks: a folder beside the journal, or memory if the journal is in memory, too.
 
-All of this waits for a disk: it is called in threads.
+The functions wait for the disk: call them in threads.
 """
 
 import errno
@@ -16,7 +16,7 @@ from typing import Protocol
 from m2pem.api import RunId
 
 MOST_IN_MEMORY = 20
-"""Runs with a track; the oldest are removed."""
+"""Most runs with a track; the oldest are removed."""
 
 FILE_BYTES = 20_000_000
 MEMORY_BYTES = 2_000_000
@@ -43,16 +43,16 @@ class TrackText(Protocol):
         ...
 
     def replace(self, text: bytes) -> None:
-        """Replace it by `text`, or leave it unchanged."""
+        """Replace the content by `text`, or leave it unchanged."""
         ...
 
     def close(self) -> None:
-        """Close it; nothing can be written any more."""
+        """Close the track for writing."""
         ...
 
 
 class TrackStore(Protocol):
-    """A text for each run, of `most_bytes` at most. Methods raise OSError."""
+    """A text for each run, of at most `most_bytes`. Methods raise OSError."""
 
     @property
     def most_bytes(self) -> int:
@@ -60,10 +60,10 @@ class TrackStore(Protocol):
         ...
 
     def open(self, run: RunId) -> TrackText:
-        """For writing; made where it is missing.
+        """Open the text of a run for writing; create it if it is missing.
 
         Raises:
-            HeldError: another writes it.
+            HeldError: another page writes it.
         """
         ...
 
@@ -101,7 +101,9 @@ class FolderStore:
         file = self._file(run)
         self._path.mkdir(mode=0o700, exist_ok=True)
         if self._path.lstat().st_uid != os.geteuid():
-            raise PermissionError(errno.EPERM, "the folder of tracks is another user's", self._path)
+            raise PermissionError(
+                errno.EPERM, "the folder of tracks belongs to another user", self._path
+            )
         return TextFile(file)
 
     def read(self, run: RunId, size: int = -1) -> bytes:
@@ -122,7 +124,7 @@ class FolderStore:
 
     def _file(self, run: RunId) -> Path:
         if not _RUN.fullmatch(run):
-            raise OSError(errno.EINVAL, f"{run!r} is no run of a journal")
+            raise OSError(errno.EINVAL, f"{run!r} is not the id of a run")
         return self._path / f"{run}{_SUFFIX}"
 
 
@@ -133,7 +135,7 @@ class TextFile:
         self._path = path
         while True:
             self._descriptor = _locked(path, os.O_APPEND)
-            # Between opening and locking it, another may have replaced it.
+            # Another process may have replaced the file between opening and locking.
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(self._descriptor), path.stat()):
                     return
@@ -144,7 +146,7 @@ class TextFile:
         return self._path.read_bytes()
 
     def append(self, text: bytes) -> None:
-        """See `TrackText.append`: what a full disk took of it is taken back."""
+        """See `TrackText.append`: a partial write to a full disk is undone."""
         size = os.fstat(self._descriptor).st_size
         try:
             _write(self._descriptor, text)
@@ -198,7 +200,7 @@ def _write(descriptor: int, text: bytes) -> None:
 
 
 class MemoryStore:
-    """Tracks in memory, as the journal is."""
+    """Tracks of a journal in memory."""
 
     def __init__(self, most: int = MOST_IN_MEMORY, most_bytes: int = MEMORY_BYTES) -> None:
         self._most = most

@@ -1,4 +1,4 @@
-"""Thinning of tracks: which states of vehicles and payloads are new enough to keep."""
+"""Thinning of tracks: selects the states of vehicles and payloads to keep."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -19,14 +19,14 @@ State: TypeAlias = VehicleState | PayloadState
 
 
 class Sample(msgspec.Struct, frozen=True):
-    """States at a moment of mission time, in seconds: of those only that say something new."""
+    """The states at a mission time, in seconds, that differ from the ones before."""
 
     t: float
     vehicles: dict[str, msgspec.Raw]
     payloads: dict[str, msgspec.Raw]
 
     def kinds(self) -> Iterator[tuple[str, dict[str, msgspec.Raw]]]:
-        """All states by resource."""
+        """Yield the kinds of states, each with the states by resource."""
         yield "vehicles", self.vehicles
         yield "payloads", self.payloads
 
@@ -43,7 +43,7 @@ class Thinner:
         self._kept[state.resource] = (t_s, state)
 
     def wants(self, t_s: float, state: State) -> bool:
-        """Whether to keep a state: the last one of its resource is old enough, and differs."""
+        """Return whether to keep a state: the last one of its resource is old, and differs."""
         kept = self._kept.get(state.resource)
         if kept is None:
             return True
@@ -52,7 +52,7 @@ class Thinner:
 
 
 def differs(before: State, now: State) -> bool:
-    """Whether a resource has moved, turned, or changed its state."""
+    """Return whether a resource has moved, turned, or changed its state."""
     if before.link is not now.link:
         return True
     match before, now:
@@ -102,7 +102,7 @@ def _zoomed(before: float | None, now: float | None) -> bool:
 
 
 def _known(value: float | None) -> float | None:
-    """Whether a value is known; devices also send NaN for an unknown one."""
+    """Return a value, or None for NaN, which devices send for an unknown one."""
     return value if value is not None and math.isfinite(value) else None
 
 

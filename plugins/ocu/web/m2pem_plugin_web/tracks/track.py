@@ -1,4 +1,4 @@
-"""The track of one run: a head, then a line of JSON for each moment at which something was new."""
+"""The track of one run: a head, then a line of JSON for each sample."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -31,7 +31,7 @@ _STATES: dict[str, Any] = {
 
 
 def head_of(text: bytes) -> Head | None:
-    """Return the head of a text; None if it is no track."""
+    """Return the head of a text; None if the text is not a track."""
     try:
         return _head.decode(text[: text.index(b"\n")])
     except (ValueError, msgspec.DecodeError):
@@ -49,16 +49,16 @@ def samples_of(text: bytes) -> Iterator[Sample]:
 
 
 class Track:
-    """A track open for writing; it takes only samples later than the last.
+    """A track open for writing; samples must be later than the last one.
 
-    `thinner` knows what was kept.
+    `thinner` knows the kept states.
 
-    `t_s`: mission time of now; what is later in the text is of a past that did not come about, as
-    the run was taken up again from before it.
+    `t_s`: the present mission time. Later samples are dropped: the run was resumed from a journal
+    that ends before them.
 
     Raises:
         OSError: it cannot be read or written.
-        HeldError: another writes it.
+        HeldError: another page writes it.
     """
 
     def __init__(self, store: TrackStore, head: Head, t_s: float) -> None:
@@ -87,7 +87,7 @@ class Track:
         self._size = len(whole)
         self.thinner = Thinner(self._head.spacing_s)
         self.is_new = not samples
-        """Whether nothing was written before."""
+        """Whether the track was empty."""
         self._remember(samples)
 
     def append(self, samples: Sequence[Sample]) -> None:
@@ -104,7 +104,7 @@ class Track:
         self._size += len(text)
 
     def close(self) -> None:
-        """Close it; nothing can be written any more."""
+        """Close the track for writing."""
         self._kept.close()
 
     def _thin(self, more: Sequence[Sample]) -> None:
@@ -129,7 +129,7 @@ class Track:
             for kind, states in sample.kinds():
                 last.update({(kind, name): (sample.t, raw) for name, raw in states.items()})
         for (kind, _), (t_s, raw) in last.items():
-            # What a device does not know may be nothing that a state can have.
+            # A device may send values that a state cannot have.
             with suppress(ValueError, msgspec.DecodeError):
                 self.thinner.keep(t_s, _STATES[kind].decode(raw))
 
