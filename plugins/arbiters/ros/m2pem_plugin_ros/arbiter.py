@@ -97,7 +97,7 @@ class RosArbiter:
         self._unknown: dict[BehaviorId, tuple[Checkpoint, str | None]] = {}
         self._attending: asyncio.Task[None] | None = None
 
-    # --- what is offered ------------------------------------------------------------------------
+    # --- catalogue ------------------------------------------------------------------------------
 
     def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
         """Return the behaviors of a vehicle, or of a payload with a node of its own. Other payloads
@@ -245,7 +245,7 @@ class RosArbiter:
         )
         if resource not in self._vehicles:
             kind = "payload with a node" if "/" in resource else "vehicle"
-            return replace(known, reason=f"there is no {kind} '{resource}' any more")
+            return replace(known, reason=f"the {kind} '{resource}' no longer exists")
         return await self._query_vehicle(self._vehicles[resource], behavior, checkpoint, native_ref)
 
     # --- streams --------------------------------------------------------------------------------
@@ -274,7 +274,9 @@ class RosArbiter:
         for resource, vehicle in self._vehicles.items():
             if not vehicle.first_contact.is_set():
                 where = vehicle.absence
-                self._context.logger.warning("%s: it was not heard yet: %s", resource, where)
+                self._context.logger.warning(
+                    "%s: no message from the vehicle yet: %s", resource, where
+                )
 
     async def _disconnect(self) -> None:
         attending, self._attending = self._attending, None
@@ -290,7 +292,7 @@ class RosArbiter:
     def _refusal(self, request: BehaviorRequest) -> str:
         doers = self._commanded(request.resources)
         if len(doers) != 1:
-            return f"{request.behavior} takes one vehicle or payload, and has {len(doers)}"
+            return f"{request.behavior} takes one vehicle or payload, not {len(doers)}"
         resource = doers[0]
         if all(spec.name != request.behavior for spec in self.catalogue(resource)):
             return f"{resource} has no behavior '{request.behavior}'; its vehicle is to have a role"
@@ -354,7 +356,7 @@ class RosArbiter:
         )
         outcome = await vehicle.query(order)
         if self._tracker.last(behavior).state is not BehaviorState.UNKNOWN:
-            return self._tracker.last(behavior)  # it was asked for twice at the same time
+            return self._tracker.last(behavior)  # a concurrent query has adopted it
         if outcome.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
             self._tracker.adopt(behavior, checkpoint.resources, reference)
             vehicle.adopt(order)
@@ -380,14 +382,16 @@ class RosArbiter:
         last_us, was_late, round_number = clock.now_us(), False, 0
         while True:
             now_us = clock.now_us()
-            # After a pause of our own, what vehicles said meanwhile is still to be read.
+            # After a suspension of this process, messages of vehicles are still to be read.
             late = not was_late and now_us - last_us > LATE_FACTOR * ATTEND_EVERY_S * 1e6
             last_us, was_late = now_us, late
             for vehicle in self._vehicles.values():
                 try:
                     state = vehicle.attend(may_lose=not late)
-                except Exception as error:  # one vehicle's bug must not stop the others
-                    log_throttle.log(f"{vehicle.resource} cannot be attended to", repr(error))
+                except Exception as error:  # an error of one vehicle must not stop the others
+                    log_throttle.log(
+                        f"{vehicle.resource}: the check of its state failed", repr(error)
+                    )
                 else:
                     if state is not None:
                         self._states.put(state)

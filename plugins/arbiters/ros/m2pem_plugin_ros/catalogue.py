@@ -74,7 +74,7 @@ _DIMENSIONS: Mapping[ParameterKind, Dimension] = {
 def read_declared_behaviors(
     resource: ResourceId, value: Any, type_: BehaviorType = BehaviorType.VEHICLE
 ) -> tuple[BehaviorSpec, ...]:
-    """Read `own_behaviors`. `value` is what the fleet has there, or None. `type_` tells whether the
+    """Read `own_behaviors`. `value` is what the fleet has there, or None. `type_`: whether the
     behaviors are of vehicles or of payloads.
 
     Raises:
@@ -90,14 +90,14 @@ def _behavior(place: str, name: str, body: Any, type_: BehaviorType) -> Behavior
     shared = SHARED.get((name, type_))
     if shared is not None:
         if body is not None:
-            wrong = f"'{name}' means the same for {all_}; write '{name}:' alone, or rename it"
+            wrong = f"'{name}' is the same for {all_}; write '{name}:' alone, or rename it"
             raise _error(place, wrong)
         return shared
     if body is None:
         known = [known for known, of in SHARED if of is type_]
-        new = f"Of a new one, say what it takes: {name}: {{parameters: {{speed: speed}}}}"
+        new = f"For a new one, list its parameters: {name}: {{parameters: {{speed: speed}}}}"
         raise _error(place, f"{all_} share no such behavior; {_near(name, known)}{new}")
-    given = _map(place, body, "parameters and what else there is to say")
+    given = _map(place, body, "parameters and other keys of a behavior")
     _known(place, given, _BEHAVIOR_KEYS)
     parameters = _map(
         f"{place}.parameters", given.get("parameters", {}), "names of parameters and their kinds"
@@ -177,7 +177,7 @@ def _writes(place: str, value: Any) -> tuple[str, ...]:
         raise _error(place, f"{value!r} is not a list of names, such as [sweep.swept]")
     for name in value:
         if not _DOTTED.fullmatch(name):
-            raise _error(place, f"'{name}' is no name of the data store, such as sweep.swept")
+            raise _error(place, f"'{name}' is not a name of the data store such as sweep.swept")
     return tuple(value)
 
 

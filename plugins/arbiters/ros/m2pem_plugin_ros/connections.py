@@ -55,7 +55,7 @@ class VehicleSensors(Protocol):
 
     @property
     def absence(self) -> str:
-        """On which topic the vehicle is expected, and who publishes there, as text."""
+        """The expected topic of the vehicle and its publishers, as text."""
         ...
 
     @property
@@ -72,13 +72,13 @@ class VehicleSensors(Protocol):
 @dataclass(frozen=True, slots=True)
 class VehicleConnection:
     """The ROS connection of one vehicle or payload. `publish_target` sends the state of a vehicle
-    that it goes to, follows or looks at; to a payload, also the state of its own vehicle. `sight`
-    is the status topic of a payload."""
+    that it goes to, follows or looks at; to a payload, also the state of its own vehicle.
+    `payload_status` is the status topic of a payload."""
 
     ros: "RosRuntime"
     sensors: VehicleSensors
     publish_target: Callable[[VehicleState], None]
-    sight: "PayloadStatusTopic | None" = None
+    payload_status: "PayloadStatusTopic | None" = None
 
 
 class VehicleConnections(Protocol):
@@ -88,7 +88,7 @@ class VehicleConnections(Protocol):
         """Subscribe to all topics, and return at once. The vehicles need not be there.
 
         Raises:
-            RosError: ROS cannot be used; the text says what would be right.
+            RosError: ROS cannot be used; the text gives the remedy.
         """
         ...
 
@@ -203,26 +203,30 @@ class DdsConnections:
         context = self._setup.context
         ros = self._runtime(settings.domain_id)
         if "/" in resource:
-            sight = PayloadStatusTopic(
+            payload_status = PayloadStatusTopic(
                 ros, resource, settings, LogThrottle(context.logger, resource)
             )
             domain = _domain(settings.domain_id)
-            sensors = PayloadSensors(sight, Endpoints(ros, settings, domain, is_payload=True))
-            return VehicleConnection(ros, sensors, TargetPublisher(ros, settings).show, sight)
+            sensors = PayloadSensors(
+                payload_status, Endpoints(ros, settings, domain, is_payload=True)
+            )
+            return VehicleConnection(
+                ros, sensors, TargetPublisher(ros, settings).show, payload_status
+            )
         localization = TopicLocalization(ros, resource, settings, context)
         self._localizations[resource] = localization
         topic = settings.topic(settings.topics.diagnostics)
-        board = (_domain(settings.domain_id), topic)
-        if board not in self._diagnostics:
-            self._diagnostics[board] = Diagnostics(ros, topic, context.clock)
+        key = (_domain(settings.domain_id), topic)
+        if key not in self._diagnostics:
+            self._diagnostics[key] = Diagnostics(ros, topic, context.clock)
         topics = TopicSensors(
             localization,
             Battery(ros, resource, settings, context),
-            self._diagnostics[board],
+            self._diagnostics[key],
             settings.hardware_id,
             Endpoints(ros, settings, _domain(settings.domain_id)),
         )
-        # Other drivers ask the fleet's bus themselves where a target is.
+        # Other drivers read targets from the fleet's bus.
         is_node = settings.driver is DriverName.NODE
         publish_target = TargetPublisher(ros, settings).show if is_node else _publish_nothing
         return VehicleConnection(ros, topics, publish_target)
@@ -232,7 +236,7 @@ class DdsConnections:
 
         domain = _domain(domain_id)
         if domain not in self._runtimes:
-            # Two executives on one network have two journals, and so two names.
+            # The name of the journal distinguishes executives on one network.
             name = f"m2pem_{self._setup.context.journal.hex[:8]}"
             self._runtimes[domain] = RosRuntime(name, domain_id=domain)
         return self._runtimes[domain]

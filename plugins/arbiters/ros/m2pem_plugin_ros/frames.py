@@ -1,6 +1,7 @@
-"""Between WGS-84 and the fleet's local frame: ENU (REP-103) at the fleet's origin, `map` in ROS.
+"""Conversions between WGS-84 and the fleet's local frame: ENU (REP-103) at the fleet's origin,
+`map` in ROS.
 
-As everywhere in m2pem, heights above mean sea level and above the ellipsoid are not told apart.
+Here and elsewhere, m2pem takes heights above mean sea level for heights above the ellipsoid.
 """
 
 import math
@@ -22,7 +23,7 @@ class Quaternion(NamedTuple):
 
 
 class AnyQuaternion(Protocol):
-    """Ours, or geometry_msgs/Quaternion."""
+    """The interface of a `Quaternion` and of geometry_msgs/Quaternion."""
 
     @property
     def x(self) -> float: ...
@@ -35,30 +36,30 @@ class AnyQuaternion(Protocol):
 
 
 def to_local(position: GeoPosition, origin: Origin) -> tuple[float, float, float]:
-    """East, north and up of the origin, in metres."""
+    """Return a position as metres east, north and up of the origin."""
     return LocalFrame(origin).to_enu(
         position.latitude_deg, position.longitude_deg, position.altitude_m
     )
 
 
 def to_geodetic(east_m: float, north_m: float, up_m: float, origin: Origin) -> GeoPosition:
-    """The position that is so far east, north and up of the origin."""
+    """Return the position at metres east, north and up of the origin."""
     return GeoPosition(*LocalFrame(origin).from_enu(east_m, north_m, up_m))
 
 
 def yaw_of_quaternion(q: AnyQuaternion) -> float:
-    """From east, counter-clockwise, in -pi..pi. Its length does not matter.
+    """Return the yaw of a quaternion of any length, from east, counter-clockwise, in -pi..pi.
 
     Raises:
-        ValueError: it is no rotation: zero, or not finite.
+        ValueError: the quaternion is zero or not finite.
     """
     square = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
     if not (1e-6 < square < math.inf):
-        raise ValueError(f"({q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}) is no rotation")
+        raise ValueError(f"({q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}) is not a rotation")
     sine, cosine = 2.0 * (q.w * q.z + q.x * q.y), square - 2.0 * (q.y * q.y + q.z * q.z)
     return math.atan2(sine, cosine)
 
 
 def quaternion_of_yaw(yaw_rad: float) -> Quaternion:
-    """A rotation about the vertical alone."""
+    """Return the quaternion of a yaw."""
     return Quaternion(0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0))

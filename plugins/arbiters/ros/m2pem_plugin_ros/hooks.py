@@ -34,10 +34,10 @@ def add_commands(commands: "MutableMapping[str, click.Command]") -> None:
             "ros", "m2pem_plugin_ros.simulator.command_line", "Simulate ROS vehicles on 127.0.0.1."
         )
     )
-    command_group(commands, "ros", "For vehicles that speak ROS 2.").add_command(
+    command_group(commands, "ros", "Commands for ROS 2 vehicles.").add_command(
         LazyCommand(
             "onboard",
             "m2pem_plugin_ros.onboard.command_line",
-            "Be the m2pem node of a vehicle, on board of it.",
+            "Run the m2pem node of a vehicle on board.",
         )
     )

@@ -1,4 +1,4 @@
-"""Checks that ROS 2 and packages of interfaces are installed, and says what to install."""
+"""Checks that ROS 2 and packages of interfaces are installed; errors give the remedy."""
 
 import importlib
 import importlib.metadata
@@ -15,7 +15,7 @@ SOURCED = "a machine with ROS 2: source /opt/ros/jazzy/setup.bash before m2pem s
 
 
 class RosError(PluginError):
-    """ROS 2 is missing, or cannot be used; the message says how to fix it."""
+    """ROS 2 is missing, or cannot be used; the message gives the remedy."""
 
     exit_status = 2
 
@@ -24,14 +24,14 @@ def require_ros() -> None:
     """Import rclpy.
 
     Raises:
-        RosError: it is missing, its libraries are, or there are two of it.
+        RosError: ROS or a library of it is missing, or there are two installations.
     """
     wheels = _has_wheels()
     sourced = _sourced_prefixes()
     if wheels and sourced:
         raise RosError(
-            f"ROS 2 is here twice: as wheels in {sys.prefix}, and sourced from {sourced[0]}; the "
-            "two do not mix: start m2pem without sourcing ROS, or where its wheels are not there"
+            f"there are two ROS 2: wheels in {sys.prefix}, and sourced from {sourced[0]}; the "
+            "two do not mix: start m2pem without sourcing ROS, or without its wheels"
         )
     if wheels:
         os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # what sourcing sets elsewhere
@@ -65,7 +65,7 @@ def require_interfaces(package: str) -> ModuleType:
         if package == "m2pem_interfaces":
             how = (
                 "with the wheels: pip install ./ros/m2pem_interfaces of m2pem's sources; "
-                "with a sourced ROS: colcon build that folder, and source what it made"
+                "with a sourced ROS: colcon build that folder, and source the result"
             )
         raise RosError(f"the ROS package {package} is not installed ({error}); {how}") from error
     return module

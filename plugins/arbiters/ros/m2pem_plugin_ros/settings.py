@@ -1,4 +1,4 @@
-"""What a fleet says of the connections to ROS vehicles, payloads with a node, and detectors
+"""The settings of ROS vehicles, payloads with a node, and detectors in the fleet file
 (docs/ros.md).
 
 A payload has a node of its own if its `driver` is m2pem and its namespace is not that of its
@@ -62,14 +62,14 @@ class ConnectionReader:
         """Return the reader of an inner map; it is empty if the key is missing."""
         value = self.values.get(key, {})
         if not isinstance(value, Mapping):
-            raise self.error(key, f"{value!r} is no map, such as {example}")
+            raise self.error(key, f"{value!r} is not a map such as {example}")
         return ConnectionReader(self.resource, value, f"{self.path}.{key}")
 
     def text(self, key: str, default: str) -> str:
         """Return a text that is not empty."""
         value = self.values.get(key, default)
         if key in self.values and (not isinstance(value, str) or not value.strip()):
-            raise self.error(key, f"{value!r} is no text")
+            raise self.error(key, f"{value!r} is not a text")
         return str(value)
 
     def flag(self, key: str, default: bool) -> bool:
@@ -102,18 +102,21 @@ class ConnectionReader:
         """Return the namespace with its leading "/"; "" is the root."""
         value = self.values.get("namespace", default)
         if value is None:
-            raise self.error("namespace", "it is missing: that of the vehicle's nodes, as /evsg1")
+            raise self.error(
+                "namespace",
+                "it is missing: write the namespace of the vehicle's nodes, such as /evsg1",
+            )
         if value == "/" or (value == "" and default == ""):
             return ""
         if not isinstance(value, str) or not _NAME.fullmatch(value):
-            raise self.error("namespace", f"{value!r} is no ROS namespace, such as /evsg1")
+            raise self.error("namespace", f"{value!r} is not a ROS namespace such as /evsg1")
         return f"/{value.removeprefix('/')}"
 
     def topic(self, key: str, default: str) -> str:
         """Return the name of a topic."""
         value = self.values.get(key, default)
         if not isinstance(value, str) or not _NAME.fullmatch(value):
-            raise self.error(key, f"{value!r} is no name of a ROS topic, such as {default}")
+            raise self.error(key, f"{value!r} is not the name of a ROS topic such as {default}")
         return value
 
     def number(
@@ -272,7 +275,7 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
     for resource, settings in read.items():
         other = reached.setdefault((settings.domain_id, settings.namespace), resource)
         if other != resource:
-            problem = f"{settings.namespace or '/'} is that of {other}, too"
+            problem = f"{other} has the same namespace, {settings.namespace or '/'}"
             raise ConnectionReader(resource, {}).error("namespace", problem)
     return read
 
@@ -311,7 +314,9 @@ def _read_vehicle(connection: Connection) -> Settings:
     }
     for key, of in only.items():
         if key in connection.settings and driver is not of:
-            raise reader.error(key, f"it is for the driver {of} only, and this one is {driver}")
+            raise reader.error(
+                key, f"the key is for the driver {of} only; this vehicle has {driver}"
+            )
     return Settings(
         reader.namespace(),
         reader.domain_id(),
@@ -405,7 +410,7 @@ def read_payloads(
         settings = read[resource] = _read_payload(connection, inherited(connection, connections))
         other = reached.setdefault((settings.domain_id, settings.namespace), resource)
         if other != resource:
-            problem = f"{settings.namespace or '/'} is that of {other}, too"
+            problem = f"{other} has the same namespace, {settings.namespace or '/'}"
             raise ConnectionReader(resource, {}).error("namespace", problem)
     return read
 
@@ -415,7 +420,7 @@ def _has_node(connection: Connection, connections: Mapping[ResourceId, Connectio
     own = _own_keys(connection, of_vehicle)
     if values.get("driver") != DriverName.NODE:
         if "driver" in own and of_vehicle is not None:
-            problem = f"{own['driver']!r} reaches no payload: one with a node of its own has m2pem"
+            problem = f"{own['driver']!r} is not a driver of payloads: those with a node have m2pem"
             raise ConnectionReader(connection.resource, own).error("driver", problem)
         return False
     if "driver" in own or "own_behaviors" in own:
@@ -441,5 +446,5 @@ def _read_payload(connection: Connection, of_vehicle: Mapping[str, Any] | None) 
 
 
 def _own_keys(connection: Connection, of_vehicle: Mapping[str, Any] | None) -> dict[str, Any]:
-    # Of a vehicle that is another arbiter's nothing is known: what we read is the payload's own.
+    # The settings of a vehicle of another arbiter are not known: only those of the payload count.
     return own_settings(connection, of_vehicle, _PAYLOAD_KEYS if of_vehicle is None else ())

@@ -87,7 +87,7 @@ class Peer:
         """Read its output until that line.
 
         Raises:
-            RuntimeError: it ended before.
+            RuntimeError: the process ended before.
         """
         assert self.process.stdout is not None
         for printed in self.process.stdout:

@@ -108,10 +108,10 @@ class Vehicle:
         """The behavior that the vehicle was given and that goes on. A behavior of the vehicle that
         only uses a payload is not the payload's."""
         holder = self._tracker.holder(self.resource)
-        is_ours = self._order is not None and self._order.request.id == holder
-        return holder if is_ours else None
+        is_own = self._order is not None and self._order.request.id == holder
+        return holder if is_own else None
 
-    # --- what the arbiter asks ------------------------------------------------------------------
+    # --- calls of the arbiter -------------------------------------------------------------------
 
     async def take(self, request: BehaviorRequest, *, query_first: bool = False) -> None:
         """Start a request in place of the current one. `query_first`: it may have been started
@@ -119,11 +119,11 @@ class Vehicle:
         order = self._order_for(request)
         self._keep(order)
         self._publish_targets()
-        # A plain base does nothing while nobody drives it.
+        # A plain base does nothing without commands.
         if query_first and self.settings.driver is not DriverName.BASE:
             outcome = await self.query(order)
             if self._tracker.last(request.id).state.terminal:
-                return  # the vehicle was lost meanwhile, or it has ended
+                return  # the vehicle was lost meanwhile, or the behavior has ended
             if outcome.state in _GOES_ON:
                 self.progress(order.goal)
                 if self._cancelled == request.id:
@@ -181,14 +181,14 @@ class Vehicle:
             self.hold()
             left = ", ".join(self._unresolved.values())
             return (
-                f"it is heard again, was told to end {left} and then to hold, and has not"
-                " acknowledged: it may still do that"
+                f"its link is up again, but it has not acknowledged the cancel of {left} and HOLD:"
+                " it may still do that"
             )
         return ""
 
     @property
     def absence(self) -> str:
-        """On which topic the vehicle is expected, and who publishes there."""
+        """The expected topic of the vehicle and its publishers, as text."""
         return self._ros_connection.sensors.absence
 
     def refusal(self, request: BehaviorRequest) -> str:
@@ -209,10 +209,10 @@ class Vehicle:
             async with asyncio.timeout(QUERY_WITHIN_S):
                 return await self.driver.query(order)
         except TimeoutError:
-            reason = f"{self.resource} did not say within {QUERY_WITHIN_S:g} s whether it does it"
+            reason = f"{self.resource} did not answer the query within {QUERY_WITHIN_S:g} s"
         except Exception as error:
-            self._context.logger.exception("%s: look", self.resource)
-            reason = f"{self.resource} could not be asked: {error}"
+            self._context.logger.exception("%s: query", self.resource)
+            reason = f"the query of {self.resource} failed: {error}"
         return Outcome(BehaviorState.UNKNOWN, reason=reason)
 
     def adopt(self, order: Order) -> None:
@@ -247,8 +247,8 @@ class Vehicle:
         except PluginError:
             raise
         except Exception as error:
-            self._context.logger.exception("%s: its driver does not open", self.resource)
-            self._broken = f"its driver did not open: {_bug(error)}"
+            self._context.logger.exception("%s: its driver failed to open", self.resource)
+            self._broken = f"its driver failed to open: {_bug(error)}"
 
     async def close(self) -> None:
         """Close the driver. The vehicle goes on with what it does."""
@@ -260,9 +260,9 @@ class Vehicle:
             async with asyncio.timeout(CLOSE_WITHIN_S):
                 await self.driver.close()
         except Exception:
-            self._context.logger.exception("%s: its driver does not close", self.resource)
+            self._context.logger.exception("%s: its driver failed to close", self.resource)
 
-    # --- what the driver tells ------------------------------------------------------------------
+    # --- reports of the driver ------------------------------------------------------------------
 
     def alive(self) -> None:
         self._last_contact_us = self._context.clock.now_us()
@@ -280,12 +280,14 @@ class Vehicle:
         if behavior is None:
             return
         if not outcome.is_end:
-            self._log_throttle.log("an end that is none", f"{behavior} is {outcome.state}")
+            self._log_throttle.log(
+                "an end with a state that is not terminal", f"{behavior} is {outcome.state}"
+            )
             return
         if self._order is not None and self._order.goal == goal:
             self._order = None
         if outcome.state is BehaviorState.SUCCEEDED:
-            self._tracker.progress(behavior)  # one that was done so soon ran all the same
+            self._tracker.progress(behavior)  # a behavior that ends at once has run, too
         self._tracker.end(behavior, outcome.state, outcome.code, outcome.reason, outcome.outputs)
 
     # --- time -----------------------------------------------------------------------------------
@@ -325,8 +327,8 @@ class Vehicle:
             return None
         self._reported = news
         behavior = self._order.request.behavior if self._order else ""
-        if self._ros_connection.sight is not None:
-            return self._ros_connection.sight.state(now_us, self.link, behavior)
+        if self._ros_connection.payload_status is not None:
+            return self._ros_connection.payload_status.state(now_us, self.link, behavior)
         health, sensors = self._health(), self._ros_connection.sensors
         state = vehicle_state(self.resource, now_us, sensors, health, self.link, behavior)
         if not self._refusal:
@@ -344,7 +346,7 @@ class Vehicle:
         self._checked_s = now_s
         wrong = self._ros_connection.sensors.refusal
         if wrong and wrong != self._refusal:
-            self._context.logger.error("%s: nothing more is commanded: %s", self.resource, wrong)
+            self._context.logger.error("%s: not commanded any longer: %s", self.resource, wrong)
         elif self._refusal and not wrong:
             self._context.logger.warning("%s: can be commanded again", self.resource)
         self._refusal = wrong
@@ -352,9 +354,9 @@ class Vehicle:
     def _lose(self, holder: BehaviorId, silent_s: float) -> None:
         self._mark_unresolved(holder)
         self._call_driver("forget", self.driver.abandon)
-        reason = f"not heard for {silent_s:.1f} s"
+        reason = f"no message for {silent_s:.1f} s"
         if not self._contacts:
-            reason = f"never heard: {self.absence}"
+            reason = f"no message ever: {self.absence}"
         self._tracker.lose(self.resource, reason)
 
     def _mark_unresolved(self, behavior: BehaviorId) -> None:
@@ -366,7 +368,7 @@ class Vehicle:
         await self._context.clock.sleep(limit_s)
         if self.doing == behavior:
             self._mark_unresolved(behavior)
-            reason = f"it did not stop within {limit_s:g} s of the cancel"
+            reason = f"the vehicle did not stop within {limit_s:g} s of the cancel"
             self._tracker.end(behavior, BehaviorState.FAILED, "TIMEOUT", reason)
 
     def _order_for(self, request: BehaviorRequest) -> Order:
@@ -388,7 +390,7 @@ class Vehicle:
     def _behavior(self, goal: UUID) -> BehaviorId | None:
         behavior = self._behaviors.get(goal)
         if behavior is None:
-            self._log_throttle.log("what it says of a goal that it was not given", str(goal))
+            self._log_throttle.log("a report of a goal that was not sent", str(goal))
         return behavior
 
     def _call_driver(self, what: str, call: Callable[[], None]) -> str:
@@ -412,7 +414,7 @@ class Vehicle:
         try:
             return self.driver.health
         except Exception as error:
-            self._log_throttle.log("what its driver says of its health", repr(error))
+            self._log_throttle.log("invalid health from its driver", repr(error))
             return Health()
 
     def _publish_targets(self) -> None:
@@ -430,7 +432,7 @@ class Vehicle:
 
 
 def _bug(error: Exception) -> str:
-    return f"m2pem is wrong: {type(error).__name__}: {error}"
+    return f"internal error of m2pem: {type(error).__name__}: {error}"
 
 
 DEGRADED_SHARE = 0.5

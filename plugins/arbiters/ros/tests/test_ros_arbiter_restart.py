@@ -120,7 +120,7 @@ def test_a_vehicle_that_cannot_be_asked_gives_its_goal_up_for_the_next() -> None
         async with world.connected() as bench:
             found = await bench.arbiter.query("r1.b1", reference)
             assert found.state is UNKNOWN
-            assert found.reason == "a did not say within 3 s whether it does it"
+            assert found.reason == "a did not answer the query within 3 s"
             await bench.start("r1.b2", "goto", A, epoch=2, target=NEAR)
             await bench.running("r1.b2")
             (_, order) = body.called("begin")[-1]
@@ -143,7 +143,7 @@ def test_a_vehicle_that_left_the_fleet_is_named() -> None:
         reference = encode_checkpoint(Checkpoint(("evsg9",), "goto", 1, {}))
         async with world.connected() as bench:
             found = await bench.arbiter.query("r1.b1", reference)
-            assert (found.state, found.reason) == (UNKNOWN, "there is no vehicle 'evsg9' any more")
+            assert (found.state, found.reason) == (UNKNOWN, "the vehicle 'evsg9' no longer exists")
 
     play(main)
 

@@ -198,7 +198,7 @@ async def test_what_cannot_be_done_is_refused(base: Bench) -> None:
 
     assert "at most 100 km" in refusal("goto", target=point(0, 300_000))
     assert "waypoint" in refusal("single_vehicle_routing", route=route())
-    assert "ugv9 has not been heard" in refusal("follow", target=VehiclePosition("ugv9"))
+    assert "ugv9 has sent no position" in refusal("follow", target=VehiclePosition("ugv9"))
     assert "another vehicle" in refusal("follow", target=VehiclePosition("ugv1"))
     assert "cannot do 'orbit'" in refusal("orbit", target=point(0, 0))
     assert refusal("goto", target=point(0, 5)) == ""

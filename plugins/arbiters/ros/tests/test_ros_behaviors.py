@@ -95,7 +95,7 @@ def test_goto_a_vehicle_that_is_not_heard_any_more_stops_and_fails() -> None:
     road.begin("goto", target=OTHER)
     ending = road.until_ended(30.0)
     assert ending.state is BehaviorState.FAILED
-    assert "other has not been heard for 3 s" in ending.reason
+    assert "other has sent no position for 3 s" in ending.reason
     assert abs(road.body.twist.forward_m_s) < 0.1
 
 
@@ -318,7 +318,7 @@ def test_follow_does_not_run_into_a_target_whatever_the_offset() -> None:
 def test_follow_of_who_is_not_heard_any_more_fails() -> None:
     road = Road()
     road.begin("follow", target=OTHER)
-    assert "has not been heard" in road.until_ended(2.0).reason
+    assert "has sent no position" in road.until_ended(2.0).reason
 
 
 def test_follow_needs_another_vehicle() -> None:

@@ -103,9 +103,9 @@ def parameter(**body: Any) -> dict[str, Any]:
 
 REFUSED = [
     (["sweep"], "own_behaviors: .* is not a map of names of behaviors"),
-    ({"sweep": None}, r"\.sweep: all vehicles share no such behavior; Of a new one, say what"),
+    ({"sweep": None}, r"\.sweep: all vehicles share no such behavior; For a new one, list its"),
     ({"area_survay": None}, r"\.area_survay: .*did you mean 'area_survey'\?"),
-    ({"goto": {"parameters": {}}}, r"\.goto: 'goto' means the same for all vehicles; write"),
+    ({"goto": {"parameters": {}}}, r"\.goto: 'goto' is the same for all vehicles; write"),
     ({"sweep": {"params": {}}}, r"\.sweep\.params: .* did you mean 'parameters'\?"),
     ({"sweep": {"parameters": ["route"]}}, r"\.sweep\.parameters: .* is not a map"),
     ({"sweep": {"parameters": {"p": "rout"}}}, r"\.p\.kind: 'rout' is none of .*'route'\?"),

@@ -57,5 +57,5 @@ def test_the_yaw_is_that_of_the_turned_bow_whatever_the_length(x, y, z, w, lengt
 
 @pytest.mark.parametrize("w", [0.0, math.nan, math.inf])
 def test_what_is_no_rotation_is_refused(w: float) -> None:
-    with pytest.raises(ValueError, match="is no rotation"):
+    with pytest.raises(ValueError, match="is not a rotation"):
         yaw_of_quaternion(SimpleNamespace(x=0.0, y=0.0, z=0.0, w=w))

@@ -36,7 +36,7 @@ def test_wheels_and_a_sourced_ros_are_refused(
     (tmp_path / "share" / "rclpy").mkdir(parents=True)
     monkeypatch.setattr(installation, "_has_wheels", lambda: True)
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path}")
-    with pytest.raises(RosError, match=f"twice: as wheels in .*, and sourced from {tmp_path}"):
+    with pytest.raises(RosError, match=f"two ROS 2: wheels in .*, and sourced from {tmp_path}"):
         require_ros()
 
 

@@ -107,8 +107,8 @@ def feature(kind: str, coordinates: object, **properties: str) -> str:
         ("9" * 5000, "is not JSON"),
         (" " * (LONGEST + 1), "characters are too many"),
         ("[38.1, -77.3]", "is neither a number"),
-        ('{"vehicle": 7}', "'vehicle' is the name of a vehicle"),
-        ('{"vehicle": ""}', "'vehicle' is the name of a vehicle"),
+        ('{"vehicle": 7}', "'vehicle' must be the name of a vehicle"),
+        ('{"vehicle": ""}', "'vehicle' must be the name of a vehicle"),
         ('{"type": "Feature"}', "the Feature has no geometry"),
         (feature("Circle", []), "a geometry of type 'Circle' is none of Point, LineString"),
         (feature("Point", [1.0]), "is not a position"),
@@ -130,7 +130,7 @@ def test_what_is_no_value_is_refused(text: str, problem: str) -> None:
 def test_a_parameter_without_a_name_or_there_twice_is_refused() -> None:
     with pytest.raises(WireError, match="a parameter has no name"):
         decode_parameters([("", "1")])
-    with pytest.raises(WireError, match="parameter 'speed' is there twice"):
+    with pytest.raises(WireError, match="there are two parameters 'speed'"):
         decode_parameters([("speed", "1"), ("speed", "2")])
 
 
@@ -157,14 +157,14 @@ def test_a_status_comes_back_as_it_was() -> None:
     ("name", "value", "problem"),
     [
         ("speed", "{", "output 'speed' was left out: { is not JSON"),
-        ("speed", "NaN", "a number in it is not finite"),
-        ("speed", "[1, -Infinity]", "a number in it is not finite"),
-        ("speed", str(2**63), "needs more than 64 bits"),
+        ("speed", "NaN", "it has a number that is not finite"),
+        ("speed", "[1, -Infinity]", "it has a number that is not finite"),
+        ("speed", str(2**63), "of more than 64 bits"),
         ("speed", "[" * 30 + "]" * 30, "more than 20 levels deep"),
         ("speed", "[" * 50_000, "is not JSON"),
-        ("speed", '"' + "a" * 100_001 + '"', "100000 are the most"),
+        ("speed", '"' + "a" * 100_001 + '"', "at most 100000 are allowed"),
         ("", "1", "it has no name"),
-        ("good", "2", "it is there twice"),
+        ("good", "2", "the name is used twice"),
     ],
 )
 def test_an_end_counts_also_with_an_output_that_cannot_be(
@@ -189,10 +189,10 @@ def test_what_has_not_ended_has_no_outputs() -> None:
     ("fields", "problem"),
     [
         ({"state": 2, "number": 1}, "a status without an id"),
-        ({"id": "a", "state": 0, "number": 1}, "a status of a with a state of 0"),
-        ({"id": "a", "state": 9, "number": 1}, "a status of a with a state of 9"),
-        ({"id": "a", "state": 2, "number": 0}, "that is RUNNING with number 0"),
-        ({"id": "a", "state": 8, "number": 1}, "that is UNKNOWN with number 1"),
+        ({"id": "a", "state": 0, "number": 1}, "a status of a with the unknown state 0"),
+        ({"id": "a", "state": 9, "number": 1}, "a status of a with the unknown state 9"),
+        ({"id": "a", "state": 2, "number": 0}, "with state RUNNING and number 0"),
+        ({"id": "a", "state": 8, "number": 1}, "with state UNKNOWN and number 1"),
     ],
 )
 def test_a_status_that_breaks_the_rules_is_refused(fields: dict[str, object], problem: str) -> None:

@@ -19,7 +19,7 @@ VEHICLES = {
 SOON = ("soon", "soon_by_action")
 """Their nodes are back before they were silent for `lost_after`; those of the others are not."""
 
-SAYS = {True: "the vehicle's node was restarted", False: "not heard for"}
+SAYS = {True: "the vehicle's node was restarted", False: "no message for"}
 
 
 @pytest.fixture

@@ -46,7 +46,7 @@ def localization(ros: RosRuntime, frame: OdomFrame = OdomFrame.MAP) -> TopicLoca
 async def test_odometry_in_the_map_is_the_pose(ros: RosRuntime, teller: Sensors) -> None:
     where = localization(ros)
     assert (where.pose, where.twist, where.position, where.age_s) == (None, None, None, INF)
-    assert where.problems == ("no odometry was heard yet on /evsg1/odom",)
+    assert where.problems == ("no odometry yet on /evsg1/odom",)
     await teller.say(odometry(30.0, 40.0, yaw=1.0, forward=1.5))
     await until(lambda: where.pose, "odometry is heard")
     assert where.pose == Pose(30.0, 40.0, pytest.approx(1.0))
@@ -65,14 +65,19 @@ async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
     spins = odometry(9.0, 9.0)
     spins[1]["twist"]["twist"]["angular"]["z"] = NAN
     wrong = {
-        "odometry with a place that cannot be": [
+        "odometry with an invalid position": [
             odometry(NAN, 0.0),
             odometry(0.0, INF),
             odometry(2e6, 0.0),
         ],
-        "odometry with an orientation that cannot be": [odometry(9.0, 9.0, yaw=NAN), zero],
-        "odometry with a speed that cannot be": [odometry(9.0, 9.0, forward=-INF), spins],
-        "a fix that cannot be": [fix(NAN, 0.0), fix(91.0, 0.0), fix(0.0, -181.0), fix(INF, 0.0)],
+        "odometry with an invalid orientation": [odometry(9.0, 9.0, yaw=NAN), zero],
+        "odometry with an invalid speed": [odometry(9.0, 9.0, forward=-INF), spins],
+        "an invalid satellite fix": [
+            fix(NAN, 0.0),
+            fix(91.0, 0.0),
+            fix(0.0, -181.0),
+            fix(INF, 0.0),
+        ],
     }
     await teller.say(odometry(1.0, 2.0))
     for cause, messages in wrong.items():
@@ -82,7 +87,7 @@ async def test_what_cannot_be_is_ignored_and_logged_once_with_a_count(
     assert where.pose == Pose(1.0, 2.0, 0.0)
     lines = [record.message for record in caplog.records if record.levelname == "WARNING"]
     assert len(lines) == len(wrong), lines
-    assert "evsg1: odometry with a place that cannot be: (nan, 0, 0)" in lines
+    assert "evsg1: odometry with an invalid position: (nan, 0, 0)" in lines
 
 
 def test_what_goes_on_being_wrong_is_counted_in_few_lines(
@@ -90,9 +95,9 @@ def test_what_goes_on_being_wrong_is_counted_in_few_lines(
 ) -> None:
     log_throttle = LogThrottle(logging.getLogger("m2pem.testing"), "evsg1")
     for _ in range(2500):
-        log_throttle.log("a fix that cannot be", "(91, 0)")
+        log_throttle.log("an invalid satellite fix", "(91, 0)")
     assert [record.message for record in caplog.records] == [
-        "evsg1: a fix that cannot be: (91, 0)" + so_far
+        "evsg1: an invalid satellite fix: (91, 0)" + so_far
         for so_far in ("", " (10 so far)", " (100 so far)", " (1000 so far)")
     ]
 
@@ -101,7 +106,7 @@ async def test_odometry_that_repeats_a_stamp_is_not_news(ros: RosRuntime, teller
     where = localization(ros)
     frozen = [odometry(5.0, 5.0, stamp=7)] * 3
     await teller.say(odometry(1.0, 1.0, stamp=7), *frozen)
-    await until(lambda: where.log_throttle.counts["odometry that was there already"] == 3)
+    await until(lambda: where.log_throttle.counts["odometry with a repeated stamp"] == 3)
     assert where.pose.east_m == 1.0
     await teller.say(odometry(2.0, 2.0, stamp=3))
     await until(lambda: where.pose.east_m == 2.0, "a robot that was restarted is believed")
@@ -115,9 +120,9 @@ async def test_odometry_that_begins_anywhere_needs_a_fix(ros: RosRuntime, teller
         odometry(500.0, 500.0, frame="odom"),
     )
     await until(lambda: where.twist, "odometry is heard")
-    await until(lambda: where.log_throttle.counts["a fix that cannot be"] == 1)
+    await until(lambda: where.log_throttle.counts["an invalid satellite fix"] == 1)
     assert (where.pose, where.age_s) == (None, INF)
-    assert where.problems == ("no satellite fix was heard yet",)
+    assert where.problems == ("no satellite fix yet",)
     await teller.say(fix(*ORIGIN[:2], altitude=NAN, status=-2))
     await until(lambda: where.pose, "the fix is heard")
     await teller.say(odometry(502.0, 501.0, frame="evsg1/odom"))

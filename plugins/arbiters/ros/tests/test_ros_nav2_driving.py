@@ -237,7 +237,7 @@ async def test_follow_keeps_its_station_behind_a_vehicle_that_moves(ugv1: Bench)
         lead.cancel()
     outcome = await ugv1.outcome(goal)
     assert outcome.state is BehaviorState.FAILED
-    assert "lead has not been heard" in outcome.reason
+    assert "lead has sent no position" in outcome.reason
     await ugv1.until(lambda: ugv1.speed_m_s < 0.05)
 
 
@@ -259,7 +259,7 @@ async def test_what_cannot_be_is_refused_before_anything_is_sent(ugv1: Bench) ->
         request = ugv1.order(behavior).request
         return ugv1.driver.refusal(replace(request, parameters=wishes))  # type: ignore[arg-type]
 
-    assert "has not been heard" in refusal("goto", target=VehiclePosition("nobody"))
+    assert "has sent no position" in refusal("goto", target=VehiclePosition("nobody"))
     assert "another vehicle" in refusal("follow", target=VehiclePosition("ugv1"))
     assert "cannot be repeated" in refusal(
         "single_vehicle_routing", route=along((1.0, 1.0)), loop=True

@@ -18,7 +18,7 @@ from m2pem_plugin_ros.pose import Pose
         (207, "TIMEOUT", "planner took too long"),
         (9003, "TIMEOUT", "took too long"),
         (202, "FAILED", "transform"),
-        (4711, "FAILED", "it says (error 4711)"),
+        (4711, "FAILED", "unknown reason (error 4711)"),
         (0, "FAILED", "did not say why"),
     ],
 )
@@ -32,11 +32,11 @@ def test_error_codes_of_nav2_become_codes_of_missions(
 
 def test_what_nav2_says_itself_is_told() -> None:
     said = SimpleNamespace(error_code=0, error_msg=" the map is gone ")
-    assert aborted(said).reason == "Nav2 gave it up: the map is gone"
+    assert aborted(said).reason == "Nav2 aborted the goal: the map is gone"
 
 
 def test_results_without_error_codes_or_messages_are_read() -> None:
-    assert aborted(SimpleNamespace()).reason == "Nav2 gave it up, and did not say why"
+    assert aborted(SimpleNamespace()).reason == "Nav2 aborted the goal, without a reason"
     assert "error 208" in aborted(SimpleNamespace(error_code=208)).reason
 
 

@@ -115,7 +115,7 @@ async def test_a_nav2_that_does_not_cancel_is_told_of_in_time(ugv1: Bench) -> No
     ugv1.driver.end(goal)
     outcome = await ugv1.outcome(goal)
     assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "TIMEOUT")
-    assert "it did not stop" in outcome.reason
+    assert "the vehicle did not stop" in outcome.reason
     await ugv1.say("inactive")  # this alone ends what hangs
 
 
@@ -139,7 +139,7 @@ async def test_a_nav2_that_is_deactivated_on_the_way_is_named_as_the_reason(ugv1
     await ugv1.say("inactive")
     outcome = await ugv1.outcome(goal)
     assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "FAILED")
-    assert outcome.reason == "Nav2 gave it up: Nav2 is not active: inactive"
+    assert outcome.reason == "Nav2 aborted the goal: Nav2 is not active: inactive"
 
 
 # --- somebody else --------------------------------------------------------------------------------
@@ -261,7 +261,7 @@ async def test_what_ended_while_nobody_looked_is_found(domain: int, ugv1: Bench)
         found = await after.driver.query(after.order("goto", target=at(1.0, 1.0)))
         assert (found.state, found.reason) == (
             BehaviorState.UNKNOWN,
-            "Nav2 knows nothing of it",
+            "Nav2 does not have the goal",
         )
 
 
@@ -291,7 +291,7 @@ async def test_a_nav2_that_was_started_anew_knows_nothing_of_its_goal(
             with Peer(PEER, domain, ["/ugv1", "3", "0"]):
                 outcome = await ugv1.outcome(goal)
                 assert outcome.state is BehaviorState.FAILED
-                assert "started anew" in outcome.reason
+                assert "it was restarted" in outcome.reason
                 await ugv1.ready()
                 await ugv1.until(lambda: not ugv1.driver.refusal(ugv1.order("reverse").request))
                 again = ugv1.begin("goto", target=at(5.0, 0.0))
@@ -310,8 +310,8 @@ async def test_a_nav2_that_has_ended_lets_its_order_fail(
             peer.kill()
             outcome = await ugv1.outcome(goal)
             assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "FAILED")
-            assert outcome.reason == "Nav2 has not been heard for 3 s"
-            assert ugv1.driver.health.not_ready_reasons == ("Nav2 is not heard",)
+            assert outcome.reason == "Nav2 has sent no message for 3 s"
+            assert ugv1.driver.health.not_ready_reasons == ("Nav2 does not answer",)
 
 
 async def test_without_nav2_msgs_the_driver_says_what_to_install(

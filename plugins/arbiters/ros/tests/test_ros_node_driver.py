@@ -140,7 +140,10 @@ async def test_an_adjusted_behavior_goes_on_with_the_new_value(one: Bench) -> No
 
 async def test_a_driver_on_board_that_raises_fails_the_behavior(one: Bench) -> None:
     end = await one.end_of(one.begin("teleop"))
-    assert (end.state, end.reason) == (FAILED, "the driver is wrong: RuntimeError('no joystick')")
+    assert (end.state, end.reason) == (
+        FAILED,
+        "internal error of the driver: RuntimeError('no joystick')",
+    )
 
 
 async def test_health_is_what_the_node_says(one: Bench) -> None:

@@ -38,7 +38,7 @@ async def test_statuses_of_other_behaviors_and_none_are_ignored(
         await one.running(order)
         await listen(one)
         assert one.events.ends == []
-        assert "a status of what we have not given it: r1.b1" in caplog.text
+        assert "a status of a behavior that was not sent: r1.b1" in caplog.text
         assert "a status without an id" in caplog.text
 
 

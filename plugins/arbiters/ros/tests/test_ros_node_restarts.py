@@ -44,7 +44,7 @@ async def test_a_start_before_the_node_is_there_is_done_once_it_is(
         assert one.begun == 1
         await end_peer(peer)
         end = await one.end_of(order)
-        assert (end.state, end.reason) == (CANCELLED, "the node on the vehicle was ended")
+        assert (end.state, end.reason) == (CANCELLED, "the node on the vehicle was stopped")
 
 
 async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
@@ -58,7 +58,7 @@ async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
         again = await start_peer(ros_domain)
         end = await one.end_of(order)
         assert (end.state, end.code) == (LOST, "LINK_LOST")
-        assert end.reason == "the vehicle's node was restarted and knows nothing of it"
+        assert end.reason == "the vehicle's node was restarted and does not have the behavior"
         assert (await one.end_of(one.begin("drive_stop"))).state is SUCCEEDED
         await one.later()
         assert one.begun == 1
@@ -108,9 +108,9 @@ async def test_a_node_that_hears_no_vehicle_any_more_says_it_is_lost(ros_domain:
         peer.process.send_signal(signal.SIGUSR1)
         end = await one.end_of(order)
         assert (end.state, end.code) == (LOST, "LINK_LOST")
-        assert re.search(r"the vehicle was not heard for \d+\.\d s", end.reason)
+        assert re.search(r"the vehicle has sent no message for \d+\.\d s", end.reason)
         await one.until(lambda: one.driver.health.ready is False)
-        assert "not heard for" in one.driver.health.not_ready_reasons[0]
+        assert "no message for" in one.driver.health.not_ready_reasons[0]
         refused = await one.end_of(one.begin("drive_stop"))
-        assert "not heard for" in refused.reason
+        assert "no message for" in refused.reason
     await end_peer(peer)

@@ -164,7 +164,7 @@ async def test_a_start_that_cannot_be_understood_is_rejected(
 async def test_a_start_for_another_vehicle_is_rejected(one: Console) -> None:
     id_ = one.start("hold", allocation=[Allocation(role="driver", resources=["evsg2"])])
     reason = (await one.last_of(id_, S.REJECTED)).reason
-    assert reason == "it is for evsg2, and this is evsg1"
+    assert reason == "the command is for evsg2, but this is evsg1"
 
 
 async def test_commands_that_are_none_are_answered_with_nothing(one: Console) -> None:
@@ -209,7 +209,7 @@ async def test_a_start_takes_over_whatever_goes_on_and_that_is_said(one: Console
     await one.last_of(bad, S.REJECTED)
     assert one.of(old)[-1] == (2, S.RUNNING), "what is rejected takes over from nothing"
     new = one.start("drive_stop")
-    assert (await one.last_of(old, S.CANCELLED)).reason == f"{new} took over"
+    assert (await one.last_of(old, S.CANCELLED)).reason == f"{new} has replaced it"
     await one.last_of(new, S.SUCCEEDED)
 
 
@@ -266,7 +266,10 @@ async def test_a_goal_is_the_behavior_of_its_id_whoever_started_it(one: Console)
 @pytest.mark.parametrize("command", [C(verb=C.HOLD, id="a"), C(verb=C.START)])
 async def test_a_goal_that_is_no_start_is_rejected(one: Console, command: C) -> None:
     status = await run_goal(one, command)
-    assert (status.state, status.reason) == (S.REJECTED, "a goal's command is a START with an id")
+    assert (status.state, status.reason) == (
+        S.REJECTED,
+        "the command of a goal must be a START with an id",
+    )
 
 
 # --- its end --------------------------------------------------------------------------------------
@@ -299,7 +302,7 @@ async def test_a_node_can_be_let_go_and_made_again_in_one_process(ros_domain: in
             await second.close()
             assert (
                 await one.last_of(id_, S.CANCELLED)
-            ).reason == "the node on the vehicle was ended"
+            ).reason == "the node on the vehicle was stopped"
     async with asyncio.timeout(AMPLE_S):
         while asyncio.all_tasks() != before:  # noqa: ASYNC110  # tasks end some turns later
             await asyncio.sleep(0.01)

@@ -36,7 +36,7 @@ async def test_a_plain_base_does_behaviors_and_stands_when_the_node_ends(ros_dom
             await one.running(order)
             node.process.send_signal(signal.SIGTERM)
             end = await one.end_of(order)
-            assert (end.state, end.reason) == (CANCELLED, "the node on the vehicle was ended")
+            assert (end.state, end.reason) == (CANCELLED, "the node on the vehicle was stopped")
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_what_cannot_be_is_refused(words: list[str], problem: str) -> None:
     [
         ("bounds.sped=1", "evsg1: connection.bounds.sped: there is no such setting"),
         ("stamped=yes", "evsg1: connection.stamped: 'yes' is neither true nor false"),
-        ("driver=m2pem", "this is the m2pem node; what it drives by is base or nav2"),
+        ("driver=m2pem", "this is the m2pem node; its driver must be base or nav2"),
     ],
 )
 def test_settings_that_are_none_are_refused(said: str, problem: str) -> None:

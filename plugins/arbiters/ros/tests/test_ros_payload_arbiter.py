@@ -89,7 +89,7 @@ def test_a_vehicle_drives_on_when_a_payload_that_it_holds_is_not_heard() -> None
     ("behavior", "resource", "reason"),
     [
         ("goto", PTZ, "ugv1/ptz has no behavior 'goto'; its vehicle is to have a role"),
-        ("goto", GPR, "goto takes one vehicle or payload, and has 0"),
+        ("goto", GPR, "goto takes one vehicle or payload, not 0"),
         ("zoom", V, "ugv1 has no behavior 'zoom'"),
         ("zoom", GPR, "ugv1/gpr has no behavior 'zoom'"),
     ],

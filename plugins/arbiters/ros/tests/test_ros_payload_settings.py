@@ -88,10 +88,10 @@ def test_a_node_may_also_detect() -> None:
 @pytest.mark.parametrize(
     ("said", "problem"),
     [
-        ({"driver": "m2pem"}, r"connection\.namespace: /evsg2 is that of evsg2, too"),
+        ({"driver": "m2pem"}, r"connection\.namespace: evsg2 has the same namespace, /evsg2"),
         ({**NODE, "viaa": "action"}, r"connection\.viaa: .* did you mean 'via'\?"),
         ({**NODE, "via": "pigeon"}, r"connection\.via: 'pigeon' is none of topics, action"),
-        ({**NODE, "driver": "nav2"}, r"connection\.driver: 'nav2' reaches no payload"),
+        ({**NODE, "driver": "nav2"}, r"connection\.driver: 'nav2' is not a driver of payloads"),
         ({**NODE, "bounds": {"speed": 2}}, r"connection\.bounds: there is no such setting"),
         ({**NODE, "own_behaviors": {"goto": None}}, "all payloads share no such behavior"),
     ],
@@ -104,7 +104,7 @@ def test_what_is_wrong_is_refused_by_name(said: dict[str, Any], problem: str) ->
 def test_two_payloads_cannot_have_one_namespace() -> None:
     other = ResourceId("evsg3/ptz")
     both = {each: Connection(each, "ground", NODE) for each in (PTZ, other)}
-    with pytest.raises(PluginError, match=r"evsg3/ptz: .* is that of evsg2/ptz, too"):
+    with pytest.raises(PluginError, match=r"evsg3/ptz: .*evsg2/ptz has the same namespace"):
         read_payloads(both, {})
 
 

@@ -133,9 +133,11 @@ def test_nothing_ends_by_a_pose_that_is_in_doubt() -> None:
 def test_a_pose_that_is_heard_once_is_one_pose_however_often_it_is_seen() -> None:
     road = driving()
     jumped = replace(road.body.pose, east_m=road.body.pose.east_m + 50.0)
-    heard_s = road.now_s
+    received_s = road.now_s
     for number in range(1, 9):  # one odd message, looked at eight times
-        now_s = heard_s + number * DT_S
-        step = road.pilot.step(Observation(now_s, jumped, road.body.twist, now_s - heard_s - DT_S))
+        now_s = received_s + number * DT_S
+        step = road.pilot.step(
+            Observation(now_s, jumped, road.body.twist, now_s - received_s - DT_S)
+        )
         assert step.twist is not None
         assert step.twist.forward_m_s > 1.0

@@ -144,7 +144,7 @@ async def test_a_vehicle_that_returns_is_told_to_stop_and_is_free_when_it_has(
             await until(lambda: truth.speed() == 0.0)
             assert kind != "node" or truth.cancels()[0] == "7"
             # Nav2 answers again only when it is asked for its state again.
-            await until(lambda: "Nav2 is not heard" not in reasons(bench))
+            await until(lambda: "Nav2 does not answer" not in reasons(bench))
             await drives(bench, truth, "r1.b2")
 
 
@@ -204,7 +204,7 @@ async def test_a_vehicle_that_appears_later_is_told_of_and_was_not_restarted(
         (
             {"driver": "base", "odom_frame": "odom"},
             "map",
-            "declared is 'odom', and tf is not read: say 'odom_frame: map'",
+            "declared is 'odom', and tf is not read: write 'odom_frame: map'",
         ),
     ],
 )
@@ -236,7 +236,7 @@ async def reason_with_a_name(bench: Any) -> str:
     ("settings", "type_", "says"),
     [
         ({}, "TwistStamped", "is subscribed to as geometry_msgs/msg/TwistStamped (/ugv1/vehicle"),
-        ({"stamped": True}, "Twist", "say 'stamped: false' in its connection"),
+        ({"stamped": True}, "Twist", "write 'stamped: false' in its connection"),
         ({}, "pose", "/ugv1/odom is of type geometry_msgs/msg/PoseStamped (/ugv1/vehicle"),
     ],
 )

@@ -86,7 +86,7 @@ def test_names_are_in_the_namespace_unless_they_are_full() -> None:
     ("settings", "said"),
     [
         ({}, "evsg1: connection.namespace: it is missing"),
-        ({"namespace": "/evsg 1"}, "connection.namespace: '/evsg 1' is no ROS namespace"),
+        ({"namespace": "/evsg 1"}, "connection.namespace: '/evsg 1' is not a ROS namespace"),
         ({"namespace": 7}, "connection.namespace: 7"),
         ({"namespace": ""}, "connection.namespace: ''"),
         ({"namespace": "/1"}, "connection.namespace"),
@@ -96,15 +96,15 @@ def test_names_are_in_the_namespace_unless_they_are_full() -> None:
         ({**LEAST, "domain_id": 233}, "connection.domain_id: 233"),
         ({**LEAST, "domain_id": True}, "connection.domain_id: True"),
         ({**LEAST, "driver": "mavros"}, "'mavros' is none of m2pem, nav2, base"),
-        ({**LEAST, "driver": "base", "via": "action"}, "connection.via: it is for the driver"),
-        ({**LEAST, "route_action": "through"}, "route_action: it is for the driver nav2"),
+        ({**LEAST, "driver": "base", "via": "action"}, "connection.via: the key is for the driver"),
+        ({**LEAST, "route_action": "through"}, "route_action: the key is for the driver nav2"),
         ({**LEAST, "topics": {"odmo": "x"}}, "connection.topics.odmo: there is no such"),
         ({**LEAST, "topics": {"odom": "a b"}}, "connection.topics.odom: 'a b' is no name of a ROS"),
-        ({**LEAST, "topics": "odom"}, "connection.topics: 'odom' is no map"),
+        ({**LEAST, "topics": "odom"}, "connection.topics: 'odom' is not a map"),
         ({**LEAST, "odom_frame": "earth"}, "connection.odom_frame: 'earth' is none of map, odom"),
         ({**LEAST, "stamped": "yes"}, "connection.stamped: 'yes' is neither true nor false"),
-        ({**LEAST, "hardware_id": ""}, "connection.hardware_id: '' is no text"),
-        ({**LEAST, "sim": 3}, "connection.sim: 3 is no map"),
+        ({**LEAST, "hardware_id": ""}, "connection.hardware_id: '' is not a text"),
+        ({**LEAST, "sim": 3}, "connection.sim: 3 is not a map"),
         ({**LEAST, "bounds": {"speed": "2 m"}}, "connection.bounds.speed: '2 m' is a distance"),
         ({**LEAST, "bounds": {"speed": 0}}, "connection.bounds.speed: 0 is not above 0"),
         ({**LEAST, "bounds": {"speed": math.inf}}, "connection.bounds.speed"),
@@ -134,7 +134,9 @@ def test_two_vehicles_are_not_the_same_robot() -> None:
             {V: Connection(V, "ground", first), W: Connection(W, "ground", second)}
         )
 
-    with pytest.raises(PluginError, match=r"evsg2: connection.namespace: /evsg1 is that of evsg1"):
+    with pytest.raises(
+        PluginError, match=r"evsg2: connection.namespace: evsg1 has the same namespace"
+    ):
         two(LEAST, {"namespace": "evsg1"})
     assert len(two({**LEAST, "domain_id": 1}, {**LEAST, "domain_id": 2})) == 2
 
@@ -164,7 +166,7 @@ def test_a_payload_that_does_not_detect_is_only_carried() -> None:
 @pytest.mark.parametrize(
     ("own", "said"),
     [
-        ({"topic": 3}, "connection.topic: 3 is no name of a ROS topic"),
+        ({"topic": 3}, "connection.topic: 3 is not the name of a ROS topic"),
         ({"topic": "gpr", "mesage": "string"}, "connection.mesage: there is no such setting; did"),
         ({"topic": "gpr", "message": "json"}, "'json' is none of detection, string"),
         ({"topic": "gpr", "driver": "base"}, "connection.driver: there is no such setting"),

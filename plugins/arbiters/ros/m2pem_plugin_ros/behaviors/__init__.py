@@ -41,7 +41,7 @@ def make_motion(behavior: str, parameters: LocalParameters, bounds: Bounds) -> M
     """Make the motion of a behavior.
 
     Raises:
-        RefusedError: a plain base cannot do it, or not so.
+        RefusedError: a plain base cannot execute it, or not with these parameters.
     """
     if behavior not in MOTIONS:
         raise RefusedError(

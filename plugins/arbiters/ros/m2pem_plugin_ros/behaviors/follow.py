@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from m2pem.api import BehaviorState
-from m2pem_plugin_ros.behaviors.goto import UNHEARD_S
+from m2pem_plugin_ros.behaviors.goto import TARGET_SILENT_S
 from m2pem_plugin_ros.behaviors.motion import Motion
 from m2pem_plugin_ros.behaviors.motion_state import (
     STANDSTILL,
@@ -26,7 +26,7 @@ from m2pem_plugin_ros.catalogue import BEHIND_RAD, OFFSET_M
 from m2pem_plugin_ros.settings import Bounds
 
 STATION_M = 1.0
-LEFT_STATION_M = 2.0
+LEFT_POSITION_M = 2.0
 """While the target stands, the base stops within the first distance of its position, and starts
 again beyond the second."""
 
@@ -50,17 +50,17 @@ class Follow(Motion):
             raise RefusedError("parameter 'target': another vehicle is expected")
         self._offset_m = OFFSET_M
         self._bearing_rad = BEHIND_RAD
-        self._take_station(parameters)
+        self._set_position(parameters)
         self._steering = Steering()
         self._approach: Approach | None = None
-        self._at_station = False
+        self._in_position = False
 
     def step(self, state: MotionState) -> DesiredMotion | Ending:
         """Drive towards the position, at a speed that follows from the target's speed and the
         gap."""
         target = state.target
-        if target is None or not target.age_s <= UNHEARD_S:
-            reason = f"{self.target} has not been heard for {UNHEARD_S:g} s"
+        if target is None or not target.age_s <= TARGET_SILENT_S:
+            reason = f"{self.target} has sent no position for {TARGET_SILENT_S:g} s"
             return Ending(BehaviorState.FAILED, "", reason)
         place = _now_at(target)
         course_rad, speed = _motion(target)
@@ -73,7 +73,7 @@ class Follow(Motion):
         station = point_beyond(place, target.pose.yaw_rad - self._bearing_rad, self._offset_m)
         if speed < STANDING_M_S:
             return self._to_rest(state, station)
-        self._at_station = False
+        self._in_position = False
         self._approach = None
         return self._keep_up(state, station, course_rad, speed)
 
@@ -92,9 +92,9 @@ class Follow(Motion):
     def adjust(self, parameters: LocalParameters) -> None:
         """Change speed, `offset` and `bearing`."""
         super().adjust(parameters)
-        self._take_station(parameters)
+        self._set_position(parameters)
 
-    def _take_station(self, parameters: LocalParameters) -> None:
+    def _set_position(self, parameters: LocalParameters) -> None:
         offset, bearing = parameters.offset_m, parameters.bearing_rad
         self._offset_m = self._offset_m if offset is None else offset
         self._bearing_rad = self._bearing_rad if bearing is None else bearing
@@ -102,8 +102,8 @@ class Follow(Motion):
     def _to_rest(self, state: MotionState, station: Place) -> DesiredMotion:
         """Drive to the position of a target that stands, and stop there."""
         away = math.dist(position_of(state.pose), station)
-        self._at_station = away <= (LEFT_STATION_M if self._at_station else STATION_M)
-        if self._at_station:
+        self._in_position = away <= (LEFT_POSITION_M if self._in_position else STATION_M)
+        if self._in_position:
             self._approach = None
             return STANDSTILL
         if self._approach is None:
@@ -125,7 +125,7 @@ class Follow(Motion):
             return self._steering.towards(state, station, min(wanted, self.speed_m_s))
         wanted = max(0.0, min(self.speed_m_s, speed + GAIN_1_S * along))
         if wanted < STANDING_M_S and along < 0:
-            return STANDSTILL  # it is ahead of its station, which comes by itself
+            return STANDSTILL  # the base is ahead of its position: wait
         point = point_beyond(station, course_rad, ahead_m)
         return self._steering.towards(state, point, wanted)
 

@@ -33,7 +33,7 @@ RUN_UPS = 3
 its heading. If it misses the position, it tries again. After `RUN_UPS` tries it drives there
 directly."""
 
-UNHEARD_S = 3.0
+TARGET_SILENT_S = 3.0
 """A target vehicle that was not received for this time is given up."""
 
 
@@ -57,14 +57,14 @@ class Goto(Motion):
         self._run_ups = 0
         if self.target and self._yaw_rad is not None and bounds.turn_radius_m > 0:
             raise RefusedError(
-                "parameter 'heading': what cannot turn on the spot cannot choose how it points "
+                "parameter 'heading': a base that cannot turn on the spot has no free heading "
                 f"at {self.target}, which may move; leave it out"
             )
 
     def step(self, state: MotionState) -> DesiredMotion | Ending:
         place = self._place(state)
         if place is None:
-            reason = f"{self.target} has not been heard for {UNHEARD_S:g} s"
+            reason = f"{self.target} has sent no position for {TARGET_SILENT_S:g} s"
             return Ending(BehaviorState.FAILED, "", reason)
         if self._arrived:
             return self._turn(state)
@@ -109,7 +109,7 @@ class Goto(Motion):
         if self.places:
             return self.places[0]
         target = state.target
-        if target is None or not target.age_s <= UNHEARD_S:
+        if target is None or not target.age_s <= TARGET_SILENT_S:
             return None
         return (
             target.pose.east_m + target.east_m_s * target.age_s,

@@ -22,7 +22,7 @@ class PoseFilter:
     def __init__(self, top_speed_m_s: float) -> None:
         self._top_speed_m_s = top_speed_m_s
         self._believed: Pose | None = None
-        self._heard_s = -math.inf
+        self._received_s = -math.inf
         self._believed_s = -math.inf
         self._ignored = 0
 
@@ -31,28 +31,28 @@ class PoseFilter:
         """Whether the last pose was dropped, so that `pose` returned an older one."""
         return self._ignored > 0
 
-    def pose(self, pose: Pose | None, heard_s: float, *, strict: bool = True) -> Pose | None:
-        """Return the pose to use, given the one received at `heard_s`; None if there is none.
+    def pose(self, pose: Pose | None, received_s: float, *, strict: bool = True) -> Pose | None:
+        """Return the pose to use, given the one received at `received_s`; None if there is none.
 
         With `strict` False, no behavior depends on it, and any finite pose is accepted.
         """
         pose = sane_pose(pose)
         if pose is None:
             return None
-        if heard_s - self._heard_s < SAME_S and self._believed is not None:
+        if received_s - self._received_s < SAME_S and self._believed is not None:
             return self._believed
-        self._heard_s = heard_s
-        if strict and self._jumps(pose, heard_s) and self._ignored < IGNORED:
+        self._received_s = received_s
+        if strict and self._jumps(pose, received_s) and self._ignored < IGNORED:
             self._ignored += 1
             return self._believed
-        self._believed, self._believed_s, self._ignored = pose, heard_s, 0
+        self._believed, self._believed_s, self._ignored = pose, received_s, 0
         return pose
 
-    def _jumps(self, pose: Pose, heard_s: float) -> bool:
+    def _jumps(self, pose: Pose, received_s: float) -> bool:
         if self._believed is None:
             return False
         far = math.dist(position_of(self._believed), position_of(pose))
-        passed_s = heard_s - self._believed_s
+        passed_s = received_s - self._believed_s
         return far > JITTER_M + MARGIN * self._top_speed_m_s * passed_s
 
 

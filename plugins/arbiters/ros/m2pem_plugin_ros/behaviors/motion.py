@@ -45,7 +45,7 @@ class Motion(ABC):
         self._take_speed(parameters)
 
     def ends_at(self, pose: Pose) -> bool:
-        """Whether a base that stands at `pose` has certainly completed the motion."""
+        """Return whether a base that stands at `pose` has certainly completed the motion."""
         return False
 
     def _take_speed(self, parameters: LocalParameters) -> None:

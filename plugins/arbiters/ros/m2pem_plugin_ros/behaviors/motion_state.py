@@ -143,4 +143,4 @@ def sane_twist(twist: Twist | None) -> Twist | None:
 
 
 def _within(bound: float, *numbers: float) -> bool:
-    return all(-bound <= number <= bound for number in numbers)  # not if it is no number
+    return all(-bound <= number <= bound for number in numbers)  # False for NaN

@@ -1,4 +1,4 @@
-"""A request's parameters in the local frame, as motions ask for them."""
+"""The parameters of a request in the local frame."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,7 +7,7 @@ from m2pem.api import BehaviorParameters, Point, ResolvedValue, VehiclePosition
 from m2pem_plugin_ros.behaviors.motion_state import Place, RefusedError
 
 Level = Callable[[float, float], Place]
-"""The local place of a latitude and a longitude, in degrees."""
+"""Converts latitude and longitude in degrees to a local place."""
 
 
 class LocalParameters(BehaviorParameters):
@@ -19,21 +19,21 @@ class LocalParameters(BehaviorParameters):
         self._own_name = own_name
 
     def route_places(self) -> tuple[Place, ...]:
-        """The places of `route`.
+        """Return the places of `route`.
 
         Raises:
-            RefusedError: there are none.
+            RefusedError: the route is empty.
         """
         route = self.route
         if route is None or not route.waypoints:
-            raise RefusedError("parameter 'route': there is no waypoint in it")
+            raise RefusedError("parameter 'route': the route has no waypoints")
         return tuple(self._place("route", each[0], each[1]) for each in route.waypoints)
 
     def other_vehicle(self) -> str:
-        """The vehicle that `target` names, or "".
+        """Return the vehicle that `target` names, or "".
 
         Raises:
-            RefusedError: it is the one that is to move.
+            RefusedError: it is the commanded vehicle.
         """
         target = self.target
         if not isinstance(target, VehiclePosition):
@@ -43,24 +43,24 @@ class LocalParameters(BehaviorParameters):
         return target.vehicle
 
     def target_place(self) -> Place:
-        """The point that `target` says.
+        """Return the point of `target`.
 
         Raises:
-            RefusedError: it says none.
+            RefusedError: there is none.
         """
         target = self.target
         if not isinstance(target, Point):
-            raise RefusedError("parameter 'target': there is none")
+            raise RefusedError("parameter 'target': it is missing")
         return self._place("target", target.position[0], target.position[1])
 
     def _place(self, parameter: str, latitude_deg: float, longitude_deg: float) -> Place:
         if not math.isfinite(latitude_deg + longitude_deg):
             raise RefusedError(
-                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is no position"
+                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is not a position"
             )
         place = self._level(latitude_deg, longitude_deg)
         if not math.isfinite(place[0] + place[1]):
             raise RefusedError(
-                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is no position"
+                f"parameter '{parameter}': [{latitude_deg}, {longitude_deg}] is not a position"
             )
         return place

@@ -76,7 +76,7 @@ class Pilot:
         self._last_s: float | None = None
         self._driven_from: Pose | None = None
 
-    # --- what may be asked ----------------------------------------------------------------------
+    # --- requests -------------------------------------------------------------------------------
 
     @property
     def goal(self) -> UUID | None:
@@ -102,7 +102,7 @@ class Pilot:
         """Whether the pilot publishes commands."""
         return self._goal is not None or self._quiet_s < QUIET_S
 
-    # --- what may be told -----------------------------------------------------------------------
+    # --- commands -------------------------------------------------------------------------------
 
     def begin(self, goal: UUID, motion: Motion) -> None:
         """Start a motion in place of the current one, without a stop in between."""
@@ -151,14 +151,14 @@ class Pilot:
         self._limiter.halt()
         self._quiet_s = QUIET_S
 
-    # --- what it does ---------------------------------------------------------------------------
+    # --- steps --------------------------------------------------------------------------------
 
     def step(self, seen: Observation) -> Step:
         """Return the command, and how the motion has ended, if it has."""
         dt_s = self._passed(seen.now_s)
         idle = self._goal is None or self._held
         pose = None
-        if seen.age_s <= STALE_S:  # not if it is no number
+        if seen.age_s <= STALE_S:  # False for NaN
             pose = self._gate.pose(seen.pose, seen.now_s - seen.age_s, strict=not idle)
         if pose is None:
             return self._blind(dt_s)
@@ -184,7 +184,7 @@ class Pilot:
         motion = self._motion
         if motion is None or self._held or self._ending is not None:
             return STANDSTILL
-        if self._gate.doubts:  # nothing ends, nor begins, where it may not be
+        if self._gate.doubts:  # outside the fence no motion ends or begins
             return self._desired
         if (left_by_m := self._fence.left_by_m(position_of(pose))) > 0:
             reason = f"it is {left_by_m:.1f} m outside the fleet's fence"
@@ -208,7 +208,7 @@ class Pilot:
         return result
 
     def _check_jump(self, motion: Motion, pose: Pose, dt_s: float) -> None:
-        """Tell the motion about a position that the base did not drive to."""
+        """Report to the motion a position that the base did not drive to."""
         before, self._driven_from = self._driven_from, pose
         if before is None:
             return
@@ -221,7 +221,7 @@ class Pilot:
         if not steered or self._held or self._ending is not None or not desired.moves:
             self._stuck.reset()
         elif self._stuck.stuck(pose, command, dt_s):
-            reason = f"it was told to move for {STUCK_S:g} s, and has not moved"
+            reason = f"it was commanded to move for {STUCK_S:g} s, and has not moved"
             self._end_with(Ending(BehaviorState.FAILED, "ROUTE_BLOCKED", reason))
 
     def _step_result(self, command: Twist, stands: bool, dt_s: float) -> Step:
@@ -239,7 +239,7 @@ class Pilot:
             if self._stopping_s < bound:
                 return Step(twist)
             if ending.state in (BehaviorState.CANCELLED, BehaviorState.SUCCEEDED):
-                reason = f"it is not known to stand {bound:g} s after it was told to"
+                reason = f"it has not stopped {bound:g} s after the command to stop"
                 ending = Ending(BehaviorState.FAILED, "TIMEOUT", reason)
         self._goal = self._motion = self._ending = None
         return Step(twist, goal, ending)

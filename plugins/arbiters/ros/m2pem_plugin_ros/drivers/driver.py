@@ -1,4 +1,4 @@
-"""The interface of drivers. A driver is one way to reach one vehicle.
+"""The interface of drivers. A driver connects to one vehicle.
 
 A driver needs rclpy; the arbiter makes it in `connect`. All calls are made on the event loop and
 return quickly. The driver reports the progress of an order by `DriverEvents`, and may report it
@@ -96,7 +96,7 @@ class DriverSetup:
 
 
 class Driver(Protocol):
-    """One way to reach one vehicle. It is made as `Driver(setup)`."""
+    """The connection to one vehicle. It is created as `Driver(setup)`."""
 
     async def open(self) -> None:
         """Connect. The vehicle need not be there yet."""

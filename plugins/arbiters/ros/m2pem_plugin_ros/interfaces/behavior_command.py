@@ -49,7 +49,7 @@ def read_command(message: Any) -> Command:
     try:
         verb = Verb(message.verb)
     except ValueError:
-        raise WireError(f"a command with a verb of {message.verb}") from None
+        raise WireError(f"a command with the unknown verb {message.verb}") from None
     asked = Command(verb, message.id, message.run, message.epoch)
     if not asked.id and not asked.of_vehicle:
         raise WireError(f"a command to {verb.name} without an id")
@@ -60,7 +60,7 @@ def read_parameters(message: Any) -> dict[str, ResolvedValue]:
     """Read the parameters of a START or an ADJUST.
 
     Raises:
-        WireError: one cannot be understood.
+        WireError: a parameter is invalid.
     """
     return decode_parameters((pair.key, pair.value) for pair in message.parameters)
 
@@ -69,16 +69,16 @@ def read_request(message: Any, vehicle: str) -> BehaviorRequest:
     """Read the request of a START. `vehicle`: the vehicle, or the payload, whose node this is.
 
     Raises:
-        WireError: a parameter cannot be understood, or it is for another vehicle.
+        WireError: a parameter is invalid, or the request is for another vehicle.
     """
     roles = {
         allocation.role: tuple(ResourceId(resource) for resource in allocation.resources)
         for allocation in message.allocation
     }
     resources = tuple(dict.fromkeys(resource for role in roles.values() for resource in role))
-    ours = {vehicle, *(each for each in resources if each.startswith(f"{vehicle}/"))}
-    if resources and ours.isdisjoint(resources):
-        raise WireError(f"it is for {', '.join(resources)}, and this is {vehicle}")
+    own = {vehicle, *(each for each in resources if each.startswith(f"{vehicle}/"))}
+    if resources and own.isdisjoint(resources):
+        raise WireError(f"the command is for {', '.join(resources)}, but this is {vehicle}")
     return BehaviorRequest(
         message.id,
         message.epoch,
@@ -109,7 +109,7 @@ def start_command(order: Order, now_us: int) -> Any:
     """Return a START. It is the goal of the action, too.
 
     Raises:
-        WireError: a parameter is none that the wire can carry.
+        WireError: a parameter cannot be encoded.
     """
     message = behavior_command(Verb.START, order, now_us)
     message.behavior = order.request.behavior
@@ -126,7 +126,7 @@ def adjust_command(order: Order, parameters: Mapping[str, ResolvedValue], now_us
     """Return an ADJUST.
 
     Raises:
-        WireError: a parameter is none that the wire can carry.
+        WireError: a parameter cannot be encoded.
     """
     message = behavior_command(Verb.ADJUST, order, now_us)
     message.parameters = _parameters(parameters)

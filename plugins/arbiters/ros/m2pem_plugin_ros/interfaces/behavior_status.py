@@ -54,9 +54,9 @@ def read_status(message: Any) -> Status:
         raise WireError("a status without an id")
     state = STATES.get(message.state)
     if state is None:
-        raise WireError(f"a status of {message.id} with a state of {message.state}")
+        raise WireError(f"a status of {message.id} with the unknown state {message.state}")
     if (state is BehaviorState.UNKNOWN) != (message.number == 0):
-        raise WireError(f"a status of {message.id} that is {state} with number {message.number}")
+        raise WireError(f"a status of {message.id} with state {state} and number {message.number}")
     outputs, wrong = decode_outputs((pair.key, pair.value) for pair in message.outputs)
     reason = "; ".join(each for each in (message.reason, *wrong) if each)
     return Status(

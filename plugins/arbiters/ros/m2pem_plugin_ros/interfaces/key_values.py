@@ -26,7 +26,7 @@ def encode_parameters(parameters: Mapping[str, ResolvedValue]) -> list[tuple[str
     """Return keys and their values as JSON. Values that are None are left out.
 
     Raises:
-        WireError: a value is none that the wire can carry, such as NaN.
+        WireError: a value cannot be encoded, such as NaN.
     """
     return [(key, _encoded(key, value)) for key, value in parameters.items() if value is not None]
 
@@ -35,14 +35,14 @@ def decode_parameters(pairs: Iterable[tuple[str, str]]) -> dict[str, ResolvedVal
     """Return the values by key.
 
     Raises:
-        WireError: a value is not JSON, not finite, or none of what msg/KeyValue.msg says.
+        WireError: a value is not JSON, is not finite, or breaks the rules of msg/KeyValue.msg.
     """
     values: dict[str, ResolvedValue] = {}
     for key, text in pairs:
         if not key:
             raise WireError("a parameter has no name")
         if key in values:
-            raise WireError(f"parameter '{key}' is there twice")
+            raise WireError(f"there are two parameters '{key}'")
         try:
             values[key] = _decoded(text)
         except WireError as error:
@@ -109,7 +109,7 @@ def _decoded(text: str) -> ResolvedValue:
     if isinstance(value, dict) and set(value) == {"vehicle"}:
         if isinstance(value["vehicle"], str) and value["vehicle"]:
             return VehiclePosition(value["vehicle"])
-        raise WireError("'vehicle' is the name of a vehicle")
+        raise WireError("'vehicle' must be the name of a vehicle")
     raise WireError(
         f"{_short(text)} is neither a number, text, true nor false, nor a GeoJSON Feature, "
         'nor {"vehicle": NAME}'
@@ -181,7 +181,7 @@ def _is_number(value: Any) -> bool:
         return False
     try:
         return math.isfinite(value)
-    except OverflowError:  # a whole number that no float can be
+    except OverflowError:  # a whole number that is too large for a float
         return False
 
 
@@ -202,7 +202,7 @@ def encode_outputs(outputs: Mapping[str, Value]) -> list[tuple[str, str]]:
     """Return names and their values as JSON.
 
     Raises:
-        WireError: a value is none that JSON can carry, such as NaN.
+        WireError: a value cannot be encoded as JSON, such as NaN.
     """
     pairs = []
     for name, value in outputs.items():
@@ -223,7 +223,7 @@ def decode_outputs(pairs: Iterable[tuple[str, str]]) -> tuple[dict[str, Value], 
             break
         try:
             if not name or name in values:
-                raise WireError("it is there twice" if name else "it has no name")
+                raise WireError("the name is used twice" if name else "it has no name")
             values[name] = _decoded_output(text)
         except WireError as error:
             wrong.append(f"output '{name[:100]}' was left out: {error}")
@@ -232,7 +232,7 @@ def decode_outputs(pairs: Iterable[tuple[str, str]]) -> tuple[dict[str, Value], 
 
 def _decoded_output(text: str) -> Value:
     if len(text) > LONGEST_OUTPUT:
-        raise WireError(f"it has {len(text)} characters, and {LONGEST_OUTPUT} are the most")
+        raise WireError(f"it has {len(text)} characters; at most {LONGEST_OUTPUT} are allowed")
     try:
         value: Value = json.loads(text)
     except (ValueError, RecursionError):
@@ -244,9 +244,9 @@ def _decoded_output(text: str) -> Value:
 def _check_output(value: Value, deep: int) -> None:
     """Raise WireError for values that the data store cannot hold, such as NaN."""
     if isinstance(value, float) and not math.isfinite(value):
-        raise WireError("a number in it is not finite")
+        raise WireError("it has a number that is not finite")
     if isinstance(value, int) and not LEAST_WHOLE <= value <= MOST_WHOLE:
-        raise WireError("a whole number in it needs more than 64 bits")
+        raise WireError("it has a whole number of more than 64 bits")
     if isinstance(value, list | dict):
         if not deep:
             raise WireError(f"it is more than {DEEPEST_OUTPUT} levels deep")

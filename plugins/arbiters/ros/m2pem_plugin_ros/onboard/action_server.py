@@ -35,7 +35,8 @@ class CommandHandler(Protocol):
 
 
 class BehaviorActionServer:
-    """Serves the action. A goal lasts as long as the behavior with its id, whoever started that."""
+    """Serves the action. A goal lasts as long as the behavior with its id, which any client may
+    have started."""
 
     def __init__(self, ros: RosRuntime, node: Node, handler: CommandHandler) -> None:
         self._handler = handler
@@ -67,7 +68,7 @@ class BehaviorActionServer:
             await asyncio.sleep(self._ended_s + ASKED_WITHIN_S - self._loop.time())
 
     def _cancel(self, handle: Any) -> CancelResponse:
-        # In the thread of ROS, before the goal is shown as being canceled.
+        # Runs in the thread of ROS, before the goal is reported as canceling.
         self._cancelled.add(_key(handle))
         self._loop.call_soon_threadsafe(self._handler.cancel, handle.request.command.id)
         return CancelResponse.ACCEPT
@@ -75,7 +76,7 @@ class BehaviorActionServer:
     async def _execute(self, handle: Any) -> Any:
         command = handle.request.command
         if command.verb != Verb.START or not command.id:
-            reason = "a goal's command is a START with an id"
+            reason = "the command of a goal must be a START with an id"
             status = Status(command.id, 1, BehaviorState.REJECTED, "REJECTED", reason)
             handle.abort()
             return _result(status)
@@ -83,7 +84,7 @@ class BehaviorActionServer:
         self._waiting[command.id].add(queue)
         try:
             self._handler.start(command)
-            if _key(handle) in self._cancelled:  # it was, before it had begun
+            if _key(handle) in self._cancelled:  # the goal was cancelled before it began
                 self._handler.cancel(command.id)
             return _result(await self._follow(handle, queue))
         finally:
@@ -109,7 +110,7 @@ class BehaviorActionServer:
         if _key(handle) not in self._cancelled:
             return False
         deadline = self._loop.time() + CANCELING_WITHIN_S
-        # There is no event for what the thread of ROS does right after `_cancel`.
+        # There is no event for the change of state that rclpy makes right after `_cancel`.
         while not handle.is_cancel_requested and self._loop.time() < deadline:  # noqa: ASYNC110
             await asyncio.sleep(POLL_S)
         return bool(handle.is_cancel_requested)

@@ -133,15 +133,15 @@ class ArbiterDriver:
             call = await self._calls.get()
             try:
                 await call
-            except Exception:  # of the arbiter; it must not make the node deaf
-                self._logger.exception("%s: its arbiter", self._resource)
+            except Exception:  # an error of the arbiter must not end the node
+                self._logger.exception("%s: its arbiter failed", self._resource)
 
     async def _start(self, request: BehaviorRequest, goal: UUID) -> None:
         try:
             await self._wait_for_states(request)
             await self._arbiter.start(request)
         except Exception as error:
-            reason = f"the arbiter on board is wrong: {error!r}"
+            reason = f"internal error of the arbiter on board: {error!r}"
             self._events.ended(goal, Outcome(BehaviorState.FAILED, reason=reason))
             raise
 
@@ -180,6 +180,6 @@ class ArbiterDriver:
 
 
 def _outcome(report: BehaviorReport) -> Outcome:
-    if report.state is BehaviorState.REJECTED:  # the node has said by then that it is accepted
+    if report.state is BehaviorState.REJECTED:  # the node has reported the acceptance by then
         return Outcome(BehaviorState.FAILED, report.code, report.reason)
     return Outcome(report.state, report.code, report.reason, report.outputs)

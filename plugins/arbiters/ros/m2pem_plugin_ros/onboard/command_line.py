@@ -35,14 +35,14 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
 
 
 @click.command()
-@click.option("--vehicle", required=True, help="Its name in the fleet.")
-@click.option("--namespace", help="Of its topics.  [default: / and its name]")
+@click.option("--vehicle", required=True, help="The vehicle's name in the fleet.")
+@click.option("--namespace", help="The namespace of its topics.  [default: / and its name]")
 @click.option(
     "--driver",
     type=click.Choice([DriverName.BASE.value, DriverName.NAV2.value]),
     default=DriverName.BASE.value,
     show_default=True,
-    help="What drives it: we, by velocities, or Nav2.",
+    help="The driver: velocities from m2pem, or Nav2.",
 )
 @click.option(
     "--domain", type=click.Choice(["ground", "surface"]), default="ground", show_default=True
@@ -51,7 +51,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
     "--origin",
     type=PositionOption(),
     required=True,
-    help="Of the frame map of its odometry: the fleet's origin.",
+    help="The origin of the frame map of its odometry: that of the fleet.",
 )
 @click.option(
     "--domain-id", type=click.IntRange(0, 232), help="The ROS domain.  [default: ROS_DOMAIN_ID]"
@@ -61,7 +61,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
     "words",
     type=Setting(),
     multiple=True,
-    help="As the connection of a fleet has it, such as bounds.speed=1.5 m/s or odom_frame=odom. "
+    help="A key of a connection in a fleet, such as bounds.speed=1.5 m/s or odom_frame=odom. "
     "May be given more than once.",
 )
 @click.option("--loopback", is_flag=True, help="Keep DDS on 127.0.0.1.")
@@ -75,7 +75,7 @@ def onboard(
     words: tuple[tuple[tuple[str, ...], str | bool], ...],
     loopback: bool,
 ) -> None:
-    """Be the m2pem node of a vehicle, on board of it, until Ctrl-C. Then the vehicle stands.
+    """Run the m2pem node of a vehicle on board until Ctrl-C, which stops the vehicle.
 
     Example: m2pem ros onboard --vehicle evsg1 --origin 38.1075,-77.3192,60
     """
@@ -90,7 +90,7 @@ def onboard(
     except PluginError as error:
         raise click.UsageError(str(error)) from error
     if settings.driver is DriverName.NODE:
-        raise click.UsageError("this is the m2pem node; what it drives by is base or nav2")
+        raise click.UsageError("this is the m2pem node; its driver must be base or nav2")
     if loopback:
         keep_on_loopback()
     at = (origin.latitude_deg, origin.longitude_deg, origin.altitude_m)

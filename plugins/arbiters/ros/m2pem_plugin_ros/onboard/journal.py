@@ -28,7 +28,7 @@ class BehaviorJournal:
 
     def last(self, id_: str) -> Status:
         """Return the last status; UNKNOWN with number 0 if there is none."""
-        reason = "this vehicle knows no such behavior"
+        reason = "this vehicle does not have the behavior"
         return self._last.get(id_) or Status(id_, 0, BehaviorState.UNKNOWN, reason=reason)
 
     def knows(self, id_: str) -> bool:
@@ -56,7 +56,7 @@ class BehaviorJournal:
         before, self._current = self._current, id_
         if before:
             number = self._last[before].number + 1
-            reason = f"{id_} took over"
+            reason = f"{id_} has replaced it"
             self._note(Status(before, number, BehaviorState.CANCELLED, reason=reason))
         self._note(Status(id_, 1, BehaviorState.ACCEPTED))
 

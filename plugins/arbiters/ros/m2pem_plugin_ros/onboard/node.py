@@ -49,7 +49,7 @@ SILENT_AFTER_S = 3.0
 SILENT_LEAST_S = 2.0
 """The same in real time, as a busy computer may be silent for longer on a fast clock."""
 
-ENDED = "the node on the vehicle was ended"
+ENDED = "the node on the vehicle was stopped"
 STOP_WITHIN_S = 5.0
 SENT_WITHIN_S = 1.0
 
@@ -61,7 +61,7 @@ class OnboardNode:
 
     `vehicle`: its name in the fleet, or that of the payload. `make_driver` gets the `DriverEvents`
     of this node. `bus` receives the states on `target`; it must be the bus of the driver's context.
-    `catalogue`: the behaviors of the driver. `payload_state` returns where a payload looks.
+    `catalogue`: the behaviors of the driver. `payload_state` returns the state of the payload.
     """
 
     def __init__(
@@ -158,14 +158,14 @@ class OnboardNode:
         try:
             command = read_command(message)
         except WireError as error:
-            self._log_throttle.log("a command that cannot be", str(error))
+            self._log_throttle.log("an invalid command", str(error))
             return
         if command.verb is Verb.START:
             self.start(message)
         elif command.verb is Verb.QUERY:
             self._journal.is_past(
                 command.run, command.epoch
-            )  # who asks after a takeover shuts others out
+            )  # the first message of a higher epoch refuses lower ones from then on
             self._journal.repeat(command.id)
         elif command.verb is Verb.HOLD:
             self._hold()
@@ -173,7 +173,7 @@ class OnboardNode:
             self._resume()
         elif self._journal.is_past(command.run, command.epoch):
             text = f"{command.verb.name} of {command.id}: {_past(command.epoch)}"
-            self._log_throttle.log("a command of the past", text)
+            self._log_throttle.log("a command of a past epoch", text)
         elif command.verb is Verb.CANCEL:
             self.cancel(command.id)
         else:
@@ -193,9 +193,11 @@ class OnboardNode:
             reason = self._refusal(request)
         except WireError as error:
             reason = str(error)
-        except Exception as error:  # a driver's bug must not leave a START without an answer
+        except (
+            Exception
+        ) as error:  # an error of the driver must not leave a START without an answer
             self._logger.exception("%s: %s", self._name, message.behavior)
-            reason = f"the driver is wrong: {error!r}"
+            reason = f"internal error of the driver: {error!r}"
         if reason:
             self._journal.reject(id_, "REJECTED", reason)
             return
@@ -228,9 +230,9 @@ class OnboardNode:
         self._journal.accept(request.id)
         try:
             self._driver.begin(order)
-        except Exception as error:  # of the driver; it must not end the node
+        except Exception as error:  # an error of the driver must not end the node
             self._logger.exception("%s: %s", self._name, request.behavior)
-            reason = f"the driver is wrong: {error!r}"
+            reason = f"internal error of the driver: {error!r}"
             self._journal.end(request.id, BehaviorState.FAILED, "FAILED", reason)
         self._publisher.vehicle()
 
@@ -252,16 +254,16 @@ class OnboardNode:
         try:
             parameters = read_parameters(message)
         except WireError as error:
-            self._log_throttle.log("a change that cannot be", str(error))
+            self._log_throttle.log("an invalid change of parameters", str(error))
             return
         behavior, together = self._request.behavior, {**self._request.parameters, **parameters}
         if reason := mismatch(self._catalogue, self._name, behavior, together):
-            self._log_throttle.log("a change that cannot be", reason)
+            self._log_throttle.log("an invalid change of parameters", reason)
             return
         self._request = replace(self._request, parameters=together)
         self._driver.adjust(_goal(command.id), parameters)
 
-    # --- what the driver tells ------------------------------------------------------------------
+    # --- reports of the driver ------------------------------------------------------------------
 
     def alive(self) -> None:
         self._contact_us = self._clock.now_us()
@@ -276,7 +278,7 @@ class OnboardNode:
             reason = outcome.reason or (ENDED if self._ending else "")
             self._journal.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
 
-    # --- what is said ---------------------------------------------------------------------------
+    # --- statuses -------------------------------------------------------------------------------
 
     def _publish_status(self, status: Status) -> None:
         self._publisher.behavior(status)
@@ -303,11 +305,11 @@ class OnboardNode:
     def _lost_reason(self) -> str:
         """Return why the vehicle counts as lost; "" if it does not."""
         if self._contact_us is None:
-            return "the vehicle was not heard yet"
+            return "the vehicle has sent no message yet"
         silent_s = (self._clock.now_us() - self._contact_us) / 1e6
         if silent_s <= SILENT_AFTER_S or time.monotonic() - self._contact_s <= SILENT_LEAST_S:
             return ""
-        return f"the vehicle was not heard for {silent_s:.1f} s"
+        return f"the vehicle has sent no message for {silent_s:.1f} s"
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -315,7 +317,7 @@ class OnboardNode:
         try:
             target = read_target(message, self._clock.now_us())
         except WireError as error:
-            self._log_throttle.log("a target that cannot be", str(error))
+            self._log_throttle.log("an invalid target", str(error))
         else:
             self._bus.publish(target)
 

@@ -78,7 +78,7 @@ class StatusPublisher:
         self._publish(self._vehicle, message)
 
     def payload(self) -> None:
-        """Publish where the payload looks, if that is known."""
+        """Publish the direction of the payload, if it is known."""
         state = self._payload_state() if self._payload_state is not None else None
         if state is not None and self._payload is not None:
             self._publish(self._payload, write_payload_status(interfaces, state))

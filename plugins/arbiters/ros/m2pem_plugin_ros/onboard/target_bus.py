@@ -47,7 +47,7 @@ def read_target(message: Any, now_us: int) -> VehicleState:
     """Read a TargetState. The altitude is NaN if it is not given.
 
     Raises:
-        WireError: it has no name, or is not on Earth.
+        WireError: the target has no name, or its position is invalid.
     """
     latitude, longitude = message.position.latitude_deg, message.position.longitude_deg
     altitude = message.position.altitude_m

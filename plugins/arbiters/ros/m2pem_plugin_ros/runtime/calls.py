@@ -80,12 +80,12 @@ class Calls:
         self._check(what)
         answer: asyncio.Future[Any] = self._loop.create_future()
         self._open.add(answer)
-        future.add_done_callback(lambda _: self._tell(answer, future))
+        future.add_done_callback(lambda _: self._settle_on_loop(answer, future))
         try:
             return await answer
         finally:
             self._open.discard(answer)
-            future.cancel()  # whose answer is no longer awaited is forgotten by rclpy, too
+            future.cancel()  # rclpy drops calls whose answer is no longer awaited
 
     def close(self) -> None:
         """End all waiting calls with RosError."""
@@ -98,10 +98,10 @@ class Calls:
         if self._closed:
             raise RosError(f"{what}: the connection to ROS was closed")
 
-    def _tell(self, answer: asyncio.Future[Any], future: Future) -> None:
+    def _settle_on_loop(self, answer: asyncio.Future[Any], future: Future) -> None:
         try:
             self._loop.call_soon_threadsafe(_settle, answer, future)
-        except RuntimeError:  # the loop is closed, and nobody waits any more
+        except RuntimeError:  # the loop is closed, and no task waits
             return
 
 
@@ -148,7 +148,7 @@ class Responses:
         if tries == len(AGAIN_S):
             logger.warning(
                 "service %s: DDS has not discovered the client of a request within %g s, so that "
-                "it gets no response; what it asked for was handled",
+                "it gets no response; its request was handled",
                 self._name,
                 sum(AGAIN_S),
             )

@@ -87,12 +87,12 @@ class RosRuntime:
         """Make another node of the same connection. Options are those of `rclpy.create_node`.
 
         Raises:
-            RosError: the name is not one of ROS, or DDS refuses.
+            RosError: the name is not valid in ROS, or DDS refuses.
         """
         try:
             node = rclpy.create_node(name, context=self.context, namespace=namespace, **options)
         except Exception as error:  # rclpy has no base class for what it raises
-            what = f"the node '{namespace}/{name}' cannot be made"
+            what = f"the node '{namespace}/{name}' cannot be created"
             raise RosError(f"{what}: {error}{_security()}") from error
         self.executor.add_node(node)
         self._nodes.append(node)
@@ -238,7 +238,7 @@ class RosRuntime:
 
     def _hand_back(self, task: asyncio.Task[Any], answer: Any) -> None:
         self._tasks.discard(task)
-        if task.cancelled():  # at the end; who asked hears nothing, as if we were gone already
+        if task.cancelled():  # the runtime closes: the client gets no answer
             return
         if (error := task.exception()) is not None:
             answer.set_exception(error)
@@ -260,7 +260,7 @@ class RosRuntime:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        # The thread first: what it waits for must not be destroyed under it.
+        # End the thread first: it may wait for entities that are destroyed below.
         rclpy.try_shutdown(context=self.context)
         await asyncio.to_thread(self._thread.join, JOIN_S)
         self._let_go()
@@ -279,11 +279,11 @@ class RosRuntime:
                 self.executor.spin_once()
             except (ExternalShutdownException, ShutdownException):
                 return
-            except InvalidHandle:  # destroyed on the loop just when its turn came
+            except InvalidHandle:  # the entity was destroyed on the loop meanwhile
                 continue
-            except Exception:  # one bad message must not deafen us to the others
+            except Exception:  # one invalid message must not end the executor
                 if self._closing is None:
-                    logger.exception("ROS brought what cannot be handled")
+                    logger.exception("a callback of ROS failed")
 
 
 def _destroy(node: Node) -> None:
@@ -294,7 +294,7 @@ def _destroy(node: Node) -> None:
 
 
 def _security() -> str:
-    """Return what an error may have to do with DDS security, if that is enabled."""
+    """Return a hint about DDS security if it is enabled, else ""."""
     if os.environ.get("ROS_SECURITY_ENABLE", "").lower() != "true":
         return ""
     return (
@@ -306,7 +306,7 @@ def _security() -> str:
 T = TypeVar("T")
 
 BATCH = 100
-"""Messages that are handled before the loop may do something else."""
+"""Messages that are handled before other tasks of the loop run."""
 
 
 class Inbox(Generic[T]):
@@ -331,7 +331,7 @@ class Inbox(Generic[T]):
             self._drains = True
             try:
                 self._loop.call_soon_threadsafe(self._drain)
-            except RuntimeError:  # the loop is closed, and nobody reads any more
+            except RuntimeError:  # the loop is closed, and no task reads
                 self._items.clear()
 
     def _drain(self) -> None:
@@ -345,7 +345,7 @@ class Inbox(Generic[T]):
             try:
                 self._callback(item)
             except Exception:
-                logger.exception("a message of ROS could not be handled")
+                logger.exception("a callback for a ROS message failed")
         if not self._drains:
             self._drains = True
             self._loop.call_soon(self._drain)

@@ -1,1 +1,1 @@
-"""What the topics of vehicles, detectors and payloads report, and who publishes on them."""
+"""The topics of vehicles, detectors and payloads, and the checks of their publishers."""

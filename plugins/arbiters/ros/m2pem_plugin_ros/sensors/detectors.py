@@ -79,7 +79,7 @@ class DetectorTopic:
 
     def retry(self) -> None:
         """Publish the waiting detections, if the position of the vehicle is known now."""
-        while self._waiting and self._tell(self._waiting[0]):
+        while self._waiting and self._publish(self._waiting[0]):
             self._waiting.popleft()
 
     def _on_text(self, message: Any) -> None:
@@ -91,17 +91,15 @@ class DetectorTopic:
         stamp = message.header.stamp
         now_us = self._context.clock.now_us()
         stamp_us = stamp.sec * 1_000_000 + stamp.nanosec // 1000
-        is_of_our_clock = 0 <= now_us - stamp_us <= LATE_S * 1e6
-        self._take(
-            message.type, stamp_us if is_of_our_clock else now_us, self._position_of(message)
-        )
+        is_own_clock = 0 <= now_us - stamp_us <= LATE_S * 1e6
+        self._take(message.type, stamp_us if is_own_clock else now_us, self._position_of(message))
 
     def _position_of(self, message: Any) -> GeoPosition | None:
         if message.position_kind == _GEOGRAPHIC:
             geo = message.position_geographic
             if -90.0 <= geo.latitude_deg <= 90.0 and -180.0 <= geo.longitude_deg <= 180.0:
                 return GeoPosition(geo.latitude_deg, geo.longitude_deg, geo.altitude_m)
-            cause = "the position of a detection, which cannot be"
+            cause = "an invalid position of a detection"
             self._log_throttle.log(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
         elif message.position_kind == _LOCAL:
             place, frame = message.position_local, message.header.frame_id
@@ -111,7 +109,7 @@ class DetectorTopic:
             elif all(abs(number) <= FARTHEST_M for number in (place.x, place.y, place.z)):
                 return to_geodetic(place.x, place.y, place.z, self._context.origin)
             else:
-                cause = "the position of a detection, which cannot be"
+                cause = "an invalid position of a detection"
                 self._log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
         return None
 
@@ -124,12 +122,12 @@ class DetectorTopic:
             self._log_throttle.log("a detection whose type is too long", f"{len(type_)} characters")
             return
         found = _Found(type_, time_us, position)
-        if self._waiting or not self._tell(found):
+        if self._waiting or not self._publish(found):
             if len(self._waiting) == WAITING:
                 self._log_throttle.log("detections, as the vehicle's position is not known")
             self._waiting.append(found)
 
-    def _tell(self, found: _Found) -> bool:
+    def _publish(self, found: _Found) -> bool:
         position = found.position
         if position is None:
             position = self._vehicle_position()

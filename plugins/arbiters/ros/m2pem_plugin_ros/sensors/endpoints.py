@@ -1,4 +1,4 @@
-"""Checks who publishes the topics of a vehicle: one node, and with the right type.
+"""Checks the publishers of a vehicle's topics: one node, and the right type.
 
 ROS has no arbitration: two vehicles in one namespace both obey one command, and mismatched types
 never connect, without an error. So the graph is checked before a vehicle is commanded.
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
 
 NAMELESS = "a node whose name is not known yet"
-LEASE = "one that has crashed is listed for up to 20 s more"
+LEASE = "a crashed one is listed for up to 20 s"
 ODOMETRY = "nav_msgs/msg/Odometry"
 VEHICLE_STATUS = "m2pem_interfaces/msg/VehicleStatus"
 BEHAVIOR_STATUS = "m2pem_interfaces/msg/BehaviorStatus"
@@ -55,15 +55,15 @@ class Endpoints:
             if wrong := [each for each in found if each.topic_type != single.type]:
                 return (
                     f"{single.topic} is of type {wrong[0].topic_type} ({_named(wrong)}),"
-                    f" and {single.type} is expected"
+                    f" but {single.type} is expected"
                 )
         if self._settings.driver is DriverName.BASE:
-            return self._unheard_commands()
+            return self._wrong_command_type()
         return ""
 
     @property
     def absence(self) -> str:
-        """On which topic the vehicle is expected, and who publishes there."""
+        """The expected topic of the vehicle and its publishers, as text."""
         awaited = self._singles[0]
         found = self._node.get_publishers_info_by_topic(awaited.topic)
         there = f"has the publisher {_named(found)}" if found else "has no publisher"
@@ -72,14 +72,14 @@ class Endpoints:
             f" namespace {self._settings.namespace or '/'}"
         )
 
-    def _unheard_commands(self) -> str:
+    def _wrong_command_type(self) -> str:
         settings = self._settings
         topic = settings.topic(settings.topics.cmd_vel)
         expected = f"geometry_msgs/msg/{'TwistStamped' if settings.stamped else 'Twist'}"
         found = self._node.get_subscriptions_info_by_topic(topic)
         if not found or any(each.topic_type == expected for each in found):
             return ""
-        remedy = f"say 'stamped: {'false' if settings.stamped else 'true'}' in its connection"
+        remedy = f"write 'stamped: {'false' if settings.stamped else 'true'}' in its connection"
         return (
             f"{topic} is subscribed to as {found[0].topic_type} ({_named(found)}), and m2pem"
             f" publishes {expected}, which that does not get; {remedy}"

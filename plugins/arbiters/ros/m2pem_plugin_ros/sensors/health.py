@@ -33,7 +33,7 @@ class Battery:
             self.fraction = share
         elif not math.isnan(share):  # NaN: the battery does not measure it
             hint = "; BatteryState.percentage is from 0 to 1" if 1.0 < share <= 100.0 else ""
-            self._log_throttle.log("a charge that cannot be", f"{share:g}{hint}")
+            self._log_throttle.log("an invalid battery charge", f"{share:g}{hint}")
 
 
 OLD_AFTER_S = 5.0

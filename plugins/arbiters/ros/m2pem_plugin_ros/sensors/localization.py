@@ -104,10 +104,10 @@ class TopicLocalization:
         """Data that is missing, as text."""
         problems = []
         if self._posed_us is None and not self.wrong_frame:
-            problems.append(f"no odometry was heard yet on {self._odom}")
+            problems.append(f"no odometry yet on {self._odom}")
         if self._frame is OdomFrame.ODOM:
             if self._fixed_us is None:
-                problems.append("no satellite fix was heard yet")
+                problems.append("no satellite fix yet")
             elif (self._clock.now_us() - self._fixed_us) / 1e6 > FIX_IS_OLD_S:
                 problems.append("the last satellite fix is old")
         return tuple(problems)
@@ -116,7 +116,7 @@ class TopicLocalization:
         stamp = (message.header.stamp.sec, message.header.stamp.nanosec)
         if stamp == self._stamp and stamp != (0, 0):
             detail = f"stamp {stamp[0]}.{stamp[1]:09}"
-            self.log_throttle.log("odometry that was there already", detail)
+            self.log_throttle.log("odometry with a repeated stamp", detail)
             return
         frame = message.header.frame_id
         self.wrong_frame = self._strange(frame)
@@ -127,18 +127,18 @@ class TopicLocalization:
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
         if not _within(FARTHEST_M, place.x, place.y, place.z):
-            cause = "odometry with a place that cannot be"
+            cause = "odometry with an invalid position"
             self.log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
             return
         speeds_are_sane = _within(FASTEST_M_S, linear.x, linear.y)
         if not speeds_are_sane or not _within(FASTEST_RAD_S, angular.z):
-            cause = "odometry with a speed that cannot be"
+            cause = "odometry with an invalid speed"
             self.log_throttle.log(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
             return
         try:
             yaw_rad = yaw_of_quaternion(turn)
         except ValueError as error:
-            self.log_throttle.log("odometry with an orientation that cannot be", str(error))
+            self.log_throttle.log("odometry with an invalid orientation", str(error))
             return
         self._stamp = stamp
         self._posed_us = self._clock.now_us()
@@ -158,9 +158,9 @@ class TopicLocalization:
             return ""
         right = f"publish odometry in '{declared}', the fleet's local frame"
         if name.rpartition("/")[2] == OdomFrame.ODOM:
-            right += ", or say 'odom_frame: odom' in its connection, with satellite fixes"
+            right += ", or write 'odom_frame: odom' in its connection, with satellite fixes"
         elif self._frame is OdomFrame.ODOM and name == OdomFrame.MAP:
-            right = "say 'odom_frame: map' in its connection"
+            right = "write 'odom_frame: map' in its connection"
         return (
             f"odometry on {self._odom} is in the frame '{frame}', declared is '{declared}', and tf"
             f" is not read: {right}"
@@ -169,11 +169,11 @@ class TopicLocalization:
     def _on_fix(self, message: Any) -> None:
         status = message.status.status
         if status == _NO_FIX:
-            return  # the receiver says so itself
+            return  # the receiver reports no fix
         latitude, longitude = message.latitude, message.longitude
         is_unset = status == _STATUS_NOT_SET and latitude == longitude == 0.0
         if is_unset or not (_within(90.0, latitude) and _within(180.0, longitude)):
-            self.log_throttle.log("a fix that cannot be", f"({latitude:g}, {longitude:g})")
+            self.log_throttle.log("an invalid satellite fix", f"({latitude:g}, {longitude:g})")
             return
         altitude = message.altitude if _within(FARTHEST_M, message.altitude) else math.nan
         self._fixed_us = self._clock.now_us()
@@ -262,7 +262,7 @@ def moves(localization: Localization) -> str:
     """Return why the vehicle does not stand, or is not known to; "" if it stands."""
     twist = localization.twist
     if twist is None or localization.age_s > FRESH_TWIST_S:
-        return "its odometry is not heard"
+        return "there is no odometry"
     speed_m_s = math.hypot(twist.forward_m_s, twist.left_m_s)
     if speed_m_s > STANDS_M_S:
         return f"it moves at {speed_m_s:.1f} m/s"
@@ -280,5 +280,5 @@ async def stands(localization: Localization, clock: Clock, within_s: float) -> s
         if looks > 1:
             return ""
         if clock.now_us() >= until_us:
-            return why or "it has just come to a stand"
+            return why or "it has just stopped"
         await clock.sleep(CHECK_EVERY_S)

@@ -1,4 +1,4 @@
-"""The status topic of a payload: where it looks (m2pem_interfaces/msg/PayloadStatus)."""
+"""The status topic of a payload with its direction (m2pem_interfaces/msg/PayloadStatus)."""
 
 import math
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ class PayloadStatusTopic:
 
     def _on_message(self, message: Any) -> None:
         if message.payload not in ("", self._resource):
-            self._log_throttle.log("where another payload looks", message.payload[:100])
+            self._log_throttle.log("the direction of another payload", message.payload[:100])
             return
         self.look = Look(
             _number(message.pan_rad),
@@ -89,8 +89,7 @@ class PayloadStatusTopic:
 
 
 class PayloadSensors:
-    """Implements `VehicleSensors` for a payload with its own node. As its `Localization`, it knows
-    nothing."""
+    """Implements `VehicleSensors` for a payload with its own node, without a localization."""
 
     battery_fraction: float | None = None
     errors: tuple[str, ...] = ()
@@ -100,8 +99,8 @@ class PayloadSensors:
     position: GeoPosition | None = None
     age_s = math.inf
 
-    def __init__(self, sight: PayloadStatusTopic, endpoints: Endpoints) -> None:
-        self._sight = sight
+    def __init__(self, status: PayloadStatusTopic, endpoints: Endpoints) -> None:
+        self._status = status
         self._endpoints = endpoints
 
     @property
@@ -118,7 +117,7 @@ class PayloadSensors:
 
     @property
     def changes(self) -> int:
-        return self._sight.changes
+        return self._status.changes
 
 
 def _number(value: float) -> float | None:

@@ -68,7 +68,7 @@ class BaseDriver:
         self._surroundings = Surroundings(setup.context, setup.connection.fence)
         self._pilot = Pilot(self._bounds, self._surroundings.outside_m)
         self._ended = EndedGoals()
-        self._progress_told: UUID | None = None
+        self._progress_reported: UUID | None = None
         self._interrupted: UUID | None = None
         self._warned_goal: UUID | None = None
         self._checked_s = -math.inf
@@ -88,7 +88,9 @@ class BaseDriver:
         if where.pose is None:
             reasons = ("its position is not known yet",)
         elif not self._is_fresh():
-            reasons = (f"odometry is {where.age_s:.1f} s old: it stands until it is heard again",)
+            reasons = (
+                f"odometry is {where.age_s:.1f} s old: the base stops until new odometry comes",
+            )
         return Health(self._mode(), not reasons, reasons)
 
     # --- orders ---------------------------------------------------------------------------------
@@ -99,18 +101,19 @@ class BaseDriver:
         if pose is None:
             settings = self._setup.settings
             topic = settings.topic(settings.topics.odom)
-            return f"its position is not known yet: no odometry was heard on {topic}"
+            return f"its position is not known yet: no odometry on {topic}"
         try:
             motion = self._motion(request)
         except RefusedError as error:
             return str(error)
         if motion.target and self._surroundings.vehicle(motion.target) is None:
-            return f"parameter 'target': {motion.target} has not been heard"
+            return f"parameter 'target': {motion.target} has sent no position"
         here = (pose.east_m, pose.north_m)
         for place in motion.places:
             if math.dist(here, place) > FARTHEST_M:
                 away_km = math.dist(here, place) / 1000
-                return f"it is to go {away_km:.0f} km; at most {FARTHEST_M / 1000:g} km are driven"
+                most_km = FARTHEST_M / 1000
+                return f"the target is {away_km:.0f} km away; at most {most_km:g} km are allowed"
         return ""
 
     def begin(self, order: Order) -> None:
@@ -139,7 +142,7 @@ class BaseDriver:
             self._pilot.stop_for(goal)
             return
         if ended is None:
-            reason = "the base was not driven for it any more"
+            reason = "the base no longer executed this goal"
             ended = Outcome(BehaviorState.CANCELLED, "", reason)
         self._loop.call_soon(self._report_ended, goal, ended)
 
@@ -171,7 +174,7 @@ class BaseDriver:
                 if self._motion(order.request).ends_at(pose):
                     return Outcome(BehaviorState.SUCCEEDED)
         self._interrupted = order.goal
-        return Outcome(BehaviorState.UNKNOWN, "", "nobody has driven the base meanwhile")
+        return Outcome(BehaviorState.UNKNOWN, "", "the base was not commanded meanwhile")
 
     def abandon(self) -> None:
         self._pilot.drop()
@@ -193,7 +196,7 @@ class BaseDriver:
         while True:
             try:
                 self._step()
-            except Exception as error:  # a bug must not leave a base on its way
+            except Exception as error:  # an error must not leave the base moving
                 self._broken(error)
             await self._timer.wait(STEP_S if self._pilot.busy else IDLE_STEP_S)
 
@@ -228,15 +231,15 @@ class BaseDriver:
 
     def _report_progress(self) -> None:
         goal = self._pilot.goal
-        if goal is not None and goal != self._progress_told:
-            self._progress_told = goal
+        if goal is not None and goal != self._progress_reported:
+            self._progress_reported = goal
             self._setup.events.progress(goal)
 
     def _report_ended(self, goal: UUID, outcome: Outcome) -> None:
         self._setup.events.ended(goal, outcome)
 
     def _broken(self, error: Exception) -> None:
-        problem = f"m2pem is wrong: {type(error).__name__}: {error}"
+        problem = f"internal error of m2pem: {type(error).__name__}: {error}"
         if problem != self._problem:
             self._problem = problem
             self._setup.context.logger.error("%s: %s", self._name, problem, exc_info=error)

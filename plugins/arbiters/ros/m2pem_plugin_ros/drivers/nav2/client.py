@@ -50,7 +50,7 @@ class Nav2:
         self._logger = logger
         self._name = namespace.rstrip("/")
         self._last_activity_s = self._now_s()
-        self._ours: set[UUID] = set()
+        self._own_goals: set[UUID] = set()
         self._limit_m_s: float | None = None
         self.state = ""
         self._refreshes = 0
@@ -64,7 +64,7 @@ class Nav2:
             self.messages.msg.SpeedLimit, f"{self._name}/speed_limit", qos.COMMANDS
         )
 
-    # --- how it is ------------------------------------------------------------------------------
+    # --- state ---------------------------------------------------------------------------------
 
     @property
     def is_active(self) -> bool:
@@ -80,7 +80,7 @@ class Nav2:
     def problem(self) -> str:
         """Why Nav2 accepts no goals; "" if it does."""
         if not self.state:
-            return "Nav2 is not heard"
+            return "Nav2 does not answer"
         return "" if self.state == "active" else f"Nav2 is not active: {self.state}"
 
     @property
@@ -122,9 +122,9 @@ class Nav2:
 
     def own_goals(self) -> set[UUID]:
         """Return the goals of this client that go on."""
-        return {goal for client in self._clients() for goal in client.active & self._ours}
+        return {goal for client in self._clients() for goal in client.active & self._own_goals}
 
-    # --- what it is to do -----------------------------------------------------------------------
+    # --- goals -----------------------------------------------------------------------------------
 
     async def drive(
         self, client: GoalClient, goal_id: UUID, goal: Any, begun: Callable[[], None]
@@ -132,17 +132,17 @@ class Nav2:
         """Send a goal in place of all others, and return its result when it succeeded.
 
         Raises:
-            NavigationError: it did not succeed.
+            NavigationError: the goal failed.
             RosError: Nav2 does not answer.
         """
         await self._stop_others(client)
-        self._ours = self._ours & client.active | {goal_id}
+        self._own_goals = self._own_goals & client.active | {goal_id}
         try:
             accepted = await client.send(goal_id, goal)
         except RosTimeoutError as error:
             raise NavigationError(f"Nav2 does not answer: {error}") from error
         if not accepted:
-            why = self.problem or "it said no"
+            why = self.problem or "no reason given"
             rejected = BehaviorState.REJECTED
             raise NavigationError(f"Nav2 rejected the goal: {why}", "REJECTED", rejected)
         begun()
@@ -152,29 +152,29 @@ class Nav2:
         """Wait for the end of a goal that Nav2 has, and return its result when it succeeded.
 
         Raises:
-            NavigationError: it did not succeed.
+            NavigationError: the goal failed.
         """
-        self._ours.add(goal_id)
+        self._own_goals.add(goal_id)
         ended = await client.result(goal_id)
         self._on_activity()
         if ended.status == GoalStatus.STATUS_SUCCEEDED:
             return ended.result
         if ended.status == GoalStatus.STATUS_CANCELED:
-            raise taken_over("somebody else has cancelled its goal at Nav2")
+            raise taken_over("another client has cancelled its goal at Nav2")
         if ended.status == GoalStatus.STATUS_ABORTED:
             raise await self.why_aborted(client, ended.result)
-        raise NavigationError("Nav2 knows nothing of its goal any more: it was started anew")
+        raise NavigationError("Nav2 no longer has the goal: it was restarted")
 
     async def why_aborted(self, client: GoalClient, result: Any) -> NavigationError:
         """Return why a goal of this client was aborted, by its result and by the goals of
         others."""
         if int(getattr(result, "error_code", 0)) == 0:
-            # Nav2 says nothing to who is preempted, or when it is deactivated.
+            # Nav2 reports nothing when a goal is preempted, or when Nav2 is deactivated.
             if other_client := await self._wait_for_other_client(client):
-                return taken_over(f"somebody else has given Nav2 another goal: {other_client}")
+                return taken_over(f"another client has given Nav2 another goal: {other_client}")
             await self.refresh()
             if not self.is_active:
-                return NavigationError(f"Nav2 gave it up: {self.problem}")
+                return NavigationError(f"Nav2 aborted the goal: {self.problem}")
         return aborted(result)
 
     async def stop(self) -> None:
@@ -192,17 +192,17 @@ class Nav2:
             RosError: it does not answer, or does not stop.
         """
         for client in self._clients():
-            for goal in filter(which, client.active & self._ours):
+            for goal in filter(which, client.active & self._own_goals):
                 await client.cancel(goal)
 
     def limit_speed(self, speed_m_s: float | None) -> None:
         """Set the highest speed; None removes the limit that was set before."""
         if speed_m_s is None and self._limit_m_s is None:
-            return  # there may be limits of others, which are left alone
+            return  # keep limits of other clients
         self._limit_m_s = speed_m_s
         if not self._speed_limit.get_subscription_count():
             self._logger.warning(
-                "%s: nobody listens: Nav2 drives at its own speed", self._speed_limit.topic_name
+                "%s: no subscriber: Nav2 drives at its own speed", self._speed_limit.topic_name
             )
         self._speed_limit.publish(
             self.messages.msg.SpeedLimit(percentage=False, speed_limit=speed_m_s or 0.0)
@@ -222,11 +222,11 @@ class Nav2:
         preempts = client in (self.to_pose, self.through_poses) and not self.waypoints.active
         others = [c for c in self._clients() if c.busy and not (preempts and c is client)]
         if preempts and client.active:
-            others = [c for c in others if c is not self.back_up]  # it may be a recovery's
+            others = [c for c in others if c is not self.back_up]  # it may be a goal of a recovery
         try:
             await self._all(others)
         except RosTimeoutError as error:
-            raise NavigationError(f"Nav2 does not end what it does: {error}") from error
+            raise NavigationError(f"Nav2 does not cancel its other goals: {error}") from error
 
     async def _all(self, clients: list[GoalClient]) -> None:
         """Cancel the waypoint follower first: the goals that it gives to the navigator end with
@@ -252,9 +252,9 @@ class Nav2:
         """Return the action of another client. Goals that Nav2 gives to itself do not count: those
         of the waypoint follower to the navigator, and those of the navigator to the behavior
         server."""
-        follows = self._ours & self.waypoints.active
+        follows = self._own_goals & self.waypoints.active
         for client in clients:
-            if not (follows and client is self.to_pose) and client.active - self._ours:
+            if not (follows and client is self.to_pose) and client.active - self._own_goals:
                 return client.name
         return ""
 

@@ -96,7 +96,7 @@ class Nav2Driver:
             return error.reason
         return (self._nav2.problem if task.needs_nav2 else "") or task.refusal()
 
-    # --- what is asked --------------------------------------------------------------------------
+    # --- orders ---------------------------------------------------------------------------------
 
     def begin(self, order: Order) -> None:
         if self._nav2 is None:
@@ -158,8 +158,10 @@ class Nav2Driver:
         if self._nav2 is None:
             return Outcome(BehaviorState.UNKNOWN, reason="the driver is not open")
         if order.request.behavior not in TASKS:
-            # A goal that goes on is found when the order is given once more, and then in full.
-            return Outcome(BehaviorState.UNKNOWN, reason="what it was to do is not known")
+            # An active goal is found when the order is sent again, with all parameters.
+            return Outcome(
+                BehaviorState.UNKNOWN, reason="the parameters of the behavior are not known"
+            )
         try:
             task = self._make_task(self._nav2, order)
             outcome = await task.query()
@@ -186,7 +188,7 @@ class Nav2Driver:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    # --- one thing at a time --------------------------------------------------------------------
+    # --- replacement ----------------------------------------------------------------------------
 
     def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
         before = set(self._work)
@@ -203,7 +205,7 @@ class Nav2Driver:
             await asyncio.wait(before)
         await work()
 
-    # --- what is done ---------------------------------------------------------------------------
+    # --- execution ------------------------------------------------------------------------------
 
     async def _run(self, drive: _Drive) -> None:
         try:
@@ -216,9 +218,9 @@ class Nav2Driver:
             await self._fail(drive, Outcome(BehaviorState.FAILED, "FAILED", str(error)))
         except asyncio.CancelledError:
             raise
-        except Exception as error:  # one vehicle's bug must not hang its mission
+        except Exception as error:  # an error of one vehicle must not block its mission
             self._logger.exception("%s: %s", self._name, drive.order.request.behavior)
-            reason = f"m2pem is wrong: {type(error).__name__}: {error}"
+            reason = f"internal error of m2pem: {type(error).__name__}: {error}"
             await self._fail(drive, Outcome(BehaviorState.FAILED, "FAILED", reason))
         else:
             self._end_drive(drive, Outcome(BehaviorState.SUCCEEDED))
@@ -233,7 +235,7 @@ class Nav2Driver:
         localization, clock = self._setup.localization, self._setup.context.clock
         problem = problem or await stands(localization, clock, STOP_WITHIN_S)
         if problem:
-            reason = f"it did not stop: {problem}"
+            reason = f"the vehicle did not stop: {problem}"
             self._end_drive(drive, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
         else:
             self._end_drive(drive, Outcome(BehaviorState.CANCELLED))
@@ -251,7 +253,7 @@ class Nav2Driver:
                 await self._setup.context.clock.sleep(AGAIN_S)
         while drive is not None and self._nav2 is not None:
             if other_client := self._nav2.other_client():
-                taken = taken_over(f"somebody else has given Nav2 a goal: {other_client}")
+                taken = taken_over(f"another client has given Nav2 a goal: {other_client}")
                 self._end_drive(drive, Outcome(taken.state, taken.code, taken.reason))
                 return
             await self._setup.context.clock.sleep(AGAIN_S)
@@ -266,7 +268,7 @@ class Nav2Driver:
             try:
                 await self._nav2.stop_own_goals()
             except RosError as error:
-                self._logger.error("%s: does not stop: %s", self._name, error)
+                self._logger.error("%s: the vehicle does not stop: %s", self._name, error)
         self._end_drive(drive, outcome)
 
     async def _cancel_old(self, nav2: Nav2, goal: UUID, outcome: Outcome) -> None:
@@ -274,7 +276,7 @@ class Nav2Driver:
         while True:
             try:
                 if self._was_lost and not nav2.other_client():
-                    # What it does may have been told while it was not heard: all is cancelled.
+                    # Another client may have sent goals while Nav2 was silent: cancel all.
                     await nav2.stop()
                 else:
                     await nav2.stop_own_goals(lambda active: number_of(goal, active) is not None)
@@ -305,7 +307,7 @@ class Nav2Driver:
 
         return TASKS[order.request.behavior](TaskContext(self._setup, nav2, order, begun))
 
-    # --- how Nav2 is ----------------------------------------------------------------------------
+    # --- supervision ----------------------------------------------------------------------------
 
     async def _poll_nav2(self, nav2: Nav2) -> None:
         while True:
@@ -314,8 +316,8 @@ class Nav2Driver:
                 await self._check_drive(nav2)
             except RosError as error:
                 self._logger.warning("%s: %s", self._name, error)
-            except Exception:  # a vehicle must not go deaf because of one bad answer
-                self._logger.exception("%s: Nav2 cannot be looked at", self._name)
+            except Exception:  # one invalid answer must not end the supervision
+                self._logger.exception("%s: the check of Nav2 failed", self._name)
             await self._pause()
 
     async def _poll_localization(self, nav2: Nav2) -> None:
@@ -340,7 +342,7 @@ class Nav2Driver:
             and not (self._held or drive.ending)
             and nav2.silent_s > GONE_S
         ):
-            reason = f"Nav2 has not been heard for {GONE_S:g} s"
+            reason = f"Nav2 has sent no message for {GONE_S:g} s"
             self._replace(
                 lambda: self._fail(drive, Outcome(BehaviorState.FAILED, "FAILED", reason))
             )

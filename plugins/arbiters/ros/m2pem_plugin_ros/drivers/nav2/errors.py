@@ -6,17 +6,17 @@ from typing import Any
 from m2pem.api import BehaviorState
 
 _BLOCKED = {
-    104: "the controller's patience was exceeded",
+    104: "the controller exceeded its time for retries",
     105: "no progress was made",
     106: "the controller found no valid command",
-    203: "the vehicle stands outside of the map",
+    203: "the vehicle is outside of the map",
     204: "the goal is outside of the map",
-    205: "the vehicle stands on an obstacle",
+    205: "the vehicle is on an obstacle",
     206: "the goal is occupied",
     208: "there is no valid path",
-    303: "the vehicle stands outside of the map",
+    303: "the vehicle is outside of the map",
     304: "a goal is outside of the map",
-    305: "the vehicle stands on an obstacle",
+    305: "the vehicle is on an obstacle",
     306: "a goal is occupied",
     308: "there is no valid path",
     503: "the path is in collision",
@@ -53,7 +53,7 @@ _OTHER = {
     603: "a waypoint was missed",
     710: "backing up failed",
     712: "backing up lacks a transform",
-    713: "backing up was asked for in a wrong way",
+    713: "the request to back up was invalid",
 }
 
 
@@ -82,9 +82,9 @@ def aborted(result: Any) -> NavigationError:
     message = str(getattr(result, "error_msg", "")).strip()
     meaning = _BLOCKED.get(error_code) or _LATE.get(error_code) or _OTHER.get(error_code)
     if error_code == 0:
-        what = "Nav2 gave it up" + ("" if message else ", and did not say why")
+        what = "Nav2 aborted the goal" + ("" if message else ", without a reason")
     else:
-        what = f"Nav2 gave it up: {meaning or 'it says'} (error {error_code})"
+        what = f"Nav2 aborted the goal: {meaning or 'unknown reason'} (error {error_code})"
     reason = f"{what}: {message}" if message else what
     if error_code in _BLOCKED:
         return NavigationError(reason, "ROUTE_BLOCKED")
@@ -96,5 +96,5 @@ def missed(waypoints: Sequence[Any]) -> NavigationError:
     numbers = [int(getattr(w, "index", getattr(w, "waypoint_index", 0))) + 1 for w in waypoints]
     which = ", ".join(str(number) for number in numbers)
     errors = sorted({int(getattr(w, "error_code", 0)) for w in waypoints} - {0})
-    told = "".join(f"; {_BLOCKED.get(e) or _LATE.get(e) or f'error {e}'}" for e in errors)
-    return NavigationError(f"Nav2 did not reach waypoint {which}{told}", "ROUTE_BLOCKED")
+    codes = "".join(f"; {_BLOCKED.get(e) or _LATE.get(e) or f'error {e}'}" for e in errors)
+    return NavigationError(f"Nav2 did not reach waypoint {which}{codes}", "ROUTE_BLOCKED")

@@ -80,8 +80,8 @@ class GoalClient:
     @property
     def active(self) -> set[UUID]:
         """Goals that go on, or may go on."""
-        told = {goal for goal, status in self._statuses.items() if status in ACTIVE}
-        return told | self._open
+        reported = {goal for goal, status in self._statuses.items() if status in ACTIVE}
+        return reported | self._open
 
     @property
     def busy(self) -> bool:
@@ -100,7 +100,7 @@ class GoalClient:
             renewed.set()
         self._writers |= writers
 
-    # --- what is asked --------------------------------------------------------------------------
+    # --- orders ---------------------------------------------------------------------------------
 
     async def send(self, goal_id: UUID, goal: Any) -> bool:
         """Send a goal, and return whether it was accepted. The server preempts its current goal.

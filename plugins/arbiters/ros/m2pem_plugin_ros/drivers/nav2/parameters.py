@@ -20,29 +20,29 @@ from m2pem_plugin_ros.frames import to_local
 from m2pem_plugin_ros.pose import Pose, known_yaw_rad
 
 STALE_S = 3.0
-"""Where a vehicle was so long ago, it need not be any more."""
+"""Seconds after which the position of a vehicle is too old."""
 
 SAME_PLACE_M = 0.1
 
 
 class LocalParameters(BehaviorParameters):
-    """What was requested, in the fleet's local frame; it may change on the way."""
+    """The requested parameters in the fleet's local frame; they may change during the behavior."""
 
     def __init__(self, values: Mapping[str, ResolvedValue], context: ArbiterContext) -> None:
         super().__init__(values)
         self.context = context
 
     def target_pose(self) -> Pose:
-        """Where `target` is now, and where it points if it is a vehicle.
+        """Return the present position of `target`, and its heading if it is a vehicle.
 
         Raises:
-            NavigationError: it is a vehicle that is not heard.
+            NavigationError: it is a vehicle without a recent position.
         """
         value = self.target
         if isinstance(value, Point):
             return self._at(value.position[0], value.position[1])
         if self.target_vehicle is None:
-            raise NavigationError("it has no target")
+            raise NavigationError("the behavior has no target")
         vehicle = ResourceId(self.target_vehicle)
         state = self.context.bus.latest(vehicle)
         now_us = self.context.clock.now_us()
@@ -52,15 +52,15 @@ class LocalParameters(BehaviorParameters):
             or state.link is LinkState.LOST
             or now_us - state.time_us > STALE_S * 1e6
         ):
-            raise NavigationError(f"{vehicle} has not been heard for {STALE_S:g} s")
+            raise NavigationError(f"{vehicle} has sent no position for {STALE_S:g} s")
         position = state.position
         place = self._at(position.latitude_deg, position.longitude_deg)
         return replace(place, yaw_rad=known_yaw_rad(state))
 
     def route_poses(self) -> list[Pose]:
-        """`route`, each pose in the direction of the next."""
+        """Return the poses of `route`, each in the direction of the next."""
         if self.route is None:
-            raise NavigationError("it has no route")
+            raise NavigationError("the behavior has no route")
         return along([self._at(each[0], each[1]) for each in self.route.waypoints])
 
     def _at(self, latitude_deg: float, longitude_deg: float) -> Pose:
@@ -70,7 +70,7 @@ class LocalParameters(BehaviorParameters):
 
 
 def along(places: list[Pose]) -> list[Pose]:
-    """The same places, each in the direction of the next; the last as the one before it."""
+    """Return poses at places, each in the direction of the next; the last as the one before it."""
     turned: list[Pose] = []
     yaw_rad = 0.0
     for place, following in pairwise([*places, None]):
@@ -82,10 +82,10 @@ def along(places: list[Pose]) -> list[Pose]:
 
 
 def apart_m(a: Pose, b: Pose) -> float:
-    """The distance on the ground."""
+    """Return the horizontal distance."""
     return math.hypot(a.east_m - b.east_m, a.north_m - b.north_m)
 
 
 def towards_rad(a: Pose, b: Pose) -> float:
-    """The yaw from one place to the other."""
+    """Return the yaw from one place to another."""
     return math.atan2(b.north_m - a.north_m, b.east_m - a.east_m)

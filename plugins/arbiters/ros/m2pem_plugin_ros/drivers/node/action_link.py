@@ -69,20 +69,20 @@ class ActionLink:
         self._goals_shown = asyncio.Event()
         self._ended: dict[UUID, Outcome] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._node_is_heard = False
+        self._node_is_received = False
 
     @property
     def order(self) -> Order | None:
         return self._current.order if self._current is not None else None
 
-    # --- what is asked of the vehicle -----------------------------------------------------------
+    # --- orders ---------------------------------------------------------------------------------
 
     def begin(self, order: Order) -> None:
         """Send the goal until it is answered."""
         self._let_go()
         pending = self._add_pending(order.goal, order)
         self._current = pending
-        self._node_is_heard = False
+        self._node_is_received = False
         self._run(self._give(pending, order))
 
     def end(self, goal: UUID) -> None:
@@ -93,7 +93,9 @@ class ActionLink:
         pending = self._pending.get(goal)
         if pending is None:
             pending = self._add_pending(goal, None)
-            pending.answered = True  # not given by us; if it is unknown, that is its end
+            pending.answered = (
+                True  # a goal of an earlier process; if the node does not have it, it has ended
+            )
             self._run(self._attend(pending))
         if not pending.cancelled:
             pending.cancelled = True
@@ -103,7 +105,7 @@ class ActionLink:
         """Return the state of a goal by the status topic, or by its result."""
         create = asyncio.get_running_loop().create_task
         asked = create(self._client.result(order.goal, QUERY_WITHIN_S))
-        shown = create(self._shown_active(order.goal))  # of such a goal, no result comes
+        shown = create(self._shown_active(order.goal))  # the node sends no result of such a goal
         try:
             await asyncio.wait([asked, shown], return_when=asyncio.FIRST_COMPLETED)
             if not asked.done():
@@ -146,12 +148,12 @@ class ActionLink:
         self.abandon()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    # --- what the vehicle says ------------------------------------------------------------------
+    # --- messages of the vehicle ----------------------------------------------------------------
 
     def vehicle_does(self, behavior: str) -> None:
         """Request the result of the current goal if the vehicle does something else: its node may
         have restarted."""
-        self._node_is_heard = True
+        self._node_is_received = True
         for each in self._pending.values():
             if behavior == str(each.goal):
                 each.shown_us = self._setup.context.clock.now_us()
@@ -184,7 +186,7 @@ class ActionLink:
         try:
             status = read_status(message)
         except WireError as error:
-            self._log_throttle.log("feedback that cannot be", str(error))
+            self._log_throttle.log("invalid feedback", str(error))
             return
         if status.id != str(goal) or status.number <= pending.number:
             return
@@ -199,11 +201,11 @@ class ActionLink:
         attempts = 0
         while not (pending.acknowledged or pending.over):
             if pending.cancelled and attempts:
-                break  # it may have arrived; `_cancel` finds out
+                break  # the goal may have arrived; `_cancel` checks it
             try:
                 accepted = await self._client.send(pending.goal, command, CALL_S)
             except RosTimeoutError:
-                attempts += self._node_is_heard
+                attempts += self._node_is_received
                 if attempts >= ATTEMPTS and not pending.cancelled:
                     self._give_up(pending)
                     return
@@ -217,7 +219,7 @@ class ActionLink:
         await self._attend(pending)
 
     def _give_up(self, pending: _PendingGoal) -> None:
-        reason = "the vehicle's node is there, and does not answer to goals"
+        reason = "the vehicle's node runs, but does not answer goals"
         self._over(pending, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
 
     async def _is_known(self, goal: UUID) -> bool:
@@ -228,7 +230,7 @@ class ActionLink:
         try:
             number, _ = await self._client.result(goal, CALL_S)
         except RosTimeoutError:
-            return True  # it goes on: of others, the answer would have come at once
+            return True  # the goal is active: for others, the node answers at once
         return bool(number != action.GoalStatus.STATUS_UNKNOWN)
 
     async def _attend(self, pending: _PendingGoal) -> None:
@@ -240,12 +242,12 @@ class ActionLink:
                 number, status = await self._client.result(pending.goal, CALL_S)
             except RosTimeoutError:
                 if self._shown.get(pending.goal, action.GoalStatus.STATUS_EXECUTING) not in ACTIVE:
-                    pending.news.set()  # it has ended, and how is not known yet
+                    pending.news.set()  # it has ended, but its outcome is not known yet
                 continue
             if number != action.GoalStatus.STATUS_UNKNOWN:
                 self._over(pending, self._outcome(pending.goal, number, status))
             elif self._goes_on(pending):
-                cause = "another node in its namespace knows nothing of what it does"
+                cause = "another node in its namespace does not have its behavior"
                 self._log_throttle.log(cause, str(pending.goal))
                 await self._pauses.pause()
                 pending.news.set()
@@ -285,7 +287,9 @@ class ActionLink:
         """Drop all goals, as another order replaces them."""
         for goal, pending in self._pending.items():
             pending.over = True
-            self._remember(goal, Outcome(BehaviorState.CANCELLED, reason="another took over"))
+            self._remember(
+                goal, Outcome(BehaviorState.CANCELLED, reason="another behavior has replaced it")
+            )
         for task in self._tasks:
             task.cancel()
         self._pending.clear()
@@ -314,10 +318,10 @@ class ActionLink:
             status = read_status(message)
             if status.id == str(goal) and status.state in ENDS:
                 return Outcome(status.state, status.code, status.reason, status.outputs)
-            wrong = f"the result of {goal} is a status of {status.id} that is {status.state}"
+            wrong = f"the result of {goal} is a status of {status.id} with state {status.state}"
         except WireError as error:
             wrong = str(error)
-        self._log_throttle.log("a result that cannot be", wrong)
+        self._log_throttle.log("an invalid result", wrong)
         return Outcome(_ENDS.get(number, BehaviorState.FAILED), reason=wrong)
 
     def _run(self, work: Coroutine[Any, Any, None]) -> None:
@@ -328,7 +332,7 @@ class ActionLink:
     def _done(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._log_throttle.log("m2pem is wrong", repr(error))
+            self._log_throttle.log("internal error of m2pem", repr(error))
 
 
 Status = action.GoalStatus
@@ -374,7 +378,7 @@ class GoalClient:
         accepted.
 
         Raises:
-            RosTimeoutError: no answer in time; it may have arrived all the same.
+            RosTimeoutError: no answer in time; the goal may still have arrived.
         """
         request = ExecuteBehavior.Impl.SendGoalService.Request(
             goal_id=_message(goal), goal=ExecuteBehavior.Goal(command=command)
@@ -386,7 +390,7 @@ class GoalClient:
         the goal has ended, or at once with STATUS_UNKNOWN.
 
         Raises:
-            RosTimeoutError: no answer in time: it goes on, or nobody is there.
+            RosTimeoutError: no answer in time: the goal is active, or no node answers.
         """
         request = ExecuteBehavior.Impl.GetResultService.Request(goal_id=_message(goal))
         response = await self._ros.call(self._result, request, timeout_s)

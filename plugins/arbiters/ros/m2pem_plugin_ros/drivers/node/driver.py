@@ -99,7 +99,7 @@ class NodeDriver:
         try:
             self._send(adjust_command(order, parameters, self._clock.now_us()))
         except WireError as error:
-            self._log_throttle.log("a change that cannot be told", str(error))
+            self._log_throttle.log("a change of parameters that cannot be sent", str(error))
 
     def hold(self) -> None:
         """Send HOLD until the node reports that the vehicle is held."""
@@ -118,13 +118,15 @@ class NodeDriver:
         self._holding.stop_all()
         self._opened.abandon()
 
-    # --- what the node says ---------------------------------------------------------------------
+    # --- messages of the node -------------------------------------------------------------------
 
     def _on_vehicle_status(self, message: Any) -> None:
         self._setup.events.alive()
         self._status = sent = read_vehicle_status(message)
         if sent.vehicle != self._resource:
-            self._log_throttle.log(f"the node in {self._name('')} is another one's", sent.vehicle)
+            self._log_throttle.log(
+                f"the node in {self._name('')} belongs to another vehicle", sent.vehicle
+            )
         self._opened.vehicle_does(sent.behavior)
 
     def _on_status(self, link: TopicLink, message: Any) -> None:
@@ -132,7 +134,7 @@ class NodeDriver:
         try:
             link.status(read_status(message))
         except WireError as error:
-            self._log_throttle.log("a status that cannot be", str(error))
+            self._log_throttle.log("an invalid status", str(error))
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -152,7 +154,7 @@ class NodeDriver:
         self._publisher.publish(message)
 
     def _retry(self, verb: int, held: bool) -> None:
-        # What the vehicle says of before need not be its answer, so that it is watched for a while.
+        # A status may be older than the command, so it is checked repeatedly.
         sent = 0
 
         def send() -> bool:

@@ -25,7 +25,7 @@ STILL_S = 2.5
 """A node reports its behavior once a second. If it was reported within this time, an UNKNOWN came
 from a second node, and the first was not restarted."""
 
-RESTARTED = "the vehicle's node was restarted and knows nothing of it"
+RESTARTED = "the vehicle's node was restarted and does not have the behavior"
 
 
 class NodeLink(Protocol):

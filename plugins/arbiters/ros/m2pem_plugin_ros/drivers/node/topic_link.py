@@ -56,14 +56,14 @@ class TopicLink:
         self._pending: dict[str, _PendingGoal] = {}
         self._ended: dict[str, Outcome] = {}
         self._queries: dict[str, asyncio.Future[Status]] = {}
-        self._node_heard_us: int | None = None
+        self._node_received_us: int | None = None
         self._orders: OrderedDict[UUID, Order] = OrderedDict()
 
     @property
     def order(self) -> Order | None:
         return self._current.order if self._current is not None else None
 
-    # --- what is asked of the vehicle -----------------------------------------------------------
+    # --- orders ---------------------------------------------------------------------------------
 
     def begin(self, order: Order) -> None:
         """Send START until the node reports the goal."""
@@ -73,7 +73,7 @@ class TopicLink:
         self._current = self._pending[str(order.goal)] = pending
         self._ended.pop(str(order.goal), None)
         began_us = self._now_us()
-        self._node_heard_us = None
+        self._node_received_us = None
 
         def send_again() -> bool:
             if pending.acknowledged or pending.cancelled:
@@ -108,7 +108,7 @@ class TopicLink:
             if str(pending.goal) not in self._pending:
                 return False
             self._send(self._about(Verb.CANCEL, pending))
-            if said:  # of what it does not know, it answers to nothing else
+            if said:  # for an unknown behavior, the node answers only QUERY
                 self._send(self._about(Verb.QUERY, pending))
             said += 1
             return True
@@ -160,7 +160,7 @@ class TopicLink:
     async def close(self) -> None:
         self.abandon()
 
-    # --- what the vehicle says ------------------------------------------------------------------
+    # --- messages of the vehicle ----------------------------------------------------------------
 
     def status(self, status: Status) -> None:
         """Process a status of any behavior. Statuses may be repeated and out of order."""
@@ -169,8 +169,8 @@ class TopicLink:
         pending = self._pending.get(status.id)
         if pending is None:
             if status.id not in self._ended and status.id not in self._queries:
-                # Another executive's, perhaps, or of before ours was started.
-                cause = "a status of what we have not given it"
+                # It may be of another executive, or from before a restart.
+                cause = "a status of a behavior that was not sent"
                 self._log_throttle.log(cause, status.id, logging.INFO)
         elif status.state is BehaviorState.UNKNOWN:
             self._unknown(pending)
@@ -184,10 +184,10 @@ class TopicLink:
 
     def _unknown(self, pending: _PendingGoal) -> None:
         if pending.shown_us is not None and self._waited_since_s(pending.shown_us) < STILL_S:
-            cause = "another node in its namespace knows nothing of what it does"
+            cause = "another node in its namespace does not have its behavior"
             self._log_throttle.log(cause, str(pending.goal))
         elif pending.cancelled:
-            reason = "the vehicle's node knows nothing of it"
+            reason = "the vehicle's node does not have the behavior"
             self._over(pending, Outcome(BehaviorState.CANCELLED, reason=reason))
         elif pending.acknowledged:
             self._over(pending, Outcome(BehaviorState.LOST, "LINK_LOST", RESTARTED))
@@ -195,8 +195,8 @@ class TopicLink:
     def vehicle_does(self, behavior: str) -> None:
         """Send QUERY for the current goal if the vehicle does something else: a status may be lost,
         or the node restarted."""
-        if self._node_heard_us is None:
-            self._node_heard_us = self._now_us()
+        if self._node_received_us is None:
+            self._node_received_us = self._now_us()
         if (shown := self._pending.get(behavior)) is not None:
             shown.shown_us = self._now_us()
         pending = self._current
@@ -234,9 +234,9 @@ class TopicLink:
 
     def _waited_s(self, began_us: int) -> float:
         """Return how long a node that is received has not answered."""
-        if self._node_heard_us is None:
+        if self._node_received_us is None:
             return 0.0
-        return (self._now_us() - max(began_us, self._node_heard_us)) / 1e6
+        return (self._now_us() - max(began_us, self._node_received_us)) / 1e6
 
     def _about(self, verb: int, pending: _PendingGoal) -> Any:
         order = pending.order or self._orders.get(pending.goal)
@@ -261,7 +261,9 @@ class TopicLink:
         self._retries.stop("query")
         for id_, pending in list(self._pending.items()):
             self._retries.stop(f"cancel {pending.goal}")
-            self._remember(id_, Outcome(BehaviorState.CANCELLED, reason="another took over"))
+            self._remember(
+                id_, Outcome(BehaviorState.CANCELLED, reason="another behavior has replaced it")
+            )
         self._pending.clear()
         self._current = None
 

@@ -45,7 +45,7 @@ class Pursuit(Nav2GoalTask):
         """Return the target pose.
 
         Raises:
-            NavigationError: that is not known any more.
+            NavigationError: the position of the target is no longer known.
         """
 
     @abstractmethod
@@ -53,7 +53,7 @@ class Pursuit(Nav2GoalTask):
         """Return whether the task is done after Nav2 has reached the goal.
 
         Raises:
-            NavigationError: it was not reached.
+            NavigationError: the target was not reached.
         """
 
     def adjust(self, parameters: Mapping[str, ResolvedValue]) -> None:
@@ -72,18 +72,18 @@ class Pursuit(Nav2GoalTask):
                     if not self._moved() and self.arrived():
                         return
                     if other_client := self.nav2.other_client():
-                        raise taken_over(f"somebody else has given Nav2 a goal: {other_client}")
+                        raise taken_over(f"another client has given Nav2 a goal: {other_client}")
                 if self._moved():
                     if other_client := self.nav2.other_client():
                         raise taken_over(
-                            f"somebody else has given Nav2 another goal: {other_client}"
+                            f"another client has given Nav2 another goal: {other_client}"
                         )
-                    # Only now: what takes the place of a goal must not come after its end.
+                    # Send the new goal only now: it must not arrive after the end of the old one.
                     before, way = way, self._set_out()
                     before.cancel()
         finally:
             if not way.cancel() and not way.cancelled():
-                way.exception()  # it has been seen, or something else has come first
+                way.exception()  # the end was processed, or another event came first
 
     def _set_out(self) -> "asyncio.Task[Any]":
         if self._found is None:
@@ -115,7 +115,7 @@ class Goto(Pursuit):
     """Go to a position, or to the current position of another vehicle."""
 
     def refusal(self) -> str:
-        """The target must be known."""
+        """Return why the target is not known; "" if it is."""
         if self.parameters.target_vehicle == self.context.setup.connection.resource:
             return "parameter 'target': another vehicle is expected"
         try:
@@ -125,20 +125,20 @@ class Goto(Pursuit):
         return super().refusal()
 
     def aim(self) -> Pose:
-        """The target, and its bow as asked for; otherwise it arrives as it comes."""
+        """Return the target, with the requested heading or else the direction of travel."""
         place, yaw = self.parameters.target_pose(), self.parameters.yaw_rad
         return replace(place, yaw_rad=self._from_here(place) if yaw is None else yaw)
 
     def arrived(self) -> bool:
-        """Within the tolerance, if one was asked for."""
+        """Return whether the vehicle is within a requested tolerance."""
         expect_there(self._away_m(), self.parameters.tolerance_m)
         return True
 
     def after_success(self, result: Any) -> Outcome:
-        """SUCCEEDED, unless the target vehicle has moved on."""
+        """Return SUCCEEDED, unless the target vehicle has moved on."""
         del result
         if self.parameters.target_vehicle is not None and self._away_m() > MOVED_M:
-            return Outcome(BehaviorState.UNKNOWN, reason="its target has gone on")
+            return Outcome(BehaviorState.UNKNOWN, reason="its target has moved on")
         return Outcome(BehaviorState.SUCCEEDED)
 
     def _away_m(self) -> float:
@@ -151,7 +151,7 @@ class Follow(Pursuit):
     heading."""
 
     def refusal(self) -> str:
-        """Another vehicle is needed, and must be heard."""
+        """Return why the target is not another vehicle with a recent position."""
         vehicle = self.parameters.target_vehicle
         if vehicle is None or vehicle == self.context.setup.connection.resource:
             return "parameter 'target': another vehicle is expected"
@@ -162,7 +162,7 @@ class Follow(Pursuit):
         return super().refusal()
 
     def aim(self) -> Pose:
-        """The station, in the direction in which its vehicle points."""
+        """Return the position relative to the target, with the target's heading."""
         at = self.parameters.target_pose()
         offset_m, bearing_rad = self.parameters.offset_m, self.parameters.bearing_rad
         offset_m = OFFSET_M if offset_m is None else offset_m
@@ -177,6 +177,6 @@ class Follow(Pursuit):
         return False
 
     def after_success(self, result: Any) -> Outcome:
-        """RUNNING: the vehicle stands at its position, and follows on."""
+        """Return RUNNING: the vehicle stands at its position, and continues to follow."""
         del result
         return Outcome(BehaviorState.RUNNING)

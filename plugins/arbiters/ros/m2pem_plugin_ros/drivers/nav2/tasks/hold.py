@@ -26,20 +26,20 @@ class Hold(Nav2Task):
         await self.nav2.stop()
         self.context.begun()
         if why := await stands(self.context.setup.localization, self.clock, STAND_WITHIN_S):
-            raise NavigationError(f"it does not stop: {why}", "TIMEOUT")
+            raise NavigationError(f"the vehicle does not stop: {why}", "TIMEOUT")
         since_us = self.clock.now_us()
         left_s = self._left_s
         while self._left_s > 0:
             if other_client := self.nav2.other_client():
-                raise taken_over(f"somebody else has given Nav2 a goal: {other_client}")
+                raise taken_over(f"another client has given Nav2 a goal: {other_client}")
             await self.clock.sleep(min(LOOK_EVERY_S, self._left_s))
             self._left_s = left_s - (self.clock.now_us() - since_us) / 1e6
 
     async def query(self) -> Outcome:
-        """RUNNING or SUCCEEDED if the vehicle stands. The duration starts again, as its rest is not
-        known."""
+        """Return RUNNING or SUCCEEDED if the vehicle stands. The duration starts again, as its rest
+        is not known."""
         if other_client := self.nav2.other_client():
-            return Outcome(BehaviorState.UNKNOWN, reason=f"Nav2 carries out a goal: {other_client}")
+            return Outcome(BehaviorState.UNKNOWN, reason=f"Nav2 executes a goal: {other_client}")
         if why := moves(self.context.setup.localization):
             return Outcome(BehaviorState.UNKNOWN, reason=why)
         return Outcome(BehaviorState.RUNNING if self._left_s else BehaviorState.SUCCEEDED)
@@ -50,7 +50,7 @@ class Stop(Hold):
 
 
 class Teleop(Nav2Task):
-    """Nav2 does nothing. The operator drives by the means of the vehicle."""
+    """Stop Nav2, and let an operator drive by the vehicle's own joystick."""
 
     needs_nav2: ClassVar[bool] = False
 
@@ -66,7 +66,7 @@ class Teleop(Nav2Task):
             await self.clock.sleep(60.0)
 
     async def query(self) -> Outcome:
-        """RUNNING if Nav2 executes no goal. The timeout starts again."""
+        """Return RUNNING if Nav2 executes no goal. The timeout starts again."""
         if other_client := self.nav2.other_client():
-            return Outcome(BehaviorState.UNKNOWN, reason=f"Nav2 carries out a goal: {other_client}")
+            return Outcome(BehaviorState.UNKNOWN, reason=f"Nav2 executes a goal: {other_client}")
         return Outcome(BehaviorState.RUNNING)

@@ -17,8 +17,8 @@ too."""
 
 
 class Route(Nav2GoalTask):
-    """A NavigateThroughPoses goal, or FollowWaypoints if the fleet says so. Feedback tells which
-    poses are left, so that the vehicle does not drive back after a hold.
+    """A NavigateThroughPoses goal, or FollowWaypoints if the fleet says so. Feedback reports the
+    remaining poses, so that the vehicle does not drive back after a hold.
 
     With `loop`, each lap is a goal from the first waypoint to the first waypoint. Only the first
     lap begins with the way to the first waypoint.
@@ -38,7 +38,7 @@ class Route(Nav2GoalTask):
         return self.nav2.waypoints if self._follows else self.nav2.through_poses
 
     def refusal(self) -> str:
-        """A route that repeats must have more than one position."""
+        """Return why the route cannot be repeated; "" if it can."""
         if self._loops and all(apart_m(p, self._lap[0]) <= SAME_PLACE_M for p in self._lap):
             return "parameter 'loop': a route of one place cannot be repeated"
         return super().refusal()
@@ -59,14 +59,15 @@ class Route(Nav2GoalTask):
             self._pass(int(feedback.current_waypoint))
             return
         remaining = int(feedback.number_of_poses_remaining)
-        if remaining > 0:  # it is 0 before the first plan
+        if remaining > 0:  # the distance is 0 before the first plan
             self._pass(len(self._lap) - remaining)
         at = feedback.current_pose.pose.position
         if apart_m(Pose(at.x, at.y, 0.0), self._lap[self._next]) <= PASSED_M:
             self._pass(self._next + 1)
 
     def after_success(self, result: Any) -> Outcome:
-        """A lap that ended while this process did not run has left the vehicle standing."""
+        """Return RUNNING for a lap that ended while this process did not run: the vehicle
+        stands."""
         if waypoints := getattr(result, "missed_waypoints", ()):
             error = missed(waypoints)
             return Outcome(error.state, error.code, error.reason)

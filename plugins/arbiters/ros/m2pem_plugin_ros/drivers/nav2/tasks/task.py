@@ -1,4 +1,4 @@
-"""The interface of tasks: how Nav2 carries out one order."""
+"""The interface of tasks: how Nav2 executes one order."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -63,7 +63,7 @@ class Nav2Task(ABC):
         """Do the order, or the rest of it, and return when it is done.
 
         Raises:
-            NavigationError: it cannot be done, or not any more.
+            NavigationError: the order cannot be done, or cannot be continued.
             RosError: Nav2 does not answer.
         """
 
@@ -80,7 +80,7 @@ class Nav2Task(ABC):
 
 
 class Nav2GoalTask(Nav2Task):
-    """An order that is carried out by goals of one action, one after the other."""
+    """An order that Nav2 executes by goals of one action, one after the other."""
 
     def __init__(self, context: TaskContext) -> None:
         super().__init__(context)
@@ -102,7 +102,7 @@ class Nav2GoalTask(Nav2Task):
         goal is the one that was found on the vehicle.
 
         Raises:
-            NavigationError, RosError: it did not succeed.
+            NavigationError, RosError: the goal failed.
         """
         self.client.feedback = self._on_message
         if self._found is not None:
@@ -137,7 +137,7 @@ class Nav2GoalTask(Nav2Task):
         first = numbered(self.context.order.goal, 0)
         try:
             ended = {0: await self.client.result(first, FOUND_WITHIN_S)}
-        except RosTimeoutError:  # it goes on, or nobody is there
+        except RosTimeoutError:  # the goal continues, or no server answers
             ended = {}
         goals = {
             number: status
@@ -151,7 +151,7 @@ class Nav2GoalTask(Nav2Task):
             return Outcome(BehaviorState.RUNNING)
         known = goals.keys() | {n for n, e in ended.items() if e.status}
         if not known:
-            why = self.nav2.problem or "Nav2 knows nothing of it"
+            why = self.nav2.problem or "Nav2 does not have the goal"
             return Outcome(BehaviorState.UNKNOWN, reason=why)
         self._goals = max(known) + 1
         last = max(known)
@@ -166,7 +166,7 @@ class Nav2GoalTask(Nav2Task):
         if ended.status == GoalStatus.STATUS_ABORTED:
             error = await self.nav2.why_aborted(self.client, ended.result)
             return Outcome(error.state, error.code, error.reason)
-        # It was held, or somebody has interfered: that cannot be told apart.
+        # A hold or another client has cancelled it: the status is the same.
         return Outcome(BehaviorState.UNKNOWN, reason="its goal was cancelled at Nav2")
 
     def _on_message(self, goal: UUID, feedback: Any) -> None:
@@ -178,12 +178,12 @@ def expect_there(away_m: float, tolerance_m: float | None) -> None:
     """Check the distance to the target, as Nav2 takes no tolerance.
 
     Raises:
-        NavigationError: the vehicle is farther away than was asked for.
+        NavigationError: the vehicle is farther away than the tolerance.
     """
     if tolerance_m is not None and away_m > tolerance_m:
         raise NavigationError(
-            f"it stands {away_m:.1f} m from its target, and tolerance is {tolerance_m:g} m: Nav2 "
-            "takes that for there"
+            f"it has stopped {away_m:.1f} m from its target, and the tolerance is "
+            f"{tolerance_m:g} m: Nav2 counts that as arrived"
         )
 
 
