@@ -60,6 +60,75 @@ def test_gateways_that_are_decided() -> None:
     assert found(around(f'<exclusiveGateway id="T"/><task id="A"/>{decided}')) == []
 
 
+# --- prompts ------------------------------------------------------------------------------------
+
+GO = '<m2pem:decision value="go" label="Go on"/>'
+
+
+def asking(said: str, more: str = "", task: str = "T") -> str:
+    return f'<userTask id="{task}"{more}><extensionElements>{said}</extensionElements></userTask>'
+
+
+def boundary(definition: str, more: str = "") -> str:
+    return f'<boundaryEvent id="B" attachedToRef="T"{more}>{definition}</boundaryEvent>'
+
+
+TIMER = "<timerEventDefinition><timeDuration>PT1M</timeDuration></timerEventDefinition>"
+SIGNAL = '<signalEventDefinition signalRef="s"/>'
+OPERATORS = '<signal id="s" m2pem:from="operator"/>'
+
+
+def test_a_prompt_with_one_decision_leaves_no_choice() -> None:
+    [finding] = lint(load(around(asking(f"<m2pem:prompt>Go on?</m2pem:prompt>{GO}"))))
+    assert (finding.rule, finding.number, finding.severity, finding.line, finding.element) == (
+        "one-decision",
+        "M315",
+        Severity.WARNING,
+        3,
+        "T",
+    )
+    assert "'Go on'" in finding.message
+
+
+def test_a_prompt_has_a_choice_with_two_decisions_and_a_task_that_is_confirmed_needs_none() -> None:
+    assert found(around(asking(f'{GO}<m2pem:decision value="abort"/>'))) == []
+    assert found(around('<userTask id="T"/>')) == []
+    assert found(around(asking("<m2pem:prompt>Load the truck</m2pem:prompt>"))) == []
+
+
+def test_a_decision_that_a_data_object_carries_is_one() -> None:
+    task = (
+        '<userTask id="T"><dataInputAssociation><sourceRef>R</sourceRef></dataInputAssociation>'
+        f'</userTask><dataObjectReference id="R" dataObjectRef="D"/><dataObject id="D">'
+        f"<extensionElements>{GO}</extensionElements></dataObject>"
+    )
+    assert ("one-decision", 3, "T") in found(around(task))
+
+
+def test_a_timeout_ends_the_wait_for_the_one_decision() -> None:
+    assert found(around(asking(GO, ' m2pem:timeout="PT5M"'))) == []
+    assert found(around(asking(f'<m2pem:userTask timeout="PT5M">{GO}</m2pem:userTask>'))) == []
+
+
+@pytest.mark.parametrize("definition", [TIMER, SIGNAL])
+def test_an_event_at_the_border_ends_the_wait_for_the_one_decision(definition: str) -> None:
+    asked = asking(GO)
+    assert found(around(asked + boundary(definition), OPERATORS)) == []
+    beside = boundary(definition, ' cancelActivity="false"')
+    assert found(around(asked + beside, OPERATORS)) == [("one-decision", 3, "T")]
+
+
+def test_an_error_is_nothing_that_ends_the_wait_for_the_one_decision() -> None:
+    caught = boundary("<errorEventDefinition/>")
+    assert found(around(asking(GO) + caught)) == [("one-decision", 3, "T")]
+
+
+def test_an_event_around_a_prompt_ends_the_wait_for_the_one_decision() -> None:
+    sub = f'<subProcess id="T">{asking(GO, task="U")}</subProcess>'
+    assert found(around(sub)) == [("one-decision", 3, "U")]
+    assert found(around(sub + boundary(TIMER))) == []
+
+
 # --- signals and messages -----------------------------------------------------------------------
 
 CATCH = (
