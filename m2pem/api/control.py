@@ -71,6 +71,13 @@ class RunSummary:
     detail: str = ""
     began_us: int = 0
 
+    @property
+    def took_s(self) -> float | None:
+        """Seconds of the executive's clock from start to end, pauses too; None: not ended."""
+        if self.ended_us is None:
+            return None
+        return max(0, self.ended_us - self.started_us) / 1_000_000
+
 
 class StampedRecord(NamedTuple):
     """A record with its position: `seq` counts from 1 in its run; `t_s` is mission time."""

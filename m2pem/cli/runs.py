@@ -26,19 +26,22 @@ def runs(journal: str | None, accept_loss: str | None, output: str) -> None:
     """List the runs of a journal."""
     found = asyncio.run(_runs(journal, accept_loss))
     if output == "json":
-        click.echo(as_json(found))
+        import msgspec
+
+        click.echo(as_json([{**msgspec.to_builtins(run), "took_s": run.took_s} for run in found]))
         return
     from m2pem.cli.table import table
 
     if not found:
         click.echo("no runs yet")
         return
-    header = ("RUN", "STATUS", "STARTED (UTC)", "RECORDS", "PROCESS", "MISSION", "DETAIL")
+    header = ("RUN", "STATUS", "STARTED (UTC)", "TOOK", "RECORDS", "PROCESS", "MISSION", "DETAIL")
     rows = [
         (
             run.run,
             run.status.value,
             _time(run.began_us or run.started_us),
+            "-" if run.took_s is None else f"{run.took_s:.1f} s",
             str(run.records),
             run.process,
             run.mission,

@@ -1,8 +1,11 @@
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+import m2pem.cli.runs
+from m2pem.api import RunStatus, RunSummary
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, FLEET, MISSION
 
@@ -21,6 +24,7 @@ def test_a_run_is_listed(invoke: Invoke) -> None:
     assert status == 0
     header, line = out.splitlines()
     assert header.split()[:2] == ["RUN", "STATUS"]
+    assert header.index(" TOOK ") == re.search(r" \d+\.\d s ", line).start()  # type: ignore[union-attr]
     assert line.split()[:2] == ["r1", "terminated"]
     assert str(MISSION) in line
 
@@ -36,6 +40,20 @@ def test_runs_as_json(invoke: Invoke, tmp_path: Path) -> None:
     ]
     assert listed[0]["records"] > 0
     assert listed[0]["started_us"] <= listed[0]["ended_us"] <= listed[1]["started_us"]
+    took_us = [each["ended_us"] - each["started_us"] for each in listed]
+    assert [each["took_s"] for each in listed] == [each / 1_000_000 for each in took_us]
+
+
+def test_a_run_that_has_not_ended_has_taken_no_time(
+    invoke: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def listed(url: str | None, accept_loss: str | None) -> list[RunSummary]:
+        return [RunSummary("r1", "m.bpmn", "P", RunStatus.INTERRUPTED, 1_000_000)]
+
+    monkeypatch.setattr(m2pem.cli.runs, "_runs", listed)
+    assert invoke("runs")[1].splitlines()[1].split()[4:] == ["-", "0", "P", "m.bpmn"]
+    (run,) = json.loads(invoke("runs", "--format", "json")[1])
+    assert run["took_s"] is None
 
 
 def test_a_journal_that_is_named_must_exist(invoke: Invoke, tmp_path: Path) -> None:

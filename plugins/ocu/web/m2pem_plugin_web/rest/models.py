@@ -53,8 +53,8 @@ class RunModel(BaseModel):
 
 def run_model(summary: RunSummary, took_s: float | None = None) -> RunModel:
     """A summary as JSON. `took_s`: up to now, of a run that goes on."""
-    if summary.ended_us is not None:
-        took_s = max(0, summary.ended_us - summary.started_us) / 1_000_000
+    if summary.took_s is not None:
+        took_s = summary.took_s
     return RunModel(
         run=summary.run,
         mission=summary.mission,
