@@ -165,7 +165,7 @@ class ManualTask(Activity):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UserTask(Activity):
-    """Asks an operator. `prompt` None: nothing to ask, but an operator must confirm it."""
+    """Asks an operator. `prompt`: None only until the file is read; see `CONFIRMATION`."""
 
     prompt: Prompt | None = None
 
