@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from m2pem.api import (
+    ArbiterCapabilities,
     ArbiterContext,
     AsyncQueue,
     BehaviorId,
@@ -52,6 +53,8 @@ class PtzArbiter:
     Raises:
         PluginError: a connection cannot be used; the text names the resource and the key.
     """
+
+    capabilities = ArbiterCapabilities()
 
     def __init__(
         self,
