@@ -4,11 +4,11 @@ import pytest
 from rule_cases import Case, assert_breaks_its_rule_alone, names, read_cases
 
 CASES = read_cases("""
-# intermediate-without-incoming | I | when its process begins
-<task id="T"/>
+# intermediate-without-incoming | I | when its process begins | end-without-start
 ! <intermediateThrowEvent id="I"/>[I>E]
-*T
-~ sourceRef="T" targetRef="E" => sourceRef="T" targetRef="I"
+<endEvent id="E"/>
+~ <endEvent id="E"/> => <endEvent id="E"/><startEvent id="S"/>
+~~ <sequenceFlow id="s" sourceRef="S" targetRef="I"/>
 
 # subprocess-starts | T | this one has 2
 ! <subProcess id="T"><startEvent id="a"/><startEvent id="b"/><endEvent id="z"/>[a>z][b>z]

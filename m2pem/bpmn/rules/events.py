@@ -354,7 +354,10 @@ def _catch(tree: Tree, event: etree._Element) -> None:
 
 
 def _has_source(tree: Tree, event: etree._Element) -> None:
-    if not tree.into(event) and parent(event).tag != _AD_HOC:
+    outer = parent(event)
+    if tree.into(event) or outer.tag == _AD_HOC:
+        return
+    if not has(outer, "startEvent"):  # else it never happens, which another rule says
         tree.report(INTERMEDIATE_WITHOUT_INCOMING, event)
 
 
