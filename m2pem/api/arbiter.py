@@ -246,7 +246,7 @@ def adjusts(arbiter: Arbiter) -> TypeGuard[AdjustingArbiter]:
 
 
 def sights(arbiter: Arbiter) -> TypeGuard[SightedArbiter]:
-    """Whether an arbiter declares that it can tell at any moment where a vehicle is."""
+    """Whether an arbiter declares that it knows the state of a vehicle at any time."""
     return arbiter_capabilities(arbiter).sights
 
 

@@ -207,7 +207,7 @@ def run_command_line(arguments: Sequence[str] | None = None) -> int:
 
 
 def ignore_closed_stdout() -> None:
-    """Nobody reads what is printed any more; the interpreter must not complain at its end."""
+    """Redirect standard output, whose reader has ended, so that Python ends without an error."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.close(nowhere)

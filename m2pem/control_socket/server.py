@@ -35,7 +35,7 @@ class ControlSocket:
     """Serves `control` to processes of this user, on a socket beside the journal.
 
     An executive without it still runs its missions: what keeps the socket from being made is
-    logged. `journal` None (a journal in memory): nobody could find the socket, so there is none.
+    logged. `journal` None (a journal in memory): no client could find the socket, so there is none.
     """
 
     def __init__(self, control: MissionControl, journal: Path | None) -> None:

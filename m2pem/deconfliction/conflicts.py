@@ -74,7 +74,7 @@ def _unknown(conflict: Conflict) -> list[tuple[str, str]]:
 def _way_out(conflict: Conflict) -> str:
     other = conflict.other
     if other.lost:
-        return f"when {other.vehicle} is heard again"
+        return f"when the link to {other.vehicle} is restored"
     if other.behavior:
         return f"after {other.behavior} has ended"
     return f"after {other.vehicle} has landed or gone elsewhere"

@@ -177,8 +177,8 @@ class Airspace:
         first: bool,
     ) -> Conflict | None:
         """What it would meet at another altitude above home. `first`: it changes to that before."""
-        wished = {**request.parameters, "altitude": altitude_m, "altitude_frame": "relative"}
-        then = replace(request, parameters=wished)
+        changed = {**request.parameters, "altitude": altitude_m, "altitude_frame": "relative"}
+        then = replace(request, parameters=changed)
         if not first:
             return self._conflict(request, kind, self._volumes(then, kind, now_us), now_us)
         climb = replace(then, behavior="change_altitude")

@@ -78,7 +78,7 @@ class Programs:
         for line in process.stdout:
             print(line, end="", flush=True)
             if line.rstrip("\n") == ready:
-                # Whoever writes into a pipe that is full waits for ever.
+                # A program that writes into a full pipe waits for ever.
                 threading.Thread(target=process.stdout.read, daemon=True).start()
                 return
         raise OperatorError(

@@ -56,7 +56,7 @@ _WITHOUT_EFFECT = frozenset(
 def name_all(definitions: Element) -> list[str]:
     """Give an id to whatever can be drawn, and another where the one it has will not do.
 
-    Tells what has changed.
+    Returns what has changed.
     """
     named = 0
     renamed: dict[str, str] = {}

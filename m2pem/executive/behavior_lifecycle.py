@@ -2,7 +2,7 @@
 
 Several owners keep a part of a behavior's state, because each must act on its own: the engine
 replays it from the journal, the dispatcher bounds the calls of arbiters, the availability keeps
-runs from each other, the airspace keeps aircraft apart, the arbiter knows what it was told, and the
+runs from each other, the airspace keeps aircraft apart, the arbiter knows its requests, and the
 vehicle does what it does. `JOINT_STATES` names what they may say at the same moment, and
 `TRANSITIONS` what leads from one to the next. docs/architecture.md is made of both:
 

@@ -78,8 +78,8 @@ class VirtualClock:
     def when_idle(self, act: Callable[[float | None], bool]) -> None:
         """Have `act` called when nothing is ready, each time before the loop jumps ahead.
 
-        It is told by how many seconds, or None when no timer is set. If it returns True, it has
-        made something happen now, and time stands still for it.
+        Its argument is by how many seconds, or None when no timer is set. If it returns True, it
+        has made something happen now, and time stands still for it.
         """
         self._loop.when_idle = act
 

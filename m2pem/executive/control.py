@@ -194,7 +194,7 @@ class Control:
 
         What came during a pause is decided with the resume, and may be ignored then: after it.
         """
-        match (await self._supervisor.runner(run).tell(item)).records:
+        match (await self._supervisor.runner(run).submit(item)).records:
             case [r.InputIgnored(reason), *_]:
                 raise OperatorError(f"{run}: {reason}")
 

@@ -90,8 +90,8 @@ class Dispatcher:
     def cancel(self, command: CancelBehavior) -> None:
         """End a behavior; if it has not within its arbiter's limit, it is given up as LOST.
 
-        One of several resources waits for its own start alone: a resource that hangs in what it was
-        told must not keep the others from stopping.
+        One of several resources waits for its own start alone: a resource whose
+        arbiter hangs in its call must not keep the others from stopping.
         """
         after = None
         if len(command.resources) > 1:
@@ -235,8 +235,8 @@ class Dispatcher:
         job: Callable[[], Awaitable[object]],
         after: set[asyncio.Task[None]] | None = None,
     ) -> asyncio.Task[None]:
-        """`after`: what the job waits for; None: all that its resources were told before. What
-        comes next waits for both."""
+        """`after`: what the job waits for; None: all earlier jobs of its resources. The next job
+        waits for both."""
         names = tuple(resources)
         before = {self._tails[name] for name in names if name in self._tails}
         task = tail = asyncio.create_task(self._in_turn(before if after is None else after, job))

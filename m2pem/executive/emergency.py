@@ -53,12 +53,12 @@ class EmergencyCommands:
             OperatorError: the run has ended.
         """
         if runner.done.is_set() and runner.failure is None:
-            return runner.tell(i.StopRun(by, reason))
+            return runner.submit(i.StopRun(by, reason))
         self._marks.put(runner.id, StopMark(by, reason))
         orders = self._dispatcher.stop_at_once(runner.id, runner.epoch)
         self._watch("STOP", runner.id, orders)
         try:
-            return runner.tell_stop(i.StopRun(by, reason), frozenset(orders))
+            return runner.submit_stop(i.StopRun(by, reason), frozenset(orders))
         except M2pemError as error:
             failed: asyncio.Future[Step] = asyncio.get_running_loop().create_future()
             failed.set_exception(error)
@@ -88,8 +88,8 @@ class EmergencyCommands:
             orders = self._dispatcher.hold_at_once(runner.id)
             self._watch("pause", runner.id, orders)
             held = {resource for order in orders.values() for resource in order.resources}
-            return runner.tell_pause(i.PauseRun(by), frozenset(map(str, held)))
-        return runner.tell(i.PauseRun(by))
+            return runner.submit_pause(i.PauseRun(by), frozenset(map(str, held)))
+        return runner.submit(i.PauseRun(by))
 
     async def written(self, what: str, asked: "Mapping[RunId, asyncio.Future[Step]]") -> None:
         """Wait until the journal has what was asked of runs, within `WRITTEN_WITHIN_S`.

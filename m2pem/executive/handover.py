@@ -39,7 +39,7 @@ class Handover:
         """Give a resource to an operator: no behavior gets it, and what it did is given up.
 
         Raises:
-            OperatorError: there is no such resource, or somebody has it.
+            OperatorError: there is no such resource, or an operator has it.
         """
         resource = self._resource(name)
         holder = self.taken.get(resource)
@@ -49,7 +49,7 @@ class Handover:
         self._withdraw(resource)
         for runner in list(runners):
             if not runner.done.is_set():
-                await runner.tell(ControlTaken(resource, by or UNNAMED_OPERATOR))
+                await runner.submit(ControlTaken(resource, by or UNNAMED_OPERATOR))
 
     def preview(self, name: str, runners: Iterable[Runner]) -> list[TakeEffect]:
         """What `take` of a resource would end now in each run.
@@ -86,7 +86,7 @@ class Handover:
             self._availability.withdraw(resource, why)
         for runner in list(runners):
             if not runner.done.is_set():
-                await runner.tell(ControlReturned(resource, by or UNNAMED_OPERATOR))
+                await runner.submit(ControlReturned(resource, by or UNNAMED_OPERATOR))
 
     def by_name(self) -> dict[str, str]:
         """What is taken, and by whom: for a run that begins."""
@@ -100,14 +100,14 @@ class Handover:
             self._withdraw(resource)
 
     def restore(self, resource: ResourceId) -> None:
-        """A lost resource is heard again: it is free, unless an operator has it."""
+        """Free a resource whose link is restored, unless an operator has it."""
         if resource in self.taken:
             self._withdraw(resource)
         else:
             self._availability.restore(resource)
 
     def holders(self) -> dict[ResourceId, str]:
-        """Who has each resource: an operator, a behavior, or "" when nobody does."""
+        """Return who has each resource: an operator, a behavior, or "" for a free one."""
         return {
             resource: self.taken.get(resource) or self._availability.holder(resource) or ""
             for resource in self._known

@@ -125,7 +125,7 @@ class JournalLossPrompts:
                             self._dispatcher.resume(resource)
                     return
                 case RunEnded():
-                    # What was held stays so: nobody has said that it may move.
+                    # Held resources stay held: no operator has said that they may move.
                     del self._services[run]
                     self._close(run, "stop", "")
                     return

@@ -142,7 +142,7 @@ def _behavior_writes(arbiters: FleetArbiters | None) -> dict[str, tuple[str, ...
 
 
 def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
-    """Service tasks whose class nobody registered.
+    """Return findings of service tasks whose class no plugin registered.
 
     Warnings: an answers file can stand in for a service, and the plugin may be installed elsewhere.
     """

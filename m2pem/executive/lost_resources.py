@@ -3,8 +3,8 @@
 Such a vehicle may still drive.
 
 What it did when its link was lost has ended for its mission (LINK_LOST). The vehicle does not know
-that, and goes on with it. So it is told to stop, at once and until it has acknowledged; operators
-see why it is not ready meanwhile.
+that, and goes on with it. So m2pem commands it to stop, at once and until it has acknowledged;
+operators see why it is not ready meanwhile.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ from m2pem.mission.catalogue import ResourceId
 log = logging.getLogger("m2pem.executive")
 
 AGAIN_S = 1.0
-"""After so long a resource that has not acknowledged is told again."""
+"""After so long m2pem commands a resource that has not acknowledged again."""
 
 ONCE_WITHIN_S = 15.0
 """An arbiter that has not returned by then is asked again."""
@@ -82,8 +82,10 @@ class LostResources:
             return
         if resource in self._stopping:
             return
-        log.warning("%s is heard again; it is told to end %s", resource, self._what(resource))
-        self._explain(resource, f"it is heard again, and must first end {self._what(resource)}")
+        log.warning("%s: its link is restored; it must end %s", resource, self._what(resource))
+        self._explain(
+            resource, f"its link is restored, and it must first end {self._what(resource)}"
+        )
         task = asyncio.get_running_loop().create_task(self._stop(resource))
         self._stopping[resource] = task
 
@@ -112,7 +114,7 @@ class LostResources:
             self._explain(resource, why)
             times = times + 1 if why == before else 0
             if times % SAY_EVERY == 0:
-                log.warning("%s is heard again, and not free yet: %s", resource, why)
+                log.warning("%s: its link is restored, and it is not free yet: %s", resource, why)
             before = why
             await self._clock.sleep(AGAIN_S)
         del self._lost[resource], self._silent[resource], self._stopping[resource]
@@ -121,7 +123,9 @@ class LostResources:
         if (said := self._said.pop(resource, None)) is not None:
             self._show(said)
         now = self._availability.reason(resource) or "free"
-        log.warning("%s is heard again, has ended what it did before, and is %s", resource, now)
+        log.warning(
+            "%s: its link is restored, it has ended what it did before, and is %s", resource, now
+        )
 
     async def _end_command(self, resource: ResourceId) -> str:
         """Have it stop; returns "" when it has acknowledged, else why it is not free."""
@@ -139,7 +143,7 @@ class LostResources:
             return f"it has not acknowledged within {ONCE_WITHIN_S:g} s that it must stop"
         except Exception as error:  # an arbiter's fault must not make a vehicle free
             log.exception("%s: the arbiter raised", resource)
-            return f"it cannot be told to stop: {type(error).__name__}: {error}"
+            return f"it cannot be commanded to stop: {type(error).__name__}: {error}"
         return ""
 
     def _explain(self, resource: ResourceId, why: str) -> None:

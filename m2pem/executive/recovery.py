@@ -57,8 +57,8 @@ async def take_over(
 ) -> None:
     """Bring a replayed and claimed run back to life. Its task must not run yet.
 
-    `outage_s`: for how long nobody drove it. Longer than the fleet's `max_outage`, every behavior
-    is held and an operator is asked. `lost`: is called for each resource whose arbiter cannot be
+    `outage_s`: for how long no executive drove it. Longer than the fleet's `max_outage`, every
+    behavior is held and an operator is asked. `lost`: is called for each resource whose arbiter cannot be
     asked, which must stop before it is free again. `loss`: what the journal has lost of it: the
     run is paused, and an operator is asked about every behavior when it goes on
     (see `JournalLossPrompts`).
@@ -115,7 +115,7 @@ async def take_over(
 
 
 def _recall(runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher) -> None:
-    """Tell the arbiter of teams what it had to do: of that, no vehicle's arbiter knows."""
+    """Give the arbiter of teams its requests: the arbiters of vehicles do not know them."""
     for behavior in runner.run.state.behaviors.values():
         if _arbiter(arbiters, behavior) is not arbiters.teams:
             continue
@@ -197,7 +197,7 @@ def _why_ask(status: RunStatus, report: BehaviorReport | None, outage_s: float |
     if outage_s is not None:
         return f"no executive drove the mission for {outage_s:.0f} s"
     if report is not None and report.held and status is not RunStatus.PAUSED:
-        return "held, and the journal does not say why: its executive failed, or was told to pause"
+        return "held, and the journal does not say why: its executive failed, or paused the run"
     return ""
 
 

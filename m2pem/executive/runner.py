@@ -109,7 +109,7 @@ class Runner:
         self._inbox: list[Input] = []
         self._wake = asyncio.Event()
         self._withheld: list[c.StartBehavior] = []
-        self._told: list[tuple[Input, asyncio.Future[Step]]] = []
+        self._submitted: list[tuple[Input, asyncio.Future[Step]]] = []
         self.done = asyncio.Event()
 
     # --- inputs ---------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ class Runner:
         self._inbox.append(item)
         self._wake.set()
 
-    def tell(self, item: Input) -> "asyncio.Future[Step]":
+    def submit(self, item: Input) -> "asyncio.Future[Step]":
         """Add an operator's input; the future is done when it is decided and committed.
 
         Raises:
@@ -128,24 +128,24 @@ class Runner:
         """
         if self.done.is_set():
             raise self._why_not()
-        told: asyncio.Future[Step] = asyncio.get_running_loop().create_future()
-        self._told.append((item, told))
+        decided: asyncio.Future[Step] = asyncio.get_running_loop().create_future()
+        self._submitted.append((item, decided))
         self.post(item)
-        return told
+        return decided
 
-    def tell_stop(self, item: StopRun, cancelled: frozenset[str]) -> "asyncio.Future[Step]":
-        """As `tell`, ahead of what waits; `cancelled`: the behaviors whose cancel is under way.
+    def submit_stop(self, item: StopRun, cancelled: frozenset[str]) -> "asyncio.Future[Step]":
+        """As `submit`, ahead of what waits; `cancelled`: the behaviors whose cancel is under way.
 
         Until it is decided the run commands nothing new.
         """
         self._stopping = True
         self._cancelled_at_once |= cancelled
-        told = self.tell(item)
+        decided = self.submit(item)
         self._inbox.pop()
         # A run that has not begun, or is not claimed, cannot be stopped: these come first.
         first = [isinstance(each, (StartRun, ClaimRun)) for each in self._inbox]
         self._inbox.insert(len(first) - first[::-1].index(True) if any(first) else 0, item)
-        return told
+        return decided
 
     @property
     def can_pause(self) -> bool:
@@ -155,14 +155,14 @@ class Runner:
         paused = status is RunStatus.PAUSED and not resumes
         return not (self.done.is_set() or status is RunStatus.ENDED or paused)
 
-    def tell_pause(self, item: PauseRun, held: frozenset[str]) -> "asyncio.Future[Step]":
-        """As `tell`; `held`: the resources whose hold is under way.
+    def submit_pause(self, item: PauseRun, held: frozenset[str]) -> "asyncio.Future[Step]":
+        """As `submit`; `held`: the resources whose hold is under way.
 
         Until it is decided nothing is started or let go.
         """
         self._pauses += 1
         self._held_at_once |= held
-        return self.tell(item)
+        return self.submit(item)
 
     # --- the loop -------------------------------------------------------------------------------
 
@@ -185,9 +185,9 @@ class Runner:
             self._hold_everything(InternalError(f"{type(error).__name__}: {error}"))
         finally:
             self.done.set()
-            for _, told in self._told:
-                if not told.done():
-                    told.set_exception(self._why_not())
+            for _, decided in self._submitted:
+                if not decided.done():
+                    decided.set_exception(self._why_not())
 
     def _why_not(self) -> M2pemError:
         return self.failure or OperatorError(f"{self.id} has ended")
@@ -331,11 +331,11 @@ class Runner:
             self._release_withheld()
 
     def _answer_asker(self, step: Step) -> None:
-        for place, (item, told) in enumerate(self._told):
+        for place, (item, decided) in enumerate(self._submitted):
             if item is step.input:
-                del self._told[place]
-                if not told.done():
-                    told.set_result(step)
+                del self._submitted[place]
+                if not decided.done():
+                    decided.set_result(step)
                 return
 
     # --- what follows a commit ------------------------------------------------------------------

@@ -34,7 +34,7 @@ from m2pem.verify.requirements.requirement import RequirementsError
 SendProgress: TypeAlias = Callable[[bytes], None]
 
 _HEAD = struct.Struct(">cQ")
-_RESULT, _TOLD, _REFUSED = b"r", b"t", b"e"
+_RESULT, _PROGRESS, _REFUSED = b"r", b"t", b"e"
 _NICENESS = 10
 _LAST_WORDS = 2_000
 """Bytes of what a process that broke off has said on standard error."""
@@ -86,10 +86,12 @@ def encode_source(mission: MissionSource) -> EncodedSource:
             return EncodedSource("Path", str(mission))
 
 
-async def run_in_subprocess(module: str, order: bytes, told: SendProgress | None = None) -> bytes:
+async def run_in_subprocess(
+    module: str, order: bytes, on_progress: SendProgress | None = None
+) -> bytes:
     """Run a module's `serve` in a subprocess; returns the result of its work.
 
-    `told` is called with each progress message. Cancelling ends the subprocess.
+    `on_progress` is called with each progress message. Cancelling ends the subprocess.
 
     Raises:
         FindingsError: the work refused what it was given, with all findings.
@@ -126,8 +128,8 @@ async def run_in_subprocess(module: str, order: bytes, told: SendProgress | None
                 return content
             if kind == _REFUSED:
                 raise _error(content)
-            if told is not None:
-                told(content)
+            if on_progress is not None:
+                on_progress(content)
     finally:
         words.cancel()
         if process.returncode is None:
@@ -163,17 +165,17 @@ def serve(work: Callable[[bytes, SendProgress], bytes]) -> None:
     order = _read(size)
     threading.Thread(target=_end_with_the_executive, daemon=True).start()
 
-    def tell(content: bytes, kind: bytes = _TOLD) -> None:
+    def send(content: bytes, kind: bytes = _PROGRESS) -> None:
         _write(answers, _HEAD.pack(kind, len(content)) + content)
 
     try:
-        tell(work(order, tell), _RESULT)
+        send(work(order, send), _RESULT)
     except FindingsError as error:
         findings = [_plain(each) for each in error.findings]
         refusal = Refusal(type(error).__name__, error.what, findings)
-        tell(msgspec.msgpack.encode(refusal), _REFUSED)
+        send(msgspec.msgpack.encode(refusal), _REFUSED)
     except M2pemError as error:
-        tell(msgspec.msgpack.encode(Refusal(type(error).__name__, str(error))), _REFUSED)
+        send(msgspec.msgpack.encode(Refusal(type(error).__name__, str(error))), _REFUSED)
 
 
 def _plain(finding: Finding) -> Finding:

@@ -248,7 +248,7 @@ class Supervisor:
         number = await self.journal.create(header)
         run = MissionRun(loaded, self.fleet, number, self.settings.steps_at_once)
         runner = self._runner(run, 1)
-        begun = runner.tell(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
+        begun = runner.submit(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
         for name, given in self.handed_over.items():
             runner.post(GeometrySet(name, dict(given.geometry), given.by))
         self._drive(runner)
@@ -288,7 +288,7 @@ class Supervisor:
         mark = self._marks.get(number)
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
-            runner.tell_stop(StopRun(mark.by, mark.reason), frozenset())
+            runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
         await take_over(runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss)
         if line.loss is not None:
             await self.losses.ask(runner, line.loss)
@@ -366,7 +366,7 @@ class Supervisor:
             self._separation.on_telemetry(state)
 
     def fault(self, fault: ResourceFault) -> None:
-        """A vehicle or payload failed, or its link was lost: tell the runs that command it."""
+        """Post the fault of a vehicle or payload, or its lost link, to the runs that command it."""
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
         resource = ResourceId(fault.resource)
         if not fault.reachable:

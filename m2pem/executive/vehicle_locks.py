@@ -1,6 +1,6 @@
 """Locks that say which executive of this user commands a vehicle: one locked file for each address.
 
-The kernel holds a lock for as long as its process lives: a killed executive keeps nobody out.
+The kernel holds a lock for as long as its process lives: a killed executive locks nothing.
 """
 
 import fcntl
@@ -77,7 +77,7 @@ class VehicleLocks:
                 return text
             if _is_at(file, path):
                 break
-            os.close(file)  # its holder has removed it meanwhile: a lock on it keeps nobody out
+            os.close(file)  # its holder has removed it meanwhile: a lock on it has no effect
         self._held[path] = file
         me = {"pid": os.getpid(), "command": shlex.join(_command()), "address": address}
         os.ftruncate(file, 0)

@@ -63,8 +63,8 @@ def search_request(
     requirements, a file or its text.
 
     Raises:
-        MissionError: there are errors; tells them all.
-        RequirementsError: requirements cannot be read, or do not fit; tells all that is wrong.
+        MissionError: there are errors; it has all of them.
+        RequirementsError: requirements cannot be read, or do not fit; it has all findings.
     """
     wrong = findings_for(mission, arbiters, plugins, tuple(data), process)
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)

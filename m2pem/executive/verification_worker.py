@@ -80,7 +80,7 @@ async def verify_in_subprocess(
     return found
 
 
-def _work(content: bytes, tell: SendProgress) -> bytes:
+def _work(content: bytes, send: SendProgress) -> bytes:
     # What searches is loaded here: the executive has no use for it.
     from m2pem.executive.verification import SearchEngine, search, search_request  # noqa: PLC0415
     from m2pem.plugins import PluginManager  # noqa: PLC0415
@@ -96,7 +96,7 @@ def _work(content: bytes, tell: SendProgress) -> bytes:
         if now >= shown_at + _BETWEEN_S:
             shown_at = now
             how_far = SearchProgress(searched.seconds, searched.states, searched.waiting)
-            tell(msgspec.msgpack.encode(how_far))
+            send(msgspec.msgpack.encode(how_far))
 
     path = [Path(each) for each in order.search_path]
     loaded = load_source(order.mission.source_of(), path)

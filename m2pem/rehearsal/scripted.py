@@ -66,7 +66,7 @@ class ScriptedPlugins:
         return self._plugins.check_mission(mission, fleet)
 
     def records_committed(self, run_id: str, records: "Sequence[Record]") -> None:
-        """Tell the observers among the plugins."""
+        """Pass records to the observers among the plugins."""
         self._plugins.records_committed(run_id, records)
 
     def entry(self, name: str, context: ServiceContext) -> ServiceEntry | None:

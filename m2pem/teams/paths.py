@@ -74,7 +74,7 @@ class MemberPath:
 
         `near_m`: where it was before, and it is at most `ahead_m` farther now, so that a path that
         crosses itself is not cut short. None, or one who has strayed: anywhere; `yaw_rad` (from
-        east, counter-clockwise) then tells the way there from the way back.
+        east, counter-clockwise) then distinguishes the way there from the way back.
         """
         if near_m is not None:
             feet = self._line.feet(place, near_m - _BEHIND_M, near_m + ahead_m)

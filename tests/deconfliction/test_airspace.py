@@ -144,7 +144,7 @@ def test_a_vehicle_whose_position_is_not_known_may_not_begin() -> None:
     assert "the position of one is not known" in claim(sky, request("takeoff", "one", altitude=5.0))
 
 
-def test_who_is_lost_keeps_its_room_until_it_is_heard() -> None:
+def test_a_lost_aircraft_keeps_its_volume_until_its_link_is_restored() -> None:
     sky = airspace("one", "two")
     sky.received(state("one", -300, 0, 20))
     going = request("goto", "one", target=point(300, 0))
@@ -154,7 +154,7 @@ def test_who_is_lost_keeps_its_room_until_it_is_heard() -> None:
     sky.received(state("one", -300, 0, 20, link=LinkState.LOST))
     said = over(sky, "two", 20.0)
     assert f"one, which is lost, and did {going.id} (goto) at 20 m" in said
-    assert said.endswith("or when one is heard again")
+    assert said.endswith("or when the link to one is restored")
     sky.received(state("one", 200, 0, 20))
     assert not over(sky, "two", 20.0)
 

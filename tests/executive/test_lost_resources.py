@@ -1,4 +1,4 @@
-"""A lost vehicle that is heard again stops before it is free."""
+"""A lost vehicle whose link is restored stops before it is free."""
 
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.mission.catalogue import ResourceId
@@ -45,7 +45,9 @@ def test_a_vehicle_that_returns_is_told_to_stop_before_it_is_free(play):
         says(world)
         await world.clock.sleep(0.1)
         assert latest(world).ready is False
-        assert "it is heard again, and must first end r1.b1" in latest(world).not_ready_reasons
+        assert (
+            "its link is restored, and it must first end r1.b1" in latest(world).not_ready_reasons
+        )
         world.fake.hangs.clear()
         await world.fake.until_called("hold", "ugv1", 2)
         await world.clock.sleep(0.1)
@@ -54,7 +56,7 @@ def test_a_vehicle_that_returns_is_told_to_stop_before_it_is_free(play):
         await world.fake.until_called("start", f"{again}.b1")
         return refused
 
-    assert "ugv1 is unavailable: it is heard again, and must first end r1.b1" in play(
+    assert "ugv1 is unavailable: its link is restored, and it must first end r1.b1" in play(
         story, "ugv1", watch_links=True
     )
 
@@ -72,8 +74,8 @@ def test_a_vehicle_that_cannot_be_told_is_told_again_and_not_free(play, caplog):
         return refused
 
     refused = play(story, "ugv1", watch_links=True)
-    assert "it cannot be told to stop: RuntimeError: the radio is broken" in refused
-    assert "ugv1 is heard again, has ended what it did before, and is free" in caplog.text
+    assert "it cannot be commanded to stop: RuntimeError: the radio is broken" in refused
+    assert "ugv1: its link is restored, it has ended what it did before, and is free" in caplog.text
 
 
 def test_a_vehicle_that_is_lost_again_meanwhile_is_told_when_it_returns(play):
