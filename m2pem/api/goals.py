@@ -192,7 +192,7 @@ class GoalArbiter:
             last_us = self._received_us.get(resource, last_us)
             silent_us = self.context.clock.now_us() - last_us
             if silent_us >= bound_us:
-                self._ledger.lose(resource, f"not heard for {silent_us / 1_000_000:.1f} s")
+                self._ledger.lose(resource, f"no telemetry for {silent_us / 1_000_000:.1f} s")
             wait_us = bound_us - silent_us if silent_us < bound_us else bound_us
             await self._sleep(wait_us / 1_000_000)
 

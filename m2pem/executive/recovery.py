@@ -58,10 +58,10 @@ async def take_over(
     """Bring a replayed and claimed run back to life. Its task must not run yet.
 
     `outage_s`: for how long no executive drove it. Longer than the fleet's `max_outage`, every
-    behavior is held and an operator is asked. `lost`: is called for each resource whose arbiter cannot be
-    asked, which must stop before it is free again. `loss`: what the journal has lost of it: the
-    run is paused, and an operator is asked about every behavior when it goes on
-    (see `JournalLossPrompts`).
+    behavior is held and an operator is asked. `lost`: is called for each resource whose arbiter
+    cannot be asked, which must stop before it is free again. `loss`: what the journal has lost of
+    it: the run is paused, and an operator is asked about every behavior when it goes on (see
+    `JournalLossPrompts`).
     """
     state = runner.run.state
     runner.post(ClaimRun(runner.epoch, lost=loss.records if loss is not None else 0))

@@ -30,7 +30,7 @@ from m2pem.simulation.links import Links
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.planning import Planner
 from m2pem.simulation.settings import own_faults, read_settings
-from m2pem.simulation.simulation import Simulation
+from m2pem.simulation.simulation import SCRIPTED, Simulation
 from m2pem.simulation.state_file import Memory, StateFile
 from m2pem.simulation.trajectory import US_PER_S, Warp
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
@@ -56,12 +56,12 @@ class RadioRange:
     def command(
         self, execution: Execution, name: str, act: Callable[[int], None], now_us: int
     ) -> None:
-        """Do something with a behavior, now or when its vehicles are heard again."""
+        """Do something with a behavior, now or when the links to its vehicles are restored."""
         vehicle = self._links.broken_of(execution)
         if vehicle is None:
             act(now_us)
         elif self._links.lost(vehicle):
-            self._simulation.abandon(execution, f"{vehicle} is not heard", now_us)
+            self._simulation.abandon(execution, f"the link to {vehicle} is lost", now_us)
         else:
             # Another of its links may be broken still when this one is mended.
             self._links.defer(
@@ -83,7 +83,7 @@ class RadioRange:
         if self._links.up(vehicle) or self._links.cuts(vehicle) != cuts:
             return  # it was mended in time
         self._links.give_up(vehicle)
-        reason = f"{vehicle} was not heard for {self._lost_after_s(vehicle):g} s"
+        reason = f"no telemetry of {vehicle} for {self._lost_after_s(vehicle):g} s"
         for execution in list(self._memory.executions.values()):
             if vehicle in execution.carriers and not execution.reported_end:
                 self._simulation.abandon(execution, reason, now_us)
@@ -95,7 +95,7 @@ LOST_AFTER_S = 3.0
 class SimArbiter:
     """Implements `m2pem.api.Arbiter`; its settings in a fleet file: docs/simulation.md.
 
-    `telemetry_hz`: of every resource that does not say its own; 0 tells of changes alone, so that
+    `telemetry_hz`: of every resource that does not say its own; 0 reports changes alone, so that
     nothing happens while nothing moves, and then links can't be watched by silence.
 
     Beside the protocol, tests and rehearsals look at `effects`, `expects`, `searching` and
@@ -202,7 +202,7 @@ class SimArbiter:
         self._links.muted = False
         self.broadcast.begin(now_us)
         for payload, detection in self._late:
-            self.broadcast.tell(payload, now_us, (detection,))
+            self.broadcast.send(payload, now_us, (detection,))
         self._late.clear()
         self._connected = True
         self._event_queue.wake()
@@ -253,11 +253,11 @@ class SimArbiter:
         elif execution is None or execution.ended:
             return
         elif isinstance(speed, int | float) and speed > 0:
-            wished = float(speed)
+            requested = float(speed)
             self._reach.command(
                 execution,
                 "adjust",
-                lambda at_us: self._simulation.adjust(execution, wished, at_us),
+                lambda at_us: self._simulation.adjust(execution, requested, at_us),
                 now_us,
             )
 
@@ -358,7 +358,7 @@ class SimArbiter:
         vehicle = carrier_of(resource)
         self._links.mend(vehicle, now_us)
         for body in self._of_vehicle(vehicle):
-            self.broadcast.tell(body, now_us)
+            self.broadcast.send(body, now_us)
 
     # --- behind it ------------------------------------------------------------------------------
 
@@ -372,8 +372,7 @@ class SimArbiter:
         strike = self._scripts.pop(request.id, None)
         fault = self._take_fault(request) if strike is None else None
         if fault is not None and fault.kind == "reject":
-            reason = "as the simulation was told"
-            self._simulation.reject(execution, fault.error or "REJECTED", reason, now_us)
+            self._simulation.reject(execution, fault.error or "REJECTED", SCRIPTED, now_us)
             return
         if fault is not None:
             end = {"fail": "failed", "stall": "stalled", "lose_link": "lose_link"}[fault.kind]
@@ -415,16 +414,16 @@ class SimArbiter:
         return self._links.up(carrier_of(resource))
 
     def _moved(self, body: Body, now_us: int) -> None:
-        self.broadcast.tell(body, now_us)
+        self.broadcast.send(body, now_us)
         if isinstance(body, SimVehicle):
             self._detectors.moved(body.id, now_us)
 
     def _detected(self, payload: SimPayload, detection: Detection, now_us: int) -> None:
         if not self._connected:
-            # What was found while nobody was there is told when somebody is.
+            # What was found while no executive was there is reported when one is.
             self._late.append((payload, detection))
         elif self._links.up(payload.carrier):
-            self.broadcast.tell(payload, now_us, (detection,))
+            self.broadcast.send(payload, now_us, (detection,))
         else:
             self._links.defer(
                 payload.carrier,

@@ -21,7 +21,7 @@ WAITING_STATES = 1000
 
 
 class Broadcast:
-    """A rate of 0 tells of changes alone, and sets no timer."""
+    """A rate of 0 reports changes alone, and sets no timer."""
 
     def __init__(
         self,
@@ -46,13 +46,13 @@ class Broadcast:
         self._seen: dict[ResourceId, tuple[GeoPosition, ...]] = {}
 
     def begin(self, now_us: int) -> None:
-        """Tell of everybody, now and from now on."""
+        """Report every body, now and from now on."""
         self._begun = True
         for body in self._bodies.values():
-            self.tell(body, now_us)
+            self.send(body, now_us)
 
-    def tell(self, body: Body, now_us: int, detections: tuple[Detection, ...] = ()) -> None:
-        """Tell of a body now, and again after its interval."""
+    def send(self, body: Body, now_us: int, detections: tuple[Detection, ...] = ()) -> None:
+        """Report a body now, and again after its interval."""
         if not self._begun:
             return
         if self._audible(body.id):
@@ -71,7 +71,7 @@ class Broadcast:
             rate = rate if busy else min(rate, SLOWEST_HZ)
             self._next[body.id] = self._event_queue.at(
                 now_us + round(US_PER_S / rate),
-                lambda at_us: self.tell(body, at_us),
+                lambda at_us: self.send(body, at_us),
                 background=True,
             )
 

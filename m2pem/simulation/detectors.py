@@ -26,7 +26,7 @@ class _Detector:
 
 
 class Detectors:
-    """`found` is told of every detection, once for each thing that is planned or planted.
+    """`found` is called with every detection, once for each thing that is planned or planted.
 
     A target counts as reached by distance on the map. `began_us` is when the simulation began, from
     which planned detections count. `known`, `keep`: which things a payload has found before.

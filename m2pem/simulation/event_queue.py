@@ -39,7 +39,7 @@ class TimedCall:
 
 class EventQueue:
     """Calls get the time that they were scheduled for, however late they come. So what happened
-    while nobody looked can be caught up with, and nothing drifts.
+    while the queue was not read can be caught up with, and nothing drifts.
 
     `expected` counts the calls to come that may change something by themselves. In the
     background is what goes on for ever: a pursuit, a battery that drains.

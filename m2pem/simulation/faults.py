@@ -19,8 +19,8 @@ class Fault:
 
     * reject: the behavior is refused (`after_s` has no meaning).
     * fail: the vehicle stops, and the behavior fails with `error` ("" is FAILED).
-    * stall: the vehicle stops and nothing more is heard of the behavior.
-    * lose_link: nothing more is heard of the vehicle, and it hears nothing.
+    * stall: the vehicle stops and nothing more is received of the behavior.
+    * lose_link: nothing more is received of the vehicle, and it receives nothing.
     """
 
     kind: str

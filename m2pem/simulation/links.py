@@ -21,8 +21,8 @@ class _Broken:
 class Links:
     """While a vehicle's link is broken, reports about it and commands to it wait.
 
-    `muted`: reports are counted and remembered, but nobody hears them; what happened while no
-    executive was there is told by `query` alone.
+    `muted`: reports are counted and remembered, but not sent; only `query` reports what
+    happened while no executive was there.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class Links:
         self._cuts: dict[ResourceId, int] = {}
 
     def up(self, vehicle: ResourceId) -> bool:
-        """Whether the vehicle is heard."""
+        """Whether the link to the vehicle is up."""
         return vehicle not in self._broken
 
     def lost(self, vehicle: ResourceId) -> bool:
@@ -40,7 +40,7 @@ class Links:
         return vehicle in self._broken and self._broken[vehicle].lost
 
     def broken_of(self, execution: Execution) -> ResourceId | None:
-        """The first of a behavior's vehicles that is not heard."""
+        """The first of a behavior's vehicles whose link is lost."""
         return next((vehicle for vehicle in execution.carriers if not self.up(vehicle)), None)
 
     def report(self, execution: Execution, outcome: Outcome) -> None:

@@ -75,7 +75,7 @@ class LocalParameters(BehaviorParameters):
         """How a vehicle stands now.
 
         Raises:
-            RefusedError: it was never heard.
+            RefusedError: it has not reported its position yet.
         """
         pose = self._pose_of_vehicle(vehicle)
         if pose is None:
@@ -90,9 +90,9 @@ class LocalParameters(BehaviorParameters):
         return self._lifted(craft, altitude, self.altitude_frame)
 
     def _up(self, craft: Craft, place: Coordinate, frame: str, up_m: float) -> float:
-        wished = self.up_m(craft)
-        if wished is not None:
-            return wished
+        requested = self.up_m(craft)
+        if requested is not None:
+            return requested
         return up_m if place[2] is None else self._lifted(craft, place[2], frame)
 
     def _lifted(self, craft: Craft, altitude_m: float, frame: str) -> float:

@@ -18,7 +18,7 @@ ORBIT_RADIUS_M = 30.0
 STANDOFF_M = 20.0
 FOLLOW_OFFSET_M = 15.0
 ACTUATOR_S = 2.0
-"""What a behavior's parameters are when nobody says."""
+"""The defaults of a behavior's parameters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,10 @@ def under_way(craft: Craft, up_m: float | None) -> Course:
 
 
 def flying_height(craft: Craft, parameters: LocalParameters) -> float:
-    """The height to move at: as wished, else the present one, else that of a take-off."""
-    wished = parameters.up_m(craft)
-    if wished is not None:
-        return wished
+    """The height to move at: as requested, else the present one, else that of a take-off."""
+    requested = parameters.up_m(craft)
+    if requested is not None:
+        return requested
     if craft.flies and not craft.aloft:
         return craft.home[2] + craft.kinematics.default_altitude_m
     return craft.pose.place[2]
@@ -193,7 +193,7 @@ def _follow(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
         raise RefusedError("parameter 'target': another vehicle is expected")
     offset, bearing = parameters.offset_m, parameters.bearing_rad
     up = flying_height(craft, parameters)
-    parameters.pose_of(vehicle)  # refused here if nobody knows where it is
+    parameters.pose_of(vehicle)  # refused here if its position is not known
     pursuit = Pursuit(
         vehicle,
         FOLLOW_OFFSET_M if offset is None else offset,

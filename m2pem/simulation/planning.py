@@ -101,7 +101,7 @@ class Planner:
         self._bodies = bodies
 
     def pose_of(self, vehicle: str, now_us: int) -> Pose | None:
-        """How a vehicle stands: a simulated one, or as it was heard on the bus."""
+        """Return the pose of a vehicle: of a simulated one, or by its telemetry on the bus."""
         body = self._bodies.get(ResourceId(vehicle))
         if isinstance(body, SimVehicle):
             return body.pose(now_us)
@@ -201,7 +201,7 @@ class Planner:
 
 
 def _type(behavior: str) -> BehaviorType | None:
-    """Whether a behavior is a vehicle's or a payload's; None: nobody has it."""
+    """Whether a behavior is a vehicle's or a payload's; None: it is in no catalogue."""
     if behavior in GAZES:
         return BehaviorType.PAYLOAD
     return BehaviorType.VEHICLE if behavior in MANOEUVRES else None

@@ -62,7 +62,7 @@ STEP_US = round(STEP_S * US_PER_S)
 
 
 def next_step(part: Part, planner: Planner, now_us: int) -> None:
-    """Give the body its motion until it looks again; a target that is not heard is waited for."""
+    """Give the body its motion until it looks again; it waits for a target without telemetry."""
     body = part.body
     if isinstance(body, SimVehicle) and isinstance(part.chase, Pursuit):
         pose = body.pose(now_us)
@@ -93,8 +93,11 @@ def next_step(part: Part, planner: Planner, now_us: int) -> None:
             body.take(Plan([aimed(gimbal, body.look(now_us), carrier, place)]), now_us)
 
 
+SCRIPTED = "a fault of the simulation"
+"""The reason of what a fault of the fleet, or an answer, made fail."""
+
 LONGEST_CATCH_UP_US = 3_600_000_000
-"""A pursuit that nobody watched for longer begins again where it was so long ago."""
+"""A pursuit that was not observed for longer begins again where it was so long ago."""
 
 ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "reverse"})
 """Behaviors whose speed can be changed on the way: they are over at a place, not after a time."""
@@ -103,7 +106,7 @@ ADJUSTABLE = frozenset({"single_vehicle_routing", "goto", "area_survey", "revers
 class Simulation:
     """Knows every behavior, running or remembered. All calls are made at their time `now_us`.
 
-    `changed` is told of every body whose motion changes. `lose_link` is called with the vehicle
+    `changed` is called with every body whose motion changes. `lose_link` is called with the vehicle
     by the fault of that name.
     """
 
@@ -170,7 +173,7 @@ class Simulation:
         execution.cancelling = True
         execution.forget_timers()
         if execution.deaf:
-            # Known to `query`, said to nobody.
+            # Known to `query`, but not reported.
             execution.next_report(Outcome(BehaviorState.CANCELLED))
             self._finish(execution, Outcome(BehaviorState.CANCELLED), now_us)
             return
@@ -229,7 +232,7 @@ class Simulation:
         """Go on with behaviors from a file: all that they did since is scheduled, as past."""
         for execution in executions:
             if any(resource not in self._bodies for resource in execution.resources):
-                continue  # the fleet has changed: nobody can tell any more
+                continue  # the fleet has changed: it cannot be known any more
             self.memory.register(execution)
             if execution.outcome is not None and not execution.reported_end:
                 self._links.report(execution, execution.outcome)
@@ -320,7 +323,7 @@ class Simulation:
         self.memory.save(execution)
 
     def _with_shots(self, execution: Execution, outcome: Outcome, now_us: int) -> Outcome:
-        """With what was taken; of a camera that is lost, nobody has it."""
+        """Report what was taken, unless the link to the camera is lost."""
         shots = execution.shots
         if shots is None or outcome.state in (BehaviorState.LOST, BehaviorState.REJECTED):
             return outcome
@@ -336,7 +339,7 @@ class Simulation:
 
     def _struck(self, execution: Execution, strike: Strike, now_us: int) -> None:
         execution.timer = None
-        code, reason = strike.error, "as the simulation was told"
+        code, reason = strike.error, SCRIPTED
         match strike.end:
             case "failed":
                 outcome = Outcome(BehaviorState.FAILED, code or "FAILED", reason)
@@ -455,7 +458,7 @@ class Simulation:
         self._tell_changed(body, now_us)
 
     def _settle(self, body: Body, now_us: int) -> None:
-        """A body comes to rest by itself: tell now, and once more when it stands."""
+        """A body comes to rest by itself: report now, and again when it stands."""
         self._changed(body, now_us)
         track, end_us = body.track, body.track.end_us
         if end_us is not None and end_us > now_us:
@@ -466,7 +469,7 @@ class Simulation:
             self._changed(body, now_us)
 
     def _drained(self, vehicle: SimVehicle, now_us: int) -> None:
-        """The battery reached the next level: tell, and stop when it is empty."""
+        """The battery reached the next level: report, and stop when it is empty."""
         if vehicle.battery_at(now_us) <= 0:
             execution = self.memory.executions.get(vehicle.behavior)
             if execution is not None:

@@ -103,8 +103,8 @@ class LinkMonitor:
         for resource, link in self._links.items():
             silence_us = now_us - link.received_us
             if not link.lost and silence_us > link.bound_us:
-                what = "never heard since connecting" if link.never_received else "not heard"
-                reason = f"{what} for {silence_us / US_PER_S:.1f} s"
+                since = " since connecting," if link.never_received else ""
+                reason = f"no telemetry{since} for {silence_us / US_PER_S:.1f} s"
                 faults.append(self._lose(resource, link, reason))
         self._next_check_us = self._first_due(now_us)
         return faults

@@ -92,7 +92,9 @@ def test_a_vehicle_that_is_lost_again_meanwhile_is_told_when_it_returns(play):
         world.fake.hangs.clear()
         held = world.fake.count("hold", "ugv1")
         refused = await refusal(world)
-        assert world.fake.count("hold", "ugv1") == held, "nothing is sent to who is not heard"
+        assert world.fake.count("hold", "ugv1") == held, (
+            "nothing is sent to a vehicle without a link"
+        )
         says(world)
         await world.fake.until_called("hold", "ugv1", held + 1)
         return refused

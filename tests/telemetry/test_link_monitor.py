@@ -41,14 +41,14 @@ def test_silence_beyond_the_bound_is_one_fault() -> None:
     rules = LinkMonitor({UGV: 3.0}, since_us=0)
     rules.received(vehicle(), 10 * S)
     assert run_checks(rules, 13 * S) == []
-    assert run_checks(rules, 60 * S) == [lost(UGV, "not heard for 3.0 s")]
+    assert run_checks(rules, 60 * S) == [lost(UGV, "no telemetry for 3.0 s")]
 
 
 def test_a_resource_never_heard_is_lost_only_its_bound_after_connecting() -> None:
     rules = LinkMonitor({UGV: 3.0}, since_us=100 * S)
     assert rules.next_check_us == 103 * S + 1
     assert run_checks(rules, 103 * S) == []
-    assert run_checks(rules, 104 * S) == [lost(UGV, "never heard since connecting for 3.0 s")]
+    assert run_checks(rules, 104 * S) == [lost(UGV, "no telemetry since connecting, for 3.0 s")]
 
 
 def test_each_resource_has_its_own_bound_and_faults_come_in_the_fleets_order() -> None:
@@ -72,7 +72,7 @@ def test_the_same_loss_is_said_again_only_after_it_was_heard_for_its_bound() -> 
     assert run_checks(rules, 19 * S) == []
     for second in (20, 21, 22):
         rules.received(vehicle(), second * S)
-    assert run_checks(rules, 40 * S) == [lost(UGV, "not heard for 2.0 s")]
+    assert run_checks(rules, 40 * S) == [lost(UGV, "no telemetry for 2.0 s")]
 
 
 def test_a_gap_begins_the_recovery_anew() -> None:
@@ -115,7 +115,7 @@ def test_a_check_that_comes_late_first_lets_the_waiting_states_be_heard() -> Non
 def test_checks_that_always_come_late_still_find_who_is_silent() -> None:
     rules = LinkMonitor({UGV: 3.0}, since_us=0)
     assert rules.check(20 * S) == []
-    assert rules.check(40 * S) == [lost(UGV, "never heard since connecting for 40.0 s")]
+    assert rules.check(40 * S) == [lost(UGV, "no telemetry since connecting, for 40.0 s")]
 
 
 def test_a_check_before_its_time_changes_nothing() -> None:
