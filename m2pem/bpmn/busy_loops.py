@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import TypeAlias
 
 from m2pem.bpmn.data_names import written_by
-from m2pem.bpmn.interruptions import Surroundings
 from m2pem.bpmn.rules.loops import BUSY_LOOP, ENDLESS_LOOP
 from m2pem.findings import Finding
 from m2pem.mission.behavior import Assignment, ThrowError
@@ -31,6 +30,7 @@ from m2pem.mission.elements import (
     IntermediateCatchEvent,
     IntermediateThrowEvent,
     ParallelGateway,
+    Process,
     ReceiveTask,
     ScriptTask,
     SendTask,
@@ -531,10 +531,29 @@ def _ends_its_scope(node: FlowNode) -> bool:
 
 def _ending(mission: Mission, group: Sequence[FlowNode]) -> FlowNode | None:
     """Return the event, of the loop's scope or one around it, that can end the scope."""
-    for container, events in Surroundings(mission).of(group[0].container):
-        ending = [node for node in container.nodes if _ends_its_scope(node)] + events
-        if ending:
-            return ending[0]
+    callers: dict[Process, list[CallActivity]] = {}
+    for node in mission.nodes:
+        if isinstance(node, CallActivity):
+            callers.setdefault(node.called, []).append(node)
+    waiting: list[Container] = [group[0].container]
+    for container in waiting:  # grows while it is read
+        for node in container.nodes:
+            if _ends_its_scope(node):
+                return node
+        for each in container.event_subprocesses:
+            if each not in waiting and any(start.interrupting for start in each.starts):
+                return each
+        around: list[Activity] = (
+            [container] if isinstance(container, SubProcess) else list(callers.get(container, []))
+        )
+        for activity in around:
+            for event in activity.boundary:
+                if event.interrupting and not any(
+                    isinstance(each, CompensateEventDefinition) for each in event.definitions
+                ):
+                    return event
+            if activity.container not in waiting:
+                waiting.append(activity.container)
     return None
 
 

@@ -5,22 +5,18 @@ and have no end: those load, and are errors of `check`.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache
 
 from m2pem.bpmn import garbage_collection
 from m2pem.bpmn.busy_loops import busy_loops
 from m2pem.bpmn.data_names import unwritten
-from m2pem.bpmn.interruptions import Surroundings
-from m2pem.bpmn.rules.activities import CALL_RECURSION, ONE_DECISION
+from m2pem.bpmn.rules.activities import CALL_RECURSION
 from m2pem.bpmn.rules.events import OUTSIDE_ONLY
 from m2pem.bpmn.rules.gateways import NO_CONDITIONS
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.sequence_flows import unreachable
 from m2pem.findings import Finding
-from m2pem.mission.behavior import CONFIRMATION
 from m2pem.mission.elements import (
     Activity,
-    BoundaryEvent,
     CallActivity,
     Container,
     EndEvent,
@@ -33,28 +29,17 @@ from m2pem.mission.elements import (
     ReceiveTask,
     SendTask,
     SubProcess,
-    UserTask,
 )
 from m2pem.mission.events import (
-    ConditionalEventDefinition,
     EventDefinition,
     Message,
     MessageEventDefinition,
     Signal,
     SignalEventDefinition,
-    TimerEventDefinition,
 )
 from m2pem.mission.loops import MultiInstance
 from m2pem.mission.mission import Mission
 from m2pem.mission.reachability import components, unreached
-
-_COMING = (
-    ConditionalEventDefinition,
-    MessageEventDefinition,
-    SignalEventDefinition,
-    TimerEventDefinition,
-)
-"""What can come to an activity that only waits."""
 
 
 def lint(
@@ -74,7 +59,6 @@ def lint(
             *_unreachable(mission),
             *_undecided_gateways(mission),
             *_outside_only(mission),
-            *_one_decision(mission),
             *_recursion(mission),
             *busy_loops(mission, known_names),
             *unwritten(mission, known_names, service_writes or {}, behavior_writes or {}),
@@ -183,48 +167,6 @@ def _named(definitions: Iterable[EventDefinition]) -> Iterator[Signal | Message]
             yield definition.signal
         elif isinstance(definition, MessageEventDefinition):
             yield definition.message
-
-
-# --- prompts ------------------------------------------------------------------------------------
-
-
-def _one_decision(mission: Mission) -> Iterator[Finding]:
-    """Prompts that leave an operator no choice; `Done`, of tasks that say nothing, is none."""
-    around = Surroundings(mission)
-
-    @cache
-    def interrupted(container: Container) -> bool:
-        return any(events for _, events in around.of(container))
-
-    for node in mission.nodes:
-        if not isinstance(node, UserTask):
-            continue
-        prompt = node.prompt
-        if (
-            prompt is not None
-            and len(prompt.decisions) == 1
-            and prompt.decisions != CONFIRMATION
-            and prompt.timeout is None
-            and not any(_interrupts_the_wait(each) for each in node.boundary)
-            and not interrupted(node.container)
-        ):
-            (decision,) = prompt.decisions
-            yield _warning(
-                mission,
-                node,
-                ONE_DECISION,
-                (
-                    f"the operator can only answer '{decision.label}', and nothing else ends the "
-                    "wait for that",
-                    "offer another decision, such as abort, or give a timeout; what an operator is "
-                    "only to confirm needs no decision",
-                ),
-            )
-
-
-def _interrupts_the_wait(event: BoundaryEvent) -> bool:
-    """Errors do not: a prompt without a timeout has none."""
-    return event.interrupting and any(isinstance(each, _COMING) for each in event.definitions)
 
 
 # --- calls --------------------------------------------------------------------------------------

@@ -32,15 +32,7 @@ from m2pem.bpmn.xml import (
     parse_xml,
 )
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.behavior import (
-    CONFIRMATION,
-    Behavior,
-    Decision,
-    Parameter,
-    Prompt,
-    Script,
-    ServiceCall,
-)
+from m2pem.mission.behavior import Behavior, Decision, Parameter, Prompt, Script, ServiceCall
 from m2pem.mission.elements import (
     BusinessRuleTask,
     ManualTask,
@@ -205,6 +197,7 @@ def _message(context: ReadingContext, found: Children) -> Message | None:
 _USED = frozenset({"userTask", "prompt", "decision"})
 _SETTINGS = ("store", "role", "timeout")
 _DEFAULT_STORE = "user.decision"
+_DONE = (Decision("done", "Done"),)
 
 
 def read_user_task(context: ReadingContext, found: Children) -> UserTask:
@@ -237,7 +230,7 @@ def resolve_prompts(context: ReadingContext) -> None:
                 asked.data_object(source, own_decisions=own > 0)
         prompt = Prompt(
             asked.text or pending.documentation or pending.task.label,
-            tuple(asked.decisions) or CONFIRMATION,
+            tuple(asked.decisions) or _DONE,
             asked.found.get("store", _DEFAULT_STORE),
             asked.found.get("role", ""),
             asked.timeout,

@@ -94,10 +94,6 @@ class Decision:
     label: str
 
 
-CONFIRMATION = (Decision("done", "Done"),)
-"""What a prompt offers whose task names no decision."""
-
-
 @dataclass(frozen=True, slots=True)
 class Prompt:
     """What a user task asks an operator (paper, section 4.1).

@@ -61,14 +61,6 @@ EMPTY_SCRIPT = Rule(
     "a script task has no script",
     "write one, or make it a plain task",
 )
-ONE_DECISION = Rule(
-    315,
-    "one-decision",
-    "missions.md",
-    W,
-    "a prompt offers one decision, and nothing but the answer ends the wait for it",
-    "offer another decision, or give a timeout",
-)
 CALL_RECURSION = Rule(
     310,
     "call-recursion",
