@@ -10,6 +10,7 @@ from m2pem import load_fleet
 from m2pem.api.control import MissionControl, OpenPrompt, RunSummary
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import simulated_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.mission.values import Value
 from m2pem.plugins import PluginManager
@@ -31,10 +32,8 @@ async def operate(control: MissionControl, route: Mapping[str, Value] | None) ->
 
 async def drive(route: Mapping[str, Value] | None, clock: VirtualClock) -> RunSummary:
     """Run the mission once, with the operator at its side."""
-    fleet = load_fleet(HERE / "fleet.yaml")
-    async with Executive(
-        fleet, MemoryJournal(), PluginManager(), clock, simulated=True
-    ) as executive:
+    fleet = simulated_fleet(load_fleet(HERE / "fleet.yaml"))
+    async with Executive(fleet, MemoryJournal(), PluginManager(), clock) as executive:
         operator = asyncio.create_task(operate(executive.control, route))
         run = await executive.control.start(HERE / "mission.bpmn", by="hand_over.py")
         summary = await executive.control.wait(run)

@@ -13,6 +13,7 @@ from m2pem.api.control import ControlEvent, RunSummary, StampedRecord
 from m2pem.engine.records import Record
 from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import simulated_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 
@@ -40,10 +41,8 @@ async def watch(notices: AsyncIterator[ControlEvent]) -> None:
 
 async def steer(clock: Clock) -> RunSummary:
     """Start a patrol, pause it for a minute, and call it home."""
-    fleet = load_fleet(HERE / "fleet.yaml")
-    async with Executive(
-        fleet, MemoryJournal(), PluginManager(), clock, simulated=True
-    ) as executive:
+    fleet = simulated_fleet(load_fleet(HERE / "fleet.yaml"))
+    async with Executive(fleet, MemoryJournal(), PluginManager(), clock) as executive:
         control = executive.control
         watching = asyncio.create_task(watch(control.subscribe()))
         run = await control.start(HERE / "mission.bpmn", by="steer.py")

@@ -28,7 +28,7 @@ COMMANDS = {
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",
     "runs": "List the runs of a journal.",
-    "replay": "Print what happened in a run, and how it stands.",
+    "replay": "Print the records of a run, and its state.",
     "resume": "Take up a run that was interrupted.",
     "answer": "Answer a prompt of a run that is running on this host.",
     "signal": "Send a signal to a run that is running on this host.",

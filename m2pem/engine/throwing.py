@@ -57,7 +57,7 @@ def throw_error(
         end_run(
             x,
             RunOutcome.FAILED,
-            f"no event catches error {code} from {node.id}{because}",
+            f"error {code} from {node.id}, which no event catches{because}",
             failed,
         )
     else:

@@ -105,7 +105,7 @@ def test_an_error_that_no_event_catches_fails_the_run_and_cancels_every_behavior
         leave b terminated; leave c terminated; close sub terminated
         leave a terminated; leave sub terminated; close MAIN failed
     """)
-    assert play.detail == "no event catches error E from bad: thrown by Oh no"
+    assert play.detail == "error E from bad, which no event catches: thrown by Oh no"
     assert sorted(play.orders()) == ["cancel b1", "cancel b2", "cancel s1", "close p1 done"]
     play.report("b1", CANCELLED).report("b2", CANCELLED)
     assert not play.run.state.behaviors

@@ -93,7 +93,7 @@ def test_a_cardinality_may_be_any_expression_that_gives_a_natural_number() -> No
 def test_another_cardinality_is_an_error_that_says_what_it_is(text: str, said: str) -> None:
     play = scripted(f"<each>{text}</each>", "x = 1")
     assert play.ended == "failed"
-    assert "no event catches error EXPRESSION from t: instances of t: the card" in play.detail
+    assert "error EXPRESSION from t, which no event catches: instances of t: the" in play.detail
     assert said in play.detail
 
 

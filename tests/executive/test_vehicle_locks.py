@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import pytest
 
-from m2pem.api import ArbiterContext
+from m2pem.api import ArbiterCapabilities, ArbiterContext
 from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
 from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
@@ -23,6 +23,8 @@ class Unaddressed:
 
 class Addressed(Unaddressed):
     """An arbiter that knows a vehicle by its radio alone."""
+
+    capabilities = ArbiterCapabilities(addresses=True)
 
     def __init__(self, radio: str) -> None:
         self._radio = radio

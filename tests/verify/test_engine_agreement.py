@@ -103,4 +103,4 @@ def test_the_runs_that_violate_a_property_can_be_played_to_the_engine() -> None:
     for violation in failures.violations:
         played = play(mission, fleet_for(mission), report.net, violation.run)
         assert played.agrees, played.stopped
-        assert "no event catches error" in played.steps[-1].records[-1].detail  # type: ignore[union-attr]
+        assert "which no event catches" in played.steps[-1].records[-1].detail  # type: ignore[union-attr]

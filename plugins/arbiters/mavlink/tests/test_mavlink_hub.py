@@ -145,7 +145,7 @@ async def test_if_one_endpoint_cannot_be_opened_the_others_are_closed() -> None:
 
 
 async def test_a_vehicle_with_no_url_is_an_error() -> None:
-    with pytest.raises(PluginError, match="no URL"):
+    with pytest.raises(PluginError, match="needs a URL"):
         await open_link(Address(1, 1), [], HandClock())
 
 

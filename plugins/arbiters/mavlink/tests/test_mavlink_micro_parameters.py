@@ -94,7 +94,7 @@ def test_other_parameters_and_other_components_are_not_meant() -> None:
 def test_a_name_that_none_can_have_is_not_asked_for(name: str) -> None:
     played = run(ReadParameter(VEHICLE, name), vehicle())
     assert type(played.error) is ExchangeError
-    assert "is no name of a parameter" in played.error.reason
+    assert "is not a parameter name" in played.error.reason
     assert played.sent == []
 
 

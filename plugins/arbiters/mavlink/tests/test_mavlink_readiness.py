@@ -63,7 +63,7 @@ def test_prearm_texts_are_the_reasons_of_a_check_that_fails() -> None:
     texts = ("PreArm: Compass not healthy", "EKF3 active", "PreArm: Compass not healthy")
     assert reasons(ARDUPILOT, failing, *texts) == ("prearm: Compass not healthy",)
     assert reasons(ARDUPILOT, READY, *texts) == ()
-    assert "does not say which" in reasons(ARDUPILOT, failing)[0]
+    assert "does not report which" in reasons(ARDUPILOT, failing)[0]
     assert reasons(PX4, failing, "Preflight Fail: no RC") == ("prearm: no RC",)
     assert reasons(PX4, failing, "Preflight: GPS fix too low") == ("prearm: GPS fix too low",)
 

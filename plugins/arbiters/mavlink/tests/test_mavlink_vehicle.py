@@ -80,7 +80,7 @@ def test_an_autopilot_that_cannot_be_driven_is_told_of_once(
         await vehicle.close()
 
     virtual(main)
-    assert caplog.text.count("system id 1 is no vehicle with ArduPilot or PX4") == 1
+    assert caplog.text.count("system id 1 is not a vehicle with ArduPilot or PX4") == 1
 
 
 def test_a_second_vehicle_with_the_same_id_is_told_of(

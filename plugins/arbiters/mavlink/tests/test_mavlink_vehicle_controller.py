@@ -324,7 +324,7 @@ def test_a_lost_vehicle_that_comes_back_in_a_failsafe_is_not_interrupted(mode) -
         await bench.clock.sleep(1)
         told = list(bench.told)
         why = await bench.arbiter.reclaim(V)
-        assert "which is not interrupted: free when it stands" in why
+        assert "is not interrupted: free when it stops" in why
         assert mode.name in why.upper()
         while await bench.arbiter.reclaim(V):
             await bench.clock.sleep(1)

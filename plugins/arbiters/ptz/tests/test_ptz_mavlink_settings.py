@@ -35,8 +35,8 @@ def test_all_of_it_can_be_said():
 @pytest.mark.parametrize(
     ("own", "said"),
     [
-        ({"url": None}, "connection.url: None is no URL such as udpin://127.0.0.1:14550"),
-        ({"url": []}, "connection.url: [] is no URL"),
+        ({"url": None}, "connection.url: None is not a URL; write that of the vehicle"),
+        ({"url": []}, "connection.url: [] is not a URL"),
         ({"system_id": None}, "connection.system_id: it is missing"),
         ({"system_id": 256}, "connection.system_id: 256 is not a whole number from 1 to 255"),
         ({"system_id": True}, "connection.system_id: True is not a whole number"),

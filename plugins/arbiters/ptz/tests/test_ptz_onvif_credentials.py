@@ -73,9 +73,9 @@ def test_what_is_no_file_is_refused_at_once(tmp_path):
         read_credentials(tmp_path / "gone.yaml")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe, 0o600)
-    with pytest.raises(PluginError, match=r"this is no file"):
+    with pytest.raises(PluginError, match=r"this is not a file"):
         read_credentials(pipe)
-    with pytest.raises(PluginError, match=r"this is no file|cannot be read"):
+    with pytest.raises(PluginError, match=r"this is not a file|cannot be read"):
         read_credentials(tmp_path)
 
 

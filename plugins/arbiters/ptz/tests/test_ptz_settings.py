@@ -58,7 +58,7 @@ def test_reach_and_mounting_carry_units():
     ("settings", "problem"),
     [
         ({}, "driver: it is missing; write one of ros, mavlink, onvif"),
-        ({"driver": "mavsdk"}, "driver: 'mavsdk' is not a driver of cameras; write one of  "),
+        ({"driver": "mavsdk"}, "driver: 'mavsdk' is not a driver of cameras; write one of ros, "),
         ({"mountin": {}}, "mountin: there is no such setting; did you mean 'mounting'?"),
         ({"reach": 5}, "reach: 5 is not a map; known in it: pan, tilt"),
         ({"reach": {"pann": 1}}, "reach.pann: there is no such setting; did you mean 'pan'?"),

@@ -109,5 +109,5 @@ async def test_a_screen_that_breaks_is_told(world: World, monkeypatch: pytest.Mo
         raise RuntimeError("a bug")
 
     monkeypatch.setattr("m2pem_plugin_terminal.display.Display.show", broken)
-    with pytest.raises(PluginError, match="broke"):
+    with pytest.raises(PluginError, match="the screen of the terminal unit failed"):
         await TerminalOcu(world.control).serve()

@@ -35,9 +35,9 @@ def tls(tmp_path: Path) -> dict[str, str]:
 
 def test_tls_alone_or_users_alone_are_not_enough(tls: dict[str, str]) -> None:
     host = {"M2PEM_WEB_HOST": "10.0.0.5"}
-    with pytest.raises(SettingError, match="needs named users"):
+    with pytest.raises(SettingError, match="requires named users"):
         read_settings({**host, **tls})
-    with pytest.raises(SettingError, match="needs TLS"):
+    with pytest.raises(SettingError, match="requires TLS"):
         read_settings({**host, "M2PEM_WEB_USERS": "users.json"})
 
 

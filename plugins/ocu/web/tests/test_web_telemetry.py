@@ -161,7 +161,7 @@ async def test_a_broken_disk_is_said_once_and_stops_nothing(
         assert f"the track of {run} cannot be written" in page["problem"]
         assert str(tmp_path) not in page["problem"]
         assert page["samples"] == []
-    said = [each for each in caplog.records if "cannot be kept" in each.getMessage()]
+    said = [each for each in caplog.records if "cannot be written" in each.getMessage()]
     assert [each.levelno for each in said] == [logging.WARNING]
 
 

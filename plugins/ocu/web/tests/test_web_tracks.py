@@ -261,9 +261,9 @@ def test_files_are_their_owners_alone_and_of_runs_alone(
     assert path.stat().st_mode & 0o777 == 0o600
     assert path.parent.stat().st_mode & 0o777 == 0o700
     for name in ("../r1", "r1/../r2", "", "r0", "r01", "R1", "r1\n", "/r1", "r" + "9" * 30):
-        with pytest.raises(OSError, match="no run"):
+        with pytest.raises(OSError, match="is not the id of a run"):
             folder.read(name)
-        with pytest.raises(OSError, match="no run"):
+        with pytest.raises(OSError, match="is not the id of a run"):
             folder.remove(name)
     (path.parent / "notes.jsonl").touch()
     assert list(folder.runs()) == ["r1"]
