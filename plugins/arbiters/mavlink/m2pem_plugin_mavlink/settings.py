@@ -90,7 +90,8 @@ def _urls(resource: ResourceId, value: Any) -> tuple[str, ...]:
     for url in urls:
         scheme = url.partition("://")[0] if isinstance(url, str) and "://" in url else ""
         if scheme not in SCHEMES:
-            raise _error(resource, "url", f"{url!r} is no URL of {', '.join(SCHEMES)}, {example}")
+            schemes = ", ".join(SCHEMES)
+            raise _error(resource, "url", f"{url!r} is not a URL of {schemes}, {example}")
     return tuple(urls)
 
 

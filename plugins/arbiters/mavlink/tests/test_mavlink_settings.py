@@ -36,7 +36,7 @@ def test_a_vehicle_may_be_heard_over_several_endpoints() -> None:
     [
         ({"system_id": 1}, "uav1: connection.url: a MAVLink vehicle needs one"),
         ({"url": [], "system_id": 1}, "connection.url"),
-        ({"url": "127.0.0.1:14550", "system_id": 1}, "connection.url: '127.0.0.1:14550' is no URL"),
+        ({"url": "127.0.0.1:14550", "system_id": 1}, "url: '127.0.0.1:14550' is not a URL"),
         ({"url": "http://x", "system_id": 1}, "connection.url"),
         ({"url": 7, "system_id": 1}, "connection.url"),
         ({"url": URL}, "uav1: connection.system_id: it is missing"),

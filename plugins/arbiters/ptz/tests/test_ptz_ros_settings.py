@@ -44,7 +44,7 @@ def test_all_of_it_can_be_said():
         ({"joints": ["a"]}, "connection.joints: ['a'] is not a map such as {pan: pan_joint"),
         ({"joints": {"pann": "a"}}, "connection.joints.pann: there is no such setting; did you"),
         ({"joints": {"pan": "tilt_joint"}}, "connection.joints: two joints have the same name"),
-        ({"joints": {"reversed": ["zoom"]}}, "connection.joints.reversed: ['zoom'] is no list of"),
+        ({"joints": {"reversed": ["zoom"]}}, "joints.reversed: ['zoom'] is not a list of"),
         ({"image": "my image"}, "connection.image: 'my image' is not the name of a ROS topic"),
         ({"namespace": "/a b"}, "connection.namespace: 'a b' is not a ROS namespace"),
         ({"domain_id": 300}, "connection.domain_id: 300 is not a whole number from 0 to 232"),

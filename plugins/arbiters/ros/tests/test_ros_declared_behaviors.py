@@ -114,7 +114,7 @@ REFUSED = [
     ({"sweep": {"ends": "no"}}, r"\.ends: 'no' is neither true nor false"),
     ({"sweep": {"doc": 5}}, r"\.doc: 5 is not a text"),
     ({"sweep": {"writes": "dust"}}, r"\.writes: 'dust' is not a list of names"),
-    ({"sweep": {"writes": ["so much"]}}, r"\.writes: 'so much' is no name of the data store"),
+    ({"sweep": {"writes": ["so much"]}}, r"\.writes: 'so much' is not a name of the data store"),
     ({"sweep": {"required_one_of": ["route"]}}, r"\.required_one_of: .* is not a list of lists"),
     ({"sweep": {"required_one_of": [["route"]]}}, r"\.required_one_of: 'route' is none of"),
     (parameter(required=True), r"\.p\.kind: it is missing: one of duration, "),

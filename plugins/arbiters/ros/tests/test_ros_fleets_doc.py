@@ -78,7 +78,7 @@ def test_every_setting_is_explained() -> None:
 
 
 def test_every_bound_is_explained_and_no_other() -> None:
-    table = TEXT.split("| `bounds` | usual")[1].split("\n\n")[0]
+    table = TEXT.split("| `bounds` | default")[1].split("\n\n")[0]
     assert re.findall(r"^\| `(\w+)`", table, re.MULTILINE) == list(BOUNDS)
 
 

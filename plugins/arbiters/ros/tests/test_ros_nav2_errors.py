@@ -19,7 +19,7 @@ from m2pem_plugin_ros.pose import Pose
         (9003, "TIMEOUT", "took too long"),
         (202, "FAILED", "transform"),
         (4711, "FAILED", "unknown reason (error 4711)"),
-        (0, "FAILED", "did not say why"),
+        (0, "FAILED", "without a reason"),
     ],
 )
 def test_error_codes_of_nav2_become_codes_of_missions(

@@ -99,7 +99,7 @@ def test_names_are_in_the_namespace_unless_they_are_full() -> None:
         ({**LEAST, "driver": "base", "via": "action"}, "connection.via: the key is for the driver"),
         ({**LEAST, "route_action": "through"}, "route_action: the key is for the driver nav2"),
         ({**LEAST, "topics": {"odmo": "x"}}, "connection.topics.odmo: there is no such"),
-        ({**LEAST, "topics": {"odom": "a b"}}, "connection.topics.odom: 'a b' is no name of a ROS"),
+        ({**LEAST, "topics": {"odom": "a b"}}, "topics.odom: 'a b' is not the name of a ROS"),
         ({**LEAST, "topics": "odom"}, "connection.topics: 'odom' is not a map"),
         ({**LEAST, "odom_frame": "earth"}, "connection.odom_frame: 'earth' is none of map, odom"),
         ({**LEAST, "stamped": "yes"}, "connection.stamped: 'yes' is neither true nor false"),

@@ -242,7 +242,7 @@ def _frame(resource: ResourceId, domain: str, sitl: SitlSettings) -> Frame | str
     name = sitl.frame or known[0]
     if name not in known:
         raise PluginError(
-            f"{resource}: connection.sitl.frame: '{name}' is no frame for a vehicle of domain "
+            f"{resource}: connection.sitl.frame: '{name}' is not a frame of a vehicle of domain "
             f"{domain}; known: {', '.join(known)}"
         )
     return FRAMES[name]
