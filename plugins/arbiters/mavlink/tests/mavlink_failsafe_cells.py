@@ -14,6 +14,7 @@ HIGH_M = 12.0
 FAR_M = 35.0
 """Beyond the fence of a rover."""
 MODE = dialect.MAV_CMD_DO_SET_MODE
+OFF = dialect.FAILURE_TYPE_OFF
 VOLTS = "SIM_BATT_VOLTAGE"
 UP: tuple[str, Mapping[str, object]] = ("takeoff", {"altitude": "30 m"})
 GO: tuple[str, Mapping[str, object]] = ("goto", {"target": NORTH})
@@ -64,6 +65,16 @@ def _charge(left: float) -> Act:
 
 def _no_satellites(play: Play) -> None:
     play.station.satellites(False)
+
+
+def _pilot(play: Play) -> None:
+    """Seen by the autopilot before the failsafe, also if that comes before the mission."""
+    play.station.sticks = True
+    play.station.watch(5.0)
+
+
+def _no_pilot(play: Play) -> None:
+    play.station.sticks = False
 
 
 def _slowly(parameter: str, value: float) -> Act:
@@ -289,7 +300,18 @@ PX4 = Vehicle(
         Failsafe("battery critical, RTL", {"COM_LOW_BAT_ACT": 3}, _charge(0.06)),
         Failsafe("battery emergency, LAND", {"COM_LOW_BAT_ACT": 3}, _charge(0.03)),
         Failsafe("no GPS", {}, _no_satellites),
+        Failsafe(
+            "manual control of the pilot lost, RTL",
+            {"COM_RC_IN_MODE": 1, "NAV_RCL_ACT": 2, "COM_RCL_EXCEPT": 0, "COM_RC_LOSS_T": 4},
+            _no_pilot,
+            prepare=_pilot,
+        ),
         Failsafe("fence breached, RTL", {"GF_ACTION": 3}, _slowly("GF_MAX_VER_DIST", 10)),
+        Failsafe(
+            "a motor fails",
+            {"SYS_FAILURE_EN": 1, "CA_FAILURE_MODE": 1},
+            _second(dialect.MAV_CMD_INJECT_FAILURE, dialect.FAILURE_UNIT_SYSTEM_MOTOR, OFF, 1),
+        ),
         Failsafe("a second ground station: mode LOITER", {}, _second(MODE, 1, 4, 3)),
         Failsafe("a second ground station: mode RTL", {}, _second(MODE, 1, 4, 5)),
         Failsafe("a second ground station: clears the mission", {}, _clear),

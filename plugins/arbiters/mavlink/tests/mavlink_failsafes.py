@@ -69,13 +69,15 @@ class Phase(NamedTuple):
 
 class Failsafe(NamedTuple):
     """`parameters`: set from the beginning; `cause`: brings it about; `end`: ends it after 20 s;
-    `phases`: in which it is played, if they are not those of all failsafes of the vehicle."""
+    `phases`: in which it is played, if they are not those of all failsafes of the vehicle;
+    `prepare`: what the second ground station does before the mission."""
 
     name: str
     parameters: Mapping[str, float]
     cause: Callable[["Play"], None]
     end: Callable[["Play"], None] = lambda play: None
     phases: tuple[Phase, ...] = ()
+    prepare: Callable[["Play"], None] = lambda play: None
 
 
 class Vehicle(NamedTuple):
@@ -226,6 +228,7 @@ def _played(
     s.connect()
     s.ready()
     vehicle.prepare(s)
+    failsafe.prepare(cell)
     if phase.before:
         failsafe.cause(cell)
         s.watch(3.0)

@@ -26,6 +26,13 @@ by its own ground station failsafe.
 Rovers say "Radio Failsafe" when it is the ground station that they have lost. m2pem commands
 heights above terrain only where a mission says `altitude_frame: terrain`, and serves no terrain
 data: a vehicle that has none does not move. Planes circle where copters stand.
+
+PX4 arms without manual control, and has then no failsafe for its loss until the pilot is there
+again. Its texts say "Failsafe activated" without the cause, and nothing where it lands or returns
+already; the cause is in its EVENT messages, which m2pem does not read. A simulated PX4 does not
+restart (it denies `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`, and every PX4 does while it is armed), and a
+PX4 takes no heights above terrain: no rows show these. Its motor 1 is stopped by
+`MAV_CMD_INJECT_FAILURE`, which PX4 does only where `CA_FAILURE_MODE` is not 0.
 """
 
 SET = """

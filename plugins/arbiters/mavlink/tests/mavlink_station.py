@@ -58,8 +58,11 @@ class Station(Recording):
         self.now_s = 0.0
         self.home: tuple[float, float, float] | None = None
         self.beats = True
+        self.sticks = False
+        """The second station sends those of a pilot, centred, ten times a second."""
         self._heard: list[Any] = []
         self._beaten_s = -math.inf
+        self._held_s = -math.inf
         self._senders = {
             system: dialect.MAVLink(None, system, GROUND_COMPONENT) for system in (OWN, SECOND)
         }
@@ -143,6 +146,9 @@ class Station(Recording):
                     dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3
                 )
             )
+        if self.sticks and self.now_s - self._held_s >= 0.1:
+            self._held_s = self.now_s
+            self.send(dialect.MAVLink_manual_control_message(self.system, 0, 0, 500, 0, 0), SECOND)
         for message in self.wire.receive():
             if message.get_type() == "BAD_DATA" or message.get_srcSystem() != self.system:
                 continue

@@ -19,6 +19,7 @@ CELLS = [
 ]
 RECORDED = [cell for cell in CELLS if cell[2] in KEPT.get(cell[0].name, {}).get(cell[1], {})]
 RETURNS = ("RTL", "LAND", "DESCEND")
+MOTORS = ("motors fail", "the motor fails", "a motor fails")
 
 
 def _named(cells: list[tuple[Vehicle, str, str]]) -> list[str]:
@@ -49,7 +50,7 @@ def test_nothing_made_it_worse_and_operators_were_not_left_without_a_word(
     assert returning == sorted(returning)
     assert seen["status"] is not None, "the mission waits for what cannot come"
     if vehicle.flies:
-        stays = failsafe.startswith(("motors fail", "the motor fails", "no data about the terrain"))
+        stays = failsafe.startswith((*MOTORS, "no data about the terrain"))
         assert seen["disarmed"] or stays or (vehicle.circles and seen["at home"])
     else:
         assert seen["disarmed"] or seen["stands"]
@@ -59,7 +60,7 @@ def test_nothing_made_it_worse_and_operators_were_not_left_without_a_word(
     # mission, or when m2pem has given up.
     first = next(iter(seen["texts"]), "").split(" N")[0]
     gone = "GCS" in first or (first == "Radio Failsafe" and not failsafe.startswith("radio"))
-    assert gone or failsafe.startswith(("motors fail", "the motor fails")) or first in said
+    assert gone or failsafe.startswith(MOTORS) or first in said
 
 
 @pytest.mark.parametrize(
