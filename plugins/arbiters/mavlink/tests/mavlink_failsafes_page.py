@@ -30,9 +30,10 @@ data: a vehicle that has none does not move. Planes circle where copters stand.
 PX4 arms without manual control, and has then no failsafe for its loss until the pilot is there
 again. Its texts say "Failsafe activated" without the cause, and nothing where it lands or returns
 already; the cause is in its EVENT messages, which m2pem does not read. A simulated PX4 does not
-restart (it denies `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN`, and every PX4 does while it is armed), and a
-PX4 takes no heights above terrain: no rows show these. Its motor 1 is stopped by
-`MAV_CMD_INJECT_FAILURE`, which PX4 does only where `CA_FAILURE_MODE` is not 0.
+restart: it denies `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN` on the ground, and every PX4 does while it is
+armed. PX4 refuses missions with heights above terrain, so that the behavior fails at once ("its
+frame is not supported"). `MAV_CMD_INJECT_FAILURE` stops its motor 1, which PX4 does only where
+`CA_FAILURE_MODE` is not 0.
 """
 
 SET = """
