@@ -1,7 +1,6 @@
 """`make setup` ends with what went wrong when Debian packages cannot be installed."""
 
 import os
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 REPOSITORY = Path(__file__).parents[1]
 
 
-@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
 @pytest.mark.parametrize("fails_at", ["update", "install"])
 def test_packages_that_cannot_be_installed_fail_the_setup(tmp_path: Path, fails_at: str) -> None:
     for name, script in {

@@ -1,9 +1,9 @@
 """The operations of `MissionControl`: one table, from which operators are served.
 
-The control socket, its client, the REST interface and the ROS services find here which operations
-there are and what parameters they take. An operation has the name of the method of `MissionControl`
-that it calls. Its parameters have the names of that method's arguments; over the socket a field may
-have another name.
+The control socket, its client and the ROS services read requests by it. The REST interface and the
+command line declare parameters of their own, for OpenAPI and `--help`; tests compare them with it.
+An operation has the name of the method of `MissionControl` that it calls. Its parameters have the
+names of that method's arguments; over the socket a field may have another name.
 """
 
 from base64 import b64decode, b64encode

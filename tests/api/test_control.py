@@ -1,4 +1,4 @@
-"""What operators are told of a run."""
+"""Summaries of runs, as operators see them."""
 
 from m2pem.api import RunStatus, RunSummary
 

@@ -225,7 +225,7 @@ class DriveStop(Hold):
 class Teleop(Behavior):
     """Stop, and let a person drive, by remote control or another ground station, until cancelled or
     for `timeout`. The person chooses the mode: m2pem commands none in which a person steers. RTL
-    ends the behavior: a failsafe began it, or somebody who has taken over."""
+    ends the behavior: a failsafe or another ground station began it."""
 
     name = "teleop"
     modes = frozenset({FlightMode.HOLD, FlightMode.MANUAL, FlightMode.GUIDED})

@@ -41,7 +41,7 @@ class Texts(Component):
 
     def say(self, text: str, severity: int) -> None:
         """A text. ArduPilot gives ids from 1 on to texts that do not fit into one message. PX4
-        says them only on links where it has heard a ground station, and numbers all texts of a
+        says them only on links where it has received a ground station, and numbers all texts of a
         link from 0 on."""
         data = text.encode("ascii", "replace")
         if not self.autopilot.firmware.is_ardupilot:
