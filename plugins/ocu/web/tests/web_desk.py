@@ -96,9 +96,10 @@ class Desk:
         for vehicle, holder in (await self.ask("GET", "/api/resources"))["holders"].items():
             if holder == OPERATOR:
                 await self.ask("POST", f"/api/resources/{vehicle}/give-back")
-        if all(each["status"] in OVER for each in await self.ask("GET", "/api/runs?limit=1000")):
-            return
-        await self.ask("POST", "/api/stop", {"reason": "the test is over"})
+        runs = await self.ask("GET", "/api/runs?limit=1000")
+        if any(each["status"] not in OVER for each in runs):
+            await self.ask("POST", "/api/stop", {"reason": "the test is over"})
+        # A run that has ended still has its vehicles until they have stopped.
         async with asyncio.timeout(TIMEOUT_MS / 1000):
             while any((await self.ask("GET", "/api/resources"))["holders"].values()):
                 await self.page.evaluate("new Promise(requestAnimationFrame)")
