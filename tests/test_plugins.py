@@ -346,9 +346,15 @@ def test_of_two_plugins_of_one_name_the_second_is_reported(install: Install) -> 
         ),
         ("capabilities = {'adjusts'}", "not an m2pem.api.ArbiterCapabilities"),
         ("takes_one_vehicle = True", "`capabilities = ArbiterCapabilities(one_vehicle=...)`"),
+        ("def reclaim(self, resource): ...", "it has `reclaim`, but its `capabilities` do not say"),
+        (
+            "capabilities = ArbiterCapabilities(reclaims=True)\n"
+            "            reclaim = addresses = print",
+            "it has `addresses`, but its `capabilities` do not say addresses=True",
+        ),
     ],
 )
-def test_an_arbiter_that_declares_what_it_does_not_have_is_refused_with_its_plugin(
+def test_an_arbiter_that_declares_other_than_what_it_has_is_refused_with_its_plugin(
     install: Install, declaration: str, problem: str
 ) -> None:
     install(

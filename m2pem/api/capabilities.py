@@ -71,10 +71,18 @@ def arbiter_problem(arbiter: object) -> str:
     """Return what is wrong in the declaration of an arbiter or of its class; "" if nothing is."""
     if problem := _problem(arbiter, ArbiterCapabilities, REPLACED):
         return problem
+    if isinstance(getattr(arbiter, "capabilities", None), property):
+        return ""
     declared = arbiter_capabilities(arbiter)
     for capability, member in ARBITER_METHODS.items():
         if getattr(declared, capability) and not hasattr(arbiter, member):
             return f"its `capabilities` say {capability}=True, but it has no `{member}`"
+        # Undeclared, a vehicle would not be stopped after a lost link, or not be locked by address.
+        if hasattr(arbiter, member) and not getattr(declared, capability):
+            return (
+                f"it has `{member}`, but its `capabilities` do not say {capability}=True: "
+                "m2pem would never call it"
+            )
     return ""
 
 

@@ -12,8 +12,11 @@ class EpochFence:
         self._highest: dict[str, int] = {}
 
     def admit(self, behavior: BehaviorId, epoch: int) -> bool:
-        """Whether a command of this epoch is good; "r1.b3" is a behavior of run r1."""
-        run = behavior.rpartition(".")[0]
+        """Whether a command of this epoch is good.
+
+        "r1.b3" is a behavior of run r1, and "r1.b3.evsg1" a team's part of that behavior.
+        """
+        run = behavior.partition(".")[0]
         highest = max(epoch, self._highest.pop(run, epoch))
         self._highest[run] = highest
         if len(self._highest) > REMEMBERED:
