@@ -16,41 +16,71 @@ PAGE := plugins/ocu/web/m2pem_plugin_web/static/index.html
 DEBIAN_PACKAGES := chromium curl nodejs npm spin tcc tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
+# Each target adds what it needs: a demonstration a few packages, the tests all (`installed`).
+CREATED := $(VENV)/created
 INSTALLED := $(VENV)/installed
-IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1) $(PLUGINS))
-ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(INSTALLED) 2>/dev/null),$(IDENTITY))
-.PHONY: $(INSTALLED)
+IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1))
+ifeq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(CREATED) 2>/dev/null),$(IDENTITY))
+packages_for = $(or $(wildcard $(INSTALLED)),$(VENV)/for-$(1))
+else
+.PHONY: $(CREATED)
+packages_for = $(VENV)/for-$(1)
 endif
+DEMO_PLUGINS := plugins/ocu/terminal
+DEMO_AIR_PLUGINS := plugins/arbiters/mavlink plugins/ocu/terminal
+DEMO_WEB_PLUGINS := plugins/ocu/web
+PIP = PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt $(BIN)/python -m pip \
+  --quiet --disable-pip-version-check
+PIP_FAILED = { echo "pip could not install what is needed (its own message is above): is a package index reachable? \
+  Then the same make command again" >&2; exit 1; }
 
 .PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team
 .PHONY: test test-long test-ros fuzz lint format docs pictures
-.PHONY: bench bench-quick conformance clean ros
+.PHONY: bench bench-quick conformance clean dist ros
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
 
-setup: python-packages npm-packages page ## make .venv and install all that the demo and the tests need
+setup: python-packages npm-packages page ## install all that the tests need, into .venv
 
 python-packages: $(INSTALLED)
 
-$(INSTALLED): pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
+$(CREATED):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "m2pem needs Python 3.11 or newer, and $(PYTHON) is not: try make PYTHON=python3.12" >&2; exit 1; }
-	@echo "Installing m2pem and its tools into $(VENV)"
 	@$(PYTHON) -m venv --clear $(VENV) || { \
 	  echo "$(PYTHON) cannot make virtual environments; on Debian: apt-get install python3-venv" >&2; exit 1; }
-	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt $(BIN)/python -m pip install \
-	  --quiet --disable-pip-version-check --editable '.[dev,docs]' $(PLUGINS:%=--editable %)
 	@echo '$(IDENTITY)' > $@
+
+$(INSTALLED): $(CREATED) pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
+	@echo "Installing m2pem, its plugins and what their tests need into $(VENV)"
+	@$(PIP) install --editable '.[dev,docs]' $(PLUGINS:%=--editable %) || $(PIP_FAILED)
+	@touch $@
+
+$(VENV)/for-demo: $(DEMO_PLUGINS:%=%/pyproject.toml)
+$(VENV)/for-demo: NEEDED = $(DEMO_PLUGINS)
+$(VENV)/for-demo-air: $(DEMO_AIR_PLUGINS:%=%/pyproject.toml)
+$(VENV)/for-demo-air: NEEDED = $(DEMO_AIR_PLUGINS)
+$(VENV)/for-demo-web: $(DEMO_WEB_PLUGINS:%=%/pyproject.toml)
+$(VENV)/for-demo-web: NEEDED = $(DEMO_WEB_PLUGINS)
+
+$(VENV)/for-%: $(CREATED) pyproject.toml constraints.txt
+	@echo "Installing m2pem with $(NEEDED) into $(VENV)"
+	@$(PIP) install --editable . $(NEEDED:%=--editable %) || $(PIP_FAILED)
+	@touch $@
 
 # The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, those of the web page
 # Chromium, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
 npm-packages:
 	@missing=; for package in $(DEBIAN_PACKAGES); do command -v $${package/nodejs/node} >/dev/null || missing="$$missing $$package"; done; \
 	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	  echo "Installing Debian packages:$$missing"; \
-	  { apt-get update -qq && apt-get install -y -qq $$missing >/dev/null; } || { \
-	    echo "apt-get could not install$$missing (its own message is above). Install them by hand, then make setup again" >&2; exit 1; }; \
+	  apt-get update -qq || echo "apt-get could not update its lists (its own message is above)" >&2; \
+	  failed=; for package in $$missing; do \
+	    echo "You are root: installing the Debian package $$package, which tests need"; \
+	    apt-get install -y -qq $$package >/dev/null || failed="$$failed $$package"; \
+	  done; \
+	  [ -z "$$failed" ] || { \
+	    echo "apt-get could not install$$failed (its own message is above). Install by hand, then make setup again" >&2; exit 1; }; \
 	fi
 	@if command -v npm >/dev/null; then $(MAKE) --silent $(JS)/node_modules/.package-lock.json; \
 	else echo "Some tests need Debian packages that are not installed: $(DEBIAN_PACKAGES)" >&2; fi
@@ -61,7 +91,7 @@ $(JS)/node_modules/.package-lock.json: $(JS)/package-lock.json $(JS)/.npmrc
 	@touch $@
 
 # Built when the package was installed, and again when it has changed since.
-page: python-packages $(PAGE)
+page: $(PAGE)
 
 $(PAGE): $(UI_SOURCES)
 	@command -v npm >/dev/null || { echo "The web page has changed; building it needs Node.js with npm" >&2; exit 1; }
@@ -112,16 +142,16 @@ test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
 	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_TESTS)
 	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
 
-demo: python-packages ## run the paper's mission on simulated vehicles, in two ways
+demo: $(call packages_for,demo) ## run the paper's mission on simulated vehicles, in two ways
 	@$(BIN)/m2pem demo
 
-demo-web: python-packages page ## draw, prove and run missions in a browser, on simulated vehicles
+demo-web: $(call packages_for,demo-web) page ## draw, prove and run missions in a browser, on simulated vehicles
 	@$(BIN)/m2pem demo web
 
-demo-air: python-packages ## survey a field with simulated MAVLink vehicles, one of which falls silent
+demo-air: $(call packages_for,demo-air) ## survey a field with simulated MAVLink vehicles, one of which falls silent
 	@$(BIN)/m2pem demo air
 
-demo-sitl: python-packages ## survey a field with real autopilots in the loop: FOLDER=~/ardupilot
+demo-sitl: $(call packages_for,demo-air) ## survey a field with real autopilots in the loop: FOLDER=~/ardupilot
 	@[ -n "$(FOLDER)" ] || { echo "Say where ArduPilot's programs are: make demo-sitl FOLDER=~/ardupilot" >&2; exit 1; }
 	@$(BIN)/m2pem demo air --ardupilot "$(FOLDER)"
 
@@ -156,6 +186,11 @@ FUZZ_S := 600
 
 fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
 	@$(BIN)/python -m tools.fuzzer.fuzz --seconds $(FUZZ_S) $(M2PEM_CORPORA)
+
+dist: $(CREATED) ## build the wheels of m2pem and its plugins, into dist/
+	@rm -rf dist && mkdir dist
+	@$(PIP) wheel --no-deps --wheel-dir dist . $(PLUGINS:%=./%) || $(PIP_FAILED)
+	@ls dist
 
 docs: python-packages ## build the documentation into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict

@@ -1,4 +1,4 @@
-"""`make setup` ends with what went wrong when Debian packages cannot be installed."""
+"""`make` installs what a target needs, and ends with what went wrong when it cannot."""
 
 import os
 import subprocess
@@ -7,26 +7,108 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).parents[1]
+LIGHT = {
+    "demo": {"plugins/ocu/terminal"},
+    "demo-air": {"plugins/ocu/terminal", "plugins/arbiters/mavlink"},
+    "demo-web": {"plugins/ocu/web"},
+}
 
 
-@pytest.mark.parametrize("fails_at", ["update", "install"])
-def test_packages_that_cannot_be_installed_fail_the_setup(tmp_path: Path, fails_at: str) -> None:
-    for name, script in {
-        "apt-get": f'[ "$1" != {fails_at} ] || {{ echo "E: no network" >&2; exit 100; }}',
-        "id": "echo 0",
-    }.items():
-        program = tmp_path / name
-        program.write_text(f"#!/bin/sh\n{script}\n")
-        program.chmod(0o755)
-    done = subprocess.run(
-        ["make", "npm-packages", "DEBIAN_PACKAGES=m2pem-no-such-program"],
+def make(*words: str, path: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run make in the repository; programs in `path` come before those of the machine."""
+    before = f"{path}:" if path else ""
+    return subprocess.run(
+        ["make", *words],
         cwd=REPOSITORY,
-        env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"},
+        env={**os.environ, "PATH": f"{before}{os.environ['PATH']}", "MAKEFLAGS": ""},
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+def program(folder: Path, name: str, script: str) -> None:
+    (folder / name).write_text(f"#!/bin/sh\n{script}\n")
+    (folder / name).chmod(0o755)
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A folder of programs: the user is root, and apt-get lists what it is asked to install."""
+    program(tmp_path, "id", "echo 0")
+    program(
+        tmp_path,
+        "apt-get",
+        f'echo "$@" >> {tmp_path}/asked\n'
+        'case "$*" in *no-such*) echo "E: no such package" >&2; exit 100;; esac',
+    )
+    return tmp_path
+
+
+def test_a_package_that_cannot_be_installed_is_named_and_the_others_are_installed(
+    root: Path,
+) -> None:
+    wanted = "m2pem-absent-1 m2pem-no-such m2pem-absent-2"
+    done = make("npm-packages", f"DEBIAN_PACKAGES={wanted}", path=root)
     assert done.returncode != 0
-    assert "E: no network" in done.stderr
-    assert "apt-get could not install m2pem-no-such-program" in done.stderr
-    assert "make setup again" in done.stderr
+    asked = (root / "asked").read_text()
+    assert "m2pem-absent-1" in asked
+    assert "m2pem-absent-2" in asked
+    assert "E: no such package" in done.stderr
+    said = next(line for line in done.stderr.splitlines() if "could not install" in line)
+    assert "m2pem-no-such" in said
+    assert "absent" not in said
+    assert "make setup again" in said
+
+
+def test_root_is_told_of_each_package_that_is_installed(root: Path) -> None:
+    done = make("npm-packages", "DEBIAN_PACKAGES=m2pem-absent-1", path=root)
+    assert done.returncode == 0, done.stderr
+    assert "You are root: installing the Debian package m2pem-absent-1" in done.stdout
+
+
+def test_nothing_is_installed_for_another_user_than_root(root: Path) -> None:
+    program(root, "id", "echo 1000")
+    done = make("npm-packages", "DEBIAN_PACKAGES=m2pem-absent-1", path=root)
+    assert done.returncode == 0, done.stderr
+    assert not (root / "asked").exists()
+
+
+@pytest.mark.parametrize("target", LIGHT)
+def test_a_demonstration_installs_the_plugins_that_it_needs_alone(
+    target: str, tmp_path: Path
+) -> None:
+    done = make("--dry-run", target, f"VENV={tmp_path}/venv")
+    assert done.returncode == 0, done.stderr
+    installing = [line for line in done.stdout.splitlines() if "-m pip" in line]
+    words = " ".join(installing).split()
+    assert {words[at + 1] for at, word in enumerate(words) if word == "--editable"} == {
+        ".",
+        *LIGHT[target],
+    }
+
+
+def test_an_environment_with_everything_is_not_changed_by_a_demonstration(tmp_path: Path) -> None:
+    venv = tmp_path / "venv"
+    (venv / "bin").mkdir(parents=True)
+    program(venv / "bin", "python", "exit 0")
+    version = subprocess.run(["python3", "-V"], capture_output=True, text=True, check=True).stdout
+    (venv / "created").write_text(f"{REPOSITORY} {version}")
+    (venv / "installed").touch()
+    done = make("--dry-run", "demo", f"VENV={venv}")
+    assert done.returncode == 0, done.stderr
+    assert "-m pip" not in done.stdout
+    assert "m2pem demo" in done.stdout
+
+
+def test_a_failed_installation_is_said_in_one_line_with_its_remedy(tmp_path: Path) -> None:
+    venv = tmp_path / "venv"
+    (venv / "bin").mkdir(parents=True)
+    program(venv / "bin", "python", '[ "$1" != -m ] || { echo "ERROR: no index" >&2; exit 1; }')
+    version = subprocess.run(["python3", "-V"], capture_output=True, text=True, check=True).stdout
+    (venv / "created").write_text(f"{REPOSITORY} {version}")
+    done = make("demo", f"VENV={venv}")
+    assert done.returncode != 0
+    assert "ERROR: no index" in done.stderr
+    assert "pip could not install what is needed" in done.stderr
+    assert "Then the same make command again" in done.stderr
