@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         DataName,
         Draft,
         Editable,
+        MissionFiles,
         MissionSource,
         Outline,
         OutlineElement,
@@ -113,7 +114,7 @@ _MODULES = {
         " SightedArbiter adjusts"
     ),
     "m2pem.api.authoring": (
-        "DataName Draft Editable MissionSource Outline OutlineElement"
+        "DataName Draft Editable MissionFiles MissionSource Outline OutlineElement"
         " OutlineProcess OutlineTrigger SearchLimits SearchProgress"
     ),
     "m2pem.api.bus": "FleetBus",
@@ -215,6 +216,7 @@ __all__ = [
     "Mission",
     "MissionControl",
     "MissionFile",
+    "MissionFiles",
     "MissionSource",
     "ControlEvent",
     "Ocu",

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias, Union
 
+from m2pem.mission.library import Source
+
 
 @dataclass(frozen=True, slots=True)
 class Draft:
@@ -16,8 +18,21 @@ class Draft:
     source: bytes
 
 
-MissionSource: TypeAlias = Union[Path, str, bytes, Draft]
-"""Where a mission is: a path, a path or `file:`/`http:` URL as a text, or the BPMN itself."""
+@dataclass(frozen=True, slots=True)
+class MissionFiles:
+    """A mission as another process has read it: its file's name and bytes, and what it calls.
+
+    `library`: the files with the processes that it calls, so that no file is read again.
+    """
+
+    file: str
+    source: bytes
+    library: tuple[Source, ...] = ()
+
+
+MissionSource: TypeAlias = Union[Path, str, bytes, Draft, MissionFiles]
+"""Where a mission is: a path, a path or `file:`/`http:` URL as a text, or the BPMN itself, with the
+files that it calls (`MissionFiles`) or without."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +126,7 @@ __all__ = [
     "DataName",
     "Draft",
     "Editable",
+    "MissionFiles",
     "MissionSource",
     "Outline",
     "OutlineElement",

@@ -15,6 +15,7 @@ from typing import Any, get_args
 
 import msgspec
 
+from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import (
     Alert,
     MissionControl,
@@ -26,9 +27,9 @@ from m2pem.api.control import (
     TakeEffect,
 )
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
+from m2pem.findings import Finding
 from m2pem.fleet.fleet import dump, restore
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.library import Source
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 
@@ -137,16 +138,27 @@ class Telemetry(Params, frozen=True):
     size: int = 100
 
 
-class MissionFiles(msgspec.Struct, frozen=True):
-    """A mission as it is sent: its file's name and bytes, and the files that it calls."""
+class Start(Params, frozen=True):
+    """As `MissionControl.start`; the caller has read the mission's files."""
 
-    file: str
-    source: bytes
-    library: list[Source]
+    mission: MissionFiles
+    process: str | None = None
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
+    by: str = ""
+    even_if_busy: bool = False
 
 
-def _mission_files(mission: Mission) -> MissionFiles:
-    return MissionFiles(mission.file, mission.source, list(mission.library))
+class Check(Params, frozen=True):
+    """As `MissionControl.check`; the caller has read the mission's files."""
+
+    mission: MissionFiles
+    process: str | None = None
+    data: list[str] = msgspec.field(default_factory=list)
+
+
+def mission_files(mission: Mission) -> MissionFiles:
+    """A mission that was read, as it is sent to another process."""
+    return MissionFiles(mission.file, mission.source, mission.library)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +167,8 @@ class Operation:
 
     `encode` and `decode` turn what the method returns into that and back. `kept`: the result never
     changes, and the client asks for it once. `alone`: the client opens a connection for it, as STOP
-    waits for no other call, and no other call waits for the end of a run.
+    waits for no other call, and no other call waits for the end of a run. `slow`: the method
+    blocks, and is called in a thread.
     """
 
     name: str
@@ -164,6 +177,7 @@ class Operation:
     stream: bool = False
     kept: bool = False
     alone: bool = False
+    slow: bool = False
     encode: Callable[[Any], Any] = lambda value: value
     decode: Callable[[Any], Any] = lambda value: value
 
@@ -183,6 +197,8 @@ STREAMED: dict[str, type] = {kind.__name__: kind for kind in get_args(Event | St
 OPERATIONS: dict[str, Operation] = {
     operation.name: operation
     for operation in (
+        Operation("start", Start, RunId, alone=True),
+        Operation("check", Check, list[Finding], alone=True, slow=True),
         Operation("answer", Answer),
         Operation("signal", Signal),
         Operation("message", Message),
@@ -198,7 +214,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("runs", Nothing, list[RunSummary]),
         Operation("prompts", Nothing, list[OpenPrompt]),
         Operation("records", Page, list[StampedRecord]),
-        Operation("mission", OfRun, MissionFiles, encode=_mission_files),
+        Operation("mission", OfRun, MissionFiles, encode=mission_files),
         Operation("mission_time_s", OfRun, float),
         Operation("wait", OfRun, RunSummary, alone=True),
         Operation(

@@ -4,7 +4,8 @@ import asyncio
 
 import click
 
-from m2pem.cli.options import UnusableError, example, journal_option, ocu_option
+from m2pem.cli.options import example, journal_option, ocu_option
+from m2pem.cli.run_control import journal_file
 
 
 @click.command(epilog=example("m2pem attach r1"))
@@ -21,19 +22,17 @@ def attach(run_id: str | None, journal: str | None, ocu_names: str | None) -> No
 
 
 async def _attach(run: str | None, journal_url: str | None, ocu_names: str | None) -> None:
-    from m2pem.cli.journals import url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.control_socket.client import find_executive
     from m2pem.control_socket.remote import RemoteControl
-    from m2pem.journal import file_of
+    from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager
 
-    path = file_of(url_of(journal_url))
-    if path is None:
-        raise UnusableError("a journal in memory has no place where its executive could be found")
+    path = journal_file(journal_url)
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
-    async with RemoteControl(await asyncio.to_thread(find_executive, path, run)) as control:
+    executive = await asyncio.to_thread(find_executive, path, run)
+    async with RemoteControl(executive, load_source) as control:
         operators.begin(control, lambda: None)
         try:
             await operators.left()

@@ -24,6 +24,7 @@ COMMANDS = {
     "demo": "Show missions on simulated vehicles.",
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",
+    "start": "Start a mission in an executive that is running on this host.",
     "check": "Check a mission file, alone or against a fleet.",
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",

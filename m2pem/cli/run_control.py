@@ -34,7 +34,7 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
     from m2pem.control_socket.client import ask_driver
     from m2pem.errors import NotDrivenError
 
-    path = _journal_file(journal_url)
+    path = journal_file(journal_url)
     try:
         ask_driver(path, run, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
@@ -52,7 +52,7 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
     from m2pem.control_socket.client import ask_all
     from m2pem.errors import NotDrivenError
 
-    path = _journal_file(journal_url)
+    path = journal_file(journal_url)
     try:
         return ask_all(path, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
@@ -71,7 +71,12 @@ def _left_behind(journal_url: str | None, path: Path, run: str | None = None) ->
     return "".join(f"\n{each.as_text()}" for each in left if run in (None, each.run))
 
 
-def _journal_file(journal_url: str | None) -> Path:
+def journal_file(journal_url: str | None) -> Path:
+    """The file of a journal, beside which its executives are found.
+
+    Raises:
+        UnusableError: the journal is in memory.
+    """
     from m2pem.cli.journals import url_of
     from m2pem.cli.options import UnusableError
     from m2pem.journal import file_of

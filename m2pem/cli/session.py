@@ -85,10 +85,15 @@ async def driving(
 
             def left() -> None:
                 output.uncover()
-                if any(not each.done.is_set() for each in executive.runners.values()):
+                running = [key for key, each in executive.runners.items() if not each.done.is_set()]
+                what = f"missions go on: {', '.join(running)}" if running else ""
+                if not one:
+                    what = f"serving goes on; {what or 'no mission runs'}"
+                if what:
+                    start = "" if one else ", m2pem start MISSION starts one"
                     click.echo(
-                        "m2pem: no operator at this terminal any more; missions go on "
-                        "(m2pem attach), and Ctrl-C stops them",
+                        f"m2pem: no operator at this terminal any more; {what} "
+                        f"(m2pem attach shows them{start}, and Ctrl-C stops everything)",
                         err=True,
                     )
 

@@ -1,6 +1,7 @@
 """One question to a running executive, for commands that ask and end."""
 
 import socket
+from base64 import b64decode
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -8,11 +9,14 @@ from typing import Any
 from m2pem.control_socket.paths import ControlSocketError, address, live_sockets
 from m2pem.control_socket.protocol import Request, line, result_of
 from m2pem.errors import M2pemError, NotDrivenError, OperatorError
+from m2pem.fleet.fleet import restore
 
 TIMEOUT_S = 10.0
+LONG_TIMEOUT_S = 600.0
+"""For what reads and checks a mission: it may be large."""
 
 
-def ask(path: Path, method: str, **params: Any) -> Any:
+def ask(path: Path, method: str, *, timeout_s: float = TIMEOUT_S, **params: Any) -> Any:
     """Call a method of the executive that listens at `path`.
 
     Raises:
@@ -20,7 +24,7 @@ def ask(path: Path, method: str, **params: Any) -> Any:
         ControlSocketError: it is gone, or does not answer.
     """
     with socket.socket(socket.AF_UNIX) as caller:
-        caller.settimeout(TIMEOUT_S)
+        caller.settimeout(timeout_s)
         try:
             with address(path) as there:
                 caller.connect(there)
@@ -99,6 +103,29 @@ def find_executive(journal: Path, run: str | None) -> Path:
         else:
             return path
     raise OperatorError("; ".join(elsewhere))
+
+
+def choose_executive(journal: Path, name: str | None) -> Path:
+    """The socket of the executive with that process id or fleet; None: of the only one.
+
+    Raises:
+        OperatorError: there is none; or several, which are listed.
+    """
+    paths = list(live_sockets(journal))
+    if not paths:
+        raise _not_driven(journal)
+    if name is None and len(paths) == 1:
+        return paths[0]
+    fleets = {path: restore(b64decode(ask(path, "fleet"))).name for path in paths}
+    chosen = [path for path, fleet in fleets.items() if name in (path.stem, fleet)]
+    if len(chosen) == 1:
+        return chosen[0]
+    listed = ", ".join(f"{path.stem} with fleet {fleet}" for path, fleet in fleets.items())
+    what = f"no executive {name!r}" if name and not chosen else f"{len(paths)} executives"
+    raise OperatorError(
+        f"{what} with the journal {journal}; running are {listed}. Say which: --run-on "
+        f"{next(iter(fleets)).stem}"
+    )
 
 
 def _not_driven(journal: Path) -> NotDrivenError:

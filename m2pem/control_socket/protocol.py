@@ -6,7 +6,8 @@ from typing import Any
 import msgspec
 
 from m2pem.control_socket.paths import ControlSocketError
-from m2pem.errors import NotDrivenError, OperatorError
+from m2pem.errors import BusyError, M2pemError, MissionError, NotDrivenError, OperatorError
+from m2pem.findings import Finding
 
 LONGEST_LINE_BYTES = 64 << 20
 """A mission with its images must fit."""
@@ -24,13 +25,26 @@ class Code(IntEnum):
     """An `OperatorError`: the request cannot be met now."""
     NOT_DRIVEN = -32001
     """A `NotDrivenError`: perhaps another executive drives the run."""
+    FINDINGS = -32002
+    """A `MissionError`; `data` has its findings."""
+    BUSY = -32003
+    """A `BusyError`; `data` has who has what."""
 
 
-class Fault(msgspec.Struct, frozen=True):
+class FaultData(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The `data` of an error. `holders`: the run or the operator that has each resource."""
+
+    what: str = ""
+    findings: list[Finding] = msgspec.field(default_factory=list)
+    holders: dict[str, str] = msgspec.field(default_factory=dict)
+
+
+class Fault(msgspec.Struct, frozen=True, omit_defaults=True):
     """The `error` of a response."""
 
     code: int
     message: str
+    data: FaultData = FaultData()
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -56,10 +70,38 @@ def line(message: Request | Response) -> bytes:
     return msgspec.json.encode(message) + b"\n"
 
 
+def fault_of(error: M2pemError) -> Fault:
+    """What a caller gets when the executive refuses."""
+    match error:
+        case MissionError():
+            data = FaultData(what=error.what, findings=list(error.findings))
+            return Fault(Code.FINDINGS, str(error), data)
+        case BusyError():
+            return Fault(Code.BUSY, str(error), FaultData(holders=error.holders))
+        case NotDrivenError():
+            return Fault(Code.NOT_DRIVEN, str(error))
+    return Fault(Code.REFUSED, str(error))
+
+
+def error_of(fault: Fault) -> M2pemError:
+    """The error that `fault_of` had."""
+    match fault.code:
+        case Code.FINDINGS:
+            return MissionError(fault.data.what, fault.data.findings)
+        case Code.BUSY:
+            return BusyError(fault.message, fault.data.holders)
+        case Code.NOT_DRIVEN:
+            return NotDrivenError(fault.message)
+        case Code.REFUSED:
+            return OperatorError(fault.message)
+    return ControlSocketError(fault.message)
+
+
 def result_of(answer: bytes) -> Any:
     """The result that a line brings.
 
     Raises:
+        MissionError: the mission is not well or does not fit the fleet.
         OperatorError: the executive refused.
         ControlSocketError: it went away, or did not understand, or is not understood.
     """
@@ -70,10 +112,5 @@ def result_of(answer: bytes) -> Any:
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise ControlSocketError(f"the executive answered what is no JSON-RPC: {error}") from error
     if isinstance(response.error, Fault):
-        fault = response.error
-        if fault.code == Code.NOT_DRIVEN:
-            raise NotDrivenError(fault.message)
-        if fault.code == Code.REFUSED:
-            raise OperatorError(fault.message)
-        raise ControlSocketError(fault.message)
+        raise error_of(response.error)
     return None if response.result is msgspec.UNSET else response.result

@@ -2,25 +2,26 @@
 
 import asyncio
 import itertools
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from inspect import iscoroutinefunction, signature
 from pathlib import Path
 from typing import Any, cast
 
 import msgspec
 
+from m2pem.api.authoring import MissionFiles, MissionSource
 from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId
-from m2pem.api.operations import OPERATIONS, STREAMED, MissionFiles, Operation
+from m2pem.api.operations import OPERATIONS, STREAMED, Operation, mission_files
 from m2pem.bpmn import parse_mission
+from m2pem.control_socket.client import LONG_TIMEOUT_S, ask
 from m2pem.control_socket.paths import ControlSocketError, address
 from m2pem.control_socket.protocol import LONGEST_LINE_BYTES, Request, line, result_of
-from m2pem.errors import OperatorError
+from m2pem.errors import MissionError, OperatorError
+from m2pem.findings import Finding
 from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
 
 REFUSED = {
-    "start": "missions are started where the executive runs: m2pem run",
-    "check": "missions are checked where the executive runs: m2pem check",
     "simulate": "missions are rehearsed where the executive runs: m2pem simulate",
     "verify": "missions are verified where the executive runs: m2pem verify",
     "editable": "missions are edited where the executive runs",
@@ -35,11 +36,13 @@ class RemoteControl:
     """Entering it connects, and gives a `MissionControl`.
 
     Its methods are made from `OPERATIONS`. Those of `REFUSED` raise OperatorError: missions cannot
-    be started, edited, checked, verified or rehearsed through it.
+    be edited, verified or rehearsed through it. `read` reads missions, which are sent with all
+    their files to be started or checked; without it only `MissionFiles` can be.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, read: Callable[[MissionSource], Mission] | None = None) -> None:
         self._path = path
+        self._read = read
         self._numbers = itertools.count(1)
         self._missions: dict[RunId, Mission] = {}
         self._prompts: dict[tuple[RunId, str], OpenPrompt] = {}
@@ -72,6 +75,31 @@ class RemoteControl:
                 parse_mission, sent.source, sent.file, library
             )
         return self._missions[run]
+
+    async def start(self, mission: MissionSource, **options: Any) -> RunId:
+        """Send a mission's files to the executive, which starts it."""
+        files = await asyncio.to_thread(self._files, mission)
+        run: RunId = await self._call(OPERATIONS["start"], mission=files, **options)
+        return run
+
+    def check(
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
+    ) -> Sequence[Finding]:
+        """Send a mission's files to the executive, which checks it against its fleet."""
+        try:
+            files = self._files(mission)
+        except MissionError as error:
+            return error.findings
+        params = {"mission": files, "process": process, "data": list(data)}
+        found = ask(self._path, "check", timeout_s=LONG_TIMEOUT_S, **params)
+        return msgspec.convert(found, list[Finding])
+
+    def _files(self, mission: MissionSource) -> MissionFiles:
+        if isinstance(mission, MissionFiles):
+            return mission
+        if self._read is None:
+            raise OperatorError("only a mission that was read can be sent: give its MissionFiles")
+        return mission_files(self._read(mission))
 
     # --- what goes through the socket -----------------------------------------------------------
 

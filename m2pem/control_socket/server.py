@@ -24,9 +24,10 @@ from m2pem.control_socket.protocol import (
     Fault,
     Request,
     Response,
+    fault_of,
     line,
 )
-from m2pem.errors import M2pemError, NotDrivenError
+from m2pem.errors import M2pemError
 
 log = logging.getLogger("m2pem.control_socket")
 
@@ -129,16 +130,17 @@ class ControlSocket:
             return _refusal(number, Code.METHOD_NOT_FOUND, what)
         try:
             params = msgspec.convert(request.params, operation.parameters)
-            result = operation.call(self._control, params)
+            if operation.slow:
+                result = await asyncio.to_thread(operation.call, self._control, params)
+            else:
+                result = operation.call(self._control, params)
             if isawaitable(result):
                 result = await result
             result = operation.encode(result)
         except msgspec.ValidationError as error:
             return _refusal(number, Code.INVALID_PARAMS, f"{request.method}: {error}")
-        except NotDrivenError as error:
-            return _refusal(number, Code.NOT_DRIVEN, str(error))
         except M2pemError as error:
-            return _refusal(number, Code.REFUSED, str(error))
+            return Response(id=number, error=fault_of(error))
         except Exception as error:  # one caller's request must not end the executive
             log.exception("%s", request.method)
             return _refusal(number, Code.INTERNAL_ERROR, f"{type(error).__name__}: {error}")

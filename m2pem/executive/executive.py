@@ -99,7 +99,7 @@ class Executive:
             self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
         )
         self.control = Control(self._supervisor, self.bus, rehearse)
-        self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file))
+        self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file), journal.file)
         self._speed = speed
         self._watch_links = watch_links
         self._listeners: list[asyncio.Task[None]] = []

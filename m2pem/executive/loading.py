@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
-from m2pem.api.authoring import Draft, MissionSource
+from m2pem.api.authoring import Draft, MissionFiles, MissionSource
 from m2pem.bpmn import parse_mission
 from m2pem.bpmn.lint import by_file, lint
 from m2pem.bpmn.rules.attributes import MISSPELLED_ATTRIBUTE
@@ -22,6 +22,7 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_named
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.elements import ServiceTask
+from m2pem.mission.library import KeptLibrary
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or
 
@@ -44,6 +45,8 @@ def load_source(mission: MissionSource, search_path: Iterable[Path] = ()) -> Mis
         return parse_mission(mission, "mission.bpmn", library_of(mission, search_path))
     if isinstance(mission, Draft):
         return parse_mission(mission.source, str(mission.path), library_of(mission, search_path))
+    if isinstance(mission, MissionFiles):
+        return parse_mission(mission.source, mission.file, KeptLibrary(mission.library))
     if isinstance(mission, str):
         parts = urlsplit(mission)
         if parts.scheme in ("http", "https"):

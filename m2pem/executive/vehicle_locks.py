@@ -26,10 +26,16 @@ class VehicleInUseError(M2pemError):
 
 
 class VehicleLocks:
-    """The locks of one executive. `addresses`: of each vehicle or payload; see `addresses_of`."""
+    """The locks of one executive. `addresses`: of each vehicle or payload; see `addresses_of`.
 
-    def __init__(self, addresses: Mapping[ResourceId, Iterable[str]]) -> None:
+    `journal`: its file, beside which the executive is found; None: it is in memory.
+    """
+
+    def __init__(
+        self, addresses: Mapping[ResourceId, Iterable[str]], journal: Path | None = None
+    ) -> None:
         self._addresses = addresses
+        self._journal = journal
         self._held: dict[Path, int] = {}
 
     def acquire(self) -> None:
@@ -79,7 +85,12 @@ class VehicleLocks:
                 break
             os.close(file)  # its holder has removed it meanwhile: a lock on it has no effect
         self._held[path] = file
-        me = {"pid": os.getpid(), "command": shlex.join(_command()), "address": address}
+        me = {
+            "pid": os.getpid(),
+            "command": shlex.join(_command()),
+            "address": address,
+            "journal": str(self._journal or ""),
+        }
         os.ftruncate(file, 0)
         os.pwrite(file, json.dumps(me).encode(), 0)
         return None
@@ -118,11 +129,14 @@ def _refusal(holder: str, resources: Iterable[ResourceId]) -> str:
     names = ", ".join(dict.fromkeys(resources))
     try:
         read = json.loads(holder)
-        pid, command = int(read["pid"]), str(read["command"])
+        pid, command, journal = int(read["pid"]), str(read["command"]), read.get("journal")
     except (ValueError, KeyError, TypeError):
         return f"{names}: another executive commands it, which has just begun; try again"
+    start = "Start the mission there"
+    if journal:
+        start += f" (m2pem start MISSION --journal {shlex.quote(journal)} --run-on {pid})"
     return (
         f"{names}: process {pid} commands it already: {command}; one executive commands a vehicle. "
-        f"Start the mission there, or end that one first: kill {pid} (it stops its missions and "
+        f"{start}, or end that one first: kill {pid} (it stops its missions and "
         "releases its vehicles)"
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.control_socket.client import ask, ask_driver, find_executive
+from m2pem.control_socket.client import ask, ask_driver, choose_executive, find_executive
 from m2pem.control_socket.paths import ControlSocketError
 from m2pem.errors import NotDrivenError, OperatorError
 from tests.control_socket.conftest import Served
@@ -63,3 +63,16 @@ async def test_which_of_several_executives_is_asked(served: Served) -> None:
     with pytest.raises(OperatorError, match="2 executives"):
         await asyncio.to_thread(find_executive, served.journal, None)
     assert (await asyncio.to_thread(find_executive, served.journal, run)).exists()
+    with pytest.raises(OperatorError, match=r"2 executives.*1 with fleet test.*--run-on 1"):
+        await asyncio.to_thread(choose_executive, served.journal, None)
+    with pytest.raises(OperatorError, match=r"no executive 'other'.*1 with fleet test"):
+        await asyncio.to_thread(choose_executive, served.journal, "other")
+    assert await asyncio.to_thread(choose_executive, served.journal, "1") == second
+
+
+async def test_an_executive_is_chosen_by_its_fleet(served: Served, tmp_path: Path) -> None:
+    for wanted in (None, "test", served.path.stem):
+        chosen = await asyncio.to_thread(choose_executive, served.journal, wanted)
+        assert chosen == served.path
+    with pytest.raises(OperatorError, match="no executive with the journal"):
+        choose_executive(tmp_path / "other.db", None)

@@ -18,10 +18,14 @@ from m2pem.api.telemetry import (
 )
 from m2pem.control_socket.paths import ControlSocketError
 from m2pem.control_socket.remote import RemoteControl
-from m2pem.errors import NotDrivenError, OperatorError
+from m2pem.errors import BusyError, MissionError, NotDrivenError, OperatorError
+from m2pem.executive.loading import load_source
+from m2pem.findings import Severity
 from m2pem.mission.catalogue import ResourceId
 from tests.control_socket.conftest import Served
-from tests.executive.conftest import mission, sequence
+from tests.executive.conftest import behavior, mission, question, sequence
+
+CALLING = sequence(("Call", '<callActivity id="Call" calledElement="Called"/>'))
 
 
 async def test_everything_that_is_asked_for_comes_as_it_is(served: Served) -> None:
@@ -117,8 +121,50 @@ async def test_refusals_are_the_same_errors(served: Served) -> None:
     async with RemoteControl(served.path) as remote:
         with pytest.raises(NotDrivenError):
             await remote.pause("r9")
-        with pytest.raises(OperatorError, match="m2pem run"):
-            await remote.start(b"")
+        with pytest.raises(OperatorError, match="m2pem verify"):
+            await remote.verify(b"")
+        with pytest.raises(OperatorError, match="MissionFiles"):
+            await remote.start("mission.bpmn")
+
+
+async def test_a_mission_is_started_with_the_files_that_the_caller_has_read(
+    served: Served, tmp_path: Path
+) -> None:
+    called, file = tmp_path / "s.bpmn", tmp_path / "here.bpmn"
+    called.write_bytes(mission(sequence(("Ask", question("Ask"))).replace('"P"', '"Called"')))
+    file.write_bytes(mission(CALLING))
+    async with RemoteControl(served.path, load_source) as remote:
+        run = await remote.start(file, by="anna")
+        file.unlink()
+        called.unlink()
+        opened = await anext(remote.subscribe(run))
+        assert isinstance(opened, OpenPrompt)
+        assert (await remote.mission(run)).file == str(file)
+        await remote.answer(run, opened.prompt, "yes")
+        assert (await remote.wait(run)).status == "completed"
+
+
+async def test_a_mission_that_does_not_fit_is_refused_with_its_findings(served: Served) -> None:
+    unfit = mission(sequence(("Go", behavior("Go", "drive_stop", "v9"))))
+    async with RemoteControl(served.path, load_source) as remote:
+        with pytest.raises(MissionError, match="cannot run with fleet") as refused:
+            await remote.start(unfit)
+        found = await asyncio.to_thread(remote.check, unfit)
+        assert refused.value.findings == tuple(found)
+        assert any("v9" in each.message for each in found)
+        [broken] = await asyncio.to_thread(remote.check, b"<no-bpmn/>")
+        assert broken.severity is Severity.ERROR
+        assert not await remote.runs()
+
+
+async def test_a_mission_whose_vehicle_is_busy_is_refused_with_who_has_it(served: Served) -> None:
+    await served.control.take("v1", by="bob")
+    goes = mission(sequence(("Go", behavior("Go", "drive_stop", "v1"))))
+    async with RemoteControl(served.path, load_source) as remote:
+        with pytest.raises(BusyError, match="bob has v1") as refused:
+            await remote.start(goes)
+        assert refused.value.holders == {"v1": "bob"}
+        assert await remote.start(goes, even_if_busy=True) == "r1"
 
 
 async def test_an_executive_that_has_gone_is_told(served: Served) -> None:

@@ -48,6 +48,7 @@ SENT = {
 """What the requests of `COMMANDS` say, by the parameter of the operation."""
 
 SERVED_OTHERWISE = {
+    "start": "service start_mission brings the BPMN, or names a file of the executive's machine",
     "runs": "service list_runs, and topic status",
     "mission_time_s": "a field of the runs of list_runs and of topic status",
     "prompts": "topic prompts",
@@ -57,6 +58,7 @@ SERVED_OTHERWISE = {
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "check": "start_mission answers with the findings",
     "preview_take": "no message has its effects",
     "holders": "no message has them; a refused take_vehicle names the holder",
     "records": "a client has them from topic events on; older ones are in the journal",
