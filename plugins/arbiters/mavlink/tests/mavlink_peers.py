@@ -1,6 +1,5 @@
 """Scripted vehicles that keep to MAVLink's specification of its microservices (`mavlink_lossy`)."""
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -189,51 +188,22 @@ class Stored(Silent):
 
 
 class Parameters(Silent):
-    """Has parameters; says nothing of others. `writes`: how often one got another value."""
+    """Has parameters; says nothing of others."""
 
-    STEP_S = 0.01
-
-    def __init__(self, values: Mapping[str, tuple[float, int]], *, bytewise: bool = False) -> None:
+    def __init__(self, values: Mapping[str, tuple[float, int]]) -> None:
         self.values = dict(values)
-        self.bytewise = bytewise
-        self.writes = 0
-        self.read_only: set[str] = set()
-        self._listing: list[str] = []
 
     def hear(self, message: Message, now_s: float) -> Sequence[Message]:
-        if message.TYPE.name == "PARAM_REQUEST_LIST":
-            self._listing, self.next_s = list(self.values), now_s
-            return ()
         name = message.param_id.decode()
-        if message.TYPE.name == "PARAM_REQUEST_READ" and message.param_index >= 0:
-            name = list(self.values)[message.param_index]
         if name not in self.values:
             return ()
-        if message.TYPE.name == "PARAM_SET" and name not in self.read_only:
-            type_ = self.values[name][1]
-            before = self.values[name]
-            self.values[name] = (self._decoded(message.param_value, type_), type_)
-            self.writes += self.values[name] != before
-        return (self._value(name),)
-
-    def wake(self, now_s: float) -> Sequence[Message]:
-        name = self._listing.pop(0)
-        self.next_s = now_s + self.STEP_S if self._listing else None
-        return (self._value(name),)
-
-    def _value(self, name: str) -> Message:
         value, type_ = self.values[name]
-        if self.bytewise and type_ == dialect.MAV_PARAM_TYPE_INT32:
-            value = struct.unpack("<f", struct.pack("<i", int(value)))[0]
-        return message_type("PARAM_VALUE").make(
-            param_id=name.encode(),
-            param_value=value,
-            param_type=type_,
-            param_index=list(self.values).index(name),
-            param_count=len(self.values),
+        return (
+            message_type("PARAM_VALUE").make(
+                param_id=name.encode(),
+                param_value=value,
+                param_type=type_,
+                param_index=list(self.values).index(name),
+                param_count=len(self.values),
+            ),
         )
-
-    def _decoded(self, carried: float, type_: int) -> float:
-        if self.bytewise and type_ == dialect.MAV_PARAM_TYPE_INT32:
-            return float(struct.unpack("<i", struct.pack("<f", carried))[0])
-        return carried

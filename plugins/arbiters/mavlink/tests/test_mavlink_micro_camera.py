@@ -8,20 +8,17 @@ from m2pem_plugin_mavlink.microservices.camera import (
     Camera,
     FindCamera,
     ReadCaptureStatus,
-    ReadStorage,
     ReadZoom,
     camera_mode,
     start_video,
-    stop_images,
     stop_video,
     stop_zoom,
     take_image,
-    take_images,
     zoom,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError
-from mavlink_lossy import VEHICLE, Played, Silent, play_table, run
+from mavlink_lossy import VEHICLE, Played, play_table, run
 from mavlink_peers import Commanded, ack
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -34,8 +31,7 @@ def photographs(command: Any, vehicle: Commanded) -> Sequence[Message]:
 
 
 def tells(command: Any, vehicle: Commanded) -> Sequence[Message]:
-    name = {259: "CAMERA_INFORMATION", 262: "CAMERA_CAPTURE_STATUS", 261: "STORAGE_INFORMATION"}
-    name |= {260: "CAMERA_SETTINGS"}
+    name = {259: "CAMERA_INFORMATION", 260: "CAMERA_SETTINGS", 262: "CAMERA_CAPTURE_STATUS"}
     type_ = message_type(name[int(command.param1)])
     fields: dict[str, Any] = {
         "CAMERA_INFORMATION": {
@@ -45,11 +41,6 @@ def tells(command: Any, vehicle: Commanded) -> Sequence[Message]:
         },
         "CAMERA_SETTINGS": {"zoomLevel": 25.0},
         "CAMERA_CAPTURE_STATUS": {"video_status": 1, "recording_time_ms": 2500, "image_count": 9},
-        "STORAGE_INFORMATION": {
-            "storage_id": int(command.param2),
-            "status": dialect.STORAGE_STATUS_READY,
-            "available_capacity": 100.5,
-        },
     }[type_.name]
     return ack(command.command), type_.make(**fields)
 
@@ -66,17 +57,10 @@ def test_one_image_is_taken_or_it_fails_clearly_whatever_the_link_does() -> None
     )
 
 
-def test_several_images_are_asked_for_only_once_as_they_would_be_taken_again() -> None:
-    assert len(run(take_images(VEHICLE, 2.0, count=3), Silent()).sent) == 1
-    assert len(run(take_images(VEHICLE, 2.0), Silent()).sent) == RETRIES.tries
-
-
 @pytest.mark.parametrize(
     ("command", "id_", "params"),
     [
         (take_image(VEHICLE, 5, 2), dialect.MAV_CMD_IMAGE_START_CAPTURE, (2, 0, 1, 5)),
-        (take_images(VEHICLE, 2.5, 3), dialect.MAV_CMD_IMAGE_START_CAPTURE, (0, 2.5, 3, 0)),
-        (stop_images(VEHICLE, 2), dialect.MAV_CMD_IMAGE_STOP_CAPTURE, (2,)),
         (start_video(VEHICLE, 1.0, 2), dialect.MAV_CMD_VIDEO_START_CAPTURE, (0, 1.0, 2)),
         (stop_video(VEHICLE, 2), dialect.MAV_CMD_VIDEO_STOP_CAPTURE, (0, 2)),
         (zoom(VEHICLE, 0.25), dialect.MAV_CMD_SET_CAMERA_ZOOM, (2, 25.0, 0)),
@@ -104,9 +88,6 @@ def test_what_cameras_tell_of_themselves() -> None:
     assert status.images == 9
 
     assert run(ReadZoom(VEHICLE), Commanded(tells)).result == 0.25
-
-    storage = run(ReadStorage(VEHICLE, 2), Commanded(tells)).result
-    assert (storage.storage, storage.is_ready, storage.free_mib) == (2, True, 100.5)
 
 
 def test_another_camera_behind_the_same_autopilot_is_not_meant() -> None:

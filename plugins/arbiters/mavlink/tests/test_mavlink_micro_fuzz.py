@@ -5,17 +5,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
-from m2pem_plugin_mavlink.microservices.camera import FindCamera, ReadCaptureStatus, ReadStorage
+from m2pem_plugin_mavlink.microservices.camera import FindCamera, ReadCaptureStatus
 from m2pem_plugin_mavlink.microservices.camera_images import ReadImage
 from m2pem_plugin_mavlink.microservices.commands import Command
 from m2pem_plugin_mavlink.microservices.gimbal import FindGimbal
 from m2pem_plugin_mavlink.microservices.gimbal_status import WANTED, GimbalStatus
-from m2pem_plugin_mavlink.microservices.home import GroundPlace, ReadHome, SetOrigin
-from m2pem_plugin_mavlink.microservices.message_requests import (
-    ReadAutopilotVersion,
-    ReadMessageInterval,
-    SetMessageInterval,
-)
+from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage, SetMessageInterval
 from m2pem_plugin_mavlink.microservices.mission_download import DownloadMission
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.microservices.mission_upload import UploadMission
@@ -24,12 +19,7 @@ from m2pem_plugin_mavlink.microservices.missions import (
     ReadMissionItem,
     SetCurrentItem,
 )
-from m2pem_plugin_mavlink.microservices.parameters import (
-    ParameterEncoding,
-    ReadParameter,
-    ReadParameters,
-    SetParameter,
-)
+from m2pem_plugin_mavlink.microservices.parameters import ParameterEncoding, ReadParameter
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type, types_by_id
 from m2pem_plugin_mavlink.protocol.transaction import Transaction
 from mavlink_lossy import VEHICLE, Silent, run
@@ -40,23 +30,17 @@ BYTEWISE = ParameterEncoding.BYTEWISE
 EXCHANGES: dict[str, Callable[[], Transaction[Any]]] = {
     "command": lambda: Command(VEHICLE, 400),
     "interval": lambda: SetMessageInterval(VEHICLE, 30, 0.01),
-    "interval read": lambda: ReadMessageInterval(VEHICLE, 30),
     "upload": lambda: UploadMission(VEHICLE, ITEMS),
     "download": lambda: DownloadMission(VEHICLE),
     "clear": lambda: ClearMission(VEHICLE),
     "current": lambda: SetCurrentItem(VEHICLE, 1),
     "item": lambda: ReadMissionItem(VEHICLE, 1),
     "parameter": lambda: ReadParameter(VEHICLE, "P", BYTEWISE),
-    "parameter set": lambda: SetParameter(VEHICLE, "P", 3, BYTEWISE),
-    "parameters": lambda: ReadParameters(VEHICLE),
-    "version": lambda: ReadAutopilotVersion(VEHICLE),
+    "message": lambda: RequestMessage(VEHICLE, "HOME_POSITION", lambda message: message),
     "camera": lambda: FindCamera(VEHICLE, 1),
     "capture": lambda: ReadCaptureStatus(VEHICLE, 1),
-    "storage": lambda: ReadStorage(VEHICLE),
     "image": lambda: ReadImage(VEHICLE, 1),
     "gimbal": lambda: FindGimbal(VEHICLE, 1),
-    "home": lambda: ReadHome(VEHICLE),
-    "origin": lambda: SetOrigin(VEHICLE, GroundPlace(47.0, 8.0, 0.0)),
 }
 LIKELY: dict[str, tuple[int, ...]] = {
     "command": (400, 510, 511, 512, 224),

@@ -7,10 +7,8 @@ import pytest
 from m2pem_plugin_mavlink.microservices.commands import REASON_S
 from m2pem_plugin_mavlink.microservices.message_requests import (
     SLOWER_TRIES,
-    ReadMessageInterval,
     RequestMessage,
     SetMessageInterval,
-    as_it_is,
 )
 from m2pem_plugin_mavlink.protocol.messages import Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import RETRIES, NoAnswerError, RefusedError
@@ -21,15 +19,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 ATTITUDE: int = message_type("ATTITUDE").id
 FASTEST_US = 20_000
 BOUND_S = (1 + SLOWER_TRIES) * RETRIES.bound_s + REASON_S
-INTERVAL = message_type("MESSAGE_INTERVAL")
 
 
 def streams(command: Any, vehicle: Commanded) -> Sequence[Message]:
     """As ArduPilot does: what is faster than its loop is denied."""
-    if command.command == dialect.MAV_CMD_GET_MESSAGE_INTERVAL:
-        other = INTERVAL.make(message_id=1, interval_us=7)
-        asked = INTERVAL.make(message_id=int(command.param1), interval_us=vehicle.effects[-1])
-        return ack(command.command), other, asked
     if 0 < command.param2 < FASTEST_US or command.param1 != ATTITUDE:
         return (ack(command.command, dialect.MAV_RESULT_DENIED),)
     vehicle.effects.append(int(command.param2))
@@ -77,11 +70,8 @@ def test_default_and_never_are_said_as_they_are(interval_s: float) -> None:
     assert vehicle.received[0].param2 == interval_s
 
 
-@pytest.mark.parametrize(("interval_us", "interval_s"), [(250_000, 0.25), (-1, -1.0), (0, 0.0)])
-def test_the_interval_of_a_message_is_read(interval_us: int, interval_s: float) -> None:
-    vehicle = Commanded(streams)
-    vehicle.effects.append(interval_us)
-    assert run(ReadMessageInterval(VEHICLE, ATTITUDE), vehicle).result == interval_s
+def as_it_is(message: Message) -> Message:
+    return message
 
 
 def test_a_message_is_sent_once_or_it_fails_clearly_whatever_the_link_does() -> None:

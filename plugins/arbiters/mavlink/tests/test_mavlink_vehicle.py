@@ -17,7 +17,6 @@ from mavlink_vehicle_world import (
     copter,
     fly,
     make,
-    px4,
     rover,
 )
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -252,16 +251,6 @@ def test_a_home_that_is_not_streamed_is_asked_for_until_it_is_told(virtual: Run)
             assert await vehicle.until(lambda: vehicle.state.home is not None, 30.0)
             await vehicle.sleep(30.0)
             assert [each.param1 for each in asked] == [refused] * 3
-
-    virtual(main)
-
-
-def test_another_message_can_be_asked_for(virtual: Run) -> None:
-    async def main(clock: Clock) -> None:
-        async with Playing(px4(clock)) as (link, vehicle):
-            vehicle.want("GIMBAL_DEVICE_ATTITUDE_STATUS", 0.5)
-            await vehicle.sleep(3.0)
-            assert link.intervals[dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS] == 0.5
 
     virtual(main)
 

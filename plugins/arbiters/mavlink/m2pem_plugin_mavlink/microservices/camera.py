@@ -68,23 +68,6 @@ class CaptureStatus:
     images: int
 
 
-@dataclass(frozen=True, slots=True)
-class Storage:
-    """One storage of a camera (STORAGE_INFORMATION). `status`: a STORAGE_STATUS."""
-
-    storage: int
-    count: int
-    status: int
-    total_mib: float
-    free_mib: float
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether the camera reports that it can store images."""
-        ready = (dialect.STORAGE_STATUS_READY, dialect.STORAGE_STATUS_NOT_SUPPORTED)
-        return self.status in ready
-
-
 class FindCamera(RequestMessage[Camera]):
     """Reads the camera of a component."""
 
@@ -134,42 +117,11 @@ class ReadZoom(RequestMessage[float]):
         super().__init__(target, "CAMERA_SETTINGS", read)
 
 
-class ReadStorage(RequestMessage[Storage]):
-    """Reads one of a camera's storages; the first is 1."""
-
-    def __init__(self, target: Address, storage: int = 1) -> None:
-        def read(message: Message) -> Storage | None:
-            if message.storage_id != storage:
-                return None
-            return Storage(
-                storage,
-                message.storage_count,
-                message.status,
-                message.total_capacity,
-                message.available_capacity,
-            )
-
-        super().__init__(target, "STORAGE_INFORMATION", read, index=storage)
-
-
 def take_image(target: Address, sequence: int, device: int = 0) -> Command:
     """Take one image. A camera takes one for each `sequence`, which begins with 1: so a command
     that is sent again takes no second image."""
     params = (device, 0, 1, sequence, 0, 0, _NAN)
     return Command(target, dialect.MAV_CMD_IMAGE_START_CAPTURE, params)
-
-
-def take_images(target: Address, interval_s: float, count: int = 0, device: int = 0) -> Command:
-    """Take `count` images, or with 0 continue until `stop_images`. A camera may start to count
-    again when it receives the command twice, so a command with a count is sent only once."""
-    params = (device, interval_s, count, 0, 0, 0, _NAN)
-    return Command(target, dialect.MAV_CMD_IMAGE_START_CAPTURE, params, once=count != 0)
-
-
-def stop_images(target: Address, device: int = 0) -> Command:
-    """Stop taking images."""
-    params = (device, _NAN, _NAN, _NAN, 0, 0, _NAN)
-    return Command(target, dialect.MAV_CMD_IMAGE_STOP_CAPTURE, params)
 
 
 def start_video(target: Address, status_hz: float = 0.0, device: int = 0) -> Command:

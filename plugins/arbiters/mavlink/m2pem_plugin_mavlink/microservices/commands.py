@@ -99,8 +99,6 @@ class CommandExchange(Transaction[T]):
         command: a MAV_CMD.
         params: its param1 and so on, as many as matter; the others are 0.
         place: its param5 to param7, which are then sent as whole numbers (COMMAND_INT).
-        once: send it only once, as a repetition would execute it again.
-        progress: called with the progress in percent; None if the vehicle does not report it.
 
     Fails with `RefusedError` (a MAV_RESULT; with the texts that the vehicle sent meanwhile) or
     `NoAnswerError`, at the latest after `LONGEST_S`, and without progress after `retry_policy`.
@@ -115,19 +113,16 @@ class CommandExchange(Transaction[T]):
         params: Sequence[float] = (),
         *,
         place: CommandPosition | None = None,
-        once: bool = False,
         retry_policy: RetryPolicy = RETRIES,
-        progress: Callable[[int | None], None] | None = None,
     ) -> None:
         super().__init__(("command", target, command))
         self.target, self.command = target, command
         self.name = command_name(command)
-        self.retry_policy = RetryPolicy(1, retry_policy.bound_s) if once else retry_policy
+        self.retry_policy = retry_policy
         self._params = tuple(float(each) for each in params) + (0.0,) * (7 - len(params))
         self._place = place
         self._as_int = place is not None
         self._form_changed = False
-        self._progress = progress
         self._texts = StatusTexts()
         self._sent_count = 0
         self._began_s = 0.0
@@ -194,8 +189,6 @@ class CommandExchange(Transaction[T]):
         elif result == dialect.MAV_RESULT_IN_PROGRESS:
             self._in_progress = True
             self.deadline_s = min(now_s + PROGRESS_S, self._began_s + LONGEST_S)
-            if self._progress is not None:
-                self._progress(ack.progress if ack.progress <= 100 else None)
         elif result in _OTHER_FORM and not self._form_changed and self._has_other_form(result):
             self._form_changed = True
             self._as_int = not self._as_int

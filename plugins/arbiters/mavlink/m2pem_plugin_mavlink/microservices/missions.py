@@ -85,11 +85,9 @@ class SetCurrentItem(CommandExchange[None]):
 
     wants = CommandExchange.wants | {_CURRENT.id}
 
-    def __init__(
-        self, target: Address, sequence: int, *, retry_policy: RetryPolicy = RETRIES
-    ) -> None:
+    def __init__(self, target: Address, sequence: int) -> None:
         command = dialect.MAV_CMD_DO_SET_MISSION_CURRENT
-        super().__init__(target, command, (sequence,), retry_policy=retry_policy)
+        super().__init__(target, command, (sequence,))
         self.name = f"current item {sequence}"
         self._sequence = sequence
         self._by_message = False
@@ -150,11 +148,9 @@ class ReadMissionItem(Transaction[MissionItem]):
         target: Address,
         sequence: int,
         mission_type: MissionType = MissionType.MISSION,
-        *,
-        retry_policy: RetryPolicy = RETRIES,
     ) -> None:
         super().__init__(("mission", target))
-        self.target, self.mission_type, self.retry_policy = target, mission_type, retry_policy
+        self.target, self.mission_type = target, mission_type
         self._sequence = sequence
         self._tries = 0
 
@@ -162,7 +158,7 @@ class ReadMissionItem(Transaction[MissionItem]):
         """Ask."""
         self._tries += 1
         self.outbox.append(item_request(self.target, self._sequence, self.mission_type))
-        self.deadline_s = now_s + self.retry_policy.answer_s
+        self.deadline_s = now_s + RETRIES.answer_s
 
     def receive(self, message: Message, sender: Address, now_s: float) -> None:
         """Process the item, or a refusal."""
@@ -178,7 +174,7 @@ class ReadMissionItem(Transaction[MissionItem]):
 
     def expire(self, now_s: float) -> None:
         """Repeat the request, or fail."""
-        if self._tries < self.retry_policy.tries:
+        if self._tries < RETRIES.tries:
             self.begin(now_s)
         else:
             asked = f"no answer after {self._tries} requests"

@@ -100,5 +100,4 @@ async def mission_item(link: VehicleLink, sequence: int) -> MissionItem:
 
 async def parameter(link: VehicleLink, firmware: Firmware, name: str) -> float:
     """Return the value of a parameter."""
-    found = await link.perform(ReadParameter(link.address, name, _ENCODINGS[firmware]))
-    return found.value
+    return await link.perform(ReadParameter(link.address, name, _ENCODINGS[firmware]))

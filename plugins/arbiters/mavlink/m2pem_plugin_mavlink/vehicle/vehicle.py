@@ -212,13 +212,6 @@ class Vehicle:
         """Wait, by the arbiter's clock."""
         await self._clock.sleep(seconds)
 
-    def want(self, message: str, interval_s: float) -> None:
-        """Request a stream of a message that is not part of telemetry (a gimbal's attitude,
-        say)."""
-        if self._streams is None:
-            raise NoAnswerError(f"{self.resource} has sent no message yet")
-        self._streams.wanted[message_type(message).id] = interval_s
-
     # --- receiving ------------------------------------------------------------------------------
 
     def _identify(self, message: Message, sender: Address) -> None:
