@@ -6,7 +6,7 @@ from m2pem.executive.loading import load_source
 from m2pem.plugins import PluginManager
 from m2pem.verify.check import check
 from m2pem.verify.report.findings import findings_of
-from m2pem.verify.report.picture import picture
+from m2pem.verify.report.picture import pictures
 from m2pem.verify.translate.options import Options
 from tests.broken.expected import EXPECTED, Expected
 
@@ -20,7 +20,7 @@ def drawn(expected: Expected) -> str:
     violation = next(each for each in findings.violations if each.answer.property == expected.asked)
     hashed = sha256(expected.mission.read_bytes()).hexdigest()
     about = f"Drawn from {expected.mission.name}, SHA-256 {hashed}"
-    return picture(findings, violation, about=about)
+    return pictures(findings, violation, about=about)[""]
 
 
 if __name__ == "__main__":

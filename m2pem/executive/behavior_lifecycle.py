@@ -338,15 +338,6 @@ TRANSITIONS = (
 )
 
 
-def follows(before: str, after: str) -> bool:
-    """Whether one stage can come after another, with others between them that took no time."""
-    reached, edge = {before}, {before}
-    while edge:
-        edge = {each.target for each in TRANSITIONS if each.source in edge} - reached
-        reached |= edge
-    return after in reached
-
-
 _BEGIN, _END = "<!-- begin: the life of a behavior -->", "<!-- end: the life of a behavior -->"
 
 

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 from bpmn_text import definitions, findings, flow, line_of
 
-from m2pem.bpmn.rules.registry import BY_SLUG
+from m2pem.bpmn.rules.registry import RULES
 
+BY_SLUG = {rule.slug: rule for rule in RULES}
 PLAIN = f'<startEvent id="S"/><endEvent id="E"/>{flow("S", "E")}'
 _FLOW = re.compile(r"\[(\w+)>(\w+)\]")
 

@@ -19,10 +19,10 @@ from m2pem.engine.state import RunStatus
 from m2pem.errors import M2pemError
 from m2pem.executive.behavior_lifecycle import (
     JOINT_STATES,
+    TRANSITIONS,
     ArbiterView,
     BehaviorViews,
     VehicleView,
-    follows,
 )
 from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
@@ -38,6 +38,17 @@ from .conftest import START_US, behavior, flow, mission
 ORIGIN = (38.1075, -77.3192, 60.0)
 HOMES = {"ugv1": (38.1075, -77.3192), "uav1": (38.1085, -77.3192), "uav2": (38.1075, -77.3172)}
 VEHICLES = tuple(ResourceId(name) for name in HOMES)
+
+
+def follows(before: str, after: str) -> bool:
+    """Whether one stage can come after another, with others between them that took no time."""
+    reached, edge = {before}, {before}
+    while edge:
+        edge = {each.target for each in TRANSITIONS if each.source in edge} - reached
+        reached |= edge
+    return after in reached
+
+
 FAR = '<m2pem:property name="target" value="[38.1175, -77.3192, 90]"/>'
 NEAR = '<m2pem:property name="target" value="[38.1077, -77.3190, 80]"/>'
 

@@ -12,11 +12,10 @@ from m2pem.executive.behavior_lifecycle import (
     JOINT_STATES,
     TRANSITIONS,
     BehaviorViews,
-    follows,
     write_page,
 )
 
-from .lifecycle_world import VEHICLES, live
+from .lifecycle_world import VEHICLES, follows, live
 
 PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"
 NAMES = [each.name for each in JOINT_STATES]

@@ -1,7 +1,5 @@
 """All rules of mission files, and the checks of a file's XML tree; time is linear in the file."""
 
-from collections.abc import Mapping
-
 from lxml import etree
 
 from m2pem.bpmn.file_findings import FileFindings
@@ -51,8 +49,6 @@ RULES: tuple[Rule, ...] = tuple(
     )
 )
 """Every rule once, by number."""
-
-BY_SLUG: Mapping[str, Rule] = {rule.slug: rule for rule in RULES}
 
 _CHECKS: tuple[Checks, ...] = (
     definitions.CHECKS,

@@ -52,19 +52,6 @@ class Automaton:
     promises: int
     accepting_all: int = -1
 
-    @property
-    def needs_cycles(self) -> bool:
-        """Whether some runs are accepted only because of what they repeat for ever."""
-        component = components([[edge.target for edge in each] for each in self.edges])
-        every = (1 << self.promises) - 1
-        together: dict[int, int] = {}
-        for state, edges in enumerate(self.edges):
-            for edge in edges:
-                if component[state] == component[edge.target] and state != self.accepting_all:
-                    number = component[state]
-                    together[number] = together.get(number, every) & edge.postponed
-        return any(not always for always in together.values())
-
     def __len__(self) -> int:
         return len(self.edges)
 

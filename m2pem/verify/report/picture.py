@@ -77,17 +77,6 @@ def pictures(
     }
 
 
-def picture(
-    findings: Findings, violation: DescribedViolation | None = None, *, about: str = ""
-) -> str:
-    """The mission's own diagram as SVG.
-
-    Raises:
-        ValueError: as `pictures`.
-    """
-    return pictures(findings, violation, about=about)[""]
-
-
 def _passed(file: _File, marks: Overlays) -> bool:
     """Whether a run passes a file, or a violation is in it."""
     shown = (*(each for step in marks.steps for each in step), *marks.stuck)

@@ -53,7 +53,6 @@ class CheckerReport:
 _COUNT = r"^\s*([\d.e+]+) "
 _ERRORS = re.compile(r"^State-vector \d+ byte, depth reached \d+(?:, \S+)*?,? ?errors: (\d+)", re.M)
 _STORED = re.compile(_COUNT + r"states, stored(?: \(([\d.e+]+) visited\))?", re.M)
-_NOMINAL = re.compile(_COUNT + r"nominal states", re.M)
 _TRANSITIONS = re.compile(_COUNT + r"transitions", re.M)
 _PROBLEM = re.compile(r"^pan(?:: ?\d+)?: (?:error, )?(.*)$", re.M)
 _UNREACHED = re.compile(r':(\d+), state \d+, "D_STEP\d+"')

@@ -153,12 +153,6 @@ class Data:
         names = {name for condition in conditions for name in condition.names}
         return all(self._follows(name, hidden) for name in names) and self._small(names)
 
-    def may_change(self, condition: Expression) -> bool:
-        """Whether anything in the mission may write what a condition reads."""
-        return any(
-            name in self.domains.of or self.domains.is_written(name) for name in condition.names
-        )
-
     def is_blurred(self, key: str) -> bool:
         """Whether a name is followed, but with values that represent many."""
         return key in self.domains.of and not self.domains.of[key].closed

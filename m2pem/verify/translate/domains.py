@@ -171,7 +171,6 @@ class Domains:
         by_key: dict[str, list[Write]] = {}
         for write in writes:
             by_key.setdefault(write.key, []).append(write)
-        self._written = frozenset(by_key)
         compared: dict[str, set[tuple[str, Value]]] = {}
         wanted: list[str] = []
         for expression, hidden in conditions:
@@ -220,13 +219,6 @@ class Domains:
                     changed = True
                     continue
                 changed = changed or len(domain.values) > before
-
-    def is_written(self, name: str) -> bool:
-        """Whether something writes the name, a part of it, or what it is a part of."""
-        return any(
-            key == name or key.startswith(f"{name}.") or name.startswith(f"{key}.")
-            for key in self._written
-        )
 
     def open(self, key: str) -> None:
         """Anything may be written to a name: it gets a value of each kind."""

@@ -158,14 +158,6 @@ def _trigger(
     return []
 
 
-def _true_or_never(
-    context: TranslationContext, node: e.FlowNode, scope: ScopeDraft, ways: list[Effect]
-) -> None:
-    """A condition on data that nothing in the mission writes is true at once, or never."""
-    come = _come(context, node, scope, Action.TRIGGERED)
-    context.transitions(product([come], ways))
-
-
 def event_based(context: TranslationContext, node: e.FlowNode, scope: ScopeDraft) -> None:
     """An event-based gateway waits for the first of the events behind it."""
     assert isinstance(node, e.EventBasedGateway)
