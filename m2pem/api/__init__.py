@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from m2pem.api.capabilities import ArbiterCapabilities, OcuCapabilities
     from m2pem.api.clock import Clock
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
+    from m2pem.api.connection_reader import ConnectionReader
     from m2pem.api.control import (
         Alert,
         ControlEvent,
@@ -104,6 +105,7 @@ if TYPE_CHECKING:
     from m2pem.mission.library import MissionFile
     from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
+    from m2pem.suggestions import did_you_mean
     from m2pem.units import Dimension, UnitError, quantity
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
@@ -121,6 +123,7 @@ _MODULES = {
     "m2pem.api.capabilities": "ArbiterCapabilities OcuCapabilities",
     "m2pem.api.clock": "Clock",
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
+    "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": (
         "Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
         " RunSummary SimulationResult StampedRecord TelemetrySample"
@@ -160,6 +163,7 @@ _MODULES = {
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
     "m2pem.geo.polygon": "edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
+    "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "Dimension UnitError quantity",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
@@ -186,6 +190,7 @@ __all__ = [
     "BehaviorType",
     "Clock",
     "Connection",
+    "ConnectionReader",
     "DataName",
     "Decision",
     "Description",
@@ -265,6 +270,7 @@ __all__ = [
     "as_geojson",
     "command_group",
     "describe",
+    "did_you_mean",
     "distance_m",
     "edges_enclose",
     "follow",

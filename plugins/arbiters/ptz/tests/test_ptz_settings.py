@@ -60,7 +60,7 @@ def test_reach_and_mounting_carry_units():
         ({}, "driver: it is missing; write one of ros, mavlink, onvif"),
         ({"driver": "mavsdk"}, "driver: 'mavsdk' is not a driver of cameras; write one of ros, "),
         ({"mountin": {}}, "mountin: there is no such setting; did you mean 'mounting'?"),
-        ({"reach": 5}, "reach: 5 is not a map; known in it: pan, tilt"),
+        ({"reach": 5}, "reach: 5 is not a map such as {pan: "),
         ({"reach": {"pann": 1}}, "reach.pann: there is no such setting; did you mean 'pan'?"),
         ({"reach": {"pan": "90 deg"}}, "reach.pan: '90 deg' is not two angles"),
         ({"reach": {"pan": [-90, 90]}}, "reach.pan: -90 has no unit"),

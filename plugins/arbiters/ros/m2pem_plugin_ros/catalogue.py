@@ -18,7 +18,6 @@ parameters:
 Bounds and defaults carry units, as everywhere in a fleet.
 """
 
-import difflib
 import math
 import re
 from collections.abc import Collection, Mapping
@@ -35,6 +34,7 @@ from m2pem.api import (
     ResourceId,
     ResumePolicy,
     UnitError,
+    did_you_mean,
     quantity,
 )
 from m2pem.errors import PluginError
@@ -96,7 +96,8 @@ def _behavior(place: str, name: str, body: Any, type_: BehaviorType) -> Behavior
     if body is None:
         known = [known for known, of in SHARED if of is type_]
         new = f"For a new one, list its parameters: {name}: {{parameters: {{speed: speed}}}}"
-        raise _error(place, f"{all_} share no such behavior; {_near(name, known)}{new}")
+        hint = f"{did_you_mean(name, known)} {new}".lstrip()
+        raise _error(place, f"{all_} share no such behavior; {hint}")
     given = _map(place, body, "parameters and other keys of a behavior")
     _known(place, given, _BEHAVIOR_KEYS)
     parameters = _map(
@@ -227,20 +228,15 @@ def _text(place: str, value: Any) -> str:
 def _known(place: str, given: Mapping[str, Any], keys: Collection[str]) -> None:
     for key in given:
         if key not in keys:
-            hint = _near(key, keys) or f"known: {', '.join(keys)}"
-            raise _error(f"{place}.{key}", f"there is no such key; {hint.strip()}")
+            hint = did_you_mean(str(key), keys) or f"known: {', '.join(keys)}"
+            raise _error(f"{place}.{key}", f"there is no such key; {hint}")
 
 
 def _one_of(place: str, value: Any, known: Collection[str]) -> str:
     if not isinstance(value, str) or value not in known:
-        problem = f"{value!r} is none of {', '.join(known)}; {_near(str(value), known)}"
+        problem = f"{value!r} is none of {', '.join(known)}; {did_you_mean(str(value), known)}"
         raise _error(place, problem.rstrip("; "))
     return value
-
-
-def _near(name: str, known: Collection[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean '{near[0]}'? " if near else ""
 
 
 def _article(kind: ParameterKind) -> str:

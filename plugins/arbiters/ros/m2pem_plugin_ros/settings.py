@@ -6,97 +6,36 @@ vehicle. A payload inherits the connection of its vehicle. So a detector has a n
 `driver`, `own_behaviors`, or allowed `behaviors` say so.
 """
 
-import difflib
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
-from typing import Any, TypeVar
+from typing import Any
 
 from m2pem.api import (
     BehaviorSpec,
     BehaviorType,
     Connection,
+    ConnectionReader,
     Dimension,
     ResourceId,
-    UnitError,
-    quantity,
 )
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.catalogue import read_declared_behaviors
-
-Choice = TypeVar("Choice", bound=StrEnum)
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")
 HIGHEST_DOMAIN = 232
 
 
-class ConnectionReader:
-    """Reads the map at `connection`, or an inner map such as `connection.topics`. Unknown keys and
-    invalid values are errors.
-
-    All methods raise PluginError; the text names the resource and the key.
-    """
-
-    def __init__(
-        self, resource: ResourceId, values: Mapping[str, Any], path: str = "connection"
-    ) -> None:
-        self.resource = resource
-        self.values = values
-        self.path = path
-
-    def error(self, key: str, problem: str) -> PluginError:
-        """Return the error for the value of a key."""
-        return PluginError(f"{self.resource}: {self.path}.{key}: {problem}")
-
-    def refuse_others(self, known: Collection[str]) -> None:
-        """Raise an error for keys other than these."""
-        for key in self.values:
-            if key not in known:
-                near = difflib.get_close_matches(str(key), known, n=1)
-                hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-                raise self.error(str(key), f"there is no such setting; {hint}")
-
-    def inner(self, key: str, example: str) -> "ConnectionReader":
-        """Return the reader of an inner map; it is empty if the key is missing."""
-        value = self.values.get(key, {})
-        if not isinstance(value, Mapping):
-            raise self.error(key, f"{value!r} is not a map such as {example}")
-        return ConnectionReader(self.resource, value, f"{self.path}.{key}")
-
-    def text(self, key: str, default: str) -> str:
-        """Return a text that is not empty."""
-        value = self.values.get(key, default)
-        if key in self.values and (not isinstance(value, str) or not value.strip()):
-            raise self.error(key, f"{value!r} is not a text")
-        return str(value)
-
-    def flag(self, key: str, default: bool) -> bool:
-        value = self.values.get(key, default)
-        if not isinstance(value, bool):
-            raise self.error(key, f"{value!r} is neither true nor false")
-        return value
-
-    def choice(self, key: str, choices: type[Choice], default: Choice) -> Choice:
-        """Return a member of an enumeration."""
-        value = self.values.get(key, default)
-        try:
-            return choices(value)
-        except ValueError:
-            raise self.error(key, f"{value!r} is none of {', '.join(choices)}") from None
+class RosConnectionReader(ConnectionReader):
+    """Reads names of ROS besides. Unknown keys and invalid values are errors."""
 
     def domain_id(self) -> int | None:
         """Return the ROS domain; None means that of the environment."""
-        value = self.values.get("domain_id")
-        if value is None:
+        if self.values.get("domain_id") is None:
             return None
-        whole = isinstance(value, int) and not isinstance(value, bool)
-        if not whole or not 0 <= value <= HIGHEST_DOMAIN:
-            raise self.error(
-                "domain_id", f"{value!r} is not a whole number from 0 to {HIGHEST_DOMAIN}"
-            )
-        return int(value)
+        return self.whole("domain_id", None, 0, HIGHEST_DOMAIN)
 
     def namespace(self, default: str | None = None) -> str:
         """Return the namespace with its leading "/"; "" is the root."""
@@ -119,19 +58,11 @@ class ConnectionReader:
             raise self.error(key, f"{value!r} is not the name of a ROS topic such as {default}")
         return value
 
-    def number(
+    def positive(
         self, key: str, default: float, dimension: Dimension, *, zero: bool = False
     ) -> float:
         """Return a quantity in SI, above 0, or with `zero` not below it."""
-        if key not in self.values:
-            return default
-        try:
-            number = quantity(self.values[key], dimension)
-        except UnitError as error:
-            raise self.error(key, str(error)) from None
-        return self._positive(key, number, zero)
-
-    def _positive(self, key: str, number: float, zero: bool) -> float:
+        number = self.quantity(key, default, dimension)
         if number < 0.0 or (number == 0.0 and not zero):
             raise self.error(key, f"{self.values[key]!r} is {'below' if zero else 'not above'} 0")
         return number
@@ -276,7 +207,7 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
         other = reached.setdefault((settings.domain_id, settings.namespace), resource)
         if other != resource:
             problem = f"{other} has the same namespace, {settings.namespace or '/'}"
-            raise ConnectionReader(resource, {}).error("namespace", problem)
+            raise RosConnectionReader(resource, {}).error("namespace", problem)
     return read
 
 
@@ -303,7 +234,7 @@ def _read_vehicle(connection: Connection) -> Settings:
             f"{resource}: domain: the arbiter 'ros' commands vehicles of the domains "
             f"{' and '.join(DOMAINS)}, not {connection.domain}; the arbiter 'mavlink' does"
         )
-    reader = ConnectionReader(resource, connection.settings)
+    reader = RosConnectionReader(resource, connection.settings)
     reader.refuse_others(_KEYS)
     reader.inner("sim", "{heading: 60 deg}")
     driver = reader.choice("driver", DriverName, DriverName.NODE)
@@ -332,22 +263,22 @@ def _read_vehicle(connection: Connection) -> Settings:
     )
 
 
-def _topics(reader: ConnectionReader) -> Topics:
+def _topics(reader: RosConnectionReader) -> Topics:
     usual = {each.name: str(each.default) for each in fields(Topics)}
     reader.refuse_others(usual)
     return Topics(**{key: reader.topic(key, default) for key, default in usual.items()})
 
 
-def _bounds(reader: ConnectionReader) -> Bounds:
+def _bounds(reader: RosConnectionReader) -> Bounds:
     reader.refuse_others(BOUNDS)
     usual = Bounds()
     return Bounds(
-        reader.number("speed", usual.speed_m_s, Dimension.SPEED),
-        reader.number("reverse_speed", usual.reverse_m_s, Dimension.SPEED),
-        reader.number("acceleration", usual.acceleration_m_s2, Dimension.ACCELERATION),
-        reader.number("yaw_rate", usual.yaw_rate_rad_s, Dimension.ANGULAR_SPEED),
-        reader.number("turn_radius", usual.turn_radius_m, Dimension.DISTANCE, zero=True),
-        reader.number("lateral_acceleration", usual.lateral_m_s2, Dimension.ACCELERATION),
+        reader.positive("speed", usual.speed_m_s, Dimension.SPEED),
+        reader.positive("reverse_speed", usual.reverse_m_s, Dimension.SPEED),
+        reader.positive("acceleration", usual.acceleration_m_s2, Dimension.ACCELERATION),
+        reader.positive("yaw_rate", usual.yaw_rate_rad_s, Dimension.ANGULAR_SPEED),
+        reader.positive("turn_radius", usual.turn_radius_m, Dimension.DISTANCE, zero=True),
+        reader.positive("lateral_acceleration", usual.lateral_m_s2, Dimension.ACCELERATION),
     )
 
 
@@ -377,7 +308,7 @@ def _read_detector(
     connection: Connection, of_vehicle: Mapping[str, Any] | None, with_node: Collection[ResourceId]
 ) -> DetectorSettings:
     own = own_settings(connection, of_vehicle, DETECTOR_KEYS)
-    reader = ConnectionReader(connection.resource, own)
+    reader = RosConnectionReader(connection.resource, own)
     node_keys = NODE_KEYS if connection.resource in with_node else ()
     reader.refuse_others((*DETECTOR_KEYS, *node_keys))
     topic = reader.topic("topic", "detections")
@@ -411,7 +342,7 @@ def read_payloads(
         other = reached.setdefault((settings.domain_id, settings.namespace), resource)
         if other != resource:
             problem = f"{other} has the same namespace, {settings.namespace or '/'}"
-            raise ConnectionReader(resource, {}).error("namespace", problem)
+            raise RosConnectionReader(resource, {}).error("namespace", problem)
     return read
 
 
@@ -421,7 +352,7 @@ def _has_node(connection: Connection, connections: Mapping[ResourceId, Connectio
     if values.get("driver") != DriverName.NODE:
         if "driver" in own and of_vehicle is not None:
             problem = f"{own['driver']!r} is not a driver of payloads: those with a node have m2pem"
-            raise ConnectionReader(connection.resource, own).error("driver", problem)
+            raise RosConnectionReader(connection.resource, own).error("driver", problem)
         return False
     if "driver" in own or "own_behaviors" in own:
         return True
@@ -431,9 +362,9 @@ def _has_node(connection: Connection, connections: Mapping[ResourceId, Connectio
 
 def _read_payload(connection: Connection, of_vehicle: Mapping[str, Any] | None) -> Settings:
     resource, own = connection.resource, _own_keys(connection, of_vehicle)
-    reader = ConnectionReader(resource, own)
+    reader = RosConnectionReader(resource, own)
     reader.refuse_others(_PAYLOAD_KEYS)
-    whole = ConnectionReader(resource, connection.settings)
+    whole = RosConnectionReader(resource, connection.settings)
     return Settings(
         whole.namespace(),
         whole.domain_id(),

@@ -104,11 +104,14 @@ def parameter(**body: Any) -> dict[str, Any]:
 REFUSED = [
     (["sweep"], "own_behaviors: .* is not a map of names of behaviors"),
     ({"sweep": None}, r"\.sweep: all vehicles share no such behavior; For a new one, list its"),
-    ({"area_survay": None}, r"\.area_survay: .*did you mean 'area_survey'\?"),
+    ({"area_survay": None}, r"\.area_survay: .*did you mean 'area_survey'"),
     ({"goto": {"parameters": {}}}, r"\.goto: 'goto' is the same for all vehicles; write"),
     ({"sweep": {"params": {}}}, r"\.sweep\.params: .* did you mean 'parameters'\?"),
     ({"sweep": {"parameters": ["route"]}}, r"\.sweep\.parameters: .* is not a map"),
-    ({"sweep": {"parameters": {"p": "rout"}}}, r"\.p\.kind: 'rout' is none of .*'route'\?"),
+    (
+        {"sweep": {"parameters": {"p": "rout"}}},
+        r"\.p\.kind: 'rout' is none of .*did you mean 'route'",
+    ),
     ({"sweep": {"parameters": {"p": 5}}}, r"\.p: 5 is not a map of a kind"),
     ({"sweep": {"resume": "retry"}}, r"\.resume: 'retry' is none of restart, fail, hold"),
     ({"sweep": {"ends": "no"}}, r"\.ends: 'no' is neither true nor false"),

@@ -2,14 +2,13 @@
 (docs/mavlink.md).
 """
 
-import difflib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from m2pem.api import Connection, Dimension, Fleet, ResourceId, UnitError, offset, quantity
+from m2pem.api import Connection, ConnectionReader, Dimension, Fleet, ResourceId, offset
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.protocol.url import SocketUrl, Way, parse_url
 from m2pem_plugin_mavlink.settings import SITL, Settings, read_settings
@@ -58,63 +57,47 @@ def read_sitl_settings(resource: ResourceId, value: Any) -> SitlSettings:
     Raises:
         PluginError: one of them is wrong; the text names the resource and the key.
     """
-    if not isinstance(value, Mapping):
-        raise _error(resource, "", f"{value!r} is not a map such as {{frame: quad}}")
-    for key in value:
-        if key not in _KEYS:
-            near = difflib.get_close_matches(str(key), _KEYS, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_KEYS)}"
-            raise _error(resource, f".{key}", f"there is no such setting; {hint}")
-    firmware = _FIRMWARES.get(str(value.get("firmware", Firmware.ARDUPILOT)).lower())
+    reader = ConnectionReader(resource, {SITL: value}).inner(SITL, "{frame: quad}")
+    reader.refuse_others(_KEYS)
+    firmware = _FIRMWARES.get(str(reader.values.get("firmware", Firmware.ARDUPILOT)).lower())
     if firmware is None:
         known = ", ".join(_FIRMWARES)
-        raise _error(resource, ".firmware", f"{value['firmware']!r} is none of {known}")
-    frame = value.get("frame", "")
+        raise reader.error("firmware", f"{reader.values['firmware']!r} is none of {known}")
+    frame = reader.values.get("frame", "")
     if not isinstance(frame, str):
-        raise _error(resource, ".frame", f"{frame!r} is not a name such as quad")
+        raise reader.error("frame", f"{frame!r} is not a name such as quad")
     return SitlSettings(
         firmware,
         frame,
-        _home(resource, value.get("home")),
-        _heading_deg(resource, value.get("heading", "0 deg")),
-        _parameters(resource, value.get("parameters", {})),
+        _home(reader),
+        math.degrees(reader.quantity("heading", 0.0, Dimension.ANGLE)) % 360.0,
+        _parameters(reader),
     )
 
 
-def _home(resource: ResourceId, value: Any) -> tuple[float, float, float] | None:
+def _home(reader: ConnectionReader) -> tuple[float, float, float] | None:
+    value = reader.values.get("home")
     if value is None:
         return None
     if not isinstance(value, list) or len(value) not in (2, 3) or not all(map(_number, value)):
-        raise _error(
-            resource, ".home", f"{value!r} is not [latitude, longitude] or [.., .., altitude]"
-        )
+        raise reader.error("home", f"{value!r} is not [latitude, longitude] or [.., .., altitude]")
     latitude, longitude, altitude = (*map(float, value), math.nan)[:3]
     if abs(latitude) > 90.0 or abs(longitude) > 180.0:
-        raise _error(resource, ".home", f"{value!r} is not [latitude, longitude] in degrees")
+        raise reader.error("home", f"{value!r} is not [latitude, longitude] in degrees")
     return latitude, longitude, altitude
 
 
-def _heading_deg(resource: ResourceId, value: Any) -> float:
-    try:
-        return math.degrees(quantity(value, Dimension.ANGLE)) % 360.0
-    except UnitError as error:
-        raise _error(resource, ".heading", str(error)) from None
-
-
-def _parameters(resource: ResourceId, value: Any) -> dict[str, float]:
+def _parameters(reader: ConnectionReader) -> dict[str, float]:
+    value = reader.values.get("parameters", {})
     if not isinstance(value, Mapping) or not all(map(_number, value.values())):
-        raise _error(
-            resource, ".parameters", "names of parameters and numbers, such as {BATT_FS_LOW_ACT: 2}"
+        raise reader.error(
+            "parameters", "names of parameters and numbers, such as {BATT_FS_LOW_ACT: 2}"
         )
     return {str(name): float(number) for name, number in value.items()}
 
 
 def _number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
-    return PluginError(f"{resource}: connection.sitl{key}: {problem}")
 
 
 ARBITER = "mavlink"

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from m2pem.api import Connection
-from m2pem_plugin_ptz.settings import OwnSettings
+from m2pem.api import Connection, ConnectionReader
 
 AUTOPILOT_COMPONENT, CAMERA_COMPONENT = 1, 100
 GCS_SYSTEM_ID = 255
@@ -68,8 +67,8 @@ def read_settings(connection: Connection) -> MavlinkSettings:
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
-    own = OwnSettings.of(connection)
-    own.refuse_slips(_KEYS)
+    own = ConnectionReader(connection.resource, connection.settings)
+    own.refuse_misspelled(_KEYS)
     autopilot = own.whole("component_id", AUTOPILOT_COMPONENT, 1, 255, "of the autopilot")
     camera = None
     if "camera_component" in own.values:
@@ -89,7 +88,7 @@ def read_settings(connection: Connection) -> MavlinkSettings:
     )
 
 
-def _urls(own: OwnSettings) -> tuple[str, ...]:
+def _urls(own: ConnectionReader) -> tuple[str, ...]:
     value = own.values.get("url")
     urls = value if isinstance(value, list | tuple) else [value]
     if not urls or not all(isinstance(url, str) and "://" in url for url in urls):

@@ -1,7 +1,6 @@
 """The settings of an ONVIF camera in the fleet file, and the file with user and password."""
 
 import configparser
-import difflib
 import os
 import shlex
 import stat
@@ -13,13 +12,11 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from m2pem.api import Dimension, ResourceId, UnitError, quantity
+from m2pem.api import ConnectionReader, Dimension, ResourceId
 from m2pem.errors import PluginError
 
 KEYS = ("host", "port", "credentials", "profile", "timeout", "calls", "invert")
 AXES = ("pan", "tilt")
-LIKE = 0.75
-"""A key this similar to a known one is an error; otherwise it is inherited from the vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,72 +46,40 @@ def read_onvif(resource: ResourceId, own: Mapping[str, Any]) -> OnvifSettings:
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
-    for key in own:
-        near = difflib.get_close_matches(str(key), KEYS, n=1, cutoff=LIKE)
-        if key not in KEYS and near:
-            raise _error(resource, str(key), f"there is no such setting; did you mean '{near[0]}'?")
+    reader = ConnectionReader(resource, own)
+    reader.refuse_misspelled(KEYS)
     host = own.get("host")
     if not isinstance(host, str) or not host.strip() or "/" in host:
-        raise _error(resource, "host", "an ONVIF camera needs its name or IP address")
-    calls_s = own.get("calls", 16.0)
-    if isinstance(calls_s, bool) or not isinstance(calls_s, int | float) or not 2 <= calls_s <= 100:
-        raise _error(resource, "calls", f"{calls_s!r} is not a number from 2 to 100")
+        raise reader.error("host", "an ONVIF camera needs its name or IP address")
     return OnvifSettings(
         host.strip().strip("[]"),
-        _port(resource, own.get("port", 80)),
-        _path(resource, own),
-        _text(resource, own, "profile"),
-        _timeout_s(resource, own.get("timeout", 2.0)),
-        float(calls_s),
-        _inverted(resource, own.get("invert", [])),
+        reader.whole("port", 80, 1, 65535),
+        _path(reader),
+        reader.text("profile", "").strip(),
+        reader.quantity("timeout", 2.0, Dimension.DURATION, 0.1, 60.0),
+        reader.number("calls", 16.0, 2, 100),
+        _inverted(reader),
     )
 
 
-def _port(resource: ResourceId, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 65535:
-        raise _error(resource, "port", f"{value!r} is not a TCP port from 1 to 65535")
-    return value
-
-
-def _path(resource: ResourceId, own: Mapping[str, Any]) -> Path | None:
+def _path(reader: ConnectionReader) -> Path | None:
     for key in ("user", "username", "password"):
-        if key in own:
-            raise _error(
-                resource,
+        if key in reader.values:
+            raise reader.error(
                 key,
                 "many people read fleet files: write user and password into a separate file, and "
                 "name it as connection.credentials",
             )
-    text = _text(resource, own, "credentials")
+    text = reader.text("credentials", "").strip()
     return Path(text).expanduser() if text else None
 
 
-def _text(resource: ResourceId, own: Mapping[str, Any], key: str) -> str:
-    value = own.get(key, "")
-    if key in own and (not isinstance(value, str) or not value.strip()):
-        raise _error(resource, key, f"{value!r} is not a text")
-    return str(value).strip()
-
-
-def _timeout_s(resource: ResourceId, value: object) -> float:
-    try:
-        seconds = quantity(value, Dimension.DURATION)
-    except UnitError as error:
-        raise _error(resource, "timeout", str(error)) from error
-    if not 0.1 <= seconds <= 60:
-        raise _error(resource, "timeout", f"{seconds:g} s is not in 0.1 s to 60 s")
-    return seconds
-
-
-def _inverted(resource: ResourceId, value: object) -> frozenset[str]:
+def _inverted(reader: ConnectionReader) -> frozenset[str]:
+    value = reader.values.get("invert", [])
     axes = [value] if isinstance(value, str) else value
     if not isinstance(axes, list) or not all(axis in AXES for axis in axes):
-        raise _error(resource, "invert", f"{value!r} are none of the axes pan, tilt")
+        raise reader.error("invert", f"{value!r} are none of the axes pan, tilt")
     return frozenset(axes)
-
-
-def _error(resource: ResourceId, key: str, problem: str) -> PluginError:
-    return PluginError(f"{resource}: connection.{key}: {problem}")
 
 
 LONGEST = 64 * 1024

@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from m2pem.api import Connection
+from m2pem.api import Connection, ConnectionReader
 from m2pem_plugin_ptz.gimbal import PanTiltZoom
-from m2pem_plugin_ptz.settings import OwnSettings
 
 
 class Axis(StrEnum):
@@ -122,8 +121,8 @@ def read_settings(connection: Connection) -> RosSettings:
     Raises:
         PluginError: something is wrong; the text names the resource and the key.
     """
-    own = OwnSettings.of(connection)
-    own.refuse_slips(_ALL)
+    own = ConnectionReader(connection.resource, connection.settings)
+    own.refuse_misspelled(_ALL)
     own.choice("via", Via, Via.JOINTS)
     command = own.choice("command", Command, Command.TRAJECTORY)
     namespace = own.text("namespace", "/").strip("/")
@@ -149,7 +148,7 @@ def read_settings(connection: Connection) -> RosSettings:
     )
 
 
-def _joints(own: OwnSettings) -> Joints:
+def _joints(own: ConnectionReader) -> Joints:
     inner = own.inner("joints", "{pan: pan_joint, tilt: tilt_joint}")
     inner.refuse_others(_JOINTS)
     names = {
