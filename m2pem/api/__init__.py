@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
+    from m2pem.api.latest_task import LatestTask
     from m2pem.api.ocu import Ocu
     from m2pem.api.operations import (
         MAX_DATA_VALUES,
@@ -134,6 +135,7 @@ _MODULES = {
     "m2pem.api.behavior_parameters": "BehaviorParameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
+    "m2pem.api.latest_task": "LatestTask",
     "m2pem.api.ocu": "Ocu",
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
@@ -212,6 +214,7 @@ __all__ = [
     "Importance",
     "Kind",
     "LatLon",
+    "LatestTask",
     "LazyCommand",
     "Limits",
     "LinkState",

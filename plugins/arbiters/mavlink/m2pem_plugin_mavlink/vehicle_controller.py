@@ -7,10 +7,9 @@ exchange in flight too, and only then is something else sent.
 import asyncio
 import logging
 import math
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, Limits
+from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
 from m2pem_plugin_mavlink.behaviors.arrival import (
     STANDS_BELOW_M_S,
     StillnessTimer,
@@ -71,7 +70,7 @@ class VehicleController:
         self._active: _ActiveBehavior | None = None
         self._held = False
         self._was_commanded = False
-        self._work: set[asyncio.Task[None]] = set()
+        self._work = LatestTask()
 
     @property
     def behavior(self) -> str:
@@ -98,21 +97,23 @@ class VehicleController:
         self._held = False
         self._was_commanded = True
         self._takeover_monitor.begin()
-        self._replace(lambda: self._run(active, before.behavior if before else None, look_first))
+        self._work.replace(
+            lambda: self._run(active, before.behavior if before else None, look_first)
+        )
 
     def adopt(self, id_: BehaviorId, behavior: Behavior) -> None:
         """Continue a behavior that the vehicle was found to execute."""
         self._active = active = _ActiveBehavior(id_, behavior, begun=True, reattached=True)
         self._held = False
         self._was_commanded = True
-        self._replace(lambda: self._run(active))
+        self._work.replace(lambda: self._run(active))
 
     def cancel(self, id_: BehaviorId) -> None:
         """Stop the vehicle, and free it."""
         active = self._active
         if active is not None and active.id == id_ and not active.cancelled:
             active.cancelled = True
-            self._replace(lambda: self._cancel(active))
+            self._work.replace(lambda: self._cancel(active))
 
     def adjust(self, id_: BehaviorId, speed_m_s: float) -> None:
         """Change the speed of the behavior; while it is held, the change takes effect when it is
@@ -134,21 +135,20 @@ class VehicleController:
         if active is not None and not self._held:
             active.behavior.paused()
         self._held = True
-        self._replace(lambda: self._hold_still(active))
+        self._work.replace(lambda: self._hold_still(active))
 
     def resume(self) -> None:
         """Continue the behavior."""
         active, held = self._active, self._held
         self._held = False
         if active is not None and held:
-            self._replace(lambda: self._run(active))
+            self._work.replace(lambda: self._run(active))
 
     def release(self) -> None:
         """Forget the behavior of a vehicle that is lost."""
         self._active = None
         self._held = False
-        for task in self._work:
-            task.cancel()
+        self._work.cancel()
 
     async def reclaim(self) -> str:
         """Stop a vehicle that is connected again. Return "" when it has acknowledged, else why
@@ -189,27 +189,7 @@ class VehicleController:
 
     async def close(self) -> None:
         """Leave the vehicle as it is."""
-        tasks = list(self._work)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    # --- replacement ----------------------------------------------------------------------------
-
-    def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
-        before = set(self._work)
-        for task in before:
-            task.cancel()
-        task = asyncio.get_running_loop().create_task(self._after(before, work))
-        self._work.add(task)
-        task.add_done_callback(self._work.discard)
-
-    async def _after(
-        self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
-    ) -> None:
-        if before:
-            await asyncio.wait(before)
-        await work()
+        await self._work.close()
 
     # --- execution ------------------------------------------------------------------------------
 

@@ -6,10 +6,9 @@ cancel, or another behavior, ends the current one before anything else begins.
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, Limits
+from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
 from m2pem_plugin_ptz.behaviors.behavior import TICK_S, Behavior, BehaviorFailedError
 from m2pem_plugin_ptz.camera_model.model import CameraModel
 from m2pem_plugin_ptz.drivers.driver import CameraError
@@ -49,7 +48,7 @@ class CameraController:
         self._task: _Task | None = None
         self._replaced: list[Behavior] = []
         self._held = False
-        self._work: set[asyncio.Task[None]] = set()
+        self._work = LatestTask()
 
     @property
     def behavior(self) -> str:
@@ -73,20 +72,20 @@ class CameraController:
             self._replaced.append(self._task.behavior)
         self._task = task = _Task(id_, behavior)
         self._held = False
-        self._replace(lambda: self._run(task))
+        self._work.replace(lambda: self._run(task))
 
     def adopt(self, id_: BehaviorId, behavior: Behavior, elapsed_s: float) -> None:
         """Continue a behavior that was running before a restart."""
         self._task = task = _Task(id_, behavior, elapsed_s, adopted=True)
         self._held = False
-        self._replace(lambda: self._run(task))
+        self._work.replace(lambda: self._run(task))
 
     def cancel(self, id_: BehaviorId) -> None:
         """Stop a behavior."""
         task = self._task
         if task is not None and task.id == id_ and not task.cancelled:
             task.cancelled = True
-            self._replace(lambda: self._cancel(task))
+            self._work.replace(lambda: self._cancel(task))
 
     def hold(self) -> None:
         """Stop turning and zooming, and keep the behavior."""
@@ -102,32 +101,11 @@ class CameraController:
         self._task = None
         self._replaced.clear()
         self._held = False
-        for work in self._work:
-            work.cancel()
+        self._work.cancel()
 
     async def close(self) -> None:
         """Close. The camera stays as it is."""
-        works = list(self._work)
-        for work in works:
-            work.cancel()
-        await asyncio.gather(*works, return_exceptions=True)
-
-    # --- replacement ----------------------------------------------------------------------------
-
-    def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
-        before = set(self._work)
-        for task in before:
-            task.cancel()
-        task = asyncio.get_running_loop().create_task(self._after(before, work))
-        self._work.add(task)
-        task.add_done_callback(self._work.discard)
-
-    async def _after(
-        self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
-    ) -> None:
-        if before:
-            await asyncio.wait(before)
-        await work()
+        await self._work.close()
 
     # --- execution ------------------------------------------------------------------------------
 

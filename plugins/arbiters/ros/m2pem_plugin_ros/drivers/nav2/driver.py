@@ -6,11 +6,11 @@ before anything else is sent. A cancelled call may still have reached Nav2, and 
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from uuid import UUID
 
-from m2pem.api import BehaviorRequest, BehaviorState, ResolvedValue
+from m2pem.api import BehaviorRequest, BehaviorState, LatestTask, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
@@ -57,7 +57,7 @@ class Nav2Driver:
         self._drive: _Drive | None = None
         self._held = False
         self._ended: OrderedDict[UUID, Outcome] = OrderedDict()
-        self._work: set[asyncio.Task[None]] = set()
+        self._work = LatestTask()
         self._polling: list[asyncio.Task[None]] = []
         self._given_up: dict[UUID, asyncio.Task[None]] = {}
         self._was_lost = False
@@ -108,14 +108,14 @@ class Nav2Driver:
             return
         self._drive = drive = _Drive(order, task)
         self._held = self._was_lost = False
-        self._replace(lambda: self._run(drive))
+        self._work.replace(lambda: self._run(drive))
 
     def end(self, goal: UUID) -> None:
         drive, nav2 = self._drive, self._nav2
         if drive is not None and drive.order.goal == goal:
             if not drive.ending:
                 drive.ending = True
-                self._replace(lambda: self._stop_for(drive))
+                self._work.replace(lambda: self._stop_for(drive))
             return
         outcome = self._ended.get(goal, Outcome(BehaviorState.CANCELLED))
         active = nav2 is not None and any(
@@ -126,10 +126,8 @@ class Nav2Driver:
             return
         if goal in self._given_up:
             return
-        task = asyncio.get_running_loop().create_task(self._cancel_old(nav2, goal, outcome))
+        task = self._work.add(self._cancel_old(nav2, goal, outcome))
         self._given_up[goal] = task
-        self._work.add(task)
-        task.add_done_callback(self._work.discard)
         task.add_done_callback(lambda _: self._given_up.pop(goal, None))
 
     def adjust(self, goal: UUID, parameters: Mapping[str, ResolvedValue]) -> None:
@@ -144,14 +142,14 @@ class Nav2Driver:
         if drive is not None:
             drive.task.held()
         self._held = True
-        self._replace(lambda: self._stand(drive))
+        self._work.replace(lambda: self._stand(drive))
 
     def resume(self) -> None:
         """Send the rest of the order to Nav2."""
         drive, held = self._drive, self._held
         self._held = False
         if drive is not None and held:
-            self._replace(lambda: self._run(drive))
+            self._work.replace(lambda: self._run(drive))
 
     async def query(self, order: Order) -> Outcome:
         """Find the goal by its id among those that Nav2 reports."""
@@ -170,7 +168,7 @@ class Nav2Driver:
         if outcome.state is BehaviorState.RUNNING:
             self._drive = drive = _Drive(order, task)
             self._held = False
-            self._replace(lambda: self._run(drive))
+            self._work.replace(lambda: self._run(drive))
         return outcome
 
     def abandon(self) -> None:
@@ -179,31 +177,12 @@ class Nav2Driver:
         self._drive = None
         self._held = False
         self._was_lost = True
-        for task in self._work:
-            task.cancel()
+        self._work.cancel()
 
     async def close(self) -> None:
-        tasks = [*self._work, *self._polling]
-        for task in tasks:
+        for task in self._polling:
             task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    # --- replacement ----------------------------------------------------------------------------
-
-    def _replace(self, work: Callable[[], Awaitable[None]]) -> None:
-        before = set(self._work)
-        for task in before:
-            task.cancel()
-        task = asyncio.get_running_loop().create_task(self._after(before, work))
-        self._work.add(task)
-        task.add_done_callback(self._work.discard)
-
-    async def _after(
-        self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
-    ) -> None:
-        if before:
-            await asyncio.wait(before)
-        await work()
+        await asyncio.gather(self._work.close(), *self._polling, return_exceptions=True)
 
     # --- execution ------------------------------------------------------------------------------
 
@@ -334,7 +313,7 @@ class Nav2Driver:
     async def _check_drive(self, nav2: Nav2) -> None:
         """Cancel goals without an order, and fail the order if Nav2 has ended."""
         drive = self._drive
-        if drive is None and not self._work and not self._was_lost and nav2.own_goals():
+        if drive is None and not self._work.is_running and not self._was_lost and nav2.own_goals():
             await nav2.stop_own_goals()
         elif (
             drive is not None
@@ -343,6 +322,6 @@ class Nav2Driver:
             and nav2.silent_s > GONE_S
         ):
             reason = f"Nav2 has sent no message for {GONE_S:g} s"
-            self._replace(
+            self._work.replace(
                 lambda: self._fail(drive, Outcome(BehaviorState.FAILED, "FAILED", reason))
             )

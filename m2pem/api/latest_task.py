@@ -1,0 +1,48 @@
+"""Work on one vehicle, of which only the latest goes on."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any
+
+
+class LatestTask:
+    """Runs work in the order in which it is given: new work cancels the work before it, and begins
+    when that has ended."""
+
+    def __init__(self) -> None:
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def is_running(self) -> bool:
+        return bool(self._tasks)
+
+    def replace(self, work: Callable[[], Awaitable[None]]) -> None:
+        """Cancel all work, and do this after it."""
+        before = set(self._tasks)
+        self.cancel()
+        self.add(self._after(before, work))
+
+    def add(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        """Do this beside other work; what replaces that replaces this, too."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def cancel(self) -> None:
+        """Cancel all work, and do not wait for its end."""
+        for task in self._tasks:
+            task.cancel()
+
+    async def close(self) -> None:
+        """Cancel all work, and wait for its end."""
+        tasks = list(self._tasks)
+        self.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _after(
+        self, before: set[asyncio.Task[None]], work: Callable[[], Awaitable[None]]
+    ) -> None:
+        if before:
+            await asyncio.wait(before)
+        await work()
