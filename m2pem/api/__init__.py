@@ -37,7 +37,11 @@ if TYPE_CHECKING:
         SearchLimits,
         SearchProgress,
     )
-    from m2pem.api.behavior_parameters import BehaviorParameters
+    from m2pem.api.behavior_parameters import (
+        BehaviorParameters,
+        decode_parameters,
+        encode_parameters,
+    )
     from m2pem.api.behavior_tracker import BehaviorTracker
     from m2pem.api.bus import FleetBus
     from m2pem.api.capabilities import ArbiterCapabilities, OcuCapabilities
@@ -132,7 +136,7 @@ _MODULES = {
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
-    "m2pem.api.behavior_parameters": "BehaviorParameters",
+    "m2pem.api.behavior_parameters": "BehaviorParameters decode_parameters encode_parameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
@@ -272,10 +276,12 @@ __all__ = [
     "adjusts",
     "as_geojson",
     "command_group",
+    "decode_parameters",
     "describe",
     "did_you_mean",
     "distance_m",
     "edges_enclose",
+    "encode_parameters",
     "follow",
     "lawn_mower",
     "longest_edge_yaw",

@@ -6,6 +6,7 @@ them against an arbiter's catalogue; an arbiter checks them in every request.
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import ResolvedValue
@@ -248,3 +249,50 @@ def _problem(spec: ParameterSpec, value: ResolvedValue) -> str:
     if spec.kind is ParameterKind.COUNT and value != int(value):
         return f"{value:g} is not a whole number"
     return ""
+
+
+def encode_parameters(
+    parameters: Mapping[str, ResolvedValue], longest_route: int = 0
+) -> dict[str, Any]:
+    """Return parameters as JSON values, for the `native_ref` that finds a behavior after a restart.
+
+    Areas are left out, and routes of more than `longest_route` waypoints: every report carries the
+    text.
+    """
+    encoded: dict[str, Any] = {}
+    for name, value in parameters.items():
+        match value:
+            case Point():
+                encoded[name] = {"point": list(value.position), "frame": value.altitude_frame}
+            case Route() if len(value.waypoints) <= longest_route:
+                route = [list(each) for each in value.waypoints]
+                encoded[name] = {"route": route, "frame": value.altitude_frame}
+            case VehiclePosition():
+                encoded[name] = {"vehicle": value.vehicle}
+            case bool() | int() | float() | str():
+                encoded[name] = value
+    return encoded
+
+
+def decode_parameters(encoded: Mapping[str, Any]) -> dict[str, ResolvedValue]:
+    """Return what `encode_parameters` encoded.
+
+    Raises:
+        ValueError, TypeError, KeyError, AttributeError: it has not encoded this.
+    """
+    return {str(name): _decoded(value) for name, value in encoded.items()}
+
+
+def _decoded(value: Any) -> ResolvedValue:
+    if not isinstance(value, dict):
+        return value  # type: ignore[no-any-return]  # a number or text of JSON
+    if "vehicle" in value:
+        return VehiclePosition(str(value["vehicle"]))
+    if "route" in value:
+        return Route(tuple(map(_coordinate, value["route"])), str(value["frame"]))
+    return Point(_coordinate(value["point"]), str(value["frame"]))
+
+
+def _coordinate(value: Any) -> tuple[float, float, float | None]:
+    latitude, longitude, altitude = value
+    return float(latitude), float(longitude), None if altitude is None else float(altitude)

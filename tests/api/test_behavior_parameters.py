@@ -1,12 +1,18 @@
+import json
 import math
 
 import pytest
 
 from m2pem.api.arbiter import ResolvedValue
-from m2pem.api.behavior_parameters import BehaviorParameters, refusal
+from m2pem.api.behavior_parameters import (
+    BehaviorParameters,
+    decode_parameters,
+    encode_parameters,
+    refusal,
+)
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.behavior import BehaviorType
-from m2pem.mission.geometry import Point, Route, VehiclePosition
+from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
 
 ROUTE = Route(((0.0, 0.0, None), (0.0, 1.0, None)))
 PLACE = Point((0.0, 0.0, None))
@@ -114,3 +120,21 @@ def test_the_shared_catalogue_gives_a_name_one_default() -> None:
             if parameter.default is not None:
                 given.setdefault(parameter.name, set()).add(parameter.default)
     assert all(len(defaults) == 1 for defaults in given.values())
+
+
+def test_parameters_come_back_from_json_without_areas_and_long_routes() -> None:
+    kept = {
+        "route": ROUTE,
+        "position": Point((1.0, 2.0, 3.0), "amsl"),
+        "vehicle": VehiclePosition("uav1"),
+        "speed": 2.5,
+        "count": 3,
+        "loop": True,
+        "text": "x",
+    }
+    area = Area(((0.0, 0.0, None), (0.0, 1.0, None), (1.0, 1.0, None)))
+    text = json.dumps(encode_parameters({**kept, "area": area, "unset": None}, longest_route=2))
+    assert decode_parameters(json.loads(text)) == kept
+    assert encode_parameters({"route": ROUTE}, longest_route=1) == {}
+    with pytest.raises(KeyError):
+        decode_parameters({"position": {"x": 1}})

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from m2pem.api import Point, ResolvedValue, ResourceId, VehiclePosition
+from m2pem.api import ResolvedValue, ResourceId, decode_parameters, encode_parameters
 
 _VERSION = 1
 
@@ -45,16 +45,11 @@ class Checkpoint:
 
 def encode_checkpoint(checkpoint: Checkpoint) -> str:
     """Return the checkpoint as a JSON text."""
-    parameters = {
-        name: _encoded(value)
-        for name, value in checkpoint.parameters.items()
-        if isinstance(value, float | int | str | Point | VehiclePosition)
-    }
     whole = {
         "v": _VERSION,
         "vehicle": checkpoint.resource,
         "behavior": checkpoint.behavior,
-        "parameters": parameters,
+        "parameters": encode_parameters(checkpoint.parameters),
         "memory": dict(checkpoint.state),
         "before": asdict(checkpoint.before) if checkpoint.before is not None else None,
     }
@@ -67,7 +62,7 @@ def decode_checkpoint(text: str) -> Checkpoint | None:
         whole = json.loads(text)
         if whole["v"] != _VERSION:
             return None
-        parameters = {name: _decoded(value) for name, value in whole["parameters"].items()}
+        parameters = decode_parameters(whole["parameters"])
         resource = ResourceId(str(whole["vehicle"]))
         before = VehicleSnapshot(**whole["before"]) if whole.get("before") else None
         return Checkpoint(
@@ -75,20 +70,3 @@ def decode_checkpoint(text: str) -> Checkpoint | None:
         )
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
-
-
-def _encoded(value: float | int | str | Point | VehiclePosition) -> Any:
-    if isinstance(value, Point):
-        return {"point": list(value.position), "frame": value.altitude_frame}
-    if isinstance(value, VehiclePosition):
-        return {"vehicle": value.vehicle}
-    return value
-
-
-def _decoded(value: Any) -> ResolvedValue:
-    if not isinstance(value, dict):
-        return value  # type: ignore[no-any-return]  # a number or text of JSON
-    if "vehicle" in value:
-        return VehiclePosition(str(value["vehicle"]))
-    latitude, longitude, altitude = value["point"]
-    return Point((float(latitude), float(longitude), altitude), str(value["frame"]))

@@ -7,9 +7,8 @@ parameters without areas, and its start.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from m2pem.api import Point, ResolvedValue, ResourceId, VehiclePosition
+from m2pem.api import ResolvedValue, ResourceId, decode_parameters, encode_parameters
 
 _VERSION = 1
 
@@ -25,16 +24,11 @@ class Checkpoint:
 
 
 def encode_checkpoint(checkpoint: Checkpoint) -> str:
-    parameters = {
-        name: _encode_value(value)
-        for name, value in checkpoint.parameters.items()
-        if isinstance(value, float | int | str | Point | VehiclePosition)
-    }
     whole = {
         "v": _VERSION,
         "camera": checkpoint.resource,
         "behavior": checkpoint.behavior,
-        "parameters": parameters,
+        "parameters": encode_parameters(checkpoint.parameters),
         "began_us": checkpoint.began_us,
     }
     return json.dumps(whole, separators=(",", ":"))
@@ -46,27 +40,8 @@ def decode_checkpoint(text: str) -> Checkpoint | None:
         whole = json.loads(text)
         if whole["v"] != _VERSION:
             return None
-        parameters = {
-            str(name): _decode_value(value) for name, value in whole["parameters"].items()
-        }
+        parameters = decode_parameters(whole["parameters"])
         resource, behavior = ResourceId(str(whole["camera"])), str(whole["behavior"])
         return Checkpoint(resource, behavior, parameters, int(whole["began_us"]))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
-
-
-def _encode_value(value: float | int | str | Point | VehiclePosition) -> Any:
-    if isinstance(value, Point):
-        return {"point": list(value.position), "frame": value.altitude_frame}
-    if isinstance(value, VehiclePosition):
-        return {"vehicle": value.vehicle}
-    return value
-
-
-def _decode_value(value: Any) -> ResolvedValue:
-    if not isinstance(value, dict):
-        return value  # type: ignore[no-any-return]  # a number or text of JSON
-    if "vehicle" in value:
-        return VehiclePosition(str(value["vehicle"]))
-    latitude, longitude, altitude = value["point"]
-    return Point((float(latitude), float(longitude), altitude), str(value["frame"]))
