@@ -12,11 +12,11 @@ Icon = Callable[[Group, float, float, str, str], None]
 """Draws at x, y with a stroke's and an area's colour."""
 
 
-def star(x: float, y: float, radius: float, corners: int, turn_rad: float = 0.0) -> list[Point]:
+def star(x: float, y: float, radius: float, corners: int) -> list[Point]:
     """The corners of a regular polygon, the first one upwards."""
     return [
         (x + radius * math.sin(a), y - radius * math.cos(a))
-        for a in (turn_rad + 2 * math.pi * k / corners for k in range(corners))
+        for a in (2 * math.pi * k / corners for k in range(corners))
     ]
 
 
@@ -79,8 +79,8 @@ def _thick(to: Group, corners: list[Point], stroke: str, fill: str) -> None:
     to.polygon(corners, stroke=stroke, fill=fill, stroke_width=1.2)
 
 
-def _plus(x: float, y: float, arm: float, half: float, turn_rad: float = 0.0) -> list[Point]:
-    quarter = [(half, -arm), (half, -half), (arm, -half)]
+def _plus(x: float, y: float, half: float, turn_rad: float = 0.0) -> list[Point]:
+    quarter = [(half, -10), (half, -half), (10, -half)]
     points: list[Point] = []
     for k in range(4):
         a = turn_rad + k * math.pi / 2
@@ -93,12 +93,12 @@ def _plus(x: float, y: float, arm: float, half: float, turn_rad: float = 0.0) ->
 
 def cross(to: Group, x: float, y: float, stroke: str, fill: str) -> None:
     """Cancel; exclusive gateways."""
-    _thick(to, _plus(x, y, 10, 1.9, math.pi / 4), stroke, fill)
+    _thick(to, _plus(x, y, 1.9, math.pi / 4), stroke, fill)
 
 
 def plus(to: Group, x: float, y: float, stroke: str, fill: str) -> None:
     """Parallel gateways; parallel multiple events."""
-    _thick(to, _plus(x, y, 10, 2), stroke, fill)
+    _thick(to, _plus(x, y, 2), stroke, fill)
 
 
 def asterisk(to: Group, x: float, y: float, stroke: str, fill: str) -> None:

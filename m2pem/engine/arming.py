@@ -20,7 +20,7 @@ from m2pem.engine.data import reader
 from m2pem.engine.execution import Execution, definitions_of
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import Scope, Token, TokenOrScope, Wait
-from m2pem.engine.throwing import throw_error, throw_error_in
+from m2pem.engine.throwing import throw_error, throw_expression_error
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.elements import FlowNode
 from m2pem.mission.events import (
@@ -74,7 +74,7 @@ def arm(
                 if isinstance(holder, Token):
                     throw_error(x, holder, "EXPRESSION", reason)
                 else:
-                    throw_error_in(x, holder, "EXPRESSION", reason)
+                    throw_expression_error(x, holder, reason)
                 return False
     return True
 
@@ -205,7 +205,7 @@ def condition_fires(x: Execution, wait: Wait) -> bool:
         if wait.token is not None:
             throw_error(x, wait.token, "EXPRESSION", reason)
         else:
-            throw_error_in(x, wait.scope, "EXPRESSION", reason)
+            throw_expression_error(x, wait.scope, reason)
         return False
     ready = x.state.conditions[wait.id]
     if not holds and not ready:

@@ -17,10 +17,10 @@ from m2pem.engine.scopes import (
 from m2pem.engine.state import Scope, Token
 from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
 from m2pem.mission.events import (
-    ErrorEventDefinition,
     Escalation,
-    EscalationEventDefinition,
     EventDefinition,
+    error_code,
+    escalation_code,
 )
 
 # --- errors -------------------------------------------------------------------------------------
@@ -37,7 +37,7 @@ def throw_error(
     event).
     """
     node = token.node
-    caught = _find_catcher(token, code, _error_code)
+    caught = _find_catcher(token, code, error_code)
     x.emit(
         r.ErrorThrown(
             token.id,
@@ -64,8 +64,9 @@ def throw_error(
         _catch(x, caught, failed)
 
 
-def throw_error_in(x: Execution, scope: Scope, code: str, reason: str) -> None:
-    """Throw an error that arose in a scope as a whole, from the activity of the scope."""
+def throw_expression_error(x: Execution, scope: Scope, reason: str) -> None:
+    """Throw the error of an expression that a scope as a whole evaluates, from its activity."""
+    code = "EXPRESSION"
     if scope.owner is not None:
         throw_error(x, scope.owner, code, reason)
         return
@@ -86,7 +87,7 @@ def throw_escalation(
     consumed (an escalation end event).
     """
     node = token.node
-    caught = _find_catcher(token, escalation.code, _escalation_code)
+    caught = _find_catcher(token, escalation.code, escalation_code)
     x.emit(
         r.EscalationThrown(
             token.id,
@@ -134,19 +135,6 @@ def _catch(x: Execution, caught: _AtBoundary | _InScope, failed: ErrorPath = ())
         start_event_subprocess(x, caught.place, caught.event, failed)
 
 
-def _error_code(definition: EventDefinition) -> str | None:
-    """Return the code that an error definition catches, "" for all; None: it catches no error."""
-    if not isinstance(definition, ErrorEventDefinition):
-        return None
-    return definition.error.code if definition.error is not None else ""
-
-
-def _escalation_code(definition: EventDefinition) -> str | None:
-    if not isinstance(definition, EscalationEventDefinition):
-        return None
-    return definition.escalation.code if definition.escalation is not None else ""
-
-
 def _find_catcher(
     thrower: Token, code: str, code_of: Callable[[EventDefinition], str | None]
 ) -> _AtBoundary | _InScope | None:
@@ -176,7 +164,7 @@ def _find_catcher(
 
 def catcher_of_error(thrower: Token, code: str) -> Event | None:
     """Return the event that would catch an error thrown at a token; None: the run would fail."""
-    caught = _find_catcher(thrower, code, _error_code)
+    caught = _find_catcher(thrower, code, error_code)
     return caught.event if caught is not None else None
 
 

@@ -95,6 +95,20 @@ class EscalationEventDefinition(EventDefinition):
     escalation: Escalation | None
 
 
+def error_code(definition: EventDefinition) -> str | None:
+    """Return the code that an error definition catches, "" for all; None: it catches no error."""
+    if not isinstance(definition, ErrorEventDefinition):
+        return None
+    return definition.error.code if definition.error is not None else ""
+
+
+def escalation_code(definition: EventDefinition) -> str | None:
+    """Return the code that an escalation definition catches, as `error_code` does."""
+    if not isinstance(definition, EscalationEventDefinition):
+        return None
+    return definition.escalation.code if definition.escalation is not None else ""
+
+
 class TimerKind(StrEnum):
     """The three ways to say when (BPMN 2.0.2, table 10.101)."""
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from string import ascii_uppercase
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle
 from m2pem.mission.catalogue import ResourceId
@@ -170,10 +170,6 @@ def _question(element: str, text: str, decisions: Sequence[str]) -> str:
     )
     return (
         f'<userTask id="{element}"><extensionElements>'
-        f'<m2pem:userTask store="decision.{element}"><m2pem:prompt>{_escaped(text)}</m2pem:prompt>'
+        f'<m2pem:userTask store="decision.{element}"><m2pem:prompt>{escape(text)}</m2pem:prompt>'
         f"{choices}</m2pem:userTask></extensionElements></userTask>"
     )
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;")

@@ -118,7 +118,10 @@ class Tree:
     @cached_property
     def boundary(self) -> Flows:
         """Boundary events by the id of what they are attached to."""
-        return self._by_reference("boundaryEvent", "attachedToRef")
+        found: dict[str, list[etree._Element]] = {}
+        for event in self.root.iter(BPMN + "boundaryEvent"):
+            found.setdefault(event.get("attachedToRef", "").rpartition(":")[2], []).append(event)
+        return found
 
     @cached_property
     def associations(self) -> Flows:
@@ -128,12 +131,6 @@ class Tree:
             for attribute in ("sourceRef", "targetRef"):
                 name = association.get(attribute, "").rpartition(":")[2]
                 found.setdefault(name, []).append(association)
-        return found
-
-    def _by_reference(self, name: str, attribute: str) -> Flows:
-        found: dict[str, list[etree._Element]] = {}
-        for element in self.root.iter(BPMN + name):
-            found.setdefault(element.get(attribute, "").rpartition(":")[2], []).append(element)
         return found
 
     # --- references -----------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from m2pem.engine.elements.sequence_flows import true_flows
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.state import Join, Scope, Token
-from m2pem.engine.throwing import throw_error, throw_error_in
+from m2pem.engine.throwing import throw_error, throw_expression_error
 from m2pem.engine.triggering import await_events_of_gateway, take_kept_messages
 from m2pem.errors import ExpressionError
 from m2pem.mission.elements import (
@@ -130,7 +130,7 @@ def reset_complex_gateway(x: Execution, scope: Scope, node: ComplexGateway) -> N
             if flow.condition.holds(read):
                 flows.append(flow)
         except ExpressionError as error:
-            throw_error_in(x, scope, "EXPRESSION", f"condition of {flow.id}: {error}")
+            throw_expression_error(x, scope, f"condition of {flow.id}: {error}")
             return
     if not flows and node.default is not None:
         flows.append(node.default)

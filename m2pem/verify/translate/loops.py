@@ -56,7 +56,7 @@ def _count(loop: MultiInstance) -> int | None:
 
 
 def _instance(
-    context: TranslationContext, whole: ActivityInstance, number: int, several: bool = False
+    context: TranslationContext, whole: ActivityInstance, number: int
 ) -> ActivityInstance:
     """Translate one instance: its token is in the scope of the whole activity."""
     node, net = whole.node, context.net
@@ -68,7 +68,6 @@ def _instance(
         whole.inside,
         Role.ACTIVE,
         suffix,
-        several=several,
         resources=held or (),
         behavior=behavior.name if behavior is not None and held else "",
     )

@@ -7,10 +7,10 @@ from typing import TypeVar
 from m2pem.mission import elements as e
 from m2pem.mission.events import (
     ErrorEventDefinition,
-    EscalationEventDefinition,
-    EventDefinition,
     MessageEventDefinition,
     SignalEventDefinition,
+    error_code,
+    escalation_code,
 )
 from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step
 from m2pem.verify.translate.compensation import compensated_by, cut_short, forget_completions
@@ -68,9 +68,7 @@ def throw_error(
     catch the error itself.
     """
     thrown = Step(thrower.id, Action.THROWN, code)
-    return _go_up(
-        context, scope, thrower, instance, code, thrown, uncaught, _error_code, first=True
-    )
+    return _go_up(context, scope, thrower, instance, code, thrown, uncaught, error_code, first=True)
 
 
 def throw_escalation(
@@ -85,7 +83,7 @@ def throw_escalation(
     node: e.FlowNode = thrower
     while here is not None:
         if instance is not None and instance.boundary:
-            event = best(instance.node.boundary, code, _escalation_code)
+            event = best(instance.node.boundary, code, escalation_code)
             if event is not None:
                 there, without = _there(context, condition, instance)
                 found.append(_at_boundary(context, there, instance, event, taken_off=False))
@@ -93,7 +91,7 @@ def throw_escalation(
                     return found
                 condition = without
         if here.open is not None:
-            start = best(_starts(here, node), code, _escalation_code)
+            start = best(_starts(here, node), code, escalation_code)
             if start is not None:
                 begun = condition.then(Effect(read=frozenset({here.open})))
                 assert begun is not None
@@ -175,7 +173,7 @@ def _go_up(
     taken_off = True
     while here is not None:
         if instance is not None and instance.boundary:
-            event = best(instance.node.boundary, code, _error_code)
+            event = best(instance.node.boundary, code, error_code)
             if event is not None:
                 there, without = _there(context, condition, instance, taken_off=taken_off)
                 found.append(_at_boundary(context, there, instance, event, taken_off=taken_off)[0])
@@ -183,7 +181,7 @@ def _go_up(
                     return found
                 condition = without
         if here.open is not None:
-            start = best(_starts(here, node), code, _error_code)
+            start = best(_starts(here, node), code, error_code)
             if start is not None:
                 begun = condition.then(Effect(read=frozenset({here.open})))
                 assert begun is not None
@@ -229,19 +227,6 @@ def begin_handler(
 
 def _starts(scope: ScopeDraft, but: e.FlowNode) -> list[e.StartEvent]:
     return [start for each in handlers(scope) if each is not but for start in each.starts]
-
-
-def _error_code(definition: EventDefinition) -> str | None:
-    """The code that an event catches, "" for all codes; None: it catches no error."""
-    if not isinstance(definition, ErrorEventDefinition):
-        return None
-    return definition.error.code if definition.error is not None else ""
-
-
-def _escalation_code(definition: EventDefinition) -> str | None:
-    if not isinstance(definition, EscalationEventDefinition):
-        return None
-    return definition.escalation.code if definition.escalation is not None else ""
 
 
 def best(events: Sequence[Catching], code: str, code_of: "object") -> Catching | None:

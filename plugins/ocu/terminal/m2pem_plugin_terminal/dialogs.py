@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from rich.text import Text
 from textual import events
@@ -15,6 +15,8 @@ from textual.widgets.option_list import Option
 
 from m2pem_plugin_terminal.formatting import shortened
 from m2pem_plugin_terminal.status_lines import StopBar
+
+T = TypeVar("T")
 
 WIDTH = 60
 
@@ -68,45 +70,40 @@ class Choose(ModalScreen[str | None]):
         self.dismiss(self._choices[event.option_index].value)
 
 
-class Confirm(ModalScreen[bool]):
+class _TextDialog(ModalScreen[T]):
+    """A text. `HINT`: what the keys do."""
+
+    HINT: ClassVar[str]
+
+    def __init__(self, title: str, text: Text) -> None:
+        super().__init__()
+        self._title = title
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """Compose the text and the line of keys."""
+        with Vertical(classes="dialog") as box:
+            box.border_title = self._title
+            box.border_subtitle = self.HINT
+            yield Static(self._text, classes="dialog-text")
+        yield StopBar()
+
+
+class Confirm(_TextDialog[bool]):
     """A question that only `y` confirms: digits and Enter answer prompts and choose lines."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("y", "dismiss(True)", "Yes"),
         ("escape", "dismiss(False)", "No"),
     ]
-
-    def __init__(self, title: str, text: Text) -> None:
-        super().__init__()
-        self._title = title
-        self._text = text
-
-    def compose(self) -> ComposeResult:
-        """Compose the text and the line of keys."""
-        with Vertical(classes="dialog") as box:
-            box.border_title = self._title
-            box.border_subtitle = "y: yes   Esc: no"
-            yield Static(self._text, classes="dialog-text")
-        yield StopBar()
+    HINT = "y: yes   Esc: no"
 
 
-class Read(ModalScreen[None]):
+class Read(_TextDialog[None]):
     """A text; Escape, Enter or ? closes it."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,enter,question_mark", "dismiss", "Close")]
-
-    def __init__(self, title: str, text: Text) -> None:
-        super().__init__()
-        self._title = title
-        self._text = text
-
-    def compose(self) -> ComposeResult:
-        """Compose the text and the line of keys."""
-        with Vertical(classes="dialog") as box:
-            box.border_title = self._title
-            box.border_subtitle = "Esc: close"
-            yield Static(self._text, classes="dialog-text")
-        yield StopBar()
+    HINT = "Esc: close"
 
 
 KEYS = (

@@ -59,7 +59,7 @@ def sharpest(bounds: Bounds) -> float:
     return 1 / bounds.turn_radius_m if bounds.turn_radius_m > 0 else math.inf
 
 
-def curvature_to(pose: Pose, point: Place, nearest_m: float = NEAREST_M) -> float:
+def curvature_to(pose: Pose, point: Place) -> float:
     """Return the curvature of the arc from the pose through a point; less if the point is very
     near.
 
@@ -68,8 +68,8 @@ def curvature_to(pose: Pose, point: Place, nearest_m: float = NEAREST_M) -> floa
     distance = math.dist(position_of(pose), point)
     aside = angle_between(pose.yaw_rad, direction_to(position_of(pose), point))
     if abs(aside) > math.pi / 2:
-        return math.copysign(2 / nearest_m, aside)
-    return 2 * math.sin(aside) / max(distance, nearest_m)
+        return math.copysign(2 / NEAREST_M, aside)
+    return 2 * math.sin(aside) / max(distance, NEAREST_M)
 
 
 class Steering:

@@ -202,7 +202,7 @@ class BaseDriver:
 
     def _step(self) -> None:
         where = self._setup.localization
-        age_s = self._timer.forgive(where.age_s, STALE_S)
+        age_s = self._timer.forgive(where.age_s)
         step = self._pilot.step(
             Observation(
                 now_s=self._timer.now_s,
@@ -265,7 +265,7 @@ class BaseDriver:
     # --- what is known --------------------------------------------------------------------------
 
     def _is_fresh(self) -> bool:
-        return self._timer.forgive(self._setup.localization.age_s, STALE_S) <= STALE_S
+        return self._timer.forgive(self._setup.localization.age_s) <= STALE_S
 
     def _mode(self) -> str:
         if self._pilot.held:
@@ -334,11 +334,11 @@ class ControlTimer:
         if rest > 0:
             await asyncio.sleep(rest)
 
-    def forgive(self, age_s: float, stale_s: float) -> float:
-        """Return the age, bounded by `stale_s` if the message arrived only now in real time."""
+    def forgive(self, age_s: float) -> float:
+        """Return the age, bounded by `STALE_S` if the message arrived only now in real time."""
         real_s = self._loop.time() - self._real_began_s
         speed = (self.now_s - self._began_s) / real_s if real_s > LEAST_S else 1.0
-        return min(age_s, stale_s) if age_s <= LATENESS_S * speed else age_s
+        return min(age_s, STALE_S) if age_s <= LATENESS_S * speed else age_s
 
 
 class Surroundings:
