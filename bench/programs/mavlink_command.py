@@ -36,7 +36,7 @@ from bench.programs.commanding import (
 )
 from bench.programs.mavlink_rovers import APART_DEG, REPOSITION, SET_MODE, address, place, started
 from bench.programs.stage import Plugins, opened
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal import Journal

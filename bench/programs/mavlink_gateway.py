@@ -32,7 +32,7 @@ from m2pem_plugin_mavlink.protocol.url import parse_url
 
 from bench.measured import Stopwatch, peak_kb
 from bench.programs.mavlink_frames import RATES_HZ, WANTED
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 URL = "udpin://127.0.0.1:0"
 SYSTEMS = 250

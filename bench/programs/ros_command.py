@@ -20,7 +20,7 @@ from bench.measured import Stopwatch
 from bench.programs.commanding import Operator, Orders, on_its_way, percentiles, signalled
 from bench.programs.ros_stage import Vehicles, fleet, own_domain
 from bench.programs.stage import Plugins, opened
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import Journal
 

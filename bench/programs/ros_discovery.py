@@ -19,7 +19,7 @@ from bench.programs.ros_fleet import PATIENCE_S, Heard, until_all
 from bench.programs.ros_stage import Vehicles, fleet, own_domain
 from bench.programs.stage import Plugins
 from m2pem.api import ArbiterContext, Connection, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 

@@ -16,7 +16,7 @@ from bench.measured import Stopwatch, peak_kb
 from bench.programs.ros_stage import Vehicles, fleet, own_domain
 from bench.programs.stage import Plugins
 from m2pem.api import LinkState, VehicleState
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.graphs import file, path
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal import Journal, MemoryJournal

@@ -24,11 +24,11 @@ from typing import Any
 
 from bench.graphs import file
 from bench.programs.stage import Plugins, flows
+from m2pem.api.clock import SystemClock
 from m2pem.control_socket.client import ask
 from m2pem.control_socket.paths import address
 from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import JournalError, M2pemError
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal.base import Entry

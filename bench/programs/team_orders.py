@@ -32,7 +32,7 @@ from bench.graphs import file
 from bench.programs import mavlink_command, mavlink_rovers, ros_command, ros_stage
 from bench.programs.commanding import PATIENCE_S, PAUSE_S, Got, Orders
 from bench.programs.stage import Plugins, flows, opened
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.journal import Journal

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from m2pem.api.behavior_tracker import BehaviorTracker
     from m2pem.api.bus import FleetBus
     from m2pem.api.capabilities import ArbiterCapabilities, OcuCapabilities
-    from m2pem.api.clock import Clock
+    from m2pem.api.clock import Clock, SystemClock
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.connection_reader import ConnectionReader
     from m2pem.api.control import (
@@ -126,7 +126,7 @@ _MODULES = {
     ),
     "m2pem.api.bus": "FleetBus",
     "m2pem.api.capabilities": "ArbiterCapabilities OcuCapabilities",
-    "m2pem.api.clock": "Clock",
+    "m2pem.api.clock": "Clock SystemClock",
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": (
@@ -291,6 +291,7 @@ __all__ = [
     "parse_mission",
     "quantity",
     "simulator_group",
+    "SystemClock",
 ]
 
 

@@ -58,8 +58,8 @@ def arbiters_of(fleet: "Fleet", plugins: "PluginManager") -> "FleetArbiters":
         UnusableError: the fleet names an arbiter that no plugin provides.
     """
     from m2pem.api.arbiter import ArbiterContext
+    from m2pem.api.clock import SystemClock
     from m2pem.errors import PluginError
-    from m2pem.executive.clock import SystemClock
     from m2pem.executive.fleet_connections import FleetArbiters
     from m2pem.telemetry.bus import Bus
 

@@ -43,7 +43,7 @@ def plugins(output: str) -> None:
 def _behaviors(manager: "PluginManager", arbiter: str) -> "dict[str, list[str]]":
     """What an arbiter offers in each domain and on a payload; nothing if it needs a real fleet."""
     from m2pem.api.arbiter import ArbiterContext, Connection
-    from m2pem.executive.clock import SystemClock
+    from m2pem.api.clock import SystemClock
     from m2pem.fleet.fleet import Domain
     from m2pem.mission.catalogue import ResourceId
     from m2pem.telemetry.bus import Bus

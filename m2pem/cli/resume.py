@@ -49,6 +49,7 @@ async def _resume(
     *,
     stop: bool,
 ) -> int:
+    from m2pem.api.clock import SystemClock
     from m2pem.api.operator import operator_name
     from m2pem.cli.arguments import get_answers
     from m2pem.cli.journals import existing_journal, find_run, last_decided_us, url_of
@@ -56,7 +57,6 @@ async def _resume(
     from m2pem.cli.output import output_of
     from m2pem.cli.session import drive_run, make_executive, tidy_up
     from m2pem.engine.state import RunStatus
-    from m2pem.executive.clock import SystemClock
     from m2pem.journal import file_of
     from m2pem.journal.mission import fleet_of, mission_of
     from m2pem.plugins import PluginManager

@@ -92,12 +92,12 @@ async def _run(
     speed: float,
     output: str,
 ) -> int:
+    from m2pem.api.clock import SystemClock
     from m2pem.cli.arguments import get_answers, get_fleet
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import drive_run, make_executive, refuse_speed, tidy_up, with_own_state
-    from m2pem.executive.clock import SystemClock
     from m2pem.executive.loading import load_source, without_effect
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.journal import file_of

@@ -59,11 +59,11 @@ async def _serve(
     speed: float,
     output: str,
 ) -> int:
+    from m2pem.api.clock import SystemClock
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import driving, make_executive, refuse_speed, tidy_up, with_shared_state
-    from m2pem.executive.clock import SystemClock
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.journal import file_of

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import click
 
+from m2pem.api.clock import SystemClock
 from m2pem.api.control import RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
 from m2pem.cli.ocus import PLAIN, Operators
@@ -25,7 +26,6 @@ from m2pem.cli.standard_streams import writer_for
 from m2pem.control_socket.server import ControlSocket
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import PluginError
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, dump

@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import Self
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.control import RunId
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections

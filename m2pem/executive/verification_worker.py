@@ -10,7 +10,7 @@ import msgspec
 
 from m2pem.api.arbiter import ArbiterContext
 from m2pem.api.authoring import MissionSource, SearchLimits, SearchProgress
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import load_source
 from m2pem.executive.subprocess_worker import (

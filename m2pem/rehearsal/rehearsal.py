@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from m2pem.api.authoring import MissionSource
+from m2pem.api.clock import US_PER_S, VirtualClock, run_virtual
 from m2pem.api.control import (
     RunStatus,
     RunSummary,
@@ -21,7 +22,6 @@ from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import AnswersError, MissionError
-from m2pem.executive.clock import US_PER_S, VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.executive.loading import load_source
 from m2pem.executive.runner import Runner

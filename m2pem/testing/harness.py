@@ -6,10 +6,9 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.control import MissionControl, OpenPrompt, RunSummary, StampedRecord
 from m2pem.engine.records import Record, TokenEntered
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.journal import MemoryJournal

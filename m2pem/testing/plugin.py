@@ -13,8 +13,8 @@ import pytest
 if TYPE_CHECKING:
     from contextlib import AbstractAsyncContextManager
 
+    from m2pem.api.clock import VirtualClock
     from m2pem.api.control import MissionControl
-    from m2pem.executive.clock import VirtualClock
 
 T = TypeVar("T")
 
@@ -31,7 +31,7 @@ def virtual() -> "Callable[[Callable[[VirtualClock], Awaitable[T]]], T]":
 
     The clock begins at 2026-01-01T00:00:00Z. The coroutine cannot wait for real I/O.
     """
-    from m2pem.executive.clock import run_virtual  # noqa: PLC0415
+    from m2pem.api.clock import run_virtual  # noqa: PLC0415
 
     def run(main: "Callable[[VirtualClock], Awaitable[T]]") -> T:
         return run_virtual(main, START_US)

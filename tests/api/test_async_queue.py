@@ -1,5 +1,5 @@
 from m2pem.api.async_queue import AsyncQueue
-from m2pem.executive.clock import VirtualClock, run_virtual
+from m2pem.api.clock import VirtualClock, run_virtual
 
 
 def test_what_waits_is_read_after_closing_and_nothing_more_comes_in() -> None:

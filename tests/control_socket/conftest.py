@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from m2pem.api.clock import SystemClock
 from m2pem.control_socket.server import ControlSocket
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal

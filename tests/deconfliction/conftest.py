@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import BehaviorEnded, BehaviorProgressed, Record
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.journal import MemoryJournal

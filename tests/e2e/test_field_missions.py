@@ -10,10 +10,10 @@ import pytest
 
 from m2pem import load_fleet
 from m2pem.api.arbiter import ArbiterContext
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.control import RunStatus
 from m2pem.bpmn import parse_mission
 from m2pem.engine import records as r
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding

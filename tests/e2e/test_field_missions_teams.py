@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.engine import records as r
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.mission.catalogue import BehaviorState

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from m2pem.api.arbiter import BehaviorRequest
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.engine.records import BehaviorRequested, Record
 from m2pem.engine.state import RunStatus
 from m2pem.errors import M2pemError
@@ -24,7 +25,6 @@ from m2pem.executive.behavior_lifecycle import (
     BehaviorViews,
     VehicleView,
 )
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.journal import MemoryJournal

@@ -3,11 +3,11 @@
 import math
 
 from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.clock import run_virtual
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.records import DataWritten
 from m2pem.engine.run import MissionRun
-from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, dump
 from m2pem.journal import MemoryJournal

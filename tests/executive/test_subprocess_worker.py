@@ -15,8 +15,8 @@ import jsonschema
 import pytest
 
 from m2pem.api.authoring import SearchLimits, SearchProgress
+from m2pem.api.clock import SystemClock
 from m2pem.errors import AnswersError, InternalError, MissionError, OperatorError
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.control import Control
 from m2pem.executive.executive import Executive
 from m2pem.executive.subprocess_worker import run_in_subprocess

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.control import OpenPrompt, PromptClosed, RunStatus, RunSummary, StampedRecord
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import MessageReceived, SignalReceived
@@ -23,7 +24,6 @@ from m2pem.engine.records import (
     SignalThrown,
 )
 from m2pem.errors import AnswersError, OperatorError
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import Fleet

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from m2pem.api.clock import run_virtual
 from m2pem.api.control import RunStatus, StampedRecord
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import (
@@ -30,7 +31,6 @@ from m2pem.engine.records import (
     TokenLeft,
 )
 from m2pem.errors import AnswersError, MissionError, OperatorError
-from m2pem.executive.clock import run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
@@ -657,7 +657,7 @@ def test_an_executive_rehearses_a_mission_with_its_fleet(tmp_path: Path) -> None
             return result, list(await executive.control.runs())
 
     async def real() -> tuple[RehearsalResult, list[Any]]:
-        from m2pem.executive.clock import SystemClock
+        from m2pem.api.clock import SystemClock
 
         return await main(SystemClock())
 

@@ -8,10 +8,10 @@ import pytest
 
 from m2pem.api.arbiter import Arbiter, ArbiterContext, BehaviorRequest, Connection, adjusts
 from m2pem.api.capabilities import ArbiterCapabilities
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.service import ServiceContext, ServiceError
 from m2pem.engine.records import BehaviorRequested
 from m2pem.errors import PluginError
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, load_answers

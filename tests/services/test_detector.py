@@ -3,9 +3,9 @@ import logging
 
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.api.telemetry import Detection, GeoPosition, PayloadState, VehicleState
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.services.detector import Detector
 from m2pem.telemetry.bus import Bus

@@ -8,9 +8,8 @@ from uuid import UUID
 import pytest
 
 from m2pem.api.arbiter import Connection
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import GeoPosition
-from m2pem.executive.clock import run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Coordinate, Route
 from m2pem.simulation.arbiters import SimArbiter

@@ -5,10 +5,9 @@ import pytest
 
 from conftest import START_US, Fleet, Simulate, area, local, make, place, route
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import VehicleState
 from m2pem.errors import FleetError
-from m2pem.executive.clock import run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter

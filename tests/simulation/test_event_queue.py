@@ -3,7 +3,7 @@ import logging
 
 import pytest
 
-from m2pem.executive.clock import VirtualClock, run_virtual
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.simulation.event_queue import EventQueue
 
 LOGGER = logging.getLogger(__name__)

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from conftest import START_US, Fleet, make, place, route
 from m2pem.api.arbiter import ResolvedValue
-from m2pem.api.clock import Clock
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import Clock, run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter

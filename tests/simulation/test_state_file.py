@@ -8,9 +8,8 @@ from uuid import UUID
 import pytest
 
 from conftest import START_US, Fleet, local, make, place, route
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import VehicleState
-from m2pem.executive.clock import run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
@@ -280,7 +279,7 @@ KILLED = """
 import asyncio, os, signal, sys
 sys.path.insert(0, sys.argv[2])
 from conftest import make, route
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
 async def main():

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import pytest
 
 from m2pem.api.arbiter import ArbiterContext, Connection
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.engine.records import BehaviorEnded, Record
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Team, Vehicle
 from m2pem.journal import MemoryJournal

@@ -5,8 +5,8 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.engine.records import BehaviorEnded, Record
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import (
     Domain,

@@ -6,8 +6,8 @@ from typing import Any, cast
 import pytest
 
 from m2pem.api.arbiter import ArbiterContext, Connection
+from m2pem.api.clock import SystemClock
 from m2pem.bpmn import parse_mission
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding

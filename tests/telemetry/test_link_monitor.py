@@ -3,9 +3,9 @@ import math
 
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.engine.inputs import ResourceFault
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.telemetry.bus import Bus
 from m2pem.telemetry.link_monitor import LinkMonitor, monitor_links

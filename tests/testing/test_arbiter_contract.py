@@ -18,9 +18,8 @@ from m2pem.api.arbiter import (
     Limits,
 )
 from m2pem.api.capabilities import ArbiterCapabilities
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import PayloadState, VehicleState
-from m2pem.executive.clock import run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, Route
 from m2pem.simulation.arbiters import SimArbiter

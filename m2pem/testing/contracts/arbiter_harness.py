@@ -21,9 +21,8 @@ from m2pem.api.arbiter import (
     BehaviorRequest,
     ResolvedValue,
 )
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, SystemClock, run_virtual
 from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
-from m2pem.executive.clock import SystemClock, run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.contract import Contract

@@ -10,9 +10,9 @@ from typing import ClassVar
 import msgspec
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.service import Service, ServiceContext, ServiceError
 from m2pem.api.telemetry import PayloadState, VehicleState
-from m2pem.executive.clock import VirtualClock, run_virtual
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
 from m2pem.telemetry.bus import Bus

@@ -14,20 +14,11 @@ from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
 from m2pem_plugin_mavlink.protocol.messages import Address
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import SystemClock
+
 GROUND = Address(255, 190)
 ONE = Address(1, 1)
 WITHIN_S = 40.0
-
-
-class WallClock:
-    def now_us(self) -> int:
-        return time.monotonic_ns() // 1000
-
-    async def sleep(self, seconds: float) -> None:
-        await asyncio.sleep(seconds)
-
-    async def sleep_until(self, time_us: int) -> None:
-        await asyncio.sleep(max(0, time_us - self.now_us()) / 1e6)
 
 
 def free_port() -> int:
@@ -102,7 +93,7 @@ async def linked(url: str, *addresses: Address) -> AsyncIterator[list[MavsdkLink
     links: list[MavsdkLink] = []
     try:
         for address in addresses or (ONE,):
-            links.append(await open_mavsdk_link(address, [url], WallClock(), GROUND))
+            links.append(await open_mavsdk_link(address, [url], SystemClock(), GROUND))
         yield links
     finally:
         for link in links:

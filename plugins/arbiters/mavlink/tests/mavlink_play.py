@@ -6,7 +6,7 @@ from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from mavlink_double import Body, DoubleStation, connections
 
 from m2pem.api import BehaviorReport, ResourceId
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 START_US = 1_767_225_600_000_000

@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 from m2pem.api import Connection, LocalFrame, ResourceId, offset
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 HOME = (47.397742, 8.545594)

@@ -14,7 +14,7 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_simulated import at, connections, specs
 
 from m2pem.api import Point, ResourceId, Route
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("v1"), ResourceId("v2")

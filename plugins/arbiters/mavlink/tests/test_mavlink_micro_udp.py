@@ -20,7 +20,7 @@ from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 SPEED = 10.0
 VEHICLE = Address(1, 1)

@@ -12,7 +12,7 @@ from mavlink_double import Body, DoubleStation, at, connections
 from mavlink_play import START_US, Bench, V
 
 from m2pem.api import BehaviorReport, BehaviorState, Point
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import context
 
 GOTO = {"target": Point((*at(200.0, 0.0), None))}

@@ -7,8 +7,8 @@ from m2pem_plugin_mavlink.catalogue import offered
 from m2pem_plugin_mavlink.settings import Settings, read_settings
 
 from m2pem.api import Connection, ResourceId
+from m2pem.api.clock import SystemClock
 from m2pem.errors import PluginError
-from m2pem.executive.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
 
 V, W = ResourceId("uav1"), ResourceId("uav2")

@@ -15,7 +15,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 from m2pem.api import Arbiter, ArbiterContext, Connection, Point, ResourceId, offset
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("a"), ResourceId("b")

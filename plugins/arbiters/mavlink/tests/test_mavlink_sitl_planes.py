@@ -11,7 +11,7 @@ from mavlink_sitl import HOME
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Connection, ResourceId, Route, distance_m, offset
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PLANE = ResourceId("plane")

@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LinkState, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 SPEED = 20.0
 AMPLE_S = 400.0

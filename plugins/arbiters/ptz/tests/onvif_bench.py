@@ -14,7 +14,7 @@ from m2pem_plugin_ptz.simulator.onvif.camera import Account, CameraSpec
 from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 
 from m2pem.api import Connection, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
 
 ACCOUNT = Account("operator", "s3cret: #1")

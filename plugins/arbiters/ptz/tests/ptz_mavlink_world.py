@@ -19,7 +19,7 @@ from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.settings import DriverName, Settings
 
 from m2pem.api import ArbiterContext, Connection, ResourceId, VehicleState
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.telemetry.bus import Bus
 
 SPEED = 10.0

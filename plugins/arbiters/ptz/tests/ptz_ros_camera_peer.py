@@ -9,9 +9,8 @@ from m2pem_plugin_ptz.drivers.ros.settings import read_settings
 from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.simulator.ros.camera import CameraSpec
 from m2pem_plugin_ptz.simulator.ros.simulation import simulate
-from m2pem_plugin_ros import SimulatedClock
 
-from m2pem.api import Connection, ResourceId
+from m2pem.api import Connection, ResourceId, SystemClock
 
 REACH = Reach((-2.8, 2.8), (-1.5, 0.8), zoom_max=10.0, rate_rad_s=2.0)
 ENDLESS = Reach(tilt_rad=(-1.5, 0.8), rate_rad_s=2.0, endless=True)
@@ -21,7 +20,7 @@ async def main(name: str, settings: str, endless: str) -> None:
     connection = Connection(ResourceId(name), "ground", json.loads(settings))
     spec = CameraSpec(name, read_settings(connection), ENDLESS if endless == "yes" else REACH)
     ready = asyncio.Event()
-    going = asyncio.create_task(simulate([spec], SimulatedClock(), None, ready))
+    going = asyncio.create_task(simulate([spec], SystemClock(), None, ready))
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, going.cancel)
     await ready.wait()
     print("ready", flush=True)

@@ -20,7 +20,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 COMMAND = Path(__file__).with_name("ptz_ros_sim_command.py")

@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.telemetry.bus import Bus
 
 CAMERA = ResourceId("evsg2/ptz")
@@ -54,7 +54,7 @@ class World:
     joints: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float]] = field(default_factory=list)
     heard: list[float] = field(default_factory=list)
-    fault_is: str = "well"
+    confirmed: list[str] = field(default_factory=list)
 
     def open(self) -> None:
         self.ros.subscribe(JointState, "/evsg2/joint_states", self._on_message, qos.TELEMETRY)
@@ -66,7 +66,7 @@ class World:
         self.history.append(self.joints)
 
     def _hear_fault(self, message: Any) -> None:
-        self.fault_is = message.data
+        self.confirmed.append(message.data)
 
     async def ready(self) -> None:
         await until(lambda: self.driver.refusal("ptz_point_at") == "" and self.joints)
@@ -85,10 +85,13 @@ class World:
 
         await until(alike)
 
-    async def fault(self, name: str) -> None:
+    async def send_fault(self, text: str) -> None:
         await until(self._faults.get_subscription_count)
-        self._faults.publish(String(data=name))
-        await until(lambda: self.fault_is == name)
+        self._faults.publish(String(data=text))
+
+    async def fault(self, text: str) -> None:
+        await self.send_fault(text)
+        await until(lambda: self.confirmed[-1:] == [text])
 
     def point(self, pan_deg: float, tilt_deg: float, rate_deg_s: float | None = None) -> None:
         rate = None if rate_deg_s is None else math.radians(rate_deg_s)

@@ -8,7 +8,7 @@ from m2pem_plugin_ptz.arbiter import PtzArbiter
 from ptz_fake_camera import ORIGIN, Gimbal, HeadDriver, connection, vehicle
 
 from m2pem.api import Area, Point, ResourceId
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 START_US = 1_767_225_600_000_000

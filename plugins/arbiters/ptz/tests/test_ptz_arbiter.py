@@ -8,7 +8,7 @@ from ptz_fake_camera import Gimbal, HeadDriver, connection, rad, vehicle
 from ptz_world import CAMERA, START_US, play, point
 
 from m2pem.api import BehaviorState, LinkState, PayloadState, VehiclePosition
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 

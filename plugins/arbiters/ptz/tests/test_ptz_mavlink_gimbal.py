@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.simulator.messages import Result
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from ptz_mavlink_world import AMPLE_S, REACH, SPEED, until, world
 
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 OURS = Controller(255, 191)
 THEIRS = Controller(77, 190)

@@ -11,7 +11,7 @@ from PIL import Image
 from ptz_fake_camera import at, rad, vehicle
 
 from m2pem.api import ArbiterContext, BehaviorState, Connection, Point, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PTZ = ResourceId("a/ptz")

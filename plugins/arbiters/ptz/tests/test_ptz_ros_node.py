@@ -9,7 +9,7 @@ from m2pem_plugin_ros.arbiter import RosArbiter
 from ptz_ros_node_world import AMPLE_S, CAMERA, connection, peer, world
 
 from m2pem.api import BehaviorState, LinkState, Point, RunStatus
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing import run_mission, scenarios
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 

@@ -21,14 +21,12 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.onboard.target_bus import TargetBus
     from m2pem_plugin_ros.runtime import RosRuntime, qos
     from m2pem_plugin_ros.settings import read_payloads, read_settings
-    from m2pem_plugin_ros.simulator.clock import SimulatedClock
 
 __all__ = [
     "ArbiterDriver",
     "OnboardNode",
     "RosError",
     "RosRuntime",
-    "SimulatedClock",
     "TargetBus",
     "DriverEvents",
     "keep_on_loopback",
@@ -55,7 +53,6 @@ _MODULES = {
     "onboard.target_bus": "TargetBus",
     "runtime": "RosRuntime qos",
     "settings": "read_payloads read_settings",
-    "simulator.clock": "SimulatedClock",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 

@@ -19,8 +19,8 @@ from std_msgs.msg import String
 
 from m2pem import load_fleet
 from m2pem.api import LinkState, OpenPrompt, ResourceId, StampedRecord, VehicleState
+from m2pem.api.clock import SystemClock
 from m2pem.engine import records as r
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager

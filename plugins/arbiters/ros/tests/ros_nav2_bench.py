@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import math
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -31,6 +30,7 @@ from m2pem.api import (
     ResolvedValue,
     ResourceId,
     Route,
+    SystemClock,
     VehicleState,
 )
 
@@ -41,19 +41,6 @@ AMPLE_S = 40.0
 
 ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For who looks only now and then, and must miss nothing."""
-
-
-class WallClock:
-    """The clock of the wall."""
-
-    def now_us(self) -> int:
-        return time.time_ns() // 1000
-
-    async def sleep(self, seconds: float) -> None:
-        await asyncio.sleep(seconds)
-
-    async def sleep_until(self, time_us: int) -> None:
-        await asyncio.sleep((time_us - self.now_us()) / 1e6)
 
 
 @dataclass
@@ -113,7 +100,7 @@ class Bench:
         self.motions = -1
         self.track: list[tuple[float, float, float]] = []
         settings = Settings(f"/{name}", driver=DriverName.NAV2, route_action=route_action)
-        context = ArbiterContext(WallClock(), self.bus, logging.getLogger("bench"), ORIGIN)
+        context = ArbiterContext(SystemClock(), self.bus, logging.getLogger("bench"), ORIGIN)
         self.localization = TopicLocalization(ros, name, settings, context)
         connection = Connection(name, "ground", sitl=True)
         self.setup = DriverSetup(connection, settings, context, ros, self.localization, self.events)

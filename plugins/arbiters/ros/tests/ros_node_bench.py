@@ -14,7 +14,7 @@ from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import Settings, Via
 
 from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 AMPLE_S = 40.0
 LOOK_S = 0.005

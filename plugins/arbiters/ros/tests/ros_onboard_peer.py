@@ -13,7 +13,7 @@ from m2pem_plugin_ros.onboard.target_bus import TargetBus
 from m2pem_plugin_ros.runtime import RosRuntime
 from ros_scripted_driver import ScriptedDriver
 
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 
 async def main(speed: float, names: list[str]) -> None:

@@ -8,7 +8,7 @@ from uuid import UUID
 from ros_double import Dynamics, arbiter, at
 
 from m2pem.api import ResourceId
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 A, B = ResourceId("a"), ResourceId("b")

@@ -15,7 +15,7 @@ from ros_double import ORIGIN, DoubleDriver, Dynamics
 from std_msgs.msg import String
 
 from m2pem.api import Connection, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PEER = Path(__file__).with_name("ros_sensors_peer.py")

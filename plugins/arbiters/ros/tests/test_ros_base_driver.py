@@ -13,7 +13,7 @@ from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_base_bench import AMPLE_S, BASE, Bench, bench, geo, point, route, until
 
 from m2pem.api import Area, BehaviorState, GeoPosition, ResourceId, VehiclePosition, VehicleState
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 SPEED = 4.0
 """Of time: the peer and the driver's clock run so much faster than the world."""

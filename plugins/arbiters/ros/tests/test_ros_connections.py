@@ -11,7 +11,7 @@ from m2pem_plugin_ros.settings import DetectorMessage, DetectorSettings, Setting
 from m2pem_plugin_ros.testing import reserved_domain
 
 from m2pem.api import ArbiterContext, Connection, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.telemetry.bus import Bus
 
 A, B, GPR = ResourceId("a"), ResourceId("b"), ResourceId("b/gpr")

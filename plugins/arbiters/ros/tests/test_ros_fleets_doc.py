@@ -23,7 +23,7 @@ from m2pem_plugin_ros.settings import (
 
 import m2pem
 from m2pem.api import Connection, Fleet, ResourceId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
 
 TEXT = (Path(__file__).parents[4] / "docs" / "ros.md").read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_double import ORIGIN
 from ros_sensors import PEER, TOPICS, Sensors, V, fix, odometry, until
 
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
 
 NAN, INF = math.nan, math.inf

@@ -8,12 +8,13 @@ from dataclasses import replace
 import pytest
 from m2pem_plugin_ros.settings import RouteAction
 from m2pem_plugin_ros.testing import Peer, reserved_domain
-from ros_nav2_bench import PEER, Bench, WallClock, along, at, bench
+from ros_nav2_bench import PEER, Bench, along, at, bench
 
 from m2pem.api import (
     BehaviorState,
     GeoPosition,
     ResourceId,
+    SystemClock,
     VehiclePosition,
     VehicleState,
 )
@@ -186,7 +187,7 @@ async def test_drive_stop_ends_when_the_vehicle_stands(ugv1: Bench) -> None:
 
 
 async def test_hold_stands_for_its_duration(ugv1: Bench) -> None:
-    clock = WallClock()
+    clock = SystemClock()
     began_us = clock.now_us()
     goal = ugv1.begin("hold", duration=1.0)
     assert await ugv1.state(goal) is BehaviorState.SUCCEEDED
@@ -208,7 +209,7 @@ def lead_at(ugv1: Bench, east_m: float, north_m: float) -> None:
     ugv1.bus.publish(
         VehicleState(
             ResourceId("lead"),
-            WallClock().now_us(),
+            SystemClock().now_us(),
             GeoPosition(position[0], position[1], 60.0),
             yaw_rad=0.0,
         )

@@ -27,7 +27,7 @@ from m2pem_plugin_ros.testing import Peer, reserved_domain
 from rclpy.action import ActionClient
 from ros_scripted_driver import ScriptedDriver
 
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 
 NODE = Path(__file__).with_name("ros_onboard_peer.py")
 AMPLE_S = 40.0

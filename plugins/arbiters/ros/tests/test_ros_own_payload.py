@@ -16,7 +16,7 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 PEER = Path(__file__).with_name("ros_payload_peer.py")

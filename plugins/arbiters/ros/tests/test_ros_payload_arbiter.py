@@ -7,7 +7,7 @@ from m2pem_plugin_ros.arbiter import RosArbiter
 from ros_double import DoubleDriver, DoubleStation, Dynamics, at
 
 from m2pem.api import BehaviorState, Connection, GeoPosition, ResourceId, VehicleState
-from m2pem.executive.clock import run_virtual
+from m2pem.api.clock import run_virtual
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 V, PTZ, GPR = ResourceId("ugv1"), ResourceId("ugv1/ptz"), ResourceId("ugv1/gpr")

@@ -14,8 +14,8 @@ from m2pem_plugin_ros.settings import (
 )
 
 from m2pem.api import Connection, ResourceId
+from m2pem.api.clock import SystemClock
 from m2pem.errors import PluginError
-from m2pem.executive.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
 
 V, PTZ = ResourceId("evsg2"), ResourceId("evsg2/ptz")

@@ -26,7 +26,7 @@ from m2pem.api import (
     RunStatus,
     VehicleState,
 )
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal

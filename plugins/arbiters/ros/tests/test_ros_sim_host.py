@@ -9,11 +9,12 @@ from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import DriverName, Settings
 from m2pem_plugin_ros.simulator import host as hosts
-from m2pem_plugin_ros.simulator.clock import SimulatedClock
 from m2pem_plugin_ros.simulator.simulation import LATE_S, Simulation
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 from ros_sim_watch import until
+
+from m2pem.api import SystemClock
 
 
 class Stillborn:
@@ -39,7 +40,7 @@ async def test_a_node_that_failed_to_begin_can_be_begun_again(
     monkeypatch.setattr(hosts, "make_onboard_control", make)
     async with RosRuntime("hosting", domain_id=ros_domain) as ros:
         simulated = hosts.SimulatedVehicle(
-            ros, Vehicle(VehicleSpec("ugv1", Settings("/ugv1"))), SimulatedClock()
+            ros, Vehicle(VehicleSpec("ugv1", Settings("/ugv1"))), SystemClock()
         )
         nodes = lambda: {name for name, _ in ros.node.get_node_names_and_namespaces()}  # noqa: E731
         with pytest.raises(RuntimeError, match="not today"):

@@ -24,7 +24,7 @@ from m2pem_plugin_web.rest import (
 from m2pem_plugin_web.services import Services, services_of
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet

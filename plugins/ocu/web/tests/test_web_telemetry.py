@@ -18,8 +18,8 @@ from test_web_restart import left_by_a_crash
 from web_world import SPEED, VEHICLE, Browser, MakeWorld, World, executive, serving
 
 from m2pem.api import OpenPrompt, RunStatus, VehicleState
+from m2pem.api.clock import SystemClock
 from m2pem.cli.journals import last_decided_us
-from m2pem.executive.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.plugins import PluginManager

@@ -19,7 +19,7 @@ from m2pem_plugin_web.access.users import User, write_users
 from m2pem_plugin_web.ocu import WebOcu
 
 from m2pem.api import MissionControl, OpenPrompt, RunId
-from m2pem.executive.clock import SystemClock
+from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.journal import Journal, MemoryJournal
 from m2pem.plugins import PluginManager

@@ -5,7 +5,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 
-from m2pem.api import LinkState
+from m2pem.api import LinkState, SystemClock
 from m2pem.errors import M2pemError, PluginError
 from m2pem_plugin_mavlink.link.routed_link import GROUND_STATION, open_link
 from m2pem_plugin_mavlink.protocol.messages import Address
@@ -27,26 +27,6 @@ class NotReadyError(M2pemError):
     """Started vehicles do not become ready; the text gives the reason."""
 
 
-class SimulatedClock:
-    """A clock of `m2pem.api` that runs `speed` times as fast as a real one, from 0."""
-
-    def __init__(self, speed: float) -> None:
-        self._speed = speed
-
-    def now_us(self) -> int:
-        """Microseconds; never goes back."""
-        return int(time.monotonic() * self._speed * 1e6)
-
-    async def sleep(self, seconds: float) -> None:
-        """Wait for simulated seconds."""
-        await asyncio.sleep(max(seconds, 0.0) / self._speed)
-
-    async def sleep_until(self, time_us: int) -> None:
-        """Wait until `now_us()` is at least `time_us`."""
-        while (remaining_us := time_us - self.now_us()) > 0:
-            await self.sleep(remaining_us / 1e6)
-
-
 @asynccontextmanager
 async def connected(
     vehicles: Sequence[fleet.Vehicle], speed: float
@@ -64,7 +44,7 @@ async def connected(
     taken |= {each.settings.gcs_system_id for each in vehicles}
     own = max(set(range(1, HIGHEST_SYSTEM + 1)) - taken)
     source = Address(own, GROUND_STATION.component)
-    clock = SimulatedClock(speed)
+    clock = SystemClock(speed)
     async with AsyncExitStack() as opened:
         found: list[Vehicle] = []
         for each in vehicles:

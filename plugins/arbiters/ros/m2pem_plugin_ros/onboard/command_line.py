@@ -2,12 +2,11 @@
 
 import asyncio
 import signal
-import time
 from typing import Any
 
 import click
 
-from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId
+from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId, SystemClock
 from m2pem.api.command_options import PositionOption
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.loopback import keep_on_loopback
@@ -115,16 +114,14 @@ async def _serve(
     )
     from m2pem_plugin_ros.onboard.node import LOGGER, OnboardNode  # noqa: PLC0415
     from m2pem_plugin_ros.onboard.target_bus import TargetBus  # noqa: PLC0415
-    from m2pem_plugin_ros.sensors.localization import TopicLocalization  # noqa: PLC0415
-
-    pass
     from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415
+    from m2pem_plugin_ros.sensors.localization import TopicLocalization  # noqa: PLC0415
 
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    clock, targets = WallClock(), TargetBus()
+    clock, targets = SystemClock(), TargetBus()
     context = ArbiterContext(clock, targets, LOGGER, origin)
     name = connection.resource
     async with RosRuntime(f"m2pem_{name}", domain_id=settings.domain_id) as ros:
@@ -142,24 +139,3 @@ async def _serve(
         click.echo("ready")
         await ended.wait()
         await node.close()
-
-
-class WallClock:
-    """Implements `m2pem.api.Clock`: the time of day at its start, advanced by the monotonic
-    clock."""
-
-    def __init__(self) -> None:
-        self._start_us = time.time_ns() // 1000 - time.monotonic_ns() // 1000
-
-    def now_us(self) -> int:
-        """Microseconds since the Unix epoch; never goes back."""
-        return self._start_us + time.monotonic_ns() // 1000
-
-    async def sleep(self, seconds: float) -> None:
-        """Wait for `seconds`."""
-        await asyncio.sleep(max(seconds, 0.0))
-
-    async def sleep_until(self, time_us: int) -> None:
-        """Wait until `now_us()` is at least `time_us`."""
-        while (left_us := time_us - self.now_us()) > 0:  # noqa: ASYNC110  # it may wake early
-            await asyncio.sleep(left_us / 1e6)

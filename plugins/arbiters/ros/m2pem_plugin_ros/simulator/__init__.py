@@ -1,7 +1,7 @@
 """Simulated vehicles that speak ROS 2 as real ones do (`m2pem sim ros`), always on 127.0.0.1.
 
 - `command_line` is the command; `fleet` reads the vehicles of a fleet file; `specification`
-describes a vehicle; `clock` has simulated time.
+describes a vehicle.
 
 - `vehicle` is one vehicle without I/O, with `dynamics` and `sensors`.
 

@@ -5,9 +5,9 @@ import logging
 from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
+from m2pem.api.clock import Clock, RateTimer
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.settings import DriverName
-from m2pem_plugin_ros.simulator.clock import RateTimer, SimulatedClock
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.onboard_control import (
     ControlContext,
@@ -34,7 +34,7 @@ class SimulatedVehicle:
     control.
     """
 
-    def __init__(self, ros: RosRuntime, vehicle: Vehicle, clock: SimulatedClock) -> None:
+    def __init__(self, ros: RosRuntime, vehicle: Vehicle, clock: Clock) -> None:
         self.vehicle, self.traffic_faults = vehicle, TrafficFaults()
         self._ros, self._clock = ros, clock
         self._base: FilteredRuntime | None = None

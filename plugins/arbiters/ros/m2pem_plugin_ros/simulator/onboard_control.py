@@ -10,6 +10,7 @@ from typing import Any, Protocol, cast
 from m2pem.api import (
     ArbiterContext,
     BehaviorRequest,
+    Clock,
     Connection,
     FleetBus,
     GeoPosition,
@@ -17,13 +18,13 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
+from m2pem.api.clock import US_PER_S
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, DriverSetup, Health
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.sensors.localization import Localization
 from m2pem_plugin_ros.settings import Bounds, DriverName
-from m2pem_plugin_ros.simulator.clock import US_PER_S, SimulatedClock
 from m2pem_plugin_ros.simulator.dynamics import wrapped_rad
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Battery, Reading
@@ -61,7 +62,7 @@ class ControlContext:
     vehicle: Vehicle
     ros: FilteredRuntime
     localization: Localization
-    clock: SimulatedClock
+    clock: Clock
     traffic_faults: TrafficFaults
 
     def make_driver(self, events: DriverEvents, bus: FleetBus) -> Driver:
@@ -175,7 +176,7 @@ class SimulatedLocalization:
     simulated vehicle, with its faults. It does not use DDS, so that many vehicles in one process
     stay cheap."""
 
-    def __init__(self, spec: VehicleSpec, clock: SimulatedClock) -> None:
+    def __init__(self, spec: VehicleSpec, clock: Clock) -> None:
         self._spec, self._clock = spec, clock
         self._pose: Pose | None = None
         self._twist: Twist | None = None

@@ -11,9 +11,10 @@ from typing import Any, Self
 
 from rcl_interfaces.msg import SetParametersResult
 
+from m2pem.api import SystemClock
+from m2pem.api.clock import US_PER_S
 from m2pem.api.faults import FaultError, FaultSchedule, PlannedFault
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.simulator.clock import SimulatedClock
 from m2pem_plugin_ros.simulator.faults import GRAMMAR, FaultTarget, check
 from m2pem_plugin_ros.simulator.host import SimulatedVehicle
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
@@ -53,7 +54,8 @@ class Simulation:
         seed: int = 0,
     ) -> None:
         _check(specs)
-        self.clock = SimulatedClock(speed)
+        self.clock = SystemClock(speed)
+        self._start_us = self.clock.now_us()
         self._specs, self._domain_id, self._seed = specs, domain_id, seed
         self._hosts: dict[str, SimulatedVehicle] = {}
         self._runtimes: dict[int | None, RosRuntime] = {}
@@ -81,7 +83,7 @@ class Simulation:
         except BaseException:
             await self._close()
             raise
-        self._now_s = self.clock.elapsed_s
+        self._now_s = self._elapsed_s
         for fault in self._planned:
             self.plan(fault)
         self._task = asyncio.create_task(self._run())
@@ -137,6 +139,11 @@ class Simulation:
 
     # --- time -------------------------------------------------------------------------------------
 
+    @property
+    def _elapsed_s(self) -> float:
+        """Simulated seconds since the simulation was made."""
+        return (self.clock.now_us() - self._start_us) / US_PER_S
+
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         last_s = due_s = loop.time()
@@ -146,7 +153,7 @@ class Simulation:
             wall_s = loop.time()
             late_s = max(0.0, wall_s - last_s - LATE_S)
             self._left_out_s += late_s * self.clock.speed
-            self._now_s = self.clock.elapsed_s - self._left_out_s
+            self._now_s = self._elapsed_s - self._left_out_s
             for simulated in self:
                 simulated.step(self._now_s, wall_s - last_s)
             last_s = wall_s

@@ -11,11 +11,11 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, NavSatFix, NavSatStatus
 from std_msgs.msg import String, UInt32
 
+from m2pem.api.clock import Clock, RateTimer
 from m2pem_plugin_ros.frames import quaternion_of_yaw, to_geodetic
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import qos
-from m2pem_plugin_ros.simulator.clock import RateTimer, SimulatedClock
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Detector, Found, Reading
 from m2pem_plugin_ros.simulator.traffic import FilteredRuntime
@@ -34,7 +34,7 @@ class BaseTopics:
         ros: FilteredRuntime,
         vehicle: Vehicle,
         traffic_faults: TrafficFaults,
-        clock: SimulatedClock,
+        clock: Clock,
     ) -> None:
         self._vehicle, self._traffic_faults, self._clock = vehicle, traffic_faults, clock
         settings = vehicle.spec.settings

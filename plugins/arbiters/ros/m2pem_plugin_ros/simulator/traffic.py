@@ -11,8 +11,8 @@ from typing import Any
 
 from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus
 
+from m2pem.api.clock import RateTimer
 from m2pem_plugin_ros.runtime import RosRuntime
-from m2pem_plugin_ros.simulator.clock import RateTimer
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 
 UNSILENCED = ("cmd_vel",)

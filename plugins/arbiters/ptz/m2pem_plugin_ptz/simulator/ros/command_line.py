@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from m2pem.api import SystemClock
 from m2pem.errors import PluginError
 
 if TYPE_CHECKING:
@@ -62,15 +63,13 @@ def ros_cameras(fleet_file: Path, speed: float, domain_id: int | None) -> None:
 
 
 async def _run(specs: "Sequence[CameraSpec]", speed: float, domain_id: int | None) -> None:
-    from m2pem_plugin_ros import SimulatedClock  # noqa: PLC0415
-
     from m2pem_plugin_ptz.simulator.ros.simulation import simulate  # noqa: PLC0415  # it needs ROS
 
     stop, ready = asyncio.Event(), asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop.set)
-    going = loop.create_task(simulate(specs, SimulatedClock(speed), domain_id, ready))
+    going = loop.create_task(simulate(specs, SystemClock(speed), domain_id, ready))
     started, stopped = loop.create_task(ready.wait()), loop.create_task(stop.wait())
     await asyncio.wait((going, started), return_when=asyncio.FIRST_COMPLETED)
     if ready.is_set():

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from m2pem.api.clock import DeadlockError, SystemClock, VirtualClock, run_virtual
 from m2pem.errors import InternalError
-from m2pem.executive.clock import DeadlockError, SystemClock, VirtualClock, run_virtual
 
 DAY_S = 86_400
 START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
