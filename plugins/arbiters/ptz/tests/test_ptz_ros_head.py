@@ -119,6 +119,26 @@ async def test_joints_that_fall_silent_are_not_heard(ros_domain, tmp_path) -> No
         await until(lambda: it.heard[-1] > loop.time() - 0.2)
 
 
+async def test_a_fault_of_a_simulated_camera_ends_after_its_duration(ros_domain, tmp_path) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.fault("silent for 2 s")
+        loop = asyncio.get_running_loop()
+        await until(lambda: it.heard[-1] < loop.time() - 0.5)
+        await until(lambda: it.heard[-1] > loop.time() - 0.2)
+
+
+async def test_words_that_are_no_fault_leave_a_simulated_camera_as_it_is(
+    ros_domain, tmp_path
+) -> None:
+    async with world(ros_domain, tmp_path) as it:
+        await it.ready()
+        await it.send_fault("silent for ever")
+        await it.fault("stuck")
+        assert it.confirmed == ["stuck"]
+        await it.stands()
+
+
 async def test_a_camera_that_is_not_there_says_what_is_missing(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path, camera=False) as it:
         told = it.driver.refusal("ptz_point_at")

@@ -1,5 +1,8 @@
 """The topics of one simulated camera. It needs ROS."""
 
+import logging
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,16 +12,46 @@ from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
 
 from m2pem.api import Clock, Connection
+from m2pem.api.clock import US_PER_S, RateTimer
+from m2pem.api.faults import Effect, FaultError, FaultGrammar, FaultKind, FaultSchedule, fixed
 from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, RosSettings
 from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.simulator.ros.gimbal import Gimbal
 from m2pem_plugin_ptz.simulator.ros.image import picture
 
-JOINTS_EVERY_S, IMAGES_EVERY_S = 0.05, 0.2
-US_PER_S = 1_000_000
+JOINTS_HZ, IMAGES_HZ = 20.0, 5.0
 
-FAULTS = ("silent", "stuck", "blind", "garbled", "well")
-"""No joint states; joints that do not turn; no images; invalid images; no fault."""
+logger = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class CameraFaults:
+    """`silent`: no joint states; `stuck`: the joints do not turn; `blind`: no images; `garbled`:
+    invalid images."""
+
+    silent: bool = False
+    stuck: bool = False
+    blind: bool = False
+    garbled: bool = False
+
+
+def _switch(fault: str) -> Callable[[re.Match[str]], Effect["SimulatedCamera"]]:
+    return fixed(
+        lambda camera: setattr(camera.faults, fault, True),
+        lambda camera: setattr(camera.faults, fault, False),
+    )
+
+
+GRAMMAR: FaultGrammar["SimulatedCamera"] = FaultGrammar(
+    {
+        **{
+            fault: FaultKind(fault, _switch(fault))
+            for fault in ("silent", "stuck", "blind", "garbled")
+        },
+        "well": FaultKind("well", fixed(lambda camera: camera.clear_faults())),
+    },
+    "silent at 10 s for 5 s",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +76,12 @@ class CameraSpec:
 
 
 class SimulatedCamera:
-    """A camera on a pan-tilt unit. A std_msgs/String on `sim_fault`, beside its joint states, sets
-    a fault; `sim_fault_is` reports it."""
+    """A camera on a pan-tilt unit. A std_msgs/String on `sim_fault`, beside its joint states, plans
+    a fault; `sim_fault_is` confirms it."""
 
     def __init__(self, ros: RosRuntime, spec: CameraSpec, clock: Clock) -> None:
         self.spec = spec
         self.gimbal = Gimbal(spec.reach)
-        self.fault = "well"
         self._clock = clock
         own, create = spec.settings, ros.node.create_publisher
         self._joints = create(JointState, own.joint_states, qos.TELEMETRY)
@@ -62,23 +94,29 @@ class SimulatedCamera:
         switch = f"{own.joint_states.rpartition('/')[0]}/sim_fault"
         ros.subscribe(String, switch, self._switch, qos.COMMANDS)
         self._fault_is = create(String, f"{switch}_is", qos.STATUS)
-        self._now_us = clock.now_us()
-        self._joints_us = self._images_us = self._now_us
+        self._started_us = clock.now_us()
+        self._now_s = 0.0
+        self._joints_due, self._images_due = RateTimer(JOINTS_HZ), RateTimer(IMAGES_HZ)
+        self.clear_faults()
+
+    def clear_faults(self) -> None:
+        """End all faults, and forget those that are planned."""
+        self.faults, self._schedule = CameraFaults(), FaultSchedule()
 
     def step(self) -> None:
         """Advance, and publish what is due."""
-        now_us = self._clock.now_us()
-        self.gimbal.stuck = self.fault == "stuck"
-        self.gimbal.step((now_us - self._now_us) / US_PER_S)
-        self._now_us = now_us
-        if now_us >= self._joints_us:
-            self._joints_us = now_us + round(JOINTS_EVERY_S * US_PER_S)
-            if self.fault != "silent":
-                self._joints.publish(self._joint_state())
-        if now_us >= self._images_us:
-            self._images_us = now_us + round(IMAGES_EVERY_S * US_PER_S)
-            if self.fault != "blind" and self._images.get_subscription_count():
-                self._images.publish(self._image())
+        before_s, self._now_s = self._now_s, (self._clock.now_us() - self._started_us) / US_PER_S
+        self._schedule.run_until(self._now_s)
+        if not self.faults.stuck:
+            self.gimbal.step(self._now_s - before_s)
+        if self._joints_due.is_due(self._now_s) and not self.faults.silent:
+            self._joints.publish(self._joint_state())
+        if (
+            self._images_due.is_due(self._now_s)
+            and not self.faults.blind
+            and self._images.get_subscription_count()
+        ):
+            self._images.publish(self._image())
 
     # --- commands -------------------------------------------------------------------------------
 
@@ -99,9 +137,19 @@ class SimulatedCamera:
             self.gimbal.move(to, seconds)
 
     def _switch(self, message: Any) -> None:
-        if message.data in FAULTS:
-            self.fault = message.data
-            self._fault_is.publish(message)
+        try:
+            fault = GRAMMAR.parse(message.data)
+        except FaultError as error:
+            logger.warning("%s: %s", self.spec.name, error)
+            return
+        self._after(fault.at_s or 0.0, lambda: fault.start(self, self._after))
+        self._fault_is.publish(message)
+
+    def _after(self, seconds: float, call: Callable[[], object]) -> None:
+        if seconds <= 0:
+            call()
+        else:
+            self._schedule.at(self._now_s + seconds, call)
 
     # --- what it says ---------------------------------------------------------------------------
 
@@ -115,7 +163,7 @@ class SimulatedCamera:
 
     def _image(self) -> Any:
         content = picture(self.gimbal.ptz, self.spec.reach.view_rad)
-        if self.fault == "garbled":
+        if self.faults.garbled:
             content = b"GIF89a" + content
         message = CompressedImage(format="jpeg", data=content)
         self._stamp(message)

@@ -11,11 +11,10 @@ STEEPEST = 1e9
 
 @dataclass(slots=True)
 class Gimbal:
-    """`ptz`: the direction, within `reach`. `stuck`: the motors do not turn."""
+    """`ptz`: the direction, within `reach`."""
 
     reach: Reach
     ptz: PanTiltZoom = PanTiltZoom(0.0, 0.0)  # noqa: RUF009  # frozen
-    stuck: bool = False
     _to: PanTiltZoom = PanTiltZoom(0.0, 0.0)  # noqa: RUF009  # frozen
     _rates: tuple[float, float] = (STEEPEST, STEEPEST)
 
@@ -34,8 +33,6 @@ class Gimbal:
 
     def step(self, dt_s: float) -> None:
         """Advance by a time."""
-        if self.stuck:
-            return
         ptz, to, fastest = self.ptz, self._to, self.reach.rate_rad_s
         pan_rate, tilt_rate = (min(rate, fastest) for rate in self._rates)
         self.ptz = replace(
