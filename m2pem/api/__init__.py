@@ -265,6 +265,7 @@ __all__ = [
     "SightedArbiter",
     "SimulationResult",
     "StampedRecord",
+    "SystemClock",
     "TeamMemberState",
     "TeamState",
     "Telemetry",
@@ -291,7 +292,6 @@ __all__ = [
     "parse_mission",
     "quantity",
     "simulator_group",
-    "SystemClock",
 ]
 
 

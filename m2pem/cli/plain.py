@@ -16,7 +16,8 @@ from m2pem.api.control import (
     StampedRecord,
 )
 from m2pem.api.description import printable
-from m2pem.cli.standard_streams import Lines, writer_for
+from m2pem.api.foreground import Lines
+from m2pem.cli.standard_streams import writer_for
 from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
 from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem.mission.behavior import Decision

@@ -1,15 +1,8 @@
-"""Standard output and input for asyncio: a slow terminal or pipe never delays a mission."""
+"""Standard output for asyncio: a slow terminal or pipe never delays a mission."""
 
-import asyncio
-import codecs
-import os
-import select
-import signal
 import threading
-import time
 import weakref
-from collections.abc import AsyncIterator, Callable
-from contextlib import suppress
+from collections.abc import Callable
 from typing import TextIO
 
 MAX_WAITING = 100_000
@@ -80,61 +73,3 @@ def writer_for(stream: TextIO) -> LineWriter:
     if writer is None:
         writer = _writers[stream] = LineWriter(stream)
     return writer
-
-
-STDIN = 0
-BACKGROUND_POLL_S = 0.5
-
-
-class Lines:
-    """Lines as they are typed, without their ends; iteration stops at the end of the input.
-
-    A thread reads the descriptor itself: it may wait for ever, and must then neither hold up the
-    event loop nor keep the program from ending, which a lock on `sys.stdin` would.
-    """
-
-    def __init__(self, descriptor: int = STDIN) -> None:
-        self._descriptor = descriptor
-
-    async def __aiter__(self) -> AsyncIterator[str]:
-        loop = asyncio.get_running_loop()
-        lines: asyncio.Queue[str | None] = asyncio.Queue()
-        with suppress(ValueError):  # not in the main thread: the program around us decides
-            # Read from in the background, a terminal would stop the whole executive.
-            signal.signal(signal.SIGTTIN, signal.SIG_IGN)
-        read = threading.Thread(
-            target=self._read, args=(loop, lines), name="standard input", daemon=True
-        )
-        read.start()
-        while (line := await lines.get()) is not None:
-            yield line
-
-    def _read(self, loop: asyncio.AbstractEventLoop, lines: "asyncio.Queue[str | None]") -> None:
-        decoder = codecs.getincrementaldecoder("utf-8")("replace")
-        rest = ""
-        with suppress(RuntimeError):  # the loop is closed
-            while block := self._block():
-                *whole, rest = (rest + decoder.decode(block)).split("\n")
-                for line in whole:
-                    loop.call_soon_threadsafe(lines.put_nowait, line.removesuffix("\r"))
-            if rest:
-                loop.call_soon_threadsafe(lines.put_nowait, rest)
-            loop.call_soon_threadsafe(lines.put_nowait, None)
-
-    def _block(self) -> bytes:
-        """Read the next bytes; b"" at the end."""
-        while True:
-            try:
-                return os.read(self._descriptor, 65_536)
-            except BlockingIOError:  # the parent process has made it non-blocking
-                select.select([self._descriptor], [], [])
-            except OSError:
-                if not self._in_background():
-                    return b""
-                time.sleep(BACKGROUND_POLL_S)
-
-    def _in_background(self) -> bool:
-        try:
-            return os.tcgetpgrp(self._descriptor) != os.getpgrp()
-        except OSError:
-            return False

@@ -7,7 +7,8 @@ from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, plan
 from m2pem_plugin_mavlink.simulator.geometry import Location
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import VehicleSpec
-from m2pem_plugin_ros.simulator.command_line import read_stdin_lines
+
+from m2pem.api.foreground import Lines
 
 HOME = Location(38.107162, -77.319941, 60.0)
 PARAMETERS = {"FS_GCS_ENABLE": 1.0, "FS_GCS_TIMEOUT": 20.0, "BATT_FS_LOW_ACT": 2.0}
@@ -16,8 +17,9 @@ PARAMETERS = {"FS_GCS_ENABLE": 1.0, "FS_GCS_TIMEOUT": 20.0, "BATT_FS_LOW_ACT": 2
 async def main(port: int, speed: float) -> None:
     spec = VehicleSpec(home=HOME, parameters=PARAMETERS, estimator_s=6.0)
     async with Simulator([spec], speed=speed, to=("127.0.0.1", port)) as vehicles:
-        read_stdin_lines(lambda line: plan(GRAMMAR.parse(line), vehicles[1].faults))
         print("ready", flush=True)
+        async for line in Lines():
+            plan(GRAMMAR.parse(line), vehicles[1].faults)
         await vehicles.stopped()
 
 

@@ -1,7 +1,6 @@
 """`m2pem sitl`: the real programs of autopilots, for the vehicles of a fleet, until Ctrl-C."""
 
 import asyncio
-import signal
 import tempfile
 from collections.abc import Sequence
 from contextlib import AsyncExitStack, ExitStack
@@ -11,6 +10,7 @@ from typing import NoReturn
 import click
 
 from m2pem import load_fleet
+from m2pem.api.foreground import interrupted
 from m2pem.errors import M2pemError, PluginError
 from m2pem_plugin_mavlink.sitl.fleet import ARBITER, Vehicle, launches, read_vehicles
 from m2pem_plugin_mavlink.sitl.launch import Launch, Program, first_to_end, running
@@ -92,9 +92,7 @@ async def _run(
     vehicles: Sequence[Vehicle], starts: Sequence[Launch], folder: Path, speed: float
 ) -> None:
     """Start, wait until the vehicles are ready, give their ports up for the executive, and wait."""
-    stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    stop = interrupted()
     async with AsyncExitStack() as ports:
         watched = await ports.enter_async_context(connected(vehicles, speed))
         with ExitStack() as started:

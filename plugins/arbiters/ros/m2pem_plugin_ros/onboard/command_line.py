@@ -1,13 +1,13 @@
 """The command `m2pem ros onboard`: the m2pem node of a vehicle, until Ctrl-C."""
 
 import asyncio
-import signal
 from typing import Any
 
 import click
 
 from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId, SystemClock
 from m2pem.api.command_options import PositionOption
+from m2pem.api.foreground import interrupted
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.loopback import keep_on_loopback
 from m2pem_plugin_ros.settings import DriverName, Settings, read_settings
@@ -117,10 +117,7 @@ async def _serve(
     from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415
     from m2pem_plugin_ros.sensors.localization import TopicLocalization  # noqa: PLC0415
 
-    ended = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
+    ended = interrupted()
     clock, targets = SystemClock(), TargetBus()
     context = ArbiterContext(clock, targets, LOGGER, origin)
     name = connection.resource

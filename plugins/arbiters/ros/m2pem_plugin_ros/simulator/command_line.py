@@ -1,19 +1,16 @@
 """The command `m2pem sim ros`: simulated vehicles, until Ctrl-C."""
 
 import asyncio
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from m2pem.api import GeoPosition
 from m2pem.api.command_options import FaultOption, PositionOption
 from m2pem.api.faults import FaultError, PlannedFault
+from m2pem.api.foreground import Lines, interrupted
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.loopback import keep_on_loopback
@@ -22,6 +19,9 @@ from m2pem_plugin_ros.simulator.faults import DRIVER_TEXTS, GRAMMAR, FaultTarget
 from m2pem_plugin_ros.simulator.fleet import make_default_vehicles
 from m2pem_plugin_ros.simulator.sensors import Target
 from m2pem_plugin_ros.simulator.specification import FORT, SettingError, VehicleSpec
+
+if TYPE_CHECKING:
+    from m2pem_plugin_ros.simulator.simulation import Simulation
 
 MOST = 100
 """Vehicles in one process; 20 are moderate, see docs/ros.md."""
@@ -194,33 +194,35 @@ async def _run(
 ) -> None:
     from m2pem_plugin_ros.simulator.simulation import Simulation  # noqa: PLC0415  # imports rclpy
 
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
+    stop = interrupted()
     async with Simulation(specs, speed=speed, domain_id=domain_id, faults=faults) as vehicles:
         for spec in specs:
             click.echo(_line(spec))
         click.echo("ready")
-
-        def hear(line: str) -> None:
-            try:
-                vehicles.plan(GRAMMAR.parse(line))
-            except FaultError as error:
-                click.echo(f"m2pem: {error}", err=True)
-            else:
-                click.echo(f"fault: {line}")
-
-        read_stdin_lines(hear)
-        ended = asyncio.create_task(vehicles.stopped())
-        stopped = asyncio.create_task(stop.wait())
+        tasks = [
+            asyncio.ensure_future(each)
+            for each in (vehicles.stopped(), stop.wait(), _read_faults(vehicles))
+        ]
+        ended, stopped, _ = tasks
         await asyncio.wait((ended, stopped), return_when=asyncio.FIRST_COMPLETED)
-        stopped.cancel()
         if ended.done():
             ended.result()
-        ended.cancel()
-        with suppress(asyncio.CancelledError):
-            await ended
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _read_faults(vehicles: "Simulation") -> None:
+    """Plan the faults that are typed, until the input ends."""
+    async for line in Lines():
+        if not (text := line.strip()):
+            continue
+        try:
+            vehicles.plan(GRAMMAR.parse(text))
+        except FaultError as error:
+            click.echo(f"m2pem: {error}", err=True)
+        else:
+            click.echo(f"fault: {text}")
 
 
 def _line(spec: VehicleSpec) -> str:
@@ -230,26 +232,3 @@ def _line(spec: VehicleSpec) -> str:
     where = f"{place.latitude_deg:.6f},{place.longitude_deg:.6f}"
     what = DRIVER_TEXTS[spec.settings.driver].removeprefix("an ").removeprefix("a ")
     return f"{spec.name}: {spec.settings.namespace or '/'}, {what}, at {where}"
-
-
-def read_stdin_lines(hear: Callable[[str], None]) -> None:
-    """Call `hear` on the running loop with each line of standard input, until it ends.
-
-    If the program is in the background of a terminal, reading ends, and the program goes on.
-    """
-    with suppress(ValueError):  # not the main thread: then the signal is its business
-        signal.signal(signal.SIGTTIN, signal.SIG_IGN)
-    loop = asyncio.get_running_loop()
-    threading.Thread(target=_read, args=(loop, hear), name="stdin", daemon=True).start()
-
-
-def _read(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) -> None:
-    """Read by `os.read`: a reader of `sys.stdin` would hold a lock that the end of Python waits
-    for."""
-    rest = b""
-    with suppress(OSError, RuntimeError):  # no input; the loop is closed
-        while data := os.read(0, 4096):
-            *lines, rest = (rest + data).split(b"\n")
-            for line in lines:
-                if text := line.decode(errors="replace").strip():
-                    loop.call_soon_threadsafe(hear, text)

@@ -1,15 +1,14 @@
 """The command `m2pem sim ros-cameras`: simulated cameras on pan-tilt units, until Ctrl-C."""
 
 import asyncio
-import signal
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from m2pem.api import SystemClock
+from m2pem.api.foreground import interrupted
 from m2pem.errors import PluginError
 
 if TYPE_CHECKING:
@@ -65,23 +64,24 @@ def ros_cameras(fleet_file: Path, speed: float, domain_id: int | None) -> None:
 async def _run(specs: "Sequence[CameraSpec]", speed: float, domain_id: int | None) -> None:
     from m2pem_plugin_ptz.simulator.ros.simulation import simulate  # noqa: PLC0415  # it needs ROS
 
-    stop, ready = asyncio.Event(), asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
-    going = loop.create_task(simulate(specs, SystemClock(speed), domain_id, ready))
-    started, stopped = loop.create_task(ready.wait()), loop.create_task(stop.wait())
-    await asyncio.wait((going, started), return_when=asyncio.FIRST_COMPLETED)
-    if ready.is_set():
+    stop, ready = interrupted(), asyncio.Event()
+    simulating, started, stopped = tasks = [
+        asyncio.ensure_future(each)
+        for each in (
+            simulate(specs, SystemClock(speed), domain_id, ready),
+            ready.wait(),
+            stop.wait(),
+        )
+    ]
+    await asyncio.wait((simulating, started), return_when=asyncio.FIRST_COMPLETED)
+    if started.done():
         for spec in specs:
             node = "" if spec.node is None else ", an m2pem node"
             click.echo(f"{spec.name}: {spec.settings.joint_states}, {spec.settings.image}{node}")
         click.echo("ready")
-        await asyncio.wait((going, stopped), return_when=asyncio.FIRST_COMPLETED)
-    started.cancel()
-    stopped.cancel()
-    if going.done():
-        going.result()
-    going.cancel()
-    with suppress(asyncio.CancelledError):
-        await going
+        await asyncio.wait((simulating, stopped), return_when=asyncio.FIRST_COMPLETED)
+    if simulating.done():
+        simulating.result()
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
