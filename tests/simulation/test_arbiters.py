@@ -3,7 +3,6 @@ import math
 
 import pytest
 
-from conftest import START_US, Fleet, Simulate, area, local, make, place, route
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import VehicleState
@@ -15,6 +14,7 @@ from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.faults import Fault
 from m2pem.simulation.kinematics import DEFAULTS
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.simulation.conftest import START_US, Fleet, Simulate, area, local, make, place, route
 
 S = 1_000_000
 UGV: Fleet = {"ugv": ("ground", {"heading": "90 deg"})}

@@ -1,10 +1,10 @@
 import pytest
 
-from conftest import START_US, Simulate, local, place, route
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.simulation.conftest import START_US, Simulate, local, place, route
 
 S = 1_000_000
 GPR = "ugv/gpr"

@@ -2,7 +2,6 @@ import math
 
 import pytest
 
-from conftest import START_US, Fleet, Simulate, area, place
 from m2pem.api.telemetry import PayloadState
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.behavior import BehaviorType
@@ -11,6 +10,7 @@ from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.gimbals import GAZES, MAST_M
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.simulation.conftest import START_US, Fleet, Simulate, area, place
 
 S = 1_000_000
 PTZ = "ugv/ptz"

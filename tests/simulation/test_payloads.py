@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from conftest import ORIGIN, Fleet, Simulate
 from m2pem.api.telemetry import PayloadState
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.frame import FlatFrame
@@ -13,6 +12,7 @@ from m2pem.simulation.payloads import RANGE_M, around, seen
 from m2pem.simulation.segments import Look, Pose
 from m2pem.simulation.settings import Gimbal
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.simulation.conftest import ORIGIN, Fleet, Simulate
 
 NORTH = math.pi / 2
 VIEW = Gimbal(view_rad=math.radians(30))

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import START_US, Fleet, make, place, route
 from m2pem.api.arbiter import ResolvedValue
 from m2pem.api.clock import Clock, run_virtual
 from m2pem.mission.catalogue import BehaviorState, ResourceId
@@ -15,6 +14,7 @@ from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.vehicles import SimVehicle
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.simulation.conftest import START_US, Fleet, make, place, route
 
 STEP_S = 0.1
 VEHICLES = ("ugv", "uav")

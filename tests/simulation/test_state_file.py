@@ -7,7 +7,6 @@ from uuid import UUID
 
 import pytest
 
-from conftest import START_US, Fleet, local, make, place, route
 from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import VehicleState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
@@ -15,6 +14,7 @@ from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.state_file import StateFileError, recorded_effects
 from m2pem.testing.contracts.arbiter_harness import JOURNAL, ArbiterHarness
+from tests.simulation.conftest import START_US, Fleet, local, make, place, route
 
 S = 1_000_000
 EAST_100 = route((50, 0), (100, 0))
@@ -278,7 +278,7 @@ def test_what_could_not_be_said_before_the_end_is_known_afterwards(state: str) -
 KILLED = """
 import asyncio, os, signal, sys
 sys.path.insert(0, sys.argv[2])
-from conftest import make, route
+from tests.simulation.conftest import make, route
 from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
 
@@ -295,7 +295,7 @@ asyncio.run(main())
 
 
 def test_a_start_survives_being_killed_right_after_it(state: str) -> None:
-    folder = str(Path(__file__).parent)
+    folder = str(Path(__file__).parents[2])
     killed = subprocess.run([sys.executable, "-c", KILLED, state, folder], check=False)
     assert killed.returncode == -9
     [effect] = recorded_effects(state)

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import Fleet, Simulate, area, local, place, route
 from m2pem.api.telemetry import VehicleState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point
@@ -17,6 +16,7 @@ from m2pem.simulation.kinematics import DEFAULTS
 from m2pem.simulation.segments import Pose, Stand, Travel, fit
 from m2pem.simulation.trajectory import Plan, Track, Warp, retimed
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.simulation.conftest import Fleet, Simulate, area, local, place, route
 
 S = 1_000_000
 STRAIGHT = Travel(
