@@ -22,6 +22,7 @@ __all__ = [
     "ardupilot",
     "free_port",
     "program",
+    "programs_folder",
     "px4",
     "running",
     "until_ready",
@@ -52,6 +53,16 @@ def program(variable: str) -> Path | None:
     """The program that an environment variable names, or a link to it."""
     named = os.environ.get(variable)
     return Path(named).absolute() if named else None
+
+
+def programs_folder(folder: Path, *names: str) -> Path:
+    """Make a folder with links to programs: "arducopter" is what M2PEM_ARDUCOPTER names."""
+    folder.mkdir()
+    for name in names:
+        named = program(f"M2PEM_{name.upper()}")
+        assert named is not None, name
+        (folder / name).symlink_to(named)
+    return folder
 
 
 def ardupilot(

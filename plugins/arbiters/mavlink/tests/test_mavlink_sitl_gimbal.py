@@ -94,12 +94,7 @@ def fleet(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def programs(tmp_path: Path) -> Path:
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    program = mavlink_sitl.program("M2PEM_ARDUCOPTER")
-    assert program is not None
-    (folder / "arducopter").symlink_to(program)
-    return folder
+    return mavlink_sitl.programs_folder(tmp_path / "bin", "arducopter")
 
 
 def pointings(folder: Path, origin: At) -> Iterator[Pointing]:

@@ -23,14 +23,7 @@ Fly = Callable[..., list[dict[str, Any]]]
 
 @pytest.fixture
 def programs(tmp_path: Path) -> Path:
-    """A folder with links to the programs."""
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    for variable, name in (("M2PEM_ARDUCOPTER", "arducopter"), ("M2PEM_ARDUROVER", "ardurover")):
-        program = mavlink_sitl.program(variable)
-        assert program is not None
-        (folder / name).symlink_to(program)
-    return folder
+    return mavlink_sitl.programs_folder(tmp_path / "bin", "arducopter", "ardurover")
 
 
 @pytest.fixture

@@ -24,14 +24,7 @@ pytestmark = [pytest.mark.timeout(900), pytest.mark.sitl("M2PEM_ARDUCOPTER", "M2
 
 @pytest.fixture
 def programs(tmp_path: Path) -> Path:
-    """A folder with links to the programs."""
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    for variable, name in (("M2PEM_ARDUCOPTER", "arducopter"), ("M2PEM_ARDUROVER", "ardurover")):
-        program = mavlink_sitl.program(variable)
-        assert program is not None
-        (folder / name).symlink_to(program)
-    return folder
+    return mavlink_sitl.programs_folder(tmp_path / "bin", "arducopter", "ardurover")
 
 
 def with_patience(fleet: str, folder: Path) -> Path:
