@@ -17,8 +17,17 @@ SLOW = Figure({"cpu_s": 0.012, "peak_kb": 60_000}, 3)
 FAILED = Figure(wrong="wrong: completed with n = 99 after 99 tasks")
 
 
+def refusal(answer: dict[str, Any]) -> str:
+    """What is wrong with an answer to 100 tasks in a row; empty if it is right."""
+    try:
+        check(answer, graph("row", 100))
+    except FailedError as error:
+        return str(error)
+    return ""
+
+
 def test_a_right_result_is_right() -> None:
-    check({"instances": 1, "outcomes": [RIGHT]}, graph("row", 100))
+    assert refusal({"instances": 1, "outcomes": [RIGHT]}) == ""
 
 
 @pytest.mark.parametrize(
@@ -32,8 +41,7 @@ def test_a_right_result_is_right() -> None:
     ],
 )
 def test_a_wrong_result_is_a_failure(answer: dict[str, Any]) -> None:
-    with pytest.raises(FailedError, match="wrong"):
-        check(answer, graph("row", 100))
+    assert "wrong" in refusal(answer)
 
 
 def test_a_hang_is_a_failure() -> None:

@@ -1,4 +1,3 @@
-import contextlib
 import json
 from typing import Any
 
@@ -121,8 +120,13 @@ json_values = st.recursive(
 
 @given(st.sampled_from(["Point", "LineString", "MultiPoint", "Polygon", "Feature"]), json_values)
 def test_any_coordinates_are_read_or_refused(kind: str, value: Any) -> None:
-    with contextlib.suppress(GeometryError):
-        parse_geojson({"type": kind, "coordinates": value, "geometry": value, "properties": value})
+    data = {"type": kind, "coordinates": value, "geometry": value, "properties": value}
+    try:
+        geometry = parse_geojson(data)
+    except GeometryError as error:
+        assert str(error)
+    else:
+        assert parse_geojson(as_geojson(geometry)) == geometry
 
 
 def test_kinds_have_the_names_that_people_use() -> None:

@@ -11,6 +11,7 @@ from m2pem.fleet.fleet_file import load_fleet
 from m2pem.geo.files import read_geometry
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.polygon import MAX_CORNERS, ring_problem
+from m2pem.mission.geometry import Area
 
 from ..fleet.fleets import write_fleet, write_json
 
@@ -40,7 +41,9 @@ def moved(ring: list[list[int]], by: int) -> list[list[int]]:
     ],
 )
 def test_areas_that_are_right(rings: list[Any]) -> None:
-    parse_geojson(polygon(*rings))
+    area = parse_geojson(polygon(*rings))
+    assert isinstance(area, Area)
+    assert len(area.rings) == len(rings)
 
 
 @pytest.mark.parametrize(

@@ -132,4 +132,5 @@ async def test_a_missing_library_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_who_has_no_serial_line_does_not_load_what_reads_it() -> None:
     program = f"import sys, {routed_link.__name__}; assert 'serial' not in sys.modules"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
+    done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
+    assert done.returncode == 0

@@ -112,7 +112,7 @@ def test_the_catalogue_needs_no_mavlink_library() -> None:
         "assert arbiter.catalogue('v') and arbiter.limits('v')\n"
         "assert not {'pymavlink', 'mavsdk'} & set(sys.modules), sorted(sys.modules)\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_an_address_is_shared_unless_the_kernel_chooses_its_port() -> None:
