@@ -101,7 +101,7 @@ class Stored(Silent):
         self._quiet_s = 0.0
 
     def hear(self, message: Message, now_s: float) -> Sequence[Message]:
-        return self._HEARS[message.TYPE.name](self, message, now_s)
+        return self.HEARS[message.TYPE.name](self, message, now_s)
 
     def wake(self, now_s: float) -> Sequence[Message]:
         if now_s - self._quiet_s >= self.TIMEOUT_S:
@@ -177,7 +177,7 @@ class Stored(Silent):
             self._coming, self.next_s = None, None
         return ()
 
-    _HEARS: Mapping[str, Any] = {
+    HEARS: Mapping[str, Any] = {
         "MISSION_COUNT": _count,
         "MISSION_ITEM_INT": _item,
         "MISSION_CLEAR_ALL": _clear,

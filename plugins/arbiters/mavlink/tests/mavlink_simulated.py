@@ -2,15 +2,17 @@
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from typing import Any
 
+from m2pem_plugin_mavlink import Address, VehicleLink, open_link
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.simulator.geometry import Location
 from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
-from m2pem.api import Connection, LocalFrame, ResourceId, offset
+from m2pem.api import Clock, Connection, FleetBus, LocalFrame, ResourceId, offset
 from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
@@ -59,10 +61,22 @@ def connections(
     return made
 
 
+@asynccontextmanager
+async def ground_station(simulator: Simulator, clock: Clock) -> AsyncIterator[VehicleLink]:
+    """A link to the first vehicle beside that of its arbiter."""
+    host, port = simulator[1].address
+    link = await open_link(Address(1, 1), [f"udpout://{host}:{port}"], clock)
+    try:
+        yield link
+    finally:
+        await link.close()
+
+
 class Bench(ArbiterHarness):
     """A bench that knows where its vehicles really are."""
 
     simulator: Simulator
+    bus: FleetBus
 
     def truth(self, number: int = 1) -> SimulatedVehicle:
         """A vehicle as it really is."""
@@ -101,9 +115,10 @@ def fly(
     async def run() -> None:
         async with Simulator(specs(*kinds), speed=speed, to=None) as simulator:
             clock = SystemClock(speed)
-            arbiter = MavlinkArbiter(connections(simulator, **more), context(clock))
+            lent = context(clock)
+            arbiter = MavlinkArbiter(connections(simulator, **more), lent)
             async with Bench(arbiter, clock) as bench:
-                bench.simulator = simulator
+                bench.simulator, bench.bus = simulator, lent.bus
                 await main(bench)
 
     asyncio.run(run())

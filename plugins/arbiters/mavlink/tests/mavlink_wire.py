@@ -42,6 +42,10 @@ class HandClock:
         heapq.heappush(self._waiting, (time_us, next(self._numbers), woken))
         await woken
 
+    def jump(self, seconds: float) -> None:
+        """Let so much time pass in which nothing is done, as while a machine is suspended."""
+        self._now_us += round(seconds * 1_000_000)
+
     async def turn(self, seconds: float) -> None:
         """Let so much time pass, and everybody do what is due."""
         end_us = self._now_us + round(seconds * 1_000_000)

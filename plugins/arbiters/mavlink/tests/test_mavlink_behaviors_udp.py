@@ -75,7 +75,7 @@ def test_a_copter_follows_a_rover() -> None:
     async def main(bench) -> None:
         def tell(state) -> None:
             if isinstance(state, VehicleState):
-                bench.arbiter._context.bus.publish(state)
+                bench.bus.publish(state)
 
         await bench.do("r1.b1", "takeoff", altitude=8.0)
         await bench.start("r1.b2", "goto", "v2", target=point(120, 20), speed=3.0)

@@ -10,7 +10,7 @@ from m2pem_plugin_mavlink.link.routed_link import open_link
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.protocol.url import parse_url
-from mavlink_wire import HandClock, udp_end, until
+from mavlink_wire import GROUND_STATION, HandClock, udp_end, until
 
 from m2pem.errors import PluginError
 
@@ -112,7 +112,7 @@ async def test_heartbeats_do_not_catch_up_after_a_pause() -> None:
     vehicle = await udp_end(port())
     vehicle.beat()
     await until(link.known_systems)
-    clock._now_us += 30_000_000
+    clock.jump(30.0)
     await clock.turn(3.0)
     await until(lambda: len(vehicle.beats()) >= 4)
     assert len(vehicle.beats()) == 4
@@ -140,8 +140,10 @@ async def test_if_one_endpoint_cannot_be_opened_the_others_are_closed() -> None:
             await open_link(Address(1, 1), [URL, taken], HandClock())
     with pytest.raises(KeyError):
         port()
-    assert shared_hub()._beating is None
-    assert not shared_hub()._sources
+    assert asyncio.all_tasks() == {asyncio.current_task()}, "no heartbeats are sent"
+    vehicle = Address(GROUND_STATION[0], 1)  # its system id is m2pem's own no more
+    link = await open_link(vehicle, [URL], HandClock(), OTHER)
+    await link.close()
 
 
 async def test_a_vehicle_with_no_url_is_an_error() -> None:

@@ -4,6 +4,7 @@ import asyncio
 import logging
 import sys
 from importlib import metadata
+from types import SimpleNamespace
 
 import pytest
 from m2pem_plugin_mavlink.mavsdk_driver import library
@@ -47,15 +48,21 @@ def test_an_import_error_of_something_else_is_not_blamed_on_it(monkeypatch):
         library.require()
 
 
-async def test_its_log_is_handed_to_the_loop_at_the_right_level(caplog):
+async def test_its_log_is_handed_to_the_loop_at_the_right_level(caplog, monkeypatch):
     caplog.set_level(logging.DEBUG, library.__name__)
-    library.read_log()
+    log, subscribed = library.require("mavsdk.logging"), []
+    native = SimpleNamespace(mavsdk_log_subscribe=lambda call, _: subscribed.append(call))
+    known = SimpleNamespace(LogCallback=log.LogCallback, _cmavsdk_lib=native)
+    with monkeypatch.context() as patched:
+        patched.setattr(library.importlib, "import_module", lambda _: known)
+        library.read_log()
+    (say,) = subscribed
     try:
-        assert await asyncio.to_thread(library._take, 2, b"a warning", None, 0, None)
-        assert await asyncio.to_thread(library._take, 1, b"an \xff info", None, 0, None)
+        assert await asyncio.to_thread(say, 2, b"a warning", None, 0, None)
+        assert await asyncio.to_thread(say, 1, b"an \xff info", None, 0, None)
     finally:
         library.leave_log()
-    library._take(3, b"nobody reads this", None, 0, None)
+    say(3, b"no loop reads this", None, 0, None)
     await asyncio.sleep(0)
     assert [(each.levelname, each.message) for each in caplog.records] == [
         ("WARNING", "MAVSDK: a warning"),

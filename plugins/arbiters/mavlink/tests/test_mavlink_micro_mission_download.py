@@ -128,7 +128,7 @@ def test_items_that_were_not_asked_for_do_no_harm() -> None:
             beyond = item._replace(seq=60000, command=1)  # type: ignore[attr-defined]
             return beyond, item, item, beyond
 
-        _HEARS: ClassVar = {**Stored._HEARS, "MISSION_REQUEST_INT": _request}
+        HEARS: ClassVar = {**Stored.HEARS, "MISSION_REQUEST_INT": _request}
 
     vehicle = Chatty()
     vehicle.stored = storing().stored

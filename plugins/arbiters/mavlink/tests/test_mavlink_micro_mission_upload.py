@@ -177,7 +177,7 @@ def test_a_cancelled_upload_is_begun_anew_and_not_for_ever() -> None:
                 return self._stop(dialect.MAV_MISSION_OPERATION_CANCELLED)
             return super()._item(message, now_s)
 
-        _HEARS: ClassVar = {**Stored._HEARS, "MISSION_ITEM_INT": _item}
+        HEARS: ClassVar = {**Stored.HEARS, "MISSION_ITEM_INT": _item}
 
     vehicle = Once()
     assert run(UploadMission(VEHICLE, ITEMS), vehicle).error is None

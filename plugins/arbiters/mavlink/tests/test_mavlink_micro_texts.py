@@ -5,7 +5,6 @@ from itertools import permutations
 
 import pytest
 from m2pem_plugin_mavlink.microservices.texts import (
-    AT_ONCE,
     GIVE_UP_S,
     KEPT,
     KEPT_S,
@@ -14,6 +13,7 @@ from m2pem_plugin_mavlink.microservices.texts import (
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from mavlink_lossy import VEHICLE, over_the_wire
+from mavlink_memory import held_bytes
 from mavlink_peers import text
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -126,11 +126,13 @@ def test_texts_are_fit_to_be_shown() -> None:
 
 def test_a_torrent_takes_little_memory() -> None:
     dice = random.Random(1)
-    texts = StatusTexts()
-    for n in range(5000):
+    texts, sizes = StatusTexts(), []
+    for n in range(10_000):
         words = "x" * dice.choice((0, 10, 50))
         each = text(words, id=dice.randrange(65536), chunk_seq=dice.randrange(256))
         texts.take(each, Address(7, dice.randrange(256)), n / 1e6)
-    assert len(texts._texts) <= KEPT
-    assert len(texts._coming) <= AT_ONCE
-    assert len(texts._closed_s) <= KEPT
+        if n in (5000, 9999):
+            sizes.append(held_bytes(texts))
+    assert len(said(texts)) <= KEPT
+    early, late = sizes
+    assert late == pytest.approx(early, rel=0.2)

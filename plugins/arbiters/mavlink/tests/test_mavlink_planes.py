@@ -9,7 +9,7 @@ from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from m2pem_plugin_mavlink.vehicle import exchanges
 from m2pem_plugin_mavlink.vehicle.fixed_wing import landing_start
-from mavlink_simulated import AMPLE_S, at, fly
+from mavlink_simulated import AMPLE_S, at, fly, ground_station
 
 from m2pem.api import Area, BehaviorState, Point, Route
 
@@ -183,6 +183,14 @@ LANDING = [
 ]
 
 
+async def store_landing(bench) -> None:
+    """Upload a mission with a landing, as an operator does with another ground station."""
+    assert await bench.until(lambda: bench.latest("v1") is not None, AMPLE_S)
+    home = stored(WAYPOINT, 0, 0, 0)  # ArduPilot has it as item 0
+    async with ground_station(bench.simulator, bench.clock) as link:
+        await exchanges.upload(link, [home, stored(WAYPOINT, 0, 900, 50), *LANDING])
+
+
 def test_without_a_landing_stored_it_says_what_it_needs() -> None:
     async def main(bench) -> None:
         await bench.start("r1.b1", "land", "v1")
@@ -196,9 +204,7 @@ def test_without_a_landing_stored_it_says_what_it_needs() -> None:
 
 def test_a_plane_lands_by_the_landing_it_had_stored_before_it_flew_something_else() -> None:
     async def main(bench) -> None:
-        vehicle = bench.arbiter._controllers["v1"].vehicle
-        assert await vehicle.identified(AMPLE_S)
-        await vehicle.driver.upload([stored(WAYPOINT, 0, 900, 50), *LANDING])
+        await store_landing(bench)
         await bench.do("r1.b1", "takeoff", altitude=60.0)
         await bench.do("r1.b2", "single_vehicle_routing", route=Route(((*at(300, 300), 60.0),)))
         await circles(bench, (300, 300))
@@ -214,15 +220,15 @@ def test_a_survey_that_goes_on_with_the_stored_landing_has_not_succeeded() -> No
     """As a battery failsafe of ArduPlane does it: in AUTO, without a change of mode."""
 
     async def main(bench) -> None:
-        vehicle = bench.arbiter._controllers["v1"].vehicle
-        assert await vehicle.identified(AMPLE_S)
-        await vehicle.driver.upload([stored(WAYPOINT, 0, 900, 50), *LANDING])
+        await store_landing(bench)
         await bench.do("r1.b1", "takeoff", altitude=60.0)
         route = Route(tuple((*at(east, 900), 60.0) for east in (0, 900, 1800)))
         await bench.start("r1.b2", "single_vehicle_routing", "v1", route=route)
         await bench.running("r1.b2", AMPLE_S)
-        begins = landing_start(await vehicle.driver.downloaded())
-        await exchanges.set_current(vehicle.link, begins + 1)
+        async with ground_station(bench.simulator, bench.clock) as link:
+            begins = landing_start(await exchanges.download(link))
+            assert begins is not None
+            await exchanges.set_current(link, begins)
         end = await bench.ended("r1.b2", AMPLE_S)
         assert end.state is BehaviorState.FAILED
         assert "has started its landing" in end.reason

@@ -22,6 +22,7 @@ class World:
         self.route.autopilots.add(1)
         self.now_s = 0.0
         self.received: list[int] = []
+        self.claims: list[bool] = []
         self.route.listen([0], self._listen)
 
     def _listen(self, message: Message, _: Address) -> None:
@@ -29,7 +30,7 @@ class World:
 
     def peer(self, name: str) -> Peer:
         def meet(peer: Peer, sender: Sender) -> bool:
-            self.route.claim(peer, sender, self.now_s)
+            self.claims.append(self.route.claim(peer, sender, self.now_s))
             return True
 
         return Peer(name, lambda _: None, meet, 0.0)
@@ -144,7 +145,7 @@ def test_rivals_do_not_pile_up() -> None:
     world.beat(world.peer("first"))
     for number in range(100):
         world.beat(world.peer(str(number)))
-    assert len(world.route._owners[1].competitors) == MAX_COMPETITORS
+    assert world.claims == [True] * (1 + MAX_COMPETITORS) + [False] * (100 - MAX_COMPETITORS)
 
 
 def test_a_component_that_is_long_silent_is_forgotten_and_met_anew_but_no_autopilot() -> None:
@@ -178,7 +179,8 @@ def test_a_message_is_wanted_as_often_as_it_is_listened_to() -> None:
     world.route.unlisten([0], listen)
     world.beat(peer)
     assert len(calls) == 3
-    assert set(world.route._wanted) == {0}
+    (sender,) = peer.inbound.senders.values()
+    assert set(sender.wanted) == {0}, "no other message is decoded"
 
 
 def test_an_unknown_message_cannot_be_wanted() -> None:

@@ -1,6 +1,7 @@
 """Pictures, videos and zoom over MAVLink."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 from m2pem_plugin_mavlink.simulator.messages import Result
@@ -88,7 +89,7 @@ async def test_a_picture_that_could_not_be_taken_is_an_error() -> None:
 async def test_a_picture_that_never_comes_is_an_error() -> None:
     async with world() as it:
         await it.ready("take_picture")
-        it.camera._take_picture = lambda: None
+        it.real.faults.refuse_command(IMAGE_START, Result.ACCEPTED)  # and nothing is done
         with pytest.raises(CameraError, match="has taken none in 10 s"):
             await it.driver.take_picture()
 
@@ -164,16 +165,14 @@ async def test_halt_stops_a_zoom_on_its_way() -> None:
         await it.ready()
         await it.ready("zoom")
         told = []
-        real = it.camera._server.handlers[ZOOM]
+        real = it.camera.command_server.handlers[ZOOM]
 
         def slowly(command):
             told.append((command.param1, command.param2))
-            if command.param1 == 2:
-                it.camera._zoom_rate = 2.0
-                return Result.ACCEPTED
-            return real(command)
+            to_range = command.param1 == 2
+            return real(replace(command, param1=1, param2=0.1) if to_range else command)
 
-        it.camera._server.handlers[ZOOM] = slowly
+        it.camera.command_server.handlers[ZOOM] = slowly
         it.driver.zoom(11.0)
         await until(lambda: it.camera.zoom > 10.0)
         it.driver.halt()

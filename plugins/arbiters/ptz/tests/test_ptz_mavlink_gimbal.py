@@ -54,18 +54,25 @@ async def test_the_last_order_counts() -> None:
         assert it.is_at(-30.0, -10.0)
 
 
-async def test_an_order_whose_message_is_lost_is_given_again() -> None:
+async def test_an_order_whose_message_is_lost_is_given_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     async with world() as it:
         await it.ready()
         it.point(5.0, 0.0)
         await until(lambda: it.is_at(5.0, 0.0))
-        lost = it.gimbal.autopilot._handlers[1, "GIMBAL_MANAGER_SET_PITCHYAW"]
-        it.gimbal.autopilot._handlers[1, "GIMBAL_MANAGER_SET_PITCHYAW"] = []
-        try:
-            it.point(20.0, -20.0)
-            await until(lambda: it.is_at(20.0, -20.0))
-        finally:
-            it.gimbal.autopilot._handlers[1, "GIMBAL_MANAGER_SET_PITCHYAW"] = lost
+        receive, lost = it.real.autopilot.receive, []
+
+        def lossy(message, *arguments):
+            if message.get_type() == "GIMBAL_MANAGER_SET_PITCHYAW":
+                lost.append(message)
+            else:
+                receive(message, *arguments)
+
+        monkeypatch.setattr(it.real.autopilot, "receive", lossy)
+        it.point(20.0, -20.0)
+        await until(lambda: it.is_at(20.0, -20.0))
+        assert lost
 
 
 async def test_a_gimbal_turns_no_faster_than_asked() -> None:
@@ -104,22 +111,25 @@ async def test_halt_stops_it_on_its_way() -> None:
         assert it.truly_deg == pytest.approx(stood, abs=0.5)
 
 
-async def test_a_gimbal_that_knows_no_rates_is_halted_by_pointing() -> None:
+async def test_a_gimbal_that_knows_no_rates_is_halted_by_pointing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     async with world() as it:
         await it.ready()
-        real, refuse = it.gimbal._point, []
+        receive, refused = it.real.autopilot.receive, []
 
-        def point(flags, pitch, yaw, pitch_rps, yaw_rps):
-            if math.isnan(pitch):
-                refuse.append(yaw_rps)
-                return False
-            return real(flags, pitch, yaw, pitch_rps, yaw_rps)
+        def knows_no_rates(message, *arguments):
+            orders = getattr(message, "command", None) == PITCHYAW
+            if orders and math.isnan(message.param1):
+                refused.append(message)
+                it.real.faults.refuse_command(PITCHYAW, Result.DENIED, times=1)
+            receive(message, *arguments)
 
-        it.gimbal._point = point
+        monkeypatch.setattr(it.real.autopilot, "receive", knows_no_rates)
         it.point(150.0, 0.0, rate_deg_s=6.0)
         await until(lambda: it.truly_deg[0] > 30.0)
         it.driver.halt()
-        await until(lambda: bool(refuse))
+        await until(lambda: bool(refused))
         assert (await it.stands())[0] < 140.0
 
 

@@ -47,7 +47,8 @@ class Camera(Component):
     """`pictures`: how many it has taken; `zoom`: 0 to 100; `recording`: it takes a video.
 
     `untold`: so many more pictures are reported only on request. `spoilt`: so many more
-    pictures cannot be taken, which is reported.
+    pictures cannot be taken, which is reported. `command_server`: its handlers of commands may be
+    replaced by those of another camera.
     """
 
     component_id = dialect.MAV_COMP_ID_CAMERA
@@ -66,12 +67,12 @@ class Camera(Component):
         self._series: Series | None = None
         self._beat_s = autopilot.now_s
         self._makers = self._reports()
-        self._server = CommandServer(autopilot, self.component_id)
-        self._server.handlers.update(self._commands())
+        self.command_server = CommandServer(autopilot, self.component_id)
+        self.command_server.handlers.update(self._commands())
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Commands that are sent to the camera."""
-        return self._server.messages()
+        return self.command_server.messages()
 
     def _send(self, message: Any, to: Any = None) -> None:
         self.autopilot.send(message, to, self.component_id)
