@@ -6,7 +6,7 @@ kept in `calls`.
 
 import asyncio
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from uuid import UUID
 
@@ -59,6 +59,7 @@ class Dynamics:
     raises: set[str] = field(default_factory=set)
     refuses: str = ""
     shown: list[VehicleState] = field(default_factory=list)
+    driver: "DoubleDriver | None" = None
     health: Health = field(default_factory=lambda: Health("autonomous", True))
     battery: float | None = None
     errors: tuple[str, ...] = ()
@@ -100,6 +101,7 @@ class DoubleDriver:
     def __init__(self, setup: DriverSetup, body: Dynamics) -> None:
         self.setup = setup
         self.body = body
+        body.driver = self
         self.known: set[UUID] = set()
         self._task: asyncio.Task[None] | None = None
 
@@ -244,14 +246,24 @@ class DoubleStation:
 
 
 def connections(
-    bodies: Mapping[ResourceId, Dynamics], fence: Area | None = None, **settings: object
+    bodies: Mapping[ResourceId, Dynamics],
+    fence: Area | None = None,
+    behaviors: tuple[str, ...] | None = None,
+    carried: Sequence[ResourceId] = (),
+    **settings: object,
 ) -> dict:
-    return {
-        resource: Connection(
-            resource, "ground", {"namespace": f"/{resource}", **settings}, fence=fence
+    """`carried`: payloads without a node of their own."""
+    made = {}
+    for resource in (*bodies, *carried):
+        vehicle = resource.partition("/")[0]
+        made[resource] = Connection(
+            resource,
+            "ground",
+            {"namespace": f"/{vehicle}", **settings},
+            fence=fence,
+            behaviors=behaviors,
         )
-        for resource in bodies
-    }
+    return made
 
 
 def arbiter(

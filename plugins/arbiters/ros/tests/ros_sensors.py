@@ -70,7 +70,7 @@ class Sensors:
     """Has the peer speak."""
 
     def __init__(self, ros: RosRuntime) -> None:
-        self._ros = ros
+        self.ros = ros
         self._recent: asyncio.Queue[String] = asyncio.Queue()
         self._say = ros.node.create_publisher(String, "/say", qos.EVENTS)
         ros.subscribe(String, "/said", self._recent.put_nowait, qos.EVENTS)
@@ -78,7 +78,7 @@ class Sensors:
     async def say(self, *messages: tuple[str, dict]) -> None:
         """All were published when this returns."""
         await until(self._say.get_subscription_count, "the peer listens")
-        await until(lambda: self._ros.node.count_publishers("/said"), "the peer answers")
+        await until(lambda: self.ros.node.count_publishers("/said"), "the peer answers")
         self._say.publish(String(data=json.dumps(messages)))
         async with asyncio.timeout(AMPLE_S):
             await self._recent.get()

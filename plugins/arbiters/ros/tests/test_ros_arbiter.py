@@ -1,13 +1,12 @@
 """What the arbiter does beyond the contract: with vehicles that fall silent, lie and break."""
 
 import logging
-from dataclasses import replace
 from uuid import uuid4
 
 import pytest
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
 from m2pem_plugin_ros.drivers.driver import Health, Outcome
-from ros_double import DoubleDriver, Dynamics, at
+from ros_double import Dynamics, at
 from ros_play import FAR, JOURNAL, NEAR, A, B, play
 
 from m2pem.api import (
@@ -22,10 +21,6 @@ from m2pem.api import (
 
 FAILED, LOST, RUNNING = BehaviorState.FAILED, BehaviorState.LOST, BehaviorState.RUNNING
 CANCELLED, SUCCEEDED = BehaviorState.CANCELLED, BehaviorState.SUCCEEDED
-
-
-def driver_of(bench, resource) -> DoubleDriver:
-    return bench.arbiter._vehicles[resource].driver
 
 
 # --- what vehicles are told -----------------------------------------------------------------------
@@ -99,14 +94,12 @@ def test_a_vehicle_with_a_node_is_shown_its_target_while_it_goes_there() -> None
 def test_the_fleet_says_what_a_vehicle_may_do() -> None:
     async def main(world) -> None:
         async with world.connected() as bench:
-            connection = bench.arbiter._connections[A]
-            bench.arbiter._connections[A] = replace(connection, behaviors=("drive_stop",))
             await bench.start("r1.b1", "goto", A, target=NEAR)
             end = await bench.ended("r1.b1", 5)
             assert end.state is BehaviorState.REJECTED
             assert "does not allow a the behavior 'goto'" in end.reason
 
-    play(main)
+    play(main, behaviors=("drive_stop",))
 
 
 def test_a_drivers_refusal_is_a_rejection() -> None:
@@ -234,7 +227,7 @@ def test_goals_that_nobody_gave_are_ignored_and_logged_at_a_bounded_rate(caplog)
             await bench.start("r1.b2", "goto", B, target=FAR)
             await bench.running("r1.b1")
             await bench.running("r1.b2")
-            events = driver_of(bench, A).setup.events
+            events = world.bodies[A].driver.setup.events
             for _ in range(5000):
                 events.progress(uuid4())
                 events.ended(uuid4(), Outcome(SUCCEEDED))
@@ -253,7 +246,7 @@ def test_an_end_that_is_none_is_ignored_and_a_second_one_changes_nothing() -> No
         async with world.connected() as bench:
             await bench.start("r1.b1", "goto", A, target=FAR)
             await bench.running("r1.b1")
-            events, goal = driver_of(bench, A).setup.events, goal_id(JOURNAL, "r1.b1")
+            events, goal = world.bodies[A].driver.setup.events, goal_id(JOURNAL, "r1.b1")
             events.ended(goal, Outcome(BehaviorState.ACCEPTED))
             events.ended(goal, Outcome(BehaviorState.UNKNOWN))
             events.ended(goal, Outcome(FAILED, "ROUTE_BLOCKED", "a wall"))
@@ -270,7 +263,7 @@ def test_a_vehicle_that_is_done_at_once_was_running_all_the_same() -> None:
         async with world.connected() as bench:
             await bench.start("r1.b1", "goto", A, target=FAR)
             goal = goal_id(JOURNAL, "r1.b1")
-            driver_of(bench, A).setup.events.ended(goal, Outcome(SUCCEEDED))
+            world.bodies[A].driver.setup.events.ended(goal, Outcome(SUCCEEDED))
             await bench.ended("r1.b1", 1)
             assert bench.states_of("r1.b1") == [BehaviorState.ACCEPTED, RUNNING, SUCCEEDED]
 
@@ -359,10 +352,10 @@ def test_a_state_says_how_the_vehicle_is() -> None:
 
 
 def test_payloads_have_the_link_of_their_vehicle() -> None:
+    gpr = ResourceId("a/gpr")
+
     async def main(world) -> None:
         async with world.connected() as bench:
-            gpr = ResourceId("a/gpr")
-            bench.arbiter._connections[gpr] = replace(bench.arbiter._connections[A], resource=gpr)
             assert bench.arbiter.catalogue(gpr) == ()
             await bench.clock.sleep(2)
             assert bench.latest(gpr) == PayloadState(gpr, bench.latest(gpr).time_us)
@@ -370,4 +363,4 @@ def test_payloads_have_the_link_of_their_vehicle() -> None:
             await bench.clock.sleep(5)
             assert bench.latest(gpr).link is LinkState.LOST
 
-    play(main)
+    play(main, carried=(gpr,))

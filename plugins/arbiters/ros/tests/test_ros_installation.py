@@ -1,11 +1,11 @@
 """What is said where ROS is missing, is there twice, or cannot be loaded."""
 
+import importlib.metadata
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from m2pem_plugin_ros import installation
 from m2pem_plugin_ros.installation import RosError, require_interfaces, require_ros
 
 
@@ -34,7 +34,7 @@ def test_wheels_and_a_sourced_ros_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "share" / "rclpy").mkdir(parents=True)
-    monkeypatch.setattr(installation, "_has_wheels", lambda: True)
+    monkeypatch.setattr(importlib.metadata, "distribution", lambda _: None)  # wheels
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path}")
     with pytest.raises(RosError, match=f"two ROS 2: wheels in .*, and sourced from {tmp_path}"):
         require_ros()

@@ -1,6 +1,7 @@
 """Vehicles and payloads with nodes beside each other, in virtual time: who is commanded."""
 
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
@@ -8,6 +9,7 @@ from ros_double import DoubleDriver, DoubleStation, Dynamics, at
 
 from m2pem.api import BehaviorState, Connection, GeoPosition, ResourceId, VehicleState
 from m2pem.api.clock import run_virtual
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
 V, PTZ, GPR = ResourceId("ugv1"), ResourceId("ugv1/ptz"), ResourceId("ugv1/gpr")
@@ -17,7 +19,7 @@ FAR = {"target": at(600.0, 0.0), "speed": 5.0}
 Main = Callable[[ArbiterHarness, dict[ResourceId, Dynamics]], Awaitable[None]]
 
 
-def play(main: Main) -> None:
+def play(main: Main, bus: Bus | None = None) -> None:
     """With a vehicle, a payload that has a node, and one that is carried, no more."""
     vehicle = {"namespace": "/ugv1"}
     node = {**vehicle, "driver": "m2pem", "namespace": "/ugv1/ptz"}
@@ -31,7 +33,7 @@ def play(main: Main) -> None:
         bodies = {V: Dynamics(), PTZ: Dynamics()}
         arbiter = RosArbiter(
             connections,
-            context(clock),
+            replace(context(clock), bus=bus or Bus()),
             lambda setup: DoubleDriver(setup, bodies[setup.connection.resource]),
             lambda installation: DoubleStation(bodies, installation),
         )
@@ -109,8 +111,9 @@ def test_what_cannot_do_it_is_not_commanded(
 
 
 def test_a_payload_is_told_where_its_vehicle_is_also_while_it_does_nothing() -> None:
+    bus = Bus()
+
     async def main(bench: ArbiterHarness, bodies: dict[ResourceId, Dynamics]) -> None:
-        bus = bench.arbiter._context.bus
         state = VehicleState(V, bench.clock.now_us(), GeoPosition(38.0, -77.0, 5.0))
         bus.publish(state)
         await bench.clock.sleep(2.0)
@@ -118,4 +121,4 @@ def test_a_payload_is_told_where_its_vehicle_is_also_while_it_does_nothing() -> 
         assert len(bodies[PTZ].shown) >= 5
         assert bodies[V].shown == []
 
-    play(main)
+    play(main, bus)

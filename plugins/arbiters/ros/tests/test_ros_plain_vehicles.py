@@ -104,8 +104,8 @@ def ahead() -> Point:
     return Point((place.latitude_deg, place.longitude_deg, None))
 
 
-async def drives(bench: ArbiterHarness, truth: Truth, id_: str = "r1.b1") -> None:
-    await bench.start(id_, "goto", UGV1, epoch=bench.arbiter._context.epoch_of(id_), target=ahead())
+async def drives(bench: ArbiterHarness, truth: Truth, id_: str = "r1.b1", epoch: int = 1) -> None:
+    await bench.start(id_, "goto", UGV1, epoch=epoch, target=ahead())
     await bench.running(id_)
     await until(lambda: truth.speed() > 0.3)
 
@@ -132,7 +132,7 @@ async def test_a_vehicle_that_returns_is_told_to_stop_and_is_free_when_it_has(
 ) -> None:
     with Peer(PEER, ros_domain, ["/ugv1", kind, "map"]):
         async with connected(ros_domain, 7, **settings) as (bench, truth):
-            await drives(bench, truth)
+            await drives(bench, truth, epoch=7)
             truth.cut("/ugv1")
             assert (await bench.ended("r1.b1", AMPLE_S)).state is BehaviorState.LOST
             assert truth.speed() > 0.3, "it drives on, as nobody can tell it otherwise"
@@ -145,7 +145,7 @@ async def test_a_vehicle_that_returns_is_told_to_stop_and_is_free_when_it_has(
             assert kind != "node" or truth.cancels()[0] == "7"
             # Nav2 answers again only when it is asked for its state again.
             await until(lambda: "Nav2 does not answer" not in reasons(bench))
-            await drives(bench, truth, "r1.b2")
+            await drives(bench, truth, "r1.b2", epoch=7)
 
 
 # --- two in one namespace -------------------------------------------------------------------------

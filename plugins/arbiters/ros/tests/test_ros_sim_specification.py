@@ -205,10 +205,11 @@ def test_numbers_in_faults_count() -> None:
 def test_a_nav2_that_is_dead_takes_no_harm() -> None:
     patient = Patient()
     patient.navigation = None
-    before = patient.state
+    alive = Patient().state
     for words in ("nav2 inactive", "nav2 reject"):
         GRAMMAR.parse(words).effect.begin(patient)
-    assert patient.state == before
+    patient.navigation = Navigation()
+    assert patient.state == alive
 
 
 def test_every_fault_can_be_written_as_it_is_listed() -> None:

@@ -1,17 +1,28 @@
 """What the fleet is told of vehicles, and of what their detectors find, over real DDS."""
 
 import asyncio
+import logging
 import math
 from collections.abc import Iterator
 
 import pytest
 from m2pem_interfaces.msg import TargetState
+from m2pem_plugin_ros.connections import TargetPublisher
 from m2pem_plugin_ros.runtime import qos
+from m2pem_plugin_ros.sensors.detectors import WAITING
+from m2pem_plugin_ros.settings import read_settings
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from ros_double import ORIGIN, at
 from ros_sensors import AMPLE_S, GPR, PEER, TOPICS, V, connected, fix, odometry, sensors, until
 
-from m2pem.api import GeoPosition, PayloadState, ResourceId, ServiceContext, VehicleState
+from m2pem.api import (
+    Connection,
+    GeoPosition,
+    PayloadState,
+    ResourceId,
+    ServiceContext,
+    VehicleState,
+)
 from m2pem.services.detector import Detector
 from m2pem.telemetry.bus import Bus
 
@@ -80,12 +91,16 @@ async def test_a_state_is_made_of_what_all_topics_say(domain: int) -> None:
         assert bench.latest(V).battery_fraction == 0.75
 
 
-async def test_a_pose_that_is_no_number_never_reaches_the_fleet(domain: int) -> None:
+async def test_a_pose_that_is_no_number_never_reaches_the_fleet(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
     async with connected(domain) as bench, sensors(domain) as teller:
         await teller.repeat(lambda: positioned(bench), "odometry is heard", odometry(1.0, 1.0))
-        heard = bench.arbiter._vehicles[V]._ros_connection.sensors.localization.log_throttle.counts
         await teller.repeat(
-            lambda: len(heard) == 2,
+            lambda: all(
+                any(cause in each for each in caplog.messages)
+                for cause in ("odometry with an invalid position", "an invalid satellite fix")
+            ),
             "what is no number is heard",
             odometry(NAN, NAN, forward=NAN),
             fix(NAN, NAN),
@@ -99,7 +114,9 @@ async def test_a_pose_that_is_no_number_never_reaches_the_fleet(domain: int) -> 
             assert all(map(math.isfinite, numbers))
 
 
-async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(domain: int) -> None:
+async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
     geographic = {
         "position_kind": 1,
         "position_geographic": {"latitude_deg": 38.2, "longitude_deg": -77.4, "altitude_m": 5.0},
@@ -112,9 +129,12 @@ async def test_a_detection_is_where_it_says_or_else_where_its_vehicle_is(domain:
         connected(domain, {GPR: {"topic": "detections"}}) as bench,
         sensors(domain) as teller,
     ):
-        (topic,) = bench.arbiter._vehicle_connections._detectors
-        early = detection("early")
-        await teller.repeat(lambda: topic._waiting, "it waits for a position", early)
+        early = [detection("early")] * (WAITING + 1)
+        await teller.repeat(
+            lambda: any("the vehicle's position is not known" in each for each in caplog.messages),
+            "as many wait for a position as can",
+            *early,
+        )
         assert found(bench) == []
         await teller.repeat(lambda: found(bench), "it waited for a position", odometry(0.0, 0.0))
         await teller.say(
@@ -145,7 +165,7 @@ async def test_a_detector_that_publishes_words_completes_the_service_detector(do
     async with connected(domain, payload) as bench, sensors(domain) as teller:
         bus = Bus()
         context = ServiceContext(
-            clock=bench.clock, bus=bus, logger=bench.arbiter._context.logger, detectors=(GPR,)
+            clock=bench.clock, bus=bus, logger=logging.getLogger(__name__), detectors=(GPR,)
         )
         waiting = asyncio.create_task(Detector().run(context, {}, {}))
         await asyncio.sleep(0)
@@ -180,14 +200,15 @@ async def test_a_burst_of_detections_is_told_whole(domain: int) -> None:
 
 
 async def test_a_vehicle_is_shown_its_target_over_its_topic(domain: int) -> None:
-    async with connected(domain) as bench, sensors(domain) as teller:
+    async with sensors(domain) as teller, sensors(domain) as vehicle:
         shown: list[TargetState] = []
-        teller._ros.subscribe(TargetState, "/evsg1/target", shown.append, qos.TELEMETRY)
+        vehicle.ros.subscribe(TargetState, "/evsg1/target", shown.append, qos.TELEMETRY)
         lead = ResourceId("lead")
         state = VehicleState(
             lead, 1_700_000_000_250_000, GeoPosition(38.2, -77.4, 5.0), None, (1.0, 2.0, 0.0)
         )
-        show = bench.arbiter._vehicles[V]._ros_connection.publish_target
+        settings = read_settings({V: Connection(V, "ground", {"namespace": "/evsg1"})})[V]
+        show = TargetPublisher(teller.ros, settings).show
         show(VehicleState(lead, 0))
         while not shown:
             show(state)

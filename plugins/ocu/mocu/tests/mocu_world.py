@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,9 @@ from m2pem_plugin_mocu.settings import NAMESPACE
 from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.testing import reserved_domain
 
-from m2pem.api import MissionControl, ResourceId
+from m2pem.api import ArbiterContext, Connection, FleetBus, MissionControl, ResourceId
 from m2pem.fleet.fleet import Fleet
+from m2pem.simulation.arbiters import SimArbiter
 from m2pem.testing import scenarios
 from m2pem.testing.contracts.ocu_harness import Faults
 from m2pem.testing.harness import run_executive
@@ -139,8 +140,9 @@ def fleet() -> Fleet:
 class World:
     """An executive, the unit that serves operators of it, and what stands between the two."""
 
-    def __init__(self, control: MissionControl, domain: int) -> None:
+    def __init__(self, control: MissionControl, bus: FleetBus, domain: int) -> None:
         self.control = control
+        self.bus = bus
         self.faults = Faults(control)
         self.domain = domain
         self.serving: asyncio.Task[None]
@@ -179,8 +181,17 @@ class World:
 @asynccontextmanager
 async def staged(domain: int, **options: Any) -> AsyncIterator[World]:
     """A world whose unit serves."""
-    async with run_executive(fleet(), speed=20.0, **options) as control:
-        world = World(control, domain)
+    lent: list[ArbiterContext] = []
+
+    def simulated(
+        connections: Mapping[ResourceId, Connection], context: ArbiterContext
+    ) -> SimArbiter:
+        lent.append(context)
+        return SimArbiter(connections, context)
+
+    arbiters = {"sim": simulated}
+    async with run_executive(fleet(), speed=20.0, arbiters=arbiters, **options) as control:
+        world = World(control, lent[0].bus, domain)
         world.begin()
         try:
             yield world

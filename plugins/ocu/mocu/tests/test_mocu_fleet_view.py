@@ -35,7 +35,7 @@ async def said(world: World, state: Any) -> AsyncIterator[None]:
 
     async def say() -> None:
         while True:
-            world.control._bus.publish(state)  # type: ignore[attr-defined]
+            world.bus.publish(state)
             await asyncio.sleep(SAID_EVERY_S)
 
     saying = asyncio.create_task(say())
