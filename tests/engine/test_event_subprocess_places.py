@@ -1,27 +1,7 @@
 """Where event subprocesses may stand: in processes however they begin, and in each other."""
 
+from tests.engine.event_subprocesses import NOT, WORK, around, handler
 from tests.engine.kit import Play
-
-NOT = 'isInterrupting="false"'
-
-
-def handler(trigger: str, attributes: str = "", inside: str = "", name: str = "h") -> str:
-    """An event subprocess `h`: start `hs`, then what `inside` says, else the user task `hu`."""
-    inside = inside or f'<userTask id="{name}u"/>\n{name}s -> {name}u\n'
-    return (
-        f'<subProcess id="{name}" triggeredByEvent="true">'
-        f'<startEvent id="{name}s" {attributes}>{trigger}</startEvent>{inside}</subProcess>'
-    )
-
-
-def around(inside: str, *, after: str = '<task id="done"/>\nstart -> sub -> done') -> str:
-    """A subprocess `sub` with that inside, between `start` and `done`."""
-    return f'<startEvent id="start"/> <subProcess id="sub"> {inside} </subProcess>\n{after}\n'
-
-
-WORK = """<startEvent id="s"/> <userTask id="a"/> <userTask id="b"/>
-    s -> a -> b
-"""
 
 
 def test_an_event_subprocess_of_the_process_that_the_run_began_with_ends_with_the_run() -> None:
