@@ -79,7 +79,7 @@ async def _serve(
     fleet = with_shared_state(fleet, file_of(url), written)
     refuse_speed(fleet, speed)
     async with journal_at(url) as journal:
-        mine, others = await _interrupted(journal, fleet, speed)
+        mine, others = await interrupted_runs(journal, fleet, speed)
         executive = make_executive(
             fleet,
             journal,
@@ -103,7 +103,7 @@ async def _serve(
     return 0
 
 
-async def _interrupted(
+async def interrupted_runs(
     journal: "Journal", fleet: "Fleet", speed: float
 ) -> "tuple[list[RunInfo], list[RunInfo]]":
     """The runs that no executive drives: those with the same fleet, and the others."""

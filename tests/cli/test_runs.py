@@ -1,11 +1,12 @@
+import asyncio
 import json
 import re
 from pathlib import Path
 
 import pytest
 
-import m2pem.cli.runs
-from m2pem.api import RunStatus, RunSummary
+from m2pem.journal.base import RunHeader
+from m2pem.journal.sqlite import SqliteJournal
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, FLEET, MISSION
 
@@ -44,15 +45,16 @@ def test_runs_as_json(invoke: Invoke, tmp_path: Path) -> None:
     assert [each["took_s"] for each in listed] == [each / 1_000_000 for each in took_us]
 
 
-def test_a_run_that_has_not_ended_has_taken_no_time(
-    invoke: Invoke, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def listed(url: str | None, accept_loss: str | None) -> list[RunSummary]:
-        return [RunSummary("r1", "m.bpmn", "P", RunStatus.INTERRUPTED, 1_000_000)]
+def test_a_run_that_has_not_ended_has_taken_no_time(invoke: Invoke, tmp_path: Path) -> None:
+    async def interrupted() -> None:
+        written = SqliteJournal.open(tmp_path / "journal.db")
+        await written.create(RunHeader("m.bpmn", b"", "P", created_us=1_000_000))
+        await written.close()
 
-    monkeypatch.setattr(m2pem.cli.runs, "_runs", listed)
-    assert invoke("runs")[1].splitlines()[1].split()[4:] == ["-", "0", "P", "m.bpmn"]
-    (run,) = json.loads(invoke("runs", "--format", "json")[1])
+    asyncio.run(interrupted())
+    journal = ("--journal", tmp_path / "journal.db")
+    assert invoke("runs", *journal)[1].splitlines()[1].split()[4:] == ["-", "0", "P", "m.bpmn"]
+    (run,) = json.loads(invoke("runs", *journal, "--format", "json")[1])
     assert run["took_s"] is None
 
 

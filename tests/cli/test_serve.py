@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.cli.serve import _interrupted
+from m2pem.cli.serve import interrupted_runs
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle, dump, simulated_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import RunHeader
@@ -43,7 +43,7 @@ async def test_runs_of_the_fleet_that_is_served_are_taken_up(
     run = await journal.create(header)
     await journal.release(run)
     served = simulated_fleet(FLEET) if simulate else FLEET
-    mine, others = await _interrupted(journal, served, 1.0)
+    mine, others = await interrupted_runs(journal, served, 1.0)
     assert ([line.run for line in mine], [line.run for line in others]) == (
         ([run], []) if taken_up else ([], [run])
     )

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from m2pem_plugin_web.live.hub import FRAME_S, MOST_VIEWERS
-from m2pem_plugin_web.live.socket import FULL, SILENT, _converse
+from m2pem_plugin_web.live.socket import FULL, SILENT, converse
 from m2pem_plugin_web.live.viewer import URGENT, WINDOW, Viewer
 from starlette.types import Message
 from starlette.websockets import WebSocket
@@ -371,7 +371,7 @@ async def test_a_browser_that_goes_while_it_speaks_and_is_spoken_to_leaves_no_er
         socket, viewer = WebSocket({"type": "websocket"}, receive, send), Viewer()
         await socket.accept()
         here.ocu.hub.viewers.add(viewer)
-        await _converse(socket, here.ocu.hub, viewer, lambda: True)
+        await converse(socket, here.ocu.hub, viewer, lambda: True)
 
 
 async def test_two_units_tell_the_same(world: MakeWorld) -> None:

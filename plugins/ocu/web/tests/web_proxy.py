@@ -34,7 +34,7 @@ class Proxy:
         self.up.set()
         self.down.set()
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
         self._tasks.add(task)
@@ -71,7 +71,7 @@ async def _pump(
 async def proxy_to(origin: str) -> AsyncIterator[Proxy]:
     """A proxy before a server; its own port is `port`."""
     proxy = Proxy(urlsplit(origin).port or 0)
-    server = await asyncio.start_server(proxy._serve, "127.0.0.1", 0)
+    server = await asyncio.start_server(proxy.serve, "127.0.0.1", 0)
     proxy.port = server.sockets[0].getsockname()[1]
     try:
         yield proxy

@@ -79,9 +79,7 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
         viewer, key = Viewer(), key_of(socket)
         hub.viewers.add(viewer)
         try:
-            await _converse(
-                socket, hub, viewer, lambda: entry.person(socket.cookies, key) == person
-            )
+            await converse(socket, hub, viewer, lambda: entry.person(socket.cookies, key) == person)
         except _Leave as leave:
             await _close(socket, leave)
         finally:
@@ -90,7 +88,7 @@ def router(hub: Hub, entry: Entry) -> APIRouter:
     return routes
 
 
-async def _converse(
+async def converse(
     socket: WebSocket, hub: Hub, viewer: Viewer, may_stay: Callable[[], bool]
 ) -> None:
     """Exchange messages until the browser disconnects or must be disconnected."""
