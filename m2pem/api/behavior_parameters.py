@@ -117,7 +117,7 @@ class BehaviorParameters:
 
     @property
     def bearing_rad(self) -> float | None:
-        """From the bow of the vehicle, or of the target, clockwise."""
+        """Clockwise from the heading of the vehicle or of the target."""
         return self.number("bearing")
 
     @property

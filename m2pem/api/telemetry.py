@@ -2,7 +2,7 @@
 
 Positions are WGS-84 (EPSG:4979): degrees, metres above mean sea level. Local vectors are ENU
 (REP-103). `yaw_rad` is from east, counter-clockwise (REP-103); headings for people are made of it.
-A positive `roll_rad` has the right side down, a positive `pitch_rad` the bow (REP-103; autopilots,
+Positive `roll_rad` is right side down, positive `pitch_rad` is nose down (REP-103; autopilots,
 which use NED, have the other sign of pitch).
 Telemetry is never journaled; `m2pem.telemetry.link_monitor` makes inputs of lost links and low
 batteries.
@@ -72,7 +72,7 @@ class Detection:
 class PayloadState:
     """A payload at one moment. `detections`: found since the last state.
 
-    `pan_rad`: from the vehicle's bow, clockwise. `tilt_rad`: up from the vehicle's deck, or from
+    `pan_rad`: clockwise from the vehicle's heading. `tilt_rad`: up from the vehicle's deck, or from
     the horizon, if the payload keeps level by itself. `footprint`: the corners of what it sees of
     the ground, in order; empty if it looks above the horizon, or its vehicle's position is unknown.
     """

@@ -207,13 +207,13 @@ def search_request(
         RequirementsError: requirements cannot be read, or do not fit; it lists all findings.
     """
     from m2pem.cli.arguments import arbiters_of, get_fleet
-    from m2pem.executive import verification as proving
+    from m2pem.executive import verification
     from m2pem.plugins import PluginManager
 
     plugins = PluginManager()
     fleet = get_fleet(fleet_file, mission) if fleet_file is not None else None
     arbiters = arbiters_of(fleet, plugins) if fleet is not None else None
-    return proving.search_request(
+    return verification.search_request(
         mission, arbiters, plugins, process, data, spec, timers_in_order=timers_in_order
     )
 

@@ -176,7 +176,7 @@ def refer_to_flows(definitions: Element) -> None:
 
 _SCRIPTS = ("scriptTask", "globalScriptTask")
 _FORMAT = {"scriptTask": "scriptFormat", "globalScriptTask": "scriptLanguage"}
-_OURS = (f"{{{BPMN}}}", M2PEM)
+_OWN_NAMESPACES = (f"{{{BPMN}}}", M2PEM)
 _HEAD = ("type", "name")
 
 
@@ -224,7 +224,7 @@ def _behavior_of(script: Element) -> Element | None:
 def _in_own_namespace(element: Element) -> Element:
     """Copy an element; those of BPMN's or no namespace get m2pem's."""
     name = element.tag
-    if not name.startswith("{") or name.startswith(_OURS):
+    if not name.startswith("{") or name.startswith(_OWN_NAMESPACES):
         name = f"{M2PEM}{local(name)}"
     made = etree.Element(name)
     for key, value in element.attrib.items():

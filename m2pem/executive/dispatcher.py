@@ -27,7 +27,7 @@ log = logging.getLogger("m2pem.dispatch")
 CALL_TIMEOUT_S = 10.0
 """An arbiter's `start`, `cancel`, `hold` or `resume` only hands over; one that hangs is a fault."""
 
-START_PATIENCE_S = 0.3
+START_WAIT_S = 0.3
 """How long STOP and pause wait for an arbiter's `start` that has not returned: a cancel that comes
 before its start would stop nothing."""
 
@@ -123,7 +123,7 @@ class Dispatcher:
         """Cancel all that a run commands, by behavior; it starts nothing any more.
 
         These cancels wait for nothing that their resources were asked before, but for
-        `START_PATIENCE_S` for a start under way. A start that takes longer is abandoned, and the
+        `START_WAIT_S` for a start under way. A start that takes longer is abandoned, and the
         resource is held as well, as the arbiter may have begun the behavior.
         """
         self._barred.add(run)
@@ -398,7 +398,7 @@ async def _returns(start: asyncio.Task[None] | None) -> bool:
     """Wait a little for a start under way; whether none is under way any more."""
     if start is None or start.done():
         return True
-    await asyncio.wait({start}, timeout=START_PATIENCE_S)
+    await asyncio.wait({start}, timeout=START_WAIT_S)
     return start.done()
 
 

@@ -144,7 +144,7 @@ def _vehicle_behaviors() -> tuple[BehaviorSpec, ...]:
             ParameterSpec(
                 "bearing",
                 ParameterKind.ANGLE,
-                doc="Where to stand: from the target's bow, clockwise.",
+                doc="Direction to keep: clockwise from the target's heading.",
             ),
             _ALTITUDE,
             ends=False,
@@ -247,7 +247,9 @@ def _payload_behaviors() -> tuple[BehaviorSpec, ...]:
             "ptz_point_at",
             "Point the camera at a position, or into a direction.",
             _TARGET,
-            ParameterSpec("bearing", ParameterKind.ANGLE, doc="From the vehicle's bow, clockwise."),
+            ParameterSpec(
+                "bearing", ParameterKind.ANGLE, doc="Clockwise from the vehicle's heading."
+            ),
             _ELEVATION,
             required_one_of=(("target",), ("bearing", "elevation")),
             resume=restart,

@@ -277,11 +277,11 @@ class Teams:
 
     def _goes_on(self, request: BehaviorRequest) -> bool:
         """Whether all teams of a request go on without a lost member."""
-        crews = [members for members in request.roles.values() if members] or [request.resources]
+        teams = [members for members in request.roles.values() if members] or [request.resources]
         policies: dict[tuple[ResourceId, ...], set[LostMemberPolicy]] = {}
         for team in self._fleet.teams.values():
             policies.setdefault(spelled_out(team), set()).add(team.on_lost_member)
-        return all(policies.get(tuple(crew)) == {LostMemberPolicy.CONTINUE} for crew in crews)
+        return all(policies.get(tuple(team)) == {LostMemberPolicy.CONTINUE} for team in teams)
 
     def _forget(self) -> None:
         """Forget the oldest behavior that has ended."""

@@ -1,6 +1,6 @@
 """The direction of a camera, its limits, and slow turns.
 
-Pan is clockwise from the direction of pan 0: the vehicle's bow, unless `Mounting` says otherwise.
+Pan is clockwise from pan 0, which is the vehicle's heading unless `Mounting` gives another.
 Tilt is up from the vehicle's deck, or from the horizon for a stabilized camera. The camera turns
 with its vehicle. Zoom 1 is the widest view.
 """

@@ -30,7 +30,7 @@ class DriverName(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Mounting:
     """The mount position in the vehicle's frame (REP-103: x forward, y left, z up; metres), and the
-    direction of pan 0 from the bow, clockwise, in radians."""
+    direction of pan 0: clockwise from the vehicle's heading, in radians."""
 
     forward_m: float = 0.0
     left_m: float = 0.0

@@ -49,7 +49,7 @@ def enu_of_ecef(position: GeoPosition) -> Matrix:
 def enu_of_deck(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
     """Return the rotation from the deck to ENU.
 
-    Angles as in `VehicleState`: a positive roll has the right side down, a positive pitch the bow;
+    Angles as in `VehicleState`: positive roll is right side down, positive pitch is nose down;
     yaw is from east, counter-clockwise.
     """
     sin_r, cos_r = math.sin(roll_rad), math.cos(roll_rad)
@@ -63,7 +63,7 @@ def enu_of_deck(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Matrix:
 
 
 def deck_vector(bearing_rad: float, tilt_rad: float) -> Vector:
-    """Return the unit vector, in the deck frame, of a bearing clockwise from the bow and a tilt."""
+    """Return the unit vector, in the deck frame, of a bearing clockwise from ahead and a tilt."""
     level = math.cos(tilt_rad)
     return np.array(
         [level * math.cos(bearing_rad), -level * math.sin(bearing_rad), math.sin(tilt_rad)]
@@ -71,7 +71,7 @@ def deck_vector(bearing_rad: float, tilt_rad: float) -> Vector:
 
 
 def deck_angles(vector: Vector) -> tuple[float, float]:
-    """Return bearing from the bow, clockwise, and tilt up of a vector in the deck frame."""
+    """Return bearing (clockwise from ahead) and tilt (upwards) of a vector in the deck frame."""
     forward, left, up = (float(part) for part in vector)
     level = math.hypot(forward, left)
     # Straight up and down every bearing is as good.

@@ -33,7 +33,7 @@ class VehiclePose:
 @dataclass(frozen=True, slots=True)
 class MountFrame:
     """The frame in which a camera turns. `enu` rotates vectors of the camera at pan 0 and tilt 0 to
-    ENU. `pan_zero_rad`: direction of pan 0 from the bow, clockwise."""
+    ENU. `pan_zero_rad`: direction of pan 0, clockwise from the vehicle's heading."""
 
     enu: Matrix
     pan_zero_rad: float = 0.0
@@ -44,8 +44,7 @@ class MountFrame:
         return bearing - self.pan_zero_rad, tilt
 
     def as_pan_zero_sees(self, enu: Vector) -> Vector:
-        """Rotate directions of ENU, one in each row, to the frame of a deck whose bow is at pan
-        0."""
+        """Rotate directions in ENU, one a row, to the frame of a deck whose heading is pan 0."""
         turned: Vector = enu @ self.enu @ enu_of_deck(0.0, 0.0, -self.pan_zero_rad)
         return turned
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 Direction = tuple[float, float]
-"""Pan from the bow, clockwise, and tilt upwards, in radians."""
+"""Pan, clockwise from the vehicle's heading, and tilt upwards, in radians."""
 
 
 def deck_to_horizon(direction: Direction, roll_rad: float, pitch_rad: float) -> Direction:
