@@ -246,7 +246,7 @@ class BehaviorReader:
         self._error(
             self._line(element),
             MISPLACED,
-            f"{what} stands outside <{wrapper}>",
+            f"{what} is outside <{wrapper}>",
             f"move it into <{wrapper}>",
         )
 

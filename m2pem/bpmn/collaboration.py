@@ -205,7 +205,7 @@ def _dangling(
         identifier,
         rule,
         f"{attribute} names '{name}', which does not exist" if name else f"it has no {attribute}",
-        suggest_or(name, known, "name one that stands in definitions"),
+        suggest_or(name, known, "name one in definitions"),
     )
 
 

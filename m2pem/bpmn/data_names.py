@@ -32,7 +32,7 @@ from m2pem.suggestions import suggest_or
 
 
 class Read(NamedTuple):
-    """An expression that is evaluated over a process's data, and where it stands."""
+    """An expression that is evaluated over a process's data, and its element."""
 
     expression: Expression
     element: str

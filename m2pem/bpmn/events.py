@@ -313,7 +313,7 @@ def _definitions(
 
 
 def definition_elements(context: ReadingContext, found: Children) -> list[etree._Element]:
-    """The definitions that stand in an event, then those of the file that it refers to."""
+    """The definitions in an event, then those of the file that it refers to."""
     elements = [
         each
         for each in found.element
@@ -386,7 +386,7 @@ def referred_definition(
             identifier,
             DANGLING_REFERENCE,
             f"{attribute} names '{name}', which is no event definition of this file",
-            suggest_or(name, context.event_definitions, "name one that stands in definitions"),
+            suggest_or(name, context.event_definitions, "name one in definitions"),
         )
     return target
 

@@ -1,7 +1,7 @@
-"""What m2pem adds to BPMN: its elements and attributes, where they may be, what they mean.
+"""m2pem's elements and attributes in BPMN files: their places and meanings.
 
-One table for all: the reader refuses what is not in it, and the descriptor of the web page's editor
-and docs/extensions.md are made of it (`pages`).
+The reader of missions refuses all others. The descriptor of the web page's editor and
+docs/extensions.md are generated from this table (`pages`).
 """
 
 import re
@@ -28,7 +28,7 @@ class Type(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Attribute:
-    """An attribute of m2pem's; `doc` says what it is for."""
+    """An attribute of m2pem's. `doc`: its meaning."""
 
     name: str
     type: Type
@@ -70,11 +70,15 @@ _COMMANDING = ("scriptTask", "globalScriptTask", "sendTask", *_SERVING)
 _PROMPT = (
     Attribute("store", Type.NAME, "the name under which the answer is stored"),
     Attribute("role", Type.TEXT, "the role of the operators who may answer"),
-    Attribute("timeout", Type.DURATION, "after it the task fails with PROMPT_TIMEOUT"),
+    Attribute(
+        "timeout",
+        Type.DURATION,
+        "the time to answer; afterwards the task fails with PROMPT_TIMEOUT",
+    ),
 )
 _MAPPING = (
-    Attribute("source", Type.EXPRESSION, "what is passed"),
-    Attribute("target", Type.NAME, "the name that it gets"),
+    Attribute("source", Type.EXPRESSION, "the value to pass"),
+    Attribute("target", Type.NAME, "its name at the receiver"),
 )
 _CLASS = Attribute("class", Type.NAME, "the service's class")
 
@@ -101,16 +105,21 @@ _TABLE = (
         text="the value, where there is no `value`",
         places=_SERVING,
     ),
-    OwnElement("resources", "Who performs a behavior or service.", (), ("role",)),
+    OwnElement(
+        "resources",
+        "The vehicles, payloads and teams that perform a behavior or service.",
+        (),
+        ("role",),
+    ),
     OwnElement(
         "role",
-        "One vehicle, payload or team, and its part.",
+        "One vehicle, payload or team, and its role.",
         (
-            Attribute("name", Type.NAME, "the part that it takes"),
+            Attribute("name", Type.NAME, "the role's name"),
             Attribute("vehicle", Type.NAME, "a vehicle of the fleet"),
             Attribute("payload", Type.NAME, "a payload of the fleet, `vehicle/payload`"),
             Attribute("team", Type.NAME, "a team of the fleet"),
-            Attribute("optional", Type.BOOLEAN, "whether the fleet may lack it"),
+            Attribute("optional", Type.BOOLEAN, "whether the fleet need not have it"),
             Attribute("requires", Type.TEXT, "reserved"),
         ),
         places=_SERVING,
@@ -124,7 +133,7 @@ _TABLE = (
     ),
     OwnElement(
         "userTask",
-        "How operators are asked.",
+        "A question to operators, with its settings.",
         _PROMPT,
         ("prompt", "decision"),
         places=(*_ASKING, *_DATA),
@@ -134,8 +143,8 @@ _TABLE = (
         "decision",
         "One answer.",
         (
-            Attribute("value", Type.TEXT, "what is stored"),
-            Attribute("label", Type.TEXT, "what operators read"),
+            Attribute("value", Type.TEXT, "the stored value"),
+            Attribute("label", Type.TEXT, "the text for operators"),
         ),
         text="the value, where there is no `value`",
         places=(*_ASKING, *_DATA),
@@ -156,7 +165,7 @@ _TABLE = (
     ),
     OwnElement(
         "requirement",
-        "What `m2pem verify` proves of the mission.",
+        "A requirement that `m2pem verify` proves or refutes.",
         (
             Attribute("id", Type.NAME, "its name in reports"),
             Attribute("ltl", Type.TEXT, "a formula of linear temporal logic"),
@@ -173,7 +182,7 @@ _TABLE = (
         "An argument of a requirement's pattern.",
         (
             Attribute("name", Type.NAME, "the pattern's name for it"),
-            Attribute("value", Type.TEXT, "what it is here"),
+            Attribute("value", Type.TEXT, "its value"),
         ),
         prefixed=False,
     ),
@@ -192,7 +201,9 @@ EXTENSIONS = (
         ("multiInstanceLoopCharacteristics",),
         (
             Attribute("collection", Type.EXPRESSION, "the list with an item for each instance"),
-            Attribute("elementVariable", Type.NAME, "the name of an instance's own item"),
+            Attribute(
+                "elementVariable", Type.NAME, "the name under which an instance reads its item"
+            ),
         ),
     ),
     OwnAttributes(

@@ -1,4 +1,4 @@
-"""Makes what is generated from the tables of rules and extensions.
+"""Generate pages and the editor's vocabulary from the tables of rules and extensions.
 
 | `python -m m2pem.bpmn.pages ...` | writes |
 |---|---|
@@ -17,15 +17,15 @@ from m2pem.bpmn.xml import M2PEM
 
 _RULES_HEAD = """# Rules of mission files
 
-What `m2pem check` holds a mission file to. A finding ends with its rule's name and number:
-`[idle-gateway B10601]`. Errors stop a mission from being loaded, warnings do not (unless
-`--strict`). Numbers stay; a number that is gone is not used again.
+`m2pem check` applies these rules to a mission file. A finding ends with its rule's name and number:
+`[idle-gateway B10601]`. m2pem does not load a mission with errors, nor, with `--strict`, one with
+warnings. Numbers never change, and are never used again.
 
 A `B` number is a section of the BPMN 2.0.2 specification (formal/13-12-09) and two digits: `B10601`
-is the first rule of section 10.6. What cannot be executed, or means nothing, is an error; what BPMN
-forbids but engines and editors live with is a warning.
+is the first rule of section 10.6. A construct that cannot be executed, or has no meaning, is an
+error; one that BPMN forbids but engines and editors accept is a warning.
 
-This page is made from the rules themselves: `python -m m2pem.bpmn.pages rules`.
+This page is generated from the rules: `python -m m2pem.bpmn.pages rules`.
 """
 _RULES_OF_BPMN = """
 ## BPMN's rules
@@ -36,7 +36,7 @@ _RULES_OF_BPMN = """
 _RULES_OF_M2PEM = """
 ## m2pem's own rules
 
-What BPMN leaves open, and what [mission files](missions.md) say to m2pem alone.
+For questions that BPMN leaves open, and for m2pem's own elements of [mission files](missions.md).
 
 | number | rule | level | what is wrong | what is right |
 |---|---|---|---|---|
@@ -65,30 +65,31 @@ def _rule_rows(letter: str) -> Iterator[str]:
 
 _EXTENSIONS_HEAD = f"""# m2pem's elements and attributes
 
-What m2pem adds to BPMN in a mission file; [mission files](missions.md) shows it in use. The
-namespace is `{M2PEM[1:-1]}`:
+m2pem's additions to BPMN in a mission file; [mission files](missions.md) shows how they are used.
+The namespace is `{M2PEM[1:-1]}`:
 
 ```xml
 <definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
              xmlns:m2pem="{M2PEM[1:-1]}">
 ```
 
-The prefix may be another one, the namespace may not. A prefix or namespace that is only like
-m2pem's, and an element of this page without its prefix, are errors (`wrong-namespace`): what they
-mark would be lost. So are elements and attributes of m2pem's namespace that are not on this page
-(`unknown-extension`); what is on it has no effect anywhere else (`misplaced-extension`).
+The prefix may differ, the namespace may not. Errors are: a prefix or namespace that is only similar
+to m2pem's, an element of this page without its prefix (`wrong-namespace`), and an element or
+attribute of m2pem's namespace that is not on this page (`unknown-extension`). Elements and
+attributes in other places than listed here have no effect (`misplaced-extension`).
 
-Extension elements of other programs have no effect on the execution but for those that
-[mission files](missions.md#coming-from-another-engine) names. Where m2pem's own would have one,
-`m2pem check` says which are ignored, once for each namespace (`foreign-extension`); what editors
-keep there for themselves, such as colours, it passes over.
+Extension elements of other programs have no effect on the execution, except those that
+[mission files](missions.md#coming-from-another-engine) names. Where m2pem has an equivalent,
+`m2pem check` names those that it ignores, once for each namespace (`foreign-extension`), but not
+the settings of editors, such as colours.
 
-This page is made of the table that the reader checks files by:
+This page is generated from the table by which m2pem checks files:
 `python -m m2pem.bpmn.pages extensions`.
 
 ## Elements
 
-They are in the `extensionElements` of the BPMN elements that are named, or in each other.
+"In" names the BPMN elements whose `extensionElements` may have the element, "Inside" the m2pem
+elements that may contain it.
 """
 _EXTENSIONS_ATTRIBUTES = """
 ## Attributes of BPMN's elements
@@ -133,7 +134,7 @@ def _attributes() -> Iterator[str]:
 
 
 def descriptor() -> dict[str, object]:
-    """Return what the editor's descriptor of bpmn-moddle must have, by the names of extensions."""
+    """Return the content that the editor's descriptor of bpmn-moddle must have."""
     return {
         "uri": M2PEM[1:-1],
         "elements": {

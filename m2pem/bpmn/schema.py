@@ -181,7 +181,7 @@ SHAPES: dict[str, Shape] = {BPMN + name: shape(*row) for name, row in _TABLE.ite
 SHAPES[BPMN + "childLaneSet"] = SHAPES[BPMN + "laneSet"]
 
 FLOW_ELEMENT_NAMES = frozenset(FLOW_ELEMENTS.split("|"))
-"""Local names of what may stand in a process or subprocess as a flow element."""
+"""Local names of flow elements of a process or subprocess."""
 
 ROOT_NAMES = frozenset(_ROOTS.split("|"))
-"""Local names of what may stand directly in `definitions`."""
+"""Local names of the children of `definitions`."""

@@ -97,7 +97,7 @@ REPEATED_ELEMENT = Rule(
     "repeated-element",
     "15.3",
     W,
-    "the element stands here a second time",
+    "the element appears here a second time",
     "keep one",
 )
 _TRUTHS = {

@@ -95,7 +95,7 @@ MISPLACED = Rule(
     "misplaced",
     "missions.md",
     E,
-    "a property, parameter or role stands outside the element for it",
+    "a property, parameter or role is outside the element for it",
     "move it into that element",
 )
 DUPLICATE_PARAMETER = Rule(

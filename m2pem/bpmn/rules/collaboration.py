@@ -48,7 +48,7 @@ BINDING_PROPERTY = Rule(
     "8.4.2",
     E,
     "the correlation binding's correlationPropertyRef names no correlation property",
-    "name a correlationProperty that stands in definitions",
+    "name a correlationProperty in definitions",
 )
 BINDING_PATH = Rule(
     8418,
@@ -81,7 +81,7 @@ CORRELATION_KEY_PROPERTY = Rule(
     "8.4.2",
     W,
     "the correlation key's correlationPropertyRef names no correlation property",
-    "name a correlationProperty that stands in definitions",
+    "name a correlationProperty in definitions",
 )
 SUBSCRIPTION_KEY = Rule(
     8416,
@@ -346,7 +346,7 @@ def _carries(tree: Tree, flow: etree._Element, end: etree._Element) -> None:
 
 
 def _pool(tree: Tree, element: etree._Element) -> str | None:
-    """The id of the process in which an element stands, or which a pool shows."""
+    """The id of the process of an element or of a pool."""
     if name_of(element) == "participant":
         name = element.get("processRef", "").rpartition(":")[2]
         return name or None

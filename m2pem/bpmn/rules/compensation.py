@@ -35,7 +35,7 @@ COMPENSATED_ELSEWHERE = Rule(
     "10.7.2",
     E,
     "the activity to be compensated is not in the scope of the event",
-    "throw it where the activity stands, or in an event subprocess there",
+    "throw it in the scope of the activity, or in an event subprocess there",
 )
 COMPENSATED_WITHOUT_HANDLER = Rule(
     10537,
@@ -50,7 +50,7 @@ COMPENSATION_CATCH_ACTIVITY = Rule(
     "compensation-catch-activity",
     "10.5.5",
     W,
-    "an event that catches compensation must not name an activity; where it stands says it",
+    "an event that catches compensation must not name an activity: its place determines it",
     "delete activityRef",
 )
 COMPENSATION_BOUNDARY_FLOW = Rule(
@@ -161,7 +161,7 @@ def _definition(tree: Tree, definition: etree._Element) -> None:
 
 
 def _visible(event: etree._Element, activity: etree._Element) -> bool:
-    """Beside the event, or beside a subprocess in which it stands, at any depth."""
+    """Beside the event, or beside a subprocess around it, at any depth."""
     scope: etree._Element | None = event.getparent()
     home = parent(activity)
     while scope is not None and scope.tag in CONTAINERS:

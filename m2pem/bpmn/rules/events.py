@@ -305,7 +305,7 @@ _RULES = {
 
 
 def allowed_triggers(event: etree._Element) -> frozenset[str]:
-    """What may trigger an event where it stands, or result from it (tables 10.84 to 10.93)."""
+    """The possible triggers or results of an event in its place (tables 10.84 to 10.93)."""
     return _ALLOWED[_rule(event)]
 
 
@@ -421,7 +421,7 @@ CANCEL_END_PLACE = Rule(
     "cancel-end-place",
     "10.5.5",
     E,
-    "a cancel end event can stand only in a transaction",
+    "a cancel end event may be only in a transaction",
     "make what is around it a transaction, or use an error or terminate end event",
 )
 CANCEL_BOUNDARY_PLACE = Rule(

@@ -21,7 +21,7 @@ MISPLACED_EXTENSION = Rule(
     "misplaced-extension",
     "missions.md",
     W,
-    "an m2pem: name has no effect where it stands",
+    "an m2pem: name has no effect in this place",
     "move it, or delete it",
 )
 UNKNOWN_EXTENSION = Rule(
@@ -58,7 +58,7 @@ _READ = frozenset(
         )
     ]
 )
-"""Other engines' elements that m2pem reads where they stand (docs/missions.md)."""
+"""Other engines' elements that m2pem reads (docs/missions.md)."""
 
 _EDITORS = (
     "http://www.omg.org/",

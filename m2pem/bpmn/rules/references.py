@@ -62,7 +62,7 @@ OPERATION_OUT_MESSAGE = Rule(
     "8.5.3",
     W,
     "the operation's outMessageRef names no message",
-    "name a message that stands in definitions, or delete it",
+    "name a message in definitions, or delete it",
 )
 OPERATION_ERROR = Rule(
     8506,
@@ -70,7 +70,7 @@ OPERATION_ERROR = Rule(
     "8.5.3",
     W,
     "the operation's errorRef names no error",
-    "name an error that stands in definitions, or delete it",
+    "name an error in definitions, or delete it",
 )
 PARTICIPANT_INTERFACE = Rule(
     9303,
@@ -78,7 +78,7 @@ PARTICIPANT_INTERFACE = Rule(
     "9.3.1",
     W,
     "the pool's interfaceRef names no interface",
-    "name an interface that stands in definitions, or delete it",
+    "name an interface in definitions, or delete it",
 )
 PARTICIPANT_END_POINT = Rule(
     9304,
@@ -86,7 +86,7 @@ PARTICIPANT_END_POINT = Rule(
     "9.3.1",
     W,
     "the pool's endPointRef names no end point",
-    "name an endPoint that stands in definitions, or delete it",
+    "name an endPoint in definitions, or delete it",
 )
 PARTNER_PARTICIPANT = Rule(
     9305,
@@ -118,7 +118,7 @@ COLLABORATION_CHOREOGRAPHY = Rule(
     "9.7",
     W,
     "the collaboration's choreographyRef names no choreography",
-    "name a choreography that stands in definitions, or delete it",
+    "name a choreography in definitions, or delete it",
 )
 DEFINITIONAL_COLLABORATION = Rule(
     10103,
@@ -142,7 +142,7 @@ SUPPORTED_INTERFACE = Rule(
     "10.3.6",
     W,
     "supportedInterfaceRef names no interface",
-    "name an interface that stands in definitions, or delete it",
+    "name an interface in definitions, or delete it",
 )
 ROLE_RESOURCE = Rule(
     10303,
@@ -150,7 +150,7 @@ ROLE_RESOURCE = Rule(
     "10.3.1",
     W,
     "the role's resourceRef names no resource",
-    "name a resource that stands in definitions, or delete it",
+    "name a resource in definitions, or delete it",
 )
 TASK_OPERATION = Rule(
     10311,

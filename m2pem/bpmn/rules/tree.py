@@ -71,7 +71,7 @@ class Tree:
     # --- what is there --------------------------------------------------------------------------
 
     def mentions(self, name: str) -> bool:
-        """Whether the name may stand in the file: a rare attribute is not looked for in vain."""
+        """Whether the file may have the name: this saves the search for rare attributes."""
         return name.encode() in self._source or b"\0" in self._source[:100]  # UTF-16, UTF-32
 
     def has_one_before(self, element: etree._Element) -> bool:
