@@ -26,16 +26,16 @@ SHOWN = {
 }
 
 
-def told(record: Record) -> str:
-    """The record's name and, if it is of an element, where."""
+def line_of(record: Record) -> str:
+    """Return the record's name and, if it has one, its element."""
     return f"{type(record).__name__} {getattr(record, 'element', '')}".rstrip()
 
 
-async def watch(notices: AsyncIterator[ControlEvent]) -> None:
+async def watch(events: AsyncIterator[ControlEvent]) -> None:
     """Print records as they are committed, until the executive ends."""
-    async for notice in notices:
-        if isinstance(notice, StampedRecord) and type(notice.record).__name__ in SHOWN:
-            print(f"{notice.t_s:6.1f} s  {told(notice.record)}")
+    async for event in events:
+        if isinstance(event, StampedRecord) and type(event.record).__name__ in SHOWN:
+            print(f"{event.t_s:6.1f} s  {line_of(event.record)}")
 
 
 async def steer(clock: Clock) -> RunSummary:
@@ -57,7 +57,7 @@ async def steer(clock: Clock) -> RunSummary:
 
 
 def main() -> None:
-    """Steer one run and tell how it ended."""
+    """Steer one run and print how it ended."""
     summary = run_virtual(steer, START_US)
     seconds = ((summary.ended_us or 0) - summary.started_us) / 1_000_000
     print(f"{summary.run} {summary.status}, {seconds:.1f} s after its start by the clock")

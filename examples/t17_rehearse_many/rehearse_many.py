@@ -27,7 +27,7 @@ def rehearsed(percent: int) -> str:
     fleet = with_battery(load_fleet(HERE / "fleet.yaml"), ResourceId("uav1"), percent)
     result = rehearse(HERE / "mission.bpmn", fleet, plugins=PluginManager())
     who: dict[str, str] = {}
-    by = "nobody"
+    by = "none"
     for stamped in result.records:
         match stamped.record:
             case BehaviorRequested() as begun:

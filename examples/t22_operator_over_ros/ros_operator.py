@@ -46,7 +46,7 @@ LAST_EVENTS_S = 0.5
 
 
 class Operator:
-    """Sits at one executive, and follows one run."""
+    """The operator of one executive, who follows one run."""
 
     def __init__(self, namespace: str, by: str, answers: dict[str, list[str]]) -> None:
         self.node = rclpy.create_node("operator", namespace=namespace)
@@ -67,28 +67,28 @@ class Operator:
         subscribe(msg.MissionEvent, "events", self._see_event, EVENTS)
 
     def wait_for_executive(self, deadline_s: float) -> None:
-        """Events are told once: without their topic, the first of them would be missed."""
+        """Wait for the topics: an event is published once, so a late subscriber misses it."""
         while not (self.node.count_publishers("events") and self.node.count_publishers("status")):
             self.spin(deadline_s)
 
     def spin(self, deadline_s: float) -> None:
-        """Hear something, or nothing for a moment."""
+        """Process one ROS callback, if any within 0.1 s, and the typed lines."""
         if time.monotonic() > deadline_s:
             say("it took too long")
             raise SystemExit(TOO_LONG)
         rclpy.spin_once(self.node, timeout_sec=0.1)
         while not self._typed.empty():
-            self._heed(self._typed.get())
+            self._answer_typed(self._typed.get())
 
     def follow(self, run: str) -> None:
-        """Tell of this run from now on, and of what was heard of it before it had a name."""
+        """Print this run's events from now on, and those received before its id was known."""
         self.run = run
         for event in self._early:
             self._see_event(event)
         self._early.clear()
 
     def ask(self, kind: Any, service: str, deadline_s: float, **fields: Any) -> Any:
-        """Call a service; a refusal ends the program."""
+        """Call a service and return its response; a refusal ends the program."""
         client = self.node.create_client(kind, service, qos_profile=SERVICES)
         while not client.service_is_ready():
             self.spin(deadline_s)
@@ -102,21 +102,21 @@ class Operator:
         return response
 
     def answer(self, prompt: Any, decision: str) -> None:
-        """Answer a prompt; whether it was taken is printed later."""
+        """Answer a prompt. The response of the executive is printed when it arrives."""
         client = self.node.create_client(srv.AnswerPrompt, "answer_prompt", qos_profile=SERVICES)
         request = srv.AnswerPrompt.Request(
             run=prompt.run, prompt=prompt.prompt, decision=decision, by=self.by
         )
 
-        def told(future: Any) -> None:
+        def print_response(future: Any) -> None:
             response = future.result()
             how = "taken" if response.success else f"refused: {response.message}"
             say(f"answer to {prompt.prompt}: {decision}: {how}")
 
-        client.call_async(request).add_done_callback(told)
+        client.call_async(request).add_done_callback(print_response)
 
     def read_terminal(self) -> None:
-        """Have what is typed heeded in its turn."""
+        """Read lines of the terminal in a thread; `spin` processes them."""
 
         def read() -> None:
             for line in sys.stdin:
@@ -124,8 +124,8 @@ class Operator:
 
         threading.Thread(target=read, daemon=True).start()
 
-    def _heed(self, line: str) -> None:
-        """A line answers the prompt that was asked last."""
+    def _answer_typed(self, line: str) -> None:
+        """Answer the latest prompt by a decision or its number."""
         prompt = next(reversed(self.asked.values()), None)
         decision = line.strip()
         if prompt is None or not decision:
@@ -134,11 +134,11 @@ class Operator:
             decision = prompt.decisions[int(decision) - 1].value
         self.answer(prompt, decision)
 
-    # --- what is heard --------------------------------------------------------------------------
+    # --- subscriptions --------------------------------------------------------------------------
 
-    def _see_prompts(self, standing: Any) -> None:
-        """The latched topic has all that stand, so that none is missed, whenever we came."""
-        for prompt in standing.prompts:
+    def _see_prompts(self, open_prompts: Any) -> None:
+        """Print new prompts. The latched topic has all open ones, also for late subscribers."""
+        for prompt in open_prompts.prompts:
             if prompt.run != self.run or prompt.prompt in self.asked:
                 continue
             self.asked[prompt.prompt] = prompt
@@ -174,7 +174,7 @@ class Operator:
         if event.run != self.run:
             return
         if self._seq and event.seq > self._seq + 1:
-            say(f"{event.seq - self._seq - 1} events were not heard")
+            say(f"{event.seq - self._seq - 1} events were not received")
         self._seq = event.seq
         say(f"{event.mission_time_s:7.1f} s  {event.text}")
 
@@ -185,7 +185,7 @@ def say(text: str) -> None:
 
 
 def geometry(text: str) -> tuple[str, Any, str]:
-    """NAME=FILE: the name, the coordinates of the GeoJSON, and what altitudes are above."""
+    """Read NAME=FILE: the name, the GeoJSON's coordinates, and its altitude frame."""
     name, _, file = text.partition("=")
     feature = json.loads(Path(file).read_text(encoding="utf-8"))
     if feature["type"] == "FeatureCollection":
@@ -195,7 +195,7 @@ def geometry(text: str) -> tuple[str, Any, str]:
 
 
 def points(coordinates: Sequence[Sequence[float]]) -> list[Any]:
-    """Positions of GeoJSON, which has longitudes first."""
+    """Convert positions of GeoJSON, which has longitudes first."""
     return [
         msg.GeoPoint(
             latitude_deg=float(each[1]),
@@ -228,7 +228,7 @@ def hand_over(operator: Operator, options: argparse.Namespace, deadline_s: float
 
 
 def answers_of(options: argparse.Namespace) -> dict[str, list[str]]:
-    """Decisions by the id of the user task, visit by visit."""
+    """Read the decisions by the id of the user task, visit by visit."""
     answers: dict[str, list[str]] = defaultdict(list)
     if options.answers:
         import yaml  # noqa: PLC0415  # it comes with rclpy
@@ -243,7 +243,7 @@ def answers_of(options: argparse.Namespace) -> dict[str, list[str]]:
 
 
 def read_options() -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--mission", metavar="FILE", help="a BPMN file here, whose bytes are sent")
@@ -280,7 +280,7 @@ def begin(operator: Operator, options: argparse.Namespace, deadline_s: float) ->
 
 
 def main() -> int:
-    """Operate."""
+    """Operate one run to its end, and return the exit status."""
     options = read_options()
     rclpy.init()
     deadline_s = time.monotonic() + options.within
@@ -295,7 +295,7 @@ def main() -> int:
         begin(operator, options, deadline_s)
     while operator.status not in EXIT_STATUS:
         operator.spin(deadline_s)
-    # Topics are apart: the last events may come after the status that has them in it.
+    # Topics have no common order: the last events may arrive after the final status.
     until_s = time.monotonic() + LAST_EVENTS_S
     while time.monotonic() < until_s:
         operator.spin(until_s + 1)

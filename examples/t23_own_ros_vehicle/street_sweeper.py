@@ -93,26 +93,26 @@ class Sweeper(Node):
         self.create_timer(0.1 / faster, self.say_where)
         self.create_timer(0.5 / faster, self.say_how)
 
-    # --- what the executive says ----------------------------------------------------------------
+    # --- commands of the executive --------------------------------------------------------------
 
     def obey(self, command: BehaviorCommand) -> None:
-        """Do a command. What is not understood, or comes too late, is answered with nothing."""
+        """Carry out a command. Commands with an unknown verb, and late ones, get no answer."""
         verbs: dict[int, Callable[[BehaviorCommand], None]] = {
             BehaviorCommand.START: self.start,
             BehaviorCommand.CANCEL: self.cancel,
             BehaviorCommand.HOLD: lambda _: self.hold(True),
             BehaviorCommand.RESUME: lambda _: self.hold(False),
-            BehaviorCommand.QUERY: self.tell_again,
+            BehaviorCommand.QUERY: self.repeat_status,
             BehaviorCommand.ADJUST: self.adjust,
         }
         if command.verb in verbs:
             verbs[command.verb](command)
 
     def start(self, command: BehaviorCommand) -> None:
-        """Begin a behavior, unless something speaks against it."""
+        """Begin a behavior, or reject it."""
         if not command.id:
             return
-        if command.id in self.last:  # it was said again: do it once, and say how it stands
+        if command.id in self.last:  # a repeated START: the behavior has begun already
             self.statuses.publish(self.last[command.id])
             return
         try:
@@ -167,8 +167,8 @@ class Sweeper(Node):
             speed_m_s = number(given, "speed", self.job.speed_m_s)
             self.job.speed_m_s = min(max(speed_m_s, 0.1), TOP_SPEED_M_S)
 
-    def tell_again(self, command: BehaviorCommand) -> None:
-        """Answer how a behavior stands."""
+    def repeat_status(self, command: BehaviorCommand) -> None:
+        """Publish the last status of a behavior again."""
         unknown = BehaviorStatus(id=command.id, number=0, state=BehaviorStatus.UNKNOWN)
         self.statuses.publish(self.last.get(command.id, unknown))
 

@@ -97,7 +97,7 @@ def test_an_operator_in_another_process_runs_a_mission(
         assert line in lines, done.stdout
     assert any(line.endswith("DRIVE started by ros_operator") for line in lines), done.stdout
     assert any(line.endswith(" s  r1 completed") for line in lines), done.stdout
-    assert "were not heard" not in done.stdout
+    assert "were not received" not in done.stdout
 
     aborted = operate("--url", mission, "--answers", str(EXAMPLE / "answers.yaml"))
     assert (aborted.returncode, "started r2" in aborted.stdout) == (0, True), aborted.stdout
