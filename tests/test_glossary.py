@@ -27,11 +27,25 @@ def words(name: str) -> set[str]:
 
 
 def names(file: Path) -> Iterator[str]:
-    """Its path inside of its distribution, and what it defines."""
+    """Its path inside of its distribution, and the names that it defines or binds."""
     yield from file.relative_to(REPOSITORY).with_suffix("").parts[-4:]
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            yield node.name
+    yield from bound_names(file.read_text(encoding="utf-8"))
+
+
+def bound_names(source: str) -> Iterator[str]:
+    """Names of classes, functions, parameters, variables, attributes and import aliases."""
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.ClassDef(name) | ast.FunctionDef(name) | ast.AsyncFunctionDef(name):
+                yield name
+            case ast.arg(name) | ast.alias(asname=str(name)) | ast.ExceptHandler(name=str(name)):
+                yield name
+            case ast.Name(name, ast.Store()) | ast.Attribute(_, name, ast.Store()):
+                yield name
+            case ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)):
+                yield name
+            case _:
+                pass
 
 
 @pytest.mark.parametrize(
@@ -45,6 +59,33 @@ def names(file: Path) -> Iterator[str]:
 )
 def test_a_name_is_split_into_words(name: str, expected: set[str]) -> None:
     assert words(name) == expected
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "class Told: pass",
+        "def told(): pass",
+        "async def told(): pass",
+        "def f(told): pass",
+        "f = lambda *, told: 0",
+        "told = 1",
+        "told: int",
+        "for told in range(2): pass",
+        "self._told = 1",
+        "import m2pem as told",
+        "with f() as told: pass",
+        "try: pass\nexcept ValueError as told: pass",
+        "match f():\n    case {'a': told}: pass",
+        "match f():\n    case [*told]: pass",
+    ],
+)
+def test_a_retired_word_is_found_wherever_it_is_bound(source: str) -> None:
+    assert any("told" in words(name) for name in bound_names(source))
+
+
+def test_a_name_that_is_only_read_is_that_of_another_library() -> None:
+    assert list(bound_names("message.heard")) == []
 
 
 def test_no_name_of_the_code_contains_a_retired_word() -> None:

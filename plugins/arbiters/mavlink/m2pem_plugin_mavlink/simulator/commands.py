@@ -17,7 +17,7 @@ from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender, com
 REPEAT_S = 10.0
 """A repetition (`confirmation` > 0) within that time gets the answer of the first."""
 
-Told = tuple[Sender, int]
+CommandKey = tuple[Sender, int]
 
 
 class CommandServer(Component):
@@ -27,7 +27,7 @@ class CommandServer(Component):
         super().__init__(autopilot)
         self.component_id = component
         self.handlers: dict[int, CommandHandler] = {}
-        self._answers: dict[Told, tuple[float, tuple[Any, ...], Result]] = {}
+        self._answers: dict[CommandKey, tuple[float, tuple[Any, ...], Result]] = {}
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """Both kinds of commands."""
@@ -47,8 +47,8 @@ class CommandServer(Component):
             result = self.perform(command)
             if len(self._answers) > 200:
                 self._answers.clear()
-            told = (self.autopilot.now_s, self._content(command), result)
-            self._answers[sender, command.id] = told
+            answer = (self.autopilot.now_s, self._content(command), result)
+            self._answers[sender, command.id] = answer
         self.autopilot.send(
             dialect.MAVLink_command_ack_message(
                 command.id, result, 0, 0, sender.system, sender.component

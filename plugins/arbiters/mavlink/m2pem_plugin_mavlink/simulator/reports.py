@@ -45,8 +45,8 @@ class Texts(Component):
         link from 0 on."""
         data = text.encode("ascii", "replace")
         if not self.autopilot.firmware.is_ardupilot:
-            for peer, heard_s in self._received_s.items():
-                if self.autopilot.now_s - heard_s <= RECENT_S:
+            for peer, received_s in self._received_s.items():
+                if self.autopilot.now_s - received_s <= RECENT_S:
                     for message in _chunks(data, severity, self._said_to[peer]):
                         self.autopilot.send(message, peer)
                     self._said_to[peer] += 1

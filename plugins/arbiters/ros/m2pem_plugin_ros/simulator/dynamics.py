@@ -63,15 +63,15 @@ class Dynamics:
 
     def step(self, now_s: float, dt_s: float) -> None:
         """Advance by `dt_s` to `now_s`."""
-        told = self._requested_twist(now_s)
+        requested = self._requested_twist(now_s)
         if self._stands:
-            if not _moves(told):
+            if not _moves(requested):
                 return
             self._stands = False
             self.motions += 1
-        self._follow(told, dt_s)
+        self._follow(requested, dt_s)
         self._move(dt_s)
-        if not (_moves(told) or _moves(self._twist) or _moves(self._wanted)):
+        if not (_moves(requested) or _moves(self._twist) or _moves(self._wanted)):
             self._stands, self._twist, self._wanted = True, Twist(), Twist()
 
     def _requested_twist(self, now_s: float) -> Twist:
@@ -85,12 +85,12 @@ class Dynamics:
             yaw = 0.0  # steered wheels that stand turn nothing
         return Twist(forward, yaw)
 
-    def _follow(self, told: Twist, dt_s: float) -> None:
+    def _follow(self, requested: Twist, dt_s: float) -> None:
         chassis = self.chassis
         share = 1.0 if chassis.lag_s <= 0 else 1.0 - math.exp(-dt_s / chassis.lag_s)
         self._wanted = Twist(
-            _lagged(self._wanted.forward_m_s, told.forward_m_s, share),
-            _lagged(self._wanted.yaw_rad_s, told.yaw_rad_s, share),
+            _lagged(self._wanted.forward_m_s, requested.forward_m_s, share),
+            _lagged(self._wanted.yaw_rad_s, requested.yaw_rad_s, share),
         )
         forward = _towards(
             self._twist.forward_m_s, self._wanted.forward_m_s, chassis.acceleration_m_s2 * dt_s

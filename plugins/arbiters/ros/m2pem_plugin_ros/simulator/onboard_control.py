@@ -181,7 +181,7 @@ class SimulatedLocalization:
         self._pose: Pose | None = None
         self._twist: Twist | None = None
         self._stamp_us = -1
-        self._heard_us: int | None = None
+        self._received_us: int | None = None
 
     def hear(self, reading: Reading) -> None:
         """Process a reading. Old and invalid readings are ignored."""
@@ -191,7 +191,7 @@ class SimulatedLocalization:
         self._pose = self._in_map(pose)
         self._twist = reading.twist
         self._stamp_us = reading.time_us
-        self._heard_us = self._clock.now_us()
+        self._received_us = self._clock.now_us()
 
     @property
     def pose(self) -> Pose | None:
@@ -211,9 +211,9 @@ class SimulatedLocalization:
 
     @property
     def age_s(self) -> float:
-        if self._heard_us is None:
+        if self._received_us is None:
             return math.inf
-        return (self._clock.now_us() - self._heard_us) / US_PER_S
+        return (self._clock.now_us() - self._received_us) / US_PER_S
 
     def _in_map(self, pose: Pose) -> Pose:
         """Return the pose in the frame `map`. The vehicle knows where its odometry began."""

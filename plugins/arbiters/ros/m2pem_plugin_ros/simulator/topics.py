@@ -58,7 +58,7 @@ class BaseTopics:
             self._publish_battery: RateTimer(BATTERY_HZ),
             self._publish_diagnostics: RateTimer(DIAGNOSTICS_HZ),
         }
-        self._told_motions = -1
+        self._published_motions = -1
         frame = settings.namespace.strip("/")
         self._base_frame = f"{frame}/base_link" if frame else "base_link"
         self._odometry_message = self._make_odometry()
@@ -68,8 +68,8 @@ class BaseTopics:
         for publish, pace in self._rate_timers.items():
             if pace.is_due(self._vehicle.now_s):
                 publish()
-        if (motions := self._vehicle.body.motions) != self._told_motions:
-            self._told_motions = motions
+        if (motions := self._vehicle.body.motions) != self._published_motions:
+            self._published_motions = motions
             self._motions.publish(UInt32(data=motions))
         for detector, found in self._vehicle.detections():
             self._publish_detection(detector, found)

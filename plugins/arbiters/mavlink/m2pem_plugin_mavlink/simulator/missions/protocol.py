@@ -30,7 +30,7 @@ class Upload:
     next: int
     end: int
     asked_s: float
-    heard_s: float
+    received_s: float
     items: list[Item] = field(default_factory=list)
     """Those that came, where they become the plan all at once."""
 
@@ -40,7 +40,7 @@ class Upload:
 
     def abandoned(self, now_s: float, after_s: float) -> bool:
         """No item has come for so long."""
-        return now_s - self.heard_s > after_s
+        return now_s - self.received_s > after_s
 
 
 ERROR, UNSUPPORTED, NO_SPACE = 1, 3, 4
@@ -185,7 +185,7 @@ class MissionServer(Component):
             self.autopilot.plans.put(kind, upload.next, item)
             self._counted(kind)
         upload.items.append(item)
-        upload.heard_s = self.autopilot.now_s
+        upload.received_s = self.autopilot.now_s
         upload.next += 1
         if upload.next < upload.end:
             self._ask(upload)

@@ -23,7 +23,7 @@ from m2pem_plugin_ptz.simulator.onvif.services import Operations, device, media,
 from m2pem_plugin_ptz.simulator.onvif.soap import FaultError
 
 SIZE = (640, 360)
-SKY, GROUND, INK, PAPER = (126, 168, 206), (116, 128, 92), (250, 250, 250), (20, 20, 20)
+SKY, GROUND, LIGHT, DARK = (126, 168, 206), (116, 128, 92), (250, 250, 250), (20, 20, 20)
 SPACING = 10
 """Degrees between lines."""
 
@@ -46,13 +46,13 @@ def draw(
     first = math.ceil((pan_deg - half) / SPACING) * SPACING
     for bearing in range(first, int(pan_deg + half) + 1, SPACING):
         x = width / 2 + focal * math.tan(math.radians(bearing - pan_deg))
-        canvas.line((x, 0, x, height), fill=INK)
-        canvas.text((x + 3, 3), f"{(bearing + 180) % 360 - 180:d}", fill=INK)
-    canvas.line((width / 2 - 12, height / 2, width / 2 + 12, height / 2), fill=PAPER, width=2)
-    canvas.line((width / 2, height / 2 - 12, width / 2, height / 2 + 12), fill=PAPER, width=2)
+        canvas.line((x, 0, x, height), fill=LIGHT)
+        canvas.text((x + 3, 3), f"{(bearing + 180) % 360 - 180:d}", fill=LIGHT)
+    canvas.line((width / 2 - 12, height / 2, width / 2 + 12, height / 2), fill=DARK, width=2)
+    canvas.line((width / 2, height / 2 - 12, width / 2, height / 2 + 12), fill=DARK, width=2)
     text = f"pan {pan_deg:+.1f}  tilt {tilt_deg:+.1f}  zoom {zoom:.1f}  {note}"
-    canvas.rectangle((0, height - 18, width, height), fill=PAPER)
-    canvas.text((6, height - 15), text, fill=INK)
+    canvas.rectangle((0, height - 18, width, height), fill=DARK)
+    canvas.text((6, height - 15), text, fill=LIGHT)
     store_image = io.BytesIO()
     image.save(store_image, "JPEG", quality=85, comment=text.encode())
     return store_image.getvalue()

@@ -131,8 +131,8 @@ class SimulatedCamera:
 
     def _move(self, names: Any, positions: Any, seconds: float) -> None:
         joints = self.spec.settings.joints
-        told = {**joints.positions(self.gimbal.ptz), **joints.read(names, positions)}
-        to = joints.ptz(told)
+        requested = {**joints.positions(self.gimbal.ptz), **joints.read(names, positions)}
+        to = joints.ptz(requested)
         if to is not None:
             self.gimbal.move(to, seconds)
 

@@ -37,8 +37,8 @@ def picture(ptz: PanTiltZoom, view_rad: tuple[float, float]) -> bytes:
         for row in range(rows)
         for column in range(columns)
     )
-    told = f"pan {math.degrees(ptz.pan_rad):.2f} tilt {math.degrees(ptz.tilt_rad):.2f}"
-    return _jpeg(greys, f"{told} zoom {ptz.zoom:.2f}")
+    direction = f"pan {math.degrees(ptz.pan_rad):.2f} tilt {math.degrees(ptz.tilt_rad):.2f}"
+    return _jpeg(greys, f"{direction} zoom {ptz.zoom:.2f}")
 
 
 def _grey(pan_rad: float, tilt_rad: float) -> int:
