@@ -1,14 +1,12 @@
-"""docs/cli.md has every command, option and record."""
+"""docs/cli.md has every command and option."""
 
 import re
-from typing import get_args
 
 import click
 import pytest
 
 from m2pem.cli.group import COMMANDS, built_in
 from m2pem.cli.plain import HELP
-from m2pem.engine.records import Record
 from tests.command_line import REPOSITORY
 
 PAGE = (REPOSITORY / "docs" / "cli.md").read_text(encoding="utf-8")
@@ -24,12 +22,6 @@ def test_every_option_is_on_the_page(name: str) -> None:
     options = [each for each in built_in(name).params if isinstance(each, click.Option)]
     words = [word for each in options for word in each.opts]
     assert [word for word in words if not re.search(rf"`(m2pem {name} )?{word}[ `]", PAGE)] == []
-
-
-def test_every_record_is_on_the_page() -> None:
-    section = PAGE[PAGE.index("### Records") : PAGE.index("### Stopping")]
-    names = set(re.findall(r"`([A-Z]\w+)`", section))
-    assert names == {record.__name__ for record in get_args(Record)}
 
 
 def test_every_line_of_the_plain_operator_is_on_the_page() -> None:
