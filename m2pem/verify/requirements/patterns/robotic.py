@@ -189,7 +189,7 @@ VISITS = (
 AVOIDANCE = (
     Pattern(
         "past_avoidance",
-        "it does not happen before something else has, which must come",
+        "the first condition never holds before the second one, which must hold at some point",
         (AVOIDED, Argument("until", Kind.CONDITION)),
         lambda a, _: Until(Not(a["avoid"]), a["until"]),
         lambda a, words: f"never {words.of(a['avoid'])} before {words.of(a['until'])}, which comes",
@@ -197,35 +197,35 @@ AVOIDANCE = (
     ),
     Pattern(
         "global_avoidance",
-        "it never happens",
+        "the condition never holds",
         (AVOIDED,),
         lambda a, _: Always(Not(a["avoid"])),
         lambda a, words: f"never {words.of(a['avoid'])}",
     ),
     Pattern(
         "future_avoidance",
-        "once something has happened, it never happens any more",
+        "the first condition never holds once the second one has held",
         (AVOIDED, WHEN),
         lambda a, _: Always(Implies(a["when"], Always(Not(a["avoid"])))),
         lambda a, words: f"once {words.of(a['when'])}, never again {words.of(a['avoid'])}",
     ),
     Pattern(
         "upper_restricted_avoidance",
-        "it happens at most so many times",
+        "the condition occurs at most so many times",
         (AVOIDED, TIMES),
         lambda a, _: Always(Count((a["avoid"],), "<=", a["times"])),
         lambda a, words: f"at most {a['times']} times: {words.of(a['avoid'])}",
     ),
     Pattern(
         "lower_restricted_avoidance",
-        "it happens at least so many times",
+        "the condition occurs at least so many times",
         (AVOIDED, TIMES),
         lambda a, _: Eventually(Count((a["avoid"],), ">=", a["times"])),
         lambda a, words: f"at least {a['times']} times: {words.of(a['avoid'])}",
     ),
     Pattern(
         "exact_restricted_avoidance",
-        "it happens just so many times",
+        "the condition occurs exactly so many times",
         (AVOIDED, TIMES),
         lambda a, _: And(
             (
@@ -241,21 +241,21 @@ AVOIDANCE = (
 REACTIONS = (
     Pattern(
         "instantaneous_reaction",
-        "whenever the one holds, the other does in the same moment",
+        "whenever the first condition holds, the second one holds in the same moment",
         (WHEN, THEN),
         lambda a, _: Always(Implies(a["when"], a["then"])),
         lambda a, words: f"whenever {words.of(a['when'])}, in that moment {words.of(a['then'])}",
     ),
     Pattern(
         "delayed_reaction",
-        "whenever the one happens, the other does then or later",
+        "whenever the first condition holds, the second one holds then or later",
         (WHEN, THEN),
         lambda a, _: Always(Implies(a["when"], Eventually(a["then"]))),
         lambda a, words: f"whenever {words.of(a['when'])}, then or later {words.of(a['then'])}",
     ),
     Pattern(
         "prompt_reaction",
-        "whenever the one happens, the other does in the very next step of the run",
+        "whenever the first condition holds, the second one holds in the next step of the run",
         (WHEN, THEN),
         lambda a, _: Always(Implies(a["when"], Next(a["then"]))),
         lambda a, words: (
@@ -266,14 +266,14 @@ REACTIONS = (
     ),
     Pattern(
         "bound_reaction",
-        "the one holds in just those moments in which the other does",
+        "the first condition holds in exactly those moments in which the second one holds",
         (WHEN, THEN),
         lambda a, _: Always(Iff(a["when"], a["then"])),
         lambda a, words: f"whenever {words.of(a['when'])}, and only then, {words.of(a['then'])}",
     ),
     Pattern(
         "bound_delay",
-        "the one holds in just those steps after which, in the very next, the other does",
+        "the first condition holds in a step exactly if the second one holds in the next step",
         (WHEN, THEN),
         lambda a, _: Always(Iff(a["when"], Next(a["then"]))),
         lambda a, words: (
@@ -285,7 +285,7 @@ REACTIONS = (
     ),
     Pattern(
         "wait",
-        "the one holds until the other comes, which must come",
+        "the first condition holds until the second one holds, which must happen",
         (Argument("hold", Kind.CONDITION), Argument("until", Kind.CONDITION)),
         lambda a, _: Until(a["hold"], a["until"]),
         lambda a, words: f"{words.of(a['hold'])} until {words.of(a['until'])}, which comes",

@@ -104,8 +104,8 @@ TEAMS = (
     ),
     Pattern(
         "operator_in_the_loop",
-        "each time before it happens, an operator has answered a user task, with a decision if one "
-        "is named; one answer is good for one time",
+        "each time before the condition holds, an operator has answered a user task, with a "
+        "decision if one is named; one answer is good for one time",
         (
             Argument("ask", Kind.ELEMENT),
             Argument("decision", Kind.DECISION, required=False),
@@ -125,14 +125,14 @@ TEAMS = (
     ),
     Pattern(
         "no_command_after",
-        "once something has happened, the resource is commanded no more",
+        "once the condition has held, the resource is commanded no more",
         (_RESOURCE, WHEN),
         lambda a, _: Always(Implies(a["when"], Always(Not(Commanded(a["resource"]))))),
         lambda a, words: f"once {words.of(a['when'])}, {a['resource']} is commanded no more",
     ),
     Pattern(
         "commanded_again",
-        "whenever something has happened, the resource is commanded then or later, or the run ends",
+        "whenever the condition holds, the resource is commanded then or later, or the run ends",
         (_RESOURCE, WHEN),
         lambda a, _: Always(
             Implies(a["when"], Eventually(Or((Commanded(a["resource"]), Ended()))))
