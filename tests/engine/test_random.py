@@ -27,6 +27,7 @@ QUICK = settings(
 FEW = 150
 LONG_S = 600.0
 BATCHES = (1, 2, 5, 100, 100)
+GRAPH_BATCH = 20
 
 
 def _forbidden(*_: Any, **__: Any) -> NoReturn:
@@ -50,9 +51,9 @@ def played(text: str, choices: list[int], batch: int) -> RandomPlay:
     return game
 
 
-def check_taken_up(play: Play, place: int) -> None:
+def check_taken_up(play: Play, batch: int, place: int) -> None:
     """A run that is rebuilt after `place` inputs decides the others as the first one did."""
-    taken_up = MissionRun(play.mission, play.fleet, "r1", play.run._x.batch)
+    taken_up = MissionRun(play.mission, play.fleet, "r1", batch)
     for step in play.steps[:place]:
         taken_up.replay(step.records)
     for step in play.steps[place:]:
@@ -63,14 +64,14 @@ def check_taken_up(play: Play, place: int) -> None:
 def structured_run(dice: Random, say: Callable[[str], object] = str) -> None:
     text = structured(dice)
     say(text)
-    game = played(
-        text, [dice.randrange(10_000) for _ in range(dice.randrange(40))], dice.choice(BATCHES)
-    )
+    choices = [dice.randrange(10_000) for _ in range(dice.randrange(40))]
+    batch = dice.choice(BATCHES)
+    game = played(text, choices, batch)
     play = game.play
     assert not play.detail.startswith("stuck"), play.detail
     if not play.ended:
         assert play.run.wants_continue or play.awaits()
-    check_taken_up(play, dice.randrange(len(play.steps)))
+    check_taken_up(play, batch, dice.randrange(len(play.steps)))
     game.end()
     play.verify()
 
@@ -78,14 +79,14 @@ def structured_run(dice: Random, say: Callable[[str], object] = str) -> None:
 def graph_run(dice: Random, say: Callable[[str], object] = str) -> None:
     text = graph(dice)
     say(text)
-    game = played(text, [dice.randrange(10_000) for _ in range(dice.randrange(40))], 20)
+    game = played(text, [dice.randrange(10_000) for _ in range(dice.randrange(40))], GRAPH_BATCH)
     play = game.play
     if play.ended == "failed":
         assert play.detail
     elif not play.ended:
         assert play.run.wants_continue or play.awaits()
     assert max(len(step.records) for step in play.steps) < 50_000
-    check_taken_up(play, dice.randrange(len(play.steps)))
+    check_taken_up(play, GRAPH_BATCH, dice.randrange(len(play.steps)))
     game.end()
     assert play.ended
     play.verify()

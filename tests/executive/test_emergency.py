@@ -1,7 +1,8 @@
 """STOP and pause reach the arbiters whatever the journal, the mission or an arbiter does."""
 
 import asyncio
-import sys
+import inspect
+import re
 import threading
 import types
 from collections.abc import Sequence
@@ -12,8 +13,9 @@ import pytest
 from m2pem.api.control import Alert, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunPaused
 from m2pem.errors import OperatorError
+from m2pem.executive import process_monitors
 from m2pem.executive.control_events import MAX_WAITING, ControlEvents, RecordObservers
-from m2pem.executive.process_monitors import LoopMonitor, blocking
+from m2pem.executive.process_monitors import LATE_AFTER_S, TICK_S, LoopMonitor, blocking
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry
 from m2pem.mission.catalogue import BehaviorState
@@ -333,20 +335,34 @@ async def test_what_runs_the_event_loop_is_not_named_for_what_blocks_it() -> Non
     named: asyncio.Future[str] = asyncio.get_running_loop().create_future()
 
     def read_a_mission() -> None:
-        named.set_result(blocking(sys._getframe()))
+        named.set_result(blocking(inspect.currentframe()))
 
     # As if it were in a module of m2pem: around it are asyncio, and pytest that runs the loop.
-    known = {"__name__": "m2pem.reading", "blocking": blocking, "sys": sys}
+    known = {"__name__": "m2pem.reading", "blocking": blocking, "inspect": inspect}
     code, closure = read_a_mission.__code__, read_a_mission.__closure__
     asyncio.get_running_loop().call_soon(types.FunctionType(code, known, closure=closure))
     assert (await named).startswith("m2pem.reading, read_a_mission, line ")
 
 
-async def test_an_alert_says_how_long_the_loop_was_blocked_though_it_has_turned_since() -> None:
+async def test_an_alert_says_how_long_the_loop_was_blocked_though_it_has_turned_since(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    noticed, turned = threading.Event(), threading.Event()
+
+    def named_late(_: types.FrameType | None) -> str:
+        noticed.set()
+        assert turned.wait(30)
+        return "a plugin"
+
+    monkeypatch.setattr(process_monitors, "blocking", named_late)
     notices = ControlEvents()
     alerts = notices.subscribe(None, 10)
-    async with LoopMonitor(notices) as monitor:
-        monitor._blocked_s, monitor._blocked_by = 0.7, "a plugin"
+    async with LoopMonitor(notices):
+        assert noticed.wait(30)  # this blocks the loop, until the monitor has noticed it
+        await asyncio.sleep(TICK_S / 2)  # the monitor's own timer was due before
+        turned.set()
         alert = await anext(alerts)
     assert isinstance(alert, Alert)
-    assert "nothing was done for 0.7 s" in alert.text
+    said = re.match(r"nothing was done for (\d+\.\d) s, .* a plugin blocked", alert.text)
+    assert said is not None
+    assert float(said[1]) >= LATE_AFTER_S

@@ -13,6 +13,19 @@ from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
 
 
 @pytest.fixture
+def connections(monkeypatch):
+    """The connections to SQLite that were made; a journal writes over its first one."""
+    made, connect = [], sqlite3.connect
+
+    def noted(*arguments, **options):
+        made.append(connect(*arguments, **options))
+        return made[-1]
+
+    monkeypatch.setattr(sqlite3, "connect", noted)
+    return made
+
+
+@pytest.fixture
 def open_journal(tmp_path):
     return lambda: SqliteJournal.open(tmp_path / "journal.db")
 
@@ -21,10 +34,11 @@ def large(run, seq):
     return entry(run, seq, InputIgnored("x" * 100_000))
 
 
-async def test_a_full_disk_fails_all_that_waited_and_passes(open_journal):
+async def test_a_full_disk_fails_all_that_waited_and_passes(open_journal, connections):
     async with opened(open_journal) as journal:
+        writing = connections[0]
         runs = [await journal.create(HEADER) for _ in range(3)]
-        journal._writing.execute("PRAGMA max_page_count = 40")
+        writing.execute("PRAGMA max_page_count = 40")
         calls = [journal.append([large(run, 1), large(run, 2)]) for run in runs]
         raised = await asyncio.gather(*calls, return_exceptions=True)
         assert {type(error) for error in raised} == {JournalError}
@@ -32,32 +46,34 @@ async def test_a_full_disk_fails_all_that_waited_and_passes(open_journal):
         assert len({id(error) for error in raised}) == 3
         assert {found.last_seq for found in await journal.runs()} == {0}
         await journal.append([entry(runs[0], 1)])
-        journal._writing.execute("PRAGMA max_page_count = 100000")
+        writing.execute("PRAGMA max_page_count = 100000")
         await journal.append([large(runs[1], 1), large(runs[1], 2)])
         assert [found.last_seq for found in await journal.runs()] == [1, 2, 0]
 
 
-async def test_a_full_disk_leaves_a_claimed_run_free(open_journal):
+async def test_a_full_disk_leaves_a_claimed_run_free(open_journal, connections):
     async with opened(open_journal) as journal:
-        journal._writing.execute("PRAGMA query_only = ON")
+        writing = connections[0]
+        writing.execute("PRAGMA query_only = ON")
         with pytest.raises(JournalError, match="can only be read; allow writing"):
             await journal.create(HEADER)
-        journal._writing.execute("PRAGMA query_only = OFF")
+        writing.execute("PRAGMA query_only = OFF")
         run = await journal.create(HEADER)
         assert run == "r1"
         await journal.release(run)
-        journal._writing.execute("PRAGMA query_only = ON")
+        writing.execute("PRAGMA query_only = ON")
         with pytest.raises(JournalError, match="can only be read"):
             await journal.claim(run)
         assert not (await info(journal, run)).driven
-        journal._writing.execute("PRAGMA query_only = OFF")
+        writing.execute("PRAGMA query_only = OFF")
         assert await journal.claim(run) == 2
 
 
-async def test_another_program_that_keeps_writing_is_told_of(open_journal, tmp_path):
+async def test_another_program_that_keeps_writing_is_told_of(open_journal, connections, tmp_path):
     async with opened(open_journal) as journal:
+        writing = connections[0]
         run = await journal.create(HEADER)
-        journal._writing.execute("PRAGMA busy_timeout = 20")
+        writing.execute("PRAGMA busy_timeout = 20")
         other = sqlite3.connect(tmp_path / "journal.db", isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(JournalError, match="another program has kept it locked"):

@@ -14,6 +14,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Area, Coordinate, Route
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.frame import FlatFrame
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.arbiter_harness import JOURNAL, ORIGIN, ArbiterHarness, context
 
 START_US = 1_767_225_600_000_000
@@ -25,7 +26,7 @@ Main: TypeAlias = Callable[[ArbiterHarness, SimArbiter], Awaitable[None]]
 
 
 class Simulate(Protocol):
-    """Runs a test with a connected arbiter in virtual time; `options` go to the arbiter."""
+    """Runs a test with a connected arbiter in virtual time; `options` go to `make`."""
 
     def __call__(self, fleet: Fleet, main: Main, **options: Any) -> None: ...
 
@@ -35,14 +36,17 @@ def connection(resource: str, domain: str, settings: Mapping[str, Any]) -> Conne
     return Connection(ResourceId(resource), domain, settings, detector=detector)
 
 
-def make(clock: Clock, fleet: Fleet, journal: UUID = JOURNAL, **kw: Any) -> SimArbiter:
+def make(
+    clock: Clock, fleet: Fleet, journal: UUID = JOURNAL, bus: Bus | None = None, **kw: Any
+) -> SimArbiter:
     """An arbiter, not connected; all vehicles are the team "team"."""
     connections = {
         ResourceId(name): connection(name, domain, settings)
         for name, (domain, settings) in fleet.items()
     }
     teams = {"team": tuple(r for r in connections if "/" not in r)}
-    return SimArbiter(connections, replace(context(clock, teams), journal=journal), **kw)
+    lent = replace(context(clock, teams), journal=journal, bus=bus or Bus())
+    return SimArbiter(connections, lent, **kw)
 
 
 @pytest.fixture
@@ -64,9 +68,14 @@ def simulate() -> Simulate:
     return run
 
 
+def position(east_m: float, north_m: float) -> GeoPosition:
+    """A position so far from the origin of the bench, at its height."""
+    return FlatFrame(ORIGIN).to_position((east_m, north_m, 0.0))
+
+
 def place(east_m: float, north_m: float, altitude_m: float | None = None) -> Coordinate:
     """A coordinate so far from the origin of the bench."""
-    geo = FlatFrame(ORIGIN).to_position((east_m, north_m, 0.0))
+    geo = position(east_m, north_m)
     return geo.latitude_deg, geo.longitude_deg, altitude_m
 
 

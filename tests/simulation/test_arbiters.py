@@ -3,7 +3,7 @@ import math
 
 import pytest
 
-from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.arbiter import BehaviorReport, Connection
 from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import VehicleState
 from m2pem.errors import FleetError
@@ -13,7 +13,7 @@ from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.faults import Fault
 from m2pem.simulation.kinematics import DEFAULTS
-from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 from tests.simulation.conftest import START_US, Fleet, Simulate, area, local, make, place, route
 
 S = 1_000_000
@@ -154,11 +154,9 @@ def test_what_cannot_be_done_is_rejected_by_name(
 
 def test_a_behavior_that_the_fleet_does_not_allow_is_rejected(simulate: Simulate) -> None:
     async def main(clock: Clock) -> None:
-        arbiter = make(clock, UGV)
-        connection = arbiter._connections[ResourceId("ugv")]
-        arbiter._connections[ResourceId("ugv")] = type(connection)(
-            connection.resource, "ground", behaviors=("hold",)
-        )
+        ugv = ResourceId("ugv")
+        allowed = Connection(ugv, "ground", behaviors=("hold",))
+        arbiter = SimArbiter({ugv: allowed}, context(clock))
         async with ArbiterHarness(arbiter, clock) as bench:
             await bench.start("r1.b1", "drive_stop", "ugv")
             assert "does not allow" in (await bench.ended("r1.b1", 1)).reason
@@ -416,9 +414,9 @@ def test_every_twentieth_of_the_battery_is_told_without_a_telemetry_rate(
 
 def test_an_idle_arbiter_without_telemetry_sets_no_timer(simulate: Simulate) -> None:
     async def main(_: ArbiterHarness, __: SimArbiter) -> None:
-        mine = asyncio.current_task()
-        names = [t.get_coro().__qualname__ for t in asyncio.all_tasks() if t is not mine]  # type: ignore[union-attr]
-        assert sorted(names) == ["ArbiterHarness._read_reports", "ArbiterHarness._read_states"]
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        owners = [str(t.get_coro().__qualname__).partition(".")[0] for t in others]  # type: ignore[union-attr]
+        assert owners == ["ArbiterHarness"] * 2, "it reads reports and states"
 
     simulate({**UGV, **UAV, "ugv/ptz": ("ground", {})}, main)
 

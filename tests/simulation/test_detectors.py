@@ -3,8 +3,9 @@ import pytest
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.arbiters import SimArbiter
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
-from tests.simulation.conftest import START_US, Simulate, local, place, route
+from tests.simulation.conftest import START_US, Simulate, local, place, position, route
 
 S = 1_000_000
 GPR = "ugv/gpr"
@@ -132,14 +133,14 @@ def test_a_detector_on_a_vehicle_elsewhere_hears_of_it_on_the_bus(simulate: Simu
     latitude, longitude, _ = place(50, 0)
     detector = {"detector": True, "targets": [{"type": "m", "position": [latitude, longitude]}]}
 
-    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+    bus = Bus()
+
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
         for east in (0.0, 30.0, 48.0):
             await bench.clock.sleep(1)
-            position = arbiter._planner._frame.to_position((east, 0.0, 0.0))
-            arbiter._context.bus.publish(
-                VehicleState(ResourceId("stranger"), bench.clock.now_us(), position)
-            )
+            now_us = bench.clock.now_us()
+            bus.publish(VehicleState(ResourceId("stranger"), now_us, position(east, 0)))
         await bench.until(lambda: bool(found(bench)), 1)
         assert [detection.time_us for detection in found(bench)] == [START_US + 3 * S]
 
-    simulate({"stranger/gpr": ("ground", detector)}, main)
+    simulate({"stranger/gpr": ("ground", detector)}, main, bus=bus)

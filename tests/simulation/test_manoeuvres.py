@@ -9,8 +9,9 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Point, Route, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.simulation.manoeuvres import MANOEUVRES
+from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
-from tests.simulation.conftest import START_US, Fleet, Simulate, area, local, place, route
+from tests.simulation.conftest import START_US, Fleet, Simulate, area, local, place, position, route
 
 S = 1_000_000
 UGV: Fleet = {"ugv": ("ground", {}), "lead": ("ground", {})}
@@ -319,17 +320,15 @@ def test_a_held_follower_stands_and_catches_up_when_resumed(simulate: Simulate) 
 
 
 def test_a_target_elsewhere_is_followed_as_it_is_heard_on_the_bus(simulate: Simulate) -> None:
-    async def main(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
-        frame = arbiter._planner._frame
-        stranger = ResourceId("stranger")
-        arbiter._context.bus.publish(
-            VehicleState(stranger, START_US, frame.to_position((200.0, 0.0, 0.0)), yaw_rad=0.0)
-        )
+    bus = Bus()
+
+    async def main(bench: ArbiterHarness, _: SimArbiter) -> None:
+        bus.publish(VehicleState(ResourceId("stranger"), START_US, position(200, 0), yaw_rad=0.0))
         await bench.start("r1.b1", "follow", "ugv", target=VehiclePosition("stranger"), offset=10.0)
         await bench.clock.sleep(120)
         assert at(bench, "ugv")[:2] == pytest.approx((190, 0), abs=0.5)
 
-    simulate(UGV, main)
+    simulate(UGV, main, bus=bus)
 
 
 def test_areas_with_holes_are_read(simulate: Simulate) -> None:

@@ -63,6 +63,7 @@ class Field:
                 ahead=[FRAME.to_local(each[:2]) for each in waypoints],
             )
         self.controller = FormationController(self.march, [ResourceId(name) for name in steady])
+        self._along_m: dict[ResourceId, float | None] = dict.fromkeys(self.carts)
         self._steady = steady
         self._late = round(late_s / STEP_S)
         self._seen: deque[dict[ResourceId, MemberPose]] = deque()
@@ -106,8 +107,9 @@ class Field:
     def mark(self, index: int) -> float:
         marcher = self.march.marchers[index]
         cart = self.carts[marcher.member]
-        track = self.controller._tracks[marcher.member]
-        return marcher.path.mark_m(marcher.path.find(cart.place, track.along_m, 50.0))
+        along_m = marcher.path.find(cart.place, self._along_m[marcher.member], 50.0)
+        self._along_m[marcher.member] = along_m
+        return marcher.path.mark_m(along_m)
 
     def _measure(self) -> None:
         marks = [self.mark(index) for index in range(len(self.carts))]

@@ -1,5 +1,7 @@
 import asyncio
 import gc
+import weakref
+from collections import Counter
 
 import pytest
 
@@ -79,21 +81,35 @@ def test_nothing_changes_after_close() -> None:
     assert bus.latest(ResourceId("evsg1")) == state(1)
 
 
-async def test_a_cancelled_reader_leaves_no_subscription_behind() -> None:
+async def test_cancelled_readers_leave_no_subscriptions_behind() -> None:
     bus = Bus()
+
+    def kept() -> Counter[str]:
+        """How many subscriptions there are, and references by which a bus finds them."""
+        gc.collect()
+        return Counter(
+            type(each).__name__
+            for each in gc.get_objects()
+            if isinstance(each, Subscription | weakref.ref)
+        )
 
     async def read() -> None:
         async for _ in bus.subscribe():
             pass
 
-    reader = asyncio.create_task(read())
+    before = kept()
+    readers = [asyncio.create_task(read()) for _ in range(100)]
     await asyncio.sleep(0)
-    assert len(bus._subscriptions) == 1
-    reader.cancel()
-    await asyncio.wait([reader])
-    del reader
-    gc.collect()
-    assert bus._subscriptions == []
+    subscriptions = kept() - before
+    assert subscriptions["Subscription"] == 100
+    assert subscriptions.total() >= 200
+    for reader in readers:
+        reader.cancel()
+    await asyncio.wait(readers)
+    del reader, readers
+    subscriptions = kept() - before
+    assert subscriptions["Subscription"] == 0
+    assert subscriptions.total() < 50, "the bus itself keeps no reference either"
 
 
 async def test_a_reader_may_go_on_after_a_cancelled_wait() -> None:

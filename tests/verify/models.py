@@ -90,7 +90,7 @@ class Walk:
         """Where the net could not follow; "" if they always could."""
         agrees = self.give(i.StartRun(self.process))
         while agrees and len(self.given) < length and not self.run.wants_continue:
-            things = self._things()
+            things = self.things()
             if not things or self.run.state.status is RunStatus.ENDED:
                 return ""
             item = self.dice.choice(things)
@@ -103,7 +103,8 @@ class Walk:
         state = self.run.state
         return f"{self.given}: {state.status} {state.detail} {dict(look_of_run(state))}"
 
-    def _things(self) -> list[i.Input]:
+    def things(self) -> list[i.Input]:
+        """What could happen now."""
         state, dice = self.run.state, self.dice
         found: list[i.Input] = []
         for prompt in state.prompts.values():

@@ -35,7 +35,7 @@ def test_without_room_every_transition_is_tested_again(
 ) -> None:
     net = random_net(Random(seed))
     found = explore(net, SMALL)
-    monkeypatch.setattr(read_write_sets, "_MOST_NAMED", 0)
+    monkeypatch.setattr(read_write_sets, "MOST_NAMED", 0)
     assert len({id(each) for each in affected_transitions(Encoding(net))}) < len(net.transitions)
     again = explore(net, SMALL)
     assert set(again.states) == set(found.states)

@@ -1,8 +1,10 @@
 """Spin, the compiler and the checker: what they print, how they end, and what is missing."""
 
+import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -151,14 +153,14 @@ def test_a_run_that_is_none_is_not_believed() -> None:
 def test_limits_leave_it_undecided(folders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert search(rows(8), Limits(memory_mb=6)).stopped is Stopped.MEMORY
     assert search(rows(8), Limits(seconds=0.05)).stopped is Stopped.TIME
-    monkeypatch.setattr(queries, "_FIRST_DEPTH", 20)
-    monkeypatch.setattr(queries, "_MOST_DEPTH", 20)
+    monkeypatch.setattr(queries, "FIRST_DEPTH", 20)
+    monkeypatch.setattr(queries, "MOST_DEPTH", 20)
     assert search(rows(3)).stopped is Stopped.DEPTH
     assert not list(folders.iterdir())
 
 
 def test_more_depth_is_given_where_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(queries, "_FIRST_DEPTH", 20)
+    monkeypatch.setattr(queries, "FIRST_DEPTH", 20)
     found = search(rows(3))
     assert (found.stopped, found.states) == (None, 4**3 + 3)
 
@@ -175,13 +177,13 @@ def test_a_long_search_is_compiled_again_and_counts_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     commands: list[str] = []
-    start = programs.CheckerFolder._start
+    start = subprocess.Popen
 
-    def noted(shop: programs.CheckerFolder, command: list[str], printed: Path) -> object:
+    def noted(command: list[str], **options: Any) -> subprocess.Popen[bytes]:
         commands.append(Path(command[0]).name)
-        return start(shop, command, printed)
+        return start(command, **options)
 
-    monkeypatch.setattr(programs.CheckerFolder, "_start", noted)
+    monkeypatch.setattr(subprocess, "Popen", noted)
     monkeypatch.setattr(programs, "LONG_SEARCH_S", 0.0)
     tools = Tools.find()
     quick = tools.quick or tools.thorough
@@ -190,7 +192,8 @@ def test_a_long_search_is_compiled_again_and_counts_the_same(
     monkeypatch.setattr(Tools, "find", classmethod(lambda _: Tools(tools.spin, quick, quick)))
     found = search(rows(10))
     assert found.states == 4**10 + 3
-    assert commands[:3] == ["pan", Path(quick).name, "pan2"]
+    began = commands.index("pan")
+    assert commands[began : began + 3] == ["pan", Path(quick).name, "pan2"]
 
 
 def test_a_search_reads_no_trail_of_the_search_before_it(folders: Path) -> None:

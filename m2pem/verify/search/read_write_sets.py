@@ -142,7 +142,7 @@ def bits_of(mask: int) -> Iterable[int]:
         mask ^= low
 
 
-_MOST_NAMED = 4_000_000
+MOST_NAMED = 4_000_000
 """Most entries in all lists of affected transitions; each takes about 100 bytes."""
 
 
@@ -182,7 +182,7 @@ def affected_transitions(encoding: Encoding) -> list[list[int]]:
     for transition in encoding.transitions:
         if transition.changes in known:
             continue
-        if transition.changes.bit_count() * 2 > encoding.bits or named > _MOST_NAMED:
+        if transition.changes.bit_count() * 2 > encoding.bits or named > MOST_NAMED:
             known[transition.changes] = every
             continue
         touched: set[int] = set()

@@ -126,8 +126,9 @@ _HASH_BITS = 18
 """A table of 2 MB, which grows when it is full; Spin's own default takes 128 MB at once."""
 _BITSTATE_BITS = 30
 """Of 128 MB; that table cannot grow."""
-_FIRST_DEPTH = 100_000
-_MOST_DEPTH = 20_000_000
+FIRST_DEPTH = 100_000
+MOST_DEPTH = 20_000_000
+"""Steps of the deepest path: of the first search, and of the last after deeper and deeper ones."""
 _LEAST_VECTOR_BYTES = 1024
 _CUTS = {
     CutReason.DEPTH: Stopped.DEPTH,
@@ -184,7 +185,7 @@ class SpinQueries:
         if vector > _LEAST_VECTOR_BYTES:
             defines.append(f"-DVECTORSZ={vector}")
         bits = _BITSTATE_BITS if self.storage is Storage.BITSTATE and not shortest else _HASH_BITS
-        depth = _FIRST_DEPTH
+        depth = FIRST_DEPTH
         while True:
             arguments = [f"-w{bits}", f"-m{depth}", f"-c{errors}"]
             arguments += ["-a"] if cycles else []
@@ -192,7 +193,7 @@ class SpinQueries:
             output = self.shop.search(defines, arguments, self._watch(seconds))
             report = read(output.text)
             too_deep = report.found is None and report.cut is CutReason.DEPTH and not output.ended
-            if too_deep and depth < _MOST_DEPTH:
+            if too_deep and depth < MOST_DEPTH:
                 depth *= 10
                 continue
             return QueryResult(report, self._stopped(report, output.ended, shortest=shortest))
