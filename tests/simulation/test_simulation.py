@@ -45,6 +45,7 @@ commands = st.lists(
 def check_motion(states: Sequence[VehicleState | PayloadState]) -> None:
     """Fail when a vehicle jumped, or was faster than it can be."""
     before: dict[ResourceId, tuple[tuple[float, ...], int]] = {}
+    # A state has the time for which it was planned, however late it comes (`EventQueue`).
     for state in sorted(states, key=lambda state: state.time_us):
         assert isinstance(state, VehicleState)
         assert state.position is not None
