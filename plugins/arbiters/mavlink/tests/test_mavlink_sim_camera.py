@@ -65,7 +65,6 @@ def test_a_simulated_camera_tells_what_it_is(bench: Bench) -> None:
     assert asked(bench, 261).total_capacity > 0
     assert asked(bench, 260).zoomLevel == 0
     assert result(bench, 512, 24) == 3
-    assert any(each.get_msgId() == 259 for each in to_camera(bench, 521, 1))
 
 
 def test_a_picture_is_told_of_with_its_place(bench: Bench) -> None:

@@ -4,7 +4,6 @@ import pytest
 from m2pem_plugin_mavlink.simulator.dynamics import (
     BodyState,
     CircleSetpoint,
-    DriveSetpoint,
     MotionSetpoint,
     NoThrust,
     PositionSetpoint,
@@ -82,20 +81,13 @@ def test_a_rover_goes_backwards_to_a_place_behind_it() -> None:
     assert all(abs(each.yaw_rad) < 0.05 for each in track)
 
 
-def test_a_rover_turns_on_the_spot_when_told_to() -> None:
-    body = BodyState()
-    move(Kind.ROVER, body, DriveSetpoint(0, yaw_rps=0.5), 2)
-    assert body.yaw_rad == pytest.approx(1.0, abs=0.02)
-    assert body.point == pytest.approx((0, 0, 0), abs=1e-9)
-
-
 def test_a_plane_rolls_before_it_lifts_off_and_never_stands_in_the_air() -> None:
     body = BodyState()
     track = move(Kind.PLANE, body, PositionSetpoint(Point(2000, 0, 60), 22), 30)
     lift_off = next(each for each in track if not each.on_ground)
     assert lift_off.ground_speed_mps >= 12
     assert body.up_m == pytest.approx(60, abs=1)
-    track = move(Kind.PLANE, body, DriveSetpoint(0.0), 20)
+    track = move(Kind.PLANE, body, NoThrust(), 20)
     assert min(each.ground_speed_mps for each in track) >= 12
 
 

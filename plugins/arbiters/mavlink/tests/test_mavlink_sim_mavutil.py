@@ -75,10 +75,8 @@ async def test_a_copter_takes_off_goes_somewhere_and_stops_when_velocities_end(
         assert ground.command(22, 0, 0, 0, 0, 0, 0, 15) == 0
         ground.stream(33, 32)
         ground.wait("GLOBAL_POSITION_INT", that=lambda m: m.relative_alt > 14_500)
-        latitude, longitude = place(40, 30)
-        x, y = round(latitude * 1e7), round(longitude * 1e7)
-        ground.link.mav.set_position_target_global_int_send(
-            0, 1, 1, 6, 0xFF8, x, y, 15, 0, 0, 0, 0, 0, 0, 0, 0
+        ground.link.mav.set_position_target_local_ned_send(
+            0, 1, 1, 1, 0xFF8, 40, 30, -15, 0, 0, 0, 0, 0, 0, 0, 0
         )
         ground.wait("LOCAL_POSITION_NED", that=lambda m: abs(m.x - 40) + abs(m.y - 30) < 1)
         ground.link.mav.set_position_target_local_ned_send(

@@ -28,14 +28,6 @@ def test_armed_it_enters_no_mode_that_needs_a_position_it_has_not() -> None:
     assert bench.command(MODE, 1, 4) == 4
 
 
-def test_the_old_message_is_acknowledged_by_its_number() -> None:
-    bench = Bench()
-    bench.run(10)
-    answers = bench.tell(dialect.MAVLink_set_mode_message(1, 1, 5))
-    assert [(a.command, a.result) for a in answers if a.get_type() == "COMMAND_ACK"] == [(11, 0)]
-    assert bench.autopilot.modes.mode.name == "LOITER"
-
-
 def test_a_base_mode_without_a_custom_mode_is_denied() -> None:
     assert Bench().command(MODE, 0, 4) == 2
 

@@ -17,7 +17,7 @@ def types(answers: list[object]) -> list[str]:
     return [a.get_type() for a in answers]  # type: ignore[attr-defined]
 
 
-def test_an_upload_is_asked_for_item_by_item_the_old_way() -> None:
+def test_an_upload_is_asked_for_item_by_item() -> None:
     bench = Bench()
     (request,) = bench.tell(count(4))
     assert (request.get_type(), request.seq) == ("MISSION_REQUEST", 0)
@@ -42,9 +42,6 @@ def test_a_download_gives_back_what_was_uploaded_behind_the_own_home() -> None:
     (second,) = bench.tell(dialect.MAVLink_mission_request_int_message(1, 1, 2))
     assert second.get_type() == "MISSION_ITEM_INT"
     assert (second.x, second.y, second.z, second.command) == (473980000, 85460000, 20.0, 16)
-    (old,) = bench.tell(dialect.MAVLink_mission_request_message(1, 1, 2))
-    assert old.get_type() == "MISSION_ITEM"
-    assert old.x == pytest.approx(47.398, abs=1e-5)
 
 
 def test_a_lost_item_is_asked_for_each_second_and_the_upload_cancelled_after_eight() -> None:
@@ -148,16 +145,6 @@ def test_a_plan_of_an_unknown_kind_is_unsupported() -> None:
     for message in (count(2, 7), dialect.MAVLink_mission_request_list_message(1, 1, 7)):
         (ack,) = bench.tell(message)
         assert ack.type == 3
-
-
-def test_part_of_a_plan_is_replaced() -> None:
-    bench = Bench()
-    bench.upload(PLAN)
-    (request,) = bench.tell(dialect.MAVLink_mission_write_partial_list_message(1, 1, 2, 2))
-    assert request.seq == 2
-    answers = bench.tell(item(2, 16, HERE, 33.0))
-    assert answers[0].type == 0
-    assert [each.z for each in bench.autopilot.plans[0]][1:3] == [20.0, 33.0]
 
 
 def test_a_request_beyond_the_end_is_out_of_sequence() -> None:

@@ -3,7 +3,7 @@ import socket
 from collections.abc import AsyncIterator, Callable
 
 import pytest
-from m2pem_plugin_mavlink.simulator.server import Address, Wire
+from m2pem_plugin_mavlink.simulator.server import Address
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -91,22 +91,6 @@ async def test_a_port_where_nobody_listens_stops_nothing() -> None:
     async with Simulator([VehicleSpec(estimator_s=1)], speed=50, to=nobody) as sim:
         async with asyncio.timeout(40):
             await sim.until(lambda: sim[1].autopilot.estimator.ready)
-
-
-async def test_a_wire_that_is_cut_carries_nothing(listener: Listener) -> None:
-    class Cut(Wire):
-        lost = 0
-
-        def carry(self, data: bytes, peer: Address, now_s: float) -> None:
-            self.lost += 1
-
-    async with Simulator(
-        [VehicleSpec(), VehicleSpec(system=2)], speed=20, to=address(listener)
-    ) as sim:
-        cut = sim[1].port.outward = Cut(lambda data, peer: None)
-        await listener.until(lambda: listener.beats(2) > 3)
-        assert cut.lost > 2
-    assert listener.beats(1) == 0
 
 
 def test_two_vehicles_with_one_number_are_refused() -> None:

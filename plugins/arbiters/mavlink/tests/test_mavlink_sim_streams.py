@@ -1,8 +1,7 @@
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_bench import Bench
-from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-SET, GET, REQUEST = 511, 510, 512
+SET, REQUEST = 511, 512
 
 
 def heard(bench: Bench, id_: int) -> int:
@@ -41,34 +40,13 @@ def test_an_unknown_message_is_denied() -> None:
     bench = Bench()
     assert bench.command(SET, 9999, 1_000_000) == 2
     assert bench.command(REQUEST, 9999) == 4
-    assert bench.command(GET, 9999) == 4
     assert bench.command(SET, float("nan"), 1) == 2
-
-
-def test_an_interval_can_be_asked_for() -> None:
-    bench = Bench()
-    bench.command(SET, 1, 500_000)
-    bench.command(GET, 1)
-    bench.command(GET, 30)
-    told = [(m.message_id, m.interval_us) for m in bench.received if m.get_msgId() == 244]
-    assert told == [(1, 500_000), (30, -1)]
 
 
 def test_each_peer_has_its_own_streams() -> None:
     bench = Bench()
     bench.autopilot.meet("other")
     assert bench.command(SET, 33, 100_000, peer="other") == 0
-    bench.run(5)
-    assert heard(bench, 33) == 0
-
-
-def test_the_old_request_asks_for_a_group() -> None:
-    bench = Bench()
-    bench.tell(dialect.MAVLink_request_data_stream_message(1, 1, 6, 4, 1))
-    bench.run(10)
-    assert 38 <= heard(bench, 33) <= 42
-    bench.tell(dialect.MAVLink_request_data_stream_message(1, 1, 0, 0, 0))
-    bench.received.clear()
     bench.run(5)
     assert heard(bench, 33) == 0
 

@@ -235,16 +235,8 @@ async def test_a_refusal_says_why() -> None:
 async def test_a_cut_link_is_lost_and_found_again() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.until(lambda: vehicle.state.home is not None, AMPLE_S)
-        outward, truth.port.outward = truth.port.outward, _Nowhere()  # type: ignore[assignment]
+        truth.faults.cut_link()
         assert await vehicle.until(lambda: vehicle.link_state is LinkState.LOST, AMPLE_S)
-        truth.port.outward = outward
+        truth.faults.restore_link()
         assert await vehicle.until(lambda: vehicle.link_state is LinkState.CONNECTED, AMPLE_S)
         assert vehicle.state.boots == 1
-
-
-class _Nowhere:
-    def carry(self, *_: object) -> None:
-        pass
-
-    def step(self, _: float) -> None:
-        pass

@@ -110,10 +110,6 @@ class Camera(Component):
     def _commands(self) -> Mapping[int, CommandHandler]:
         return {
             dialect.MAV_CMD_REQUEST_MESSAGE: self._request,
-            dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION: self._old(259),
-            dialect.MAV_CMD_REQUEST_CAMERA_SETTINGS: self._old(260),
-            dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION: self._old(261),
-            dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: self._old(262),
             dialect.MAV_CMD_IMAGE_START_CAPTURE: self._start_pictures,
             dialect.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_pictures,
             dialect.MAV_CMD_VIDEO_START_CAPTURE: lambda _: self._record(True),
@@ -138,16 +134,6 @@ class Camera(Component):
             return Result.UNSUPPORTED
         self._send(maker(), command.sender.peer)
         return Result.ACCEPTED
-
-    def _old(self, message: int) -> CommandHandler:
-        """The old ways to ask: a command for each message."""
-
-        def answer(command: Command) -> Result:
-            if command.param1 == 1 or command.id == dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION:
-                self._send(self._makers[message](), command.sender.peer)
-            return Result.ACCEPTED
-
-        return answer
 
     def _start_pictures(self, command: Command) -> Result:
         """Parameter 2: seconds between them; 3: how many, 0 for as long as it goes; 4: of a single

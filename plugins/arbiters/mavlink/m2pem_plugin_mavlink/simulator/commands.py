@@ -10,7 +10,6 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
     CommandHandler,
     Component,
     MessageHandler,
-    ReportMaker,
 )
 from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender, command_of
 
@@ -173,17 +172,6 @@ class Payload(Component):
         if command.param2 not in (0, 1):
             return Result.DENIED
         return _result(self.set_gripper(command.param2 == 1))
-
-    def reports(self) -> Mapping[int, ReportMaker]:
-        """SERVO_OUTPUT_RAW."""
-        return {dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self._outputs}
-
-    def _outputs(self) -> Any:
-        running = 1500 if self.autopilot.arming.armed else 1000
-        pulses = [running] * RESERVED_SERVOS
-        pulses += [self.servos_us.get(output, 0) for output in range(RESERVED_SERVOS + 1, 17)]
-        time_us = int(self.autopilot.since_boot_s * 1e6) & 0xFFFFFFFF
-        return dialect.MAVLink_servo_output_raw_message(time_us, 0, *pulses)
 
 
 def _result(done: bool) -> Result:

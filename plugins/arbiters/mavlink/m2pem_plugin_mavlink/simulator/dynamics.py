@@ -50,7 +50,7 @@ class BodyState:
 
 @dataclass(frozen=True, slots=True)
 class NoThrust:
-    """No thrust: a vehicle in the air falls."""
+    """No thrust: a vehicle in the air falls, one that drives or floats stops."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,15 +84,6 @@ class VelocitySetpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class DriveSetpoint:
-    """Drive forwards (backwards if negative) along the present heading, and turn."""
-
-    speed_mps: float
-    yaw_rps: float = 0.0
-    yaw_rad: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class CircleSetpoint:
     """Circle a point; a negative `radius_m` means counter-clockwise. Copters face the centre."""
 
@@ -101,7 +92,7 @@ class CircleSetpoint:
     speed_mps: float
 
 
-MotionSetpoint = NoThrust | PositionSetpoint | VelocitySetpoint | DriveSetpoint | CircleSetpoint
+MotionSetpoint = NoThrust | PositionSetpoint | VelocitySetpoint | CircleSetpoint
 
 
 GRAVITY_MPS2 = 9.80665
@@ -193,13 +184,6 @@ class CopterDynamics:
                     setpoint.east_mps,
                     setpoint.up_mps,
                     _turn(body, setpoint.yaw_rad, dt_s) if turn is None else turn,
-                )
-            case DriveSetpoint(speed_mps=speed):
-                return (
-                    speed * math.cos(body.yaw_rad),
-                    speed * math.sin(body.yaw_rad),
-                    0.0,
-                    setpoint.yaw_rps,
                 )
             case CircleSetpoint(center=center):
                 return self._around(body, setpoint, center, dt_s)
@@ -349,9 +333,6 @@ class RoverDynamics:
         speed = max(-self.fastest_mps, min(self.fastest_mps, speed))
         forward = towards(forward, speed, self.acceleration_mps2 * dt_s)
         most_rps = min(self.turn_rps, abs(forward) / self.turn_radius_m)
-        if isinstance(setpoint, DriveSetpoint):
-            # A vehicle that does not move can turn, too: it has tracks or thrusters.
-            most_rps = self.turn_rps
         body.yaw_rps = max(-most_rps, min(most_rps, rate))
         body.yaw_rad = wrapped_rad(body.yaw_rad + body.yaw_rps * dt_s)
         body.north_mps = forward * math.cos(body.yaw_rad)
@@ -379,11 +360,6 @@ class RoverDynamics:
                     return 0.0, setpoint.yaw_rps or 0.0
                 bearing = math.atan2(setpoint.east_mps, setpoint.north_mps)
                 return self._along(body, bearing, speed, 1, dt_s)
-            case DriveSetpoint():
-                rate = setpoint.yaw_rps
-                if setpoint.yaw_rad is not None:
-                    rate = wrapped_rad(setpoint.yaw_rad - body.yaw_rad) / max(dt_s, 0.3)
-                return setpoint.speed_mps, rate
             case CircleSetpoint(center=center):
                 radius_m = max(self.turn_radius_m, abs(setpoint.radius_m))
                 side = 1 if setpoint.radius_m >= 0 else -1

@@ -153,7 +153,6 @@ class Gimbal(Component):
             dialect.MAV_CMD_DO_SET_ROI_LOCATION: self._watch,
             dialect.MAV_CMD_DO_SET_ROI: self._watch,
             dialect.MAV_CMD_DO_SET_ROI_NONE: self._watch_nothing,
-            dialect.MAV_CMD_DO_MOUNT_CONTROL: self._mount_control,
         }
 
     def messages(self) -> Mapping[str, MessageHandler]:
@@ -201,14 +200,6 @@ class Gimbal(Component):
         self._target = None
         self.pointing.point(*NEUTRAL, locked=False)
         return Result.ACCEPTED
-
-    def _mount_control(self, command: Command) -> Result:
-        """The old way; only with angles."""
-        if command.z != dialect.MAV_MOUNT_MODE_MAVLINK_TARGETING:
-            return Result.FAILED
-        angles = (math.radians(command.param1), math.radians(command.param3))
-        done = self._point(YAW_FROM_VEHICLE, *angles, math.nan, math.nan)
-        return Result.ACCEPTED if done else Result.FAILED
 
     def _set_pitch_yaw(self, message: Any, sender: Sender) -> None:
         if message.gimbal_device_id in (0, DEVICE) and self._may(sender):

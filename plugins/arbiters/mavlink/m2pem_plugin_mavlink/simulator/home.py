@@ -5,16 +5,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.simulator.geometry import Location, Point
+from m2pem_plugin_mavlink.simulator.geometry import Point
 from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
-    CommandHandler,
     Component,
     ReportMaker,
 )
-from m2pem_plugin_mavlink.simulator.messages import Command, Result
-
-HIGHEST_M = 100_000.0
 
 
 class Home(Component):
@@ -24,7 +20,6 @@ class Home(Component):
         super().__init__(autopilot)
         self.point = Point(0.0, 0.0, 0.0)
         self.known = False
-        self._locked = False
 
     def set(self, point: Point) -> None:
         """Set home, and report it to all peers."""
@@ -33,8 +28,8 @@ class Home(Component):
         self.autopilot.send(self._origin())
 
     def set_at_arming(self) -> None:
-        """Set home at arming, unless a command has set it."""
-        if self.known and not self._locked:
+        """Set home at arming."""
+        if self.known:
             self.set(self.autopilot.position)
 
     def step(self, dt_s: float) -> None:
@@ -48,38 +43,6 @@ class Home(Component):
             dialect.MAVLINK_MSG_ID_HOME_POSITION: self._home,
             dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._origin,
         }
-
-    def commands(self) -> Mapping[int, CommandHandler]:
-        """Setting and asking."""
-        return {
-            dialect.MAV_CMD_DO_SET_HOME: self._set,
-            dialect.MAV_CMD_GET_HOME_POSITION: self._get,
-        }
-
-    def _set(self, command: Command) -> Result:
-        autopilot = self.autopilot
-        if command.param1 == 1:
-            if not autopilot.estimator.ready:
-                return Result.FAILED
-            self.set(autopilot.position)
-        elif command.has_position and abs(command.z) < HIGHEST_M:
-            origin_m = autopilot.frame.origin.altitude_amsl_m
-            relative = command.frame in (3, 6, 10, 11) and not command.was_long
-            z_m = command.z + self.point.up_m + origin_m if relative else command.z
-            self.set(
-                autopilot.frame.to_point(Location(command.latitude_deg, command.longitude_deg, z_m))
-            )
-        else:
-            return Result.DENIED
-        self._locked = True
-        return Result.ACCEPTED
-
-    def _get(self, command: Command) -> Result:
-        message = self._home()
-        if message is None:
-            return Result.FAILED
-        self.autopilot.send(message, command.sender.peer)
-        return Result.ACCEPTED
 
     def _home(self) -> Any:
         if not self.known:

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 from m2pem_plugin_mavlink.simulator.dynamics import (
     BodyState,
     CircleSetpoint,
-    DriveSetpoint,
     MotionSetpoint,
+    NoThrust,
     PositionSetpoint,
 )
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Point
@@ -219,12 +219,12 @@ class Maneuver:
         tuning = self.autopilot.tuning
         match self.autopilot.spec.kind:
             case Kind.ROVER:
-                return DriveSetpoint(0.0)
+                return NoThrust()
             case Kind.PLANE:
                 return CircleSetpoint(point, tuning.loiter_radius_m, tuning.cruise_mps)
             case Kind.BOAT:
                 if self.autopilot.position.distance_m(point) <= tuning.loiter_radius_m:
-                    return DriveSetpoint(0.0)
+                    return NoThrust()
         return self.reach(point, yaw_rad=self.autopilot.body.yaw_rad)
 
     def reach(self, point: Point, *, yaw_rad: float | None = None) -> PositionSetpoint:

@@ -1,6 +1,5 @@
 """What a vehicle does in a mode: each maneuver gives the dynamics a motion setpoint."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from pymavlink.dialects.v20.ardupilotmega import (
@@ -10,7 +9,6 @@ from pymavlink.dialects.v20.ardupilotmega import (
 
 from m2pem_plugin_mavlink.simulator.dynamics import (
     CircleSetpoint,
-    DriveSetpoint,
     MotionSetpoint,
     NoThrust,
     PositionSetpoint,
@@ -35,7 +33,7 @@ class HoldPosition(Maneuver):
             if autopilot.spec.kind is Kind.COPTER and autopilot.body.moving:
                 return PositionSetpoint(autopilot.position, 0.0, 0.0, 0.0, autopilot.body.yaw_rad)
             if autopilot.spec.kind is Kind.BOAT and autopilot.body.moving:
-                return DriveSetpoint(0.0)
+                return NoThrust()
             self._point = autopilot.position
         return self.stay(self._point)
 
@@ -45,7 +43,7 @@ class Stop(Maneuver):
 
     def step(self, dt_s: float) -> MotionSetpoint:
         """No speed."""
-        return DriveSetpoint(0.0)
+        return NoThrust()
 
 
 class CircleHere(Maneuver):
@@ -198,7 +196,6 @@ class Guided(Maneuver):
     takeoff_up_m: float | None = None
     radius_m = 0.0
     destination: Point | None = None
-    paused = False
     _entered = False
     aimed = False
 
@@ -215,7 +212,7 @@ class Guided(Maneuver):
     def begin(self) -> None:
         """Nothing has been asked for yet."""
         self._stay = HoldPosition(self.autopilot)
-        self._velocity: Callable[[], MotionSetpoint] | None = None
+        self._velocity: VelocitySetpoint | None = None
         self._velocity_until_s = 0.0
         self.yaw_rad: float | None = None
         if not self._entered:
@@ -249,10 +246,10 @@ class Guided(Maneuver):
             )
             self._say_reached()
         self._aim(True)
-        self.taking_off, self._velocity, self.paused = False, None, False
+        self.taking_off, self._velocity = False, None
         self.destination, self.yaw_rad = point, yaw_rad
 
-    def move(self, setpoint: Callable[[], MotionSetpoint]) -> None:
+    def move(self, setpoint: VelocitySetpoint) -> None:
         """Follow a velocity for a while."""
         if self._velocity is None:
             self.autopilot.log_event("motion", "velocity")
@@ -260,11 +257,6 @@ class Guided(Maneuver):
         self.taking_off, self.destination = False, None
         self._velocity = setpoint
         self._velocity_until_s = self.autopilot.now_s + self.autopilot.tuning.setpoint_timeout_s
-
-    def pause(self, *, on: bool) -> None:
-        """Stop on the way, or go on."""
-        self.paused = on
-        self._stay = HoldPosition(self.autopilot)
 
     def stop(self) -> None:
         """Hold the position."""
@@ -288,12 +280,12 @@ class Guided(Maneuver):
             return NoThrust()
         if self._velocity is not None:
             if autopilot.now_s <= self._velocity_until_s:
-                return self._velocity()
+                return self._velocity
             self.stop()
             if autopilot.spec.kind in SURFACE:
                 text = "target not received last 3secs, stopping"
                 autopilot.say(text, MAV_SEVERITY_WARNING)
-        if self.destination is not None and not self.paused:
+        if self.destination is not None:
             return self._towards(self.destination)
         return self._turned(self._stay.step(dt_s))
 
@@ -309,7 +301,7 @@ class Guided(Maneuver):
                     self._stay = HoldPosition(autopilot)
                     self.aimed = autopilot.spec.kind is Kind.ROVER
                     autopilot.send(MAVLink_mission_item_reached_message(0))
-                    return DriveSetpoint(0.0)
+                    return NoThrust()
         return self.reach(destination, yaw_rad=self.yaw_rad)
 
     def _turned(self, setpoint: MotionSetpoint) -> MotionSetpoint:

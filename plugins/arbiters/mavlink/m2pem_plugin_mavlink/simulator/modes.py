@@ -1,7 +1,6 @@
 """Changing modes: the present mode and its maneuver."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -11,10 +10,9 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
     CommandHandler,
     Component,
     Maneuver,
-    MessageHandler,
     Mode,
 )
-from m2pem_plugin_mavlink.simulator.messages import Command, Result, Sender
+from m2pem_plugin_mavlink.simulator.messages import Command, Result
 
 
 class ModeSwitch(Component):
@@ -94,26 +92,10 @@ class ModeSwitch(Component):
         """DO_SET_MODE."""
         return {dialect.MAV_CMD_DO_SET_MODE: self._command}
 
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """The old SET_MODE."""
-        return {"SET_MODE": self._message}
-
     def _command(self, command: Command) -> Result:
         number = self.autopilot.firmware.mode_number(
             int(command.param1), int(command.param2), int(command.param3)
         )
-        return self._asked(number)
-
-    def _message(self, message: Any, sender: Sender) -> None:
-        """ArduPilot acknowledges it as if it were a command (number 11, its message id)."""
-        custom = message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        result = self._asked(message.custom_mode if custom else None)
-        ack = dialect.MAVLink_command_ack_message(
-            dialect.MAVLINK_MSG_ID_SET_MODE, result, 0, 0, sender.system, sender.component
-        )
-        self.autopilot.send(ack, sender.peer)
-
-    def _asked(self, number: int | None) -> Result:
         if number is None:
             return Result.DENIED
         switched = self.switch(number)

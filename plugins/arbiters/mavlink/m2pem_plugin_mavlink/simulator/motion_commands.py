@@ -6,7 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem_plugin_mavlink.simulator.dynamics import DriveSetpoint, MotionSetpoint, VelocitySetpoint
+from m2pem_plugin_mavlink.simulator.dynamics import VelocitySetpoint
 from m2pem_plugin_mavlink.simulator.geometry import Location, Point, wrapped_rad
 from m2pem_plugin_mavlink.simulator.interfaces import CommandHandler, Component, MessageHandler
 from m2pem_plugin_mavlink.simulator.maneuvers import Guided
@@ -18,28 +18,21 @@ from m2pem_plugin_mavlink.simulator.messages import (
     Result,
     Sender,
 )
-from m2pem_plugin_mavlink.simulator.missions.execution import ITSELF, AutoMission
+from m2pem_plugin_mavlink.simulator.missions.execution import ITSELF
 from m2pem_plugin_mavlink.simulator.specification import Kind
 
 IGNORE_POSITION = 7
 IGNORE_VELOCITY = 7 << 3
 IGNORE_YAW, IGNORE_YAW_RATE = 1 << 10, 1 << 11
 """POSITION_TARGET_TYPEMASK."""
-BODY_FRAMES = (8, 9, 12)
-"""MAV_FRAME: velocities are forward, right, down."""
-OFFSET_FRAMES = (7, 9)
-"""MAV_FRAME: positions are counted from the vehicle."""
 
 
 class GuidedSetpoints(Component):
     """Passes setpoints to GUIDED; in other modes they are ignored."""
 
     def messages(self) -> Mapping[str, MessageHandler]:
-        """Both setpoints."""
-        return {
-            "SET_POSITION_TARGET_GLOBAL_INT": self._global,
-            "SET_POSITION_TARGET_LOCAL_NED": self._local,
-        }
+        """Setpoints in the frame of the vehicle's home."""
+        return {"SET_POSITION_TARGET_LOCAL_NED": self._take}
 
     def forbidden(self, point: Point) -> bool:
         """Return whether the fence forbids a point; ArduPilot sends no reason."""
@@ -66,62 +59,22 @@ class GuidedSetpoints(Component):
         maneuver = self.autopilot.modes.maneuver
         return maneuver if isinstance(maneuver, Guided) else None
 
-    def _global(self, message: Any, sender: Sender) -> None:
-        values = (message.alt, message.vx, message.vy, message.vz, message.yaw, message.yaw_rate)
-        on_earth = abs(message.lat_int) <= 900000000 and abs(message.lon_int) <= 1800000000
-        if not on_earth or not all(map(math.isfinite, values)):
+    def _take(self, message: Any, sender: Sender) -> None:
+        guided, mask = self._guided(), message.type_mask
+        local = message.coordinate_frame == dialect.MAV_FRAME_LOCAL_NED
+        if guided is None or not local or not self.autopilot.arming.armed:
             return
-        location = Location(message.lat_int * 1e-7, message.lon_int * 1e-7, 0.0)
-        up_m = self.up_m(message.alt, message.coordinate_frame)
-        self._take(message, self.autopilot.frame.to_point(location).at_height(up_m), False)
-
-    def _local(self, message: Any, sender: Sender) -> None:
-        body, frame = self.autopilot.body, message.coordinate_frame
         values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)
         if not all(map(math.isfinite, (*values, message.yaw, message.yaw_rate))):
             return
-        north_m, east_m, up_m = message.x, message.y, -message.z
-        if frame in BODY_FRAMES:
-            north_m, east_m = _turned(north_m, east_m, body.yaw_rad)
-        if frame in OFFSET_FRAMES:
-            north_m, east_m, up_m = north_m + body.north_m, east_m + body.east_m, up_m + body.up_m
-        self._take(message, Point(north_m, east_m, up_m), frame in BODY_FRAMES)
-
-    def _take(self, message: Any, point: Point, of_body: bool) -> None:
-        guided, mask = self._guided(), message.type_mask
-        if guided is None or not self.autopilot.arming.armed:
-            return
         yaw = None if mask & IGNORE_YAW else message.yaw
-        if yaw is not None and of_body:
-            yaw = wrapped_rad(yaw + self.autopilot.body.yaw_rad)
         if mask & IGNORE_POSITION != IGNORE_POSITION:
-            point = self._on_surface(point)
+            point = self._on_surface(Point(message.x, message.y, -message.z))
             if not self.forbidden(point):
                 guided.go_to(point, yaw)
         elif mask & IGNORE_VELOCITY != IGNORE_VELOCITY and self.autopilot.spec.kind != Kind.PLANE:
             rate = None if mask & IGNORE_YAW_RATE else message.yaw_rate
-            guided.move(self._velocity(message.vx, message.vy, -message.vz, yaw, rate, of_body))
-        elif not mask & IGNORE_YAW:
-            guided.yaw_rad = yaw
-
-    def _velocity(
-        self, x: float, y: float, up: float, yaw: float | None, rate: float | None, of_body: bool
-    ) -> Any:
-        """In the body's frame, the velocity turns with the body."""
-        body = self.autopilot.body
-        if self.autopilot.spec.kind in (Kind.ROVER, Kind.BOAT) and of_body:
-            return lambda: DriveSetpoint(x, rate or 0.0, yaw)
-
-        def setpoint() -> MotionSetpoint:
-            north, east = _turned(x, y, body.yaw_rad) if of_body else (x, y)
-            return VelocitySetpoint(north, east, up, yaw, rate)
-
-        return setpoint
-
-
-def _turned(forward: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return forward * cos - right * sin, forward * sin + right * cos
+            guided.move(VelocitySetpoint(message.vx, message.vy, -message.vz, yaw, rate))
 
 
 SURFACE = (Kind.ROVER, Kind.BOAT)
@@ -150,7 +103,6 @@ class MotionCommands(Component):
         if kind is Kind.COPTER:
             handlers[dialect.MAV_CMD_NAV_TAKEOFF] = self._take_off
             handlers[dialect.MAV_CMD_CONDITION_YAW] = self._yaw
-            handlers[dialect.MAV_CMD_DO_PAUSE_CONTINUE] = self._pause
         elif kind is not Kind.PLANE:
             handlers[dialect.MAV_CMD_DO_SET_REVERSE] = self._reverse
         return handlers
@@ -237,15 +189,6 @@ class MotionCommands(Component):
             sign = -1 if command.param3 < 0 else 1
             angle = self.autopilot.body.yaw_rad + sign * angle
         guided.yaw_rad = wrapped_rad(angle)
-        return Result.ACCEPTED
-
-    def _pause(self, command: Command) -> Result:
-        if command.param1 not in (0, 1):
-            return Result.DENIED
-        maneuver = self.autopilot.modes.maneuver
-        if not isinstance(maneuver, Guided | AutoMission):
-            return Result.FAILED
-        maneuver.pause(on=command.param1 == 0)
         return Result.ACCEPTED
 
     def _reverse(self, command: Command) -> Result:

@@ -143,7 +143,7 @@ class Offboard(Guided):
         if not (autopilot.body.on_ground and autopilot.spec.kind is Kind.COPTER):
             return super().step(dt_s)
         if self._velocity is not None and autopilot.now_s <= self._velocity_until_s:
-            return self._velocity()
+            return self._velocity
         if self.destination is not None and self.destination.up_m > autopilot.body.up_m:
             return self.reach(self.destination, yaw_rad=self.yaw_rad)
         return NoThrust()

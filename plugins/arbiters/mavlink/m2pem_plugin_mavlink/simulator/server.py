@@ -16,18 +16,16 @@ Deliver = Callable[[bytes, Address], None]
 
 
 class Wire:
-    """One direction of a vehicle's link. Link faults are subclasses: they lose, delay or double
-    frames."""
+    """One direction of a vehicle's link. `cut`: it carries nothing."""
 
     def __init__(self, deliver: Deliver) -> None:
         self.deliver = deliver
+        self.cut = False
 
-    def carry(self, data: bytes, peer: Address, now_s: float) -> None:
+    def carry(self, data: bytes, peer: Address) -> None:
         """Deliver a frame, or a received datagram."""
-        self.deliver(data, peer)
-
-    def step(self, now_s: float) -> None:
-        """Deliver what was delayed until now."""
+        if not self.cut:
+            self.deliver(data, peer)
 
 
 logger = logging.getLogger(__name__)
@@ -36,7 +34,7 @@ logger = logging.getLogger(__name__)
 class VehiclePort(asyncio.DatagramProtocol):
     """One vehicle on one socket. Peers are UDP addresses; who speaks to the socket becomes one.
 
-    `outward` and `inward` carry frames and datagrams; replace them to make a bad link.
+    `outward` and `inward` carry frames and datagrams.
     """
 
     def __init__(self, autopilot: Autopilot) -> None:
@@ -59,17 +57,15 @@ class VehiclePort(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
         """A datagram has come."""
-        self.inward.carry(data, addr[:2], self.autopilot.now_s)
+        self.inward.carry(data, addr[:2])
 
     def error_received(self, exc: Exception) -> None:
         """No process listens at the peer (yet); later messages may arrive."""
 
     def step(self, now_s: float) -> None:
         """Advance simulated time, and send messages."""
-        self.inward.step(now_s)
         self.autopilot.step(now_s)
         self.flush()
-        self.outward.step(now_s)
 
     def flush(self) -> None:
         """Send the messages of the outbox."""
@@ -85,7 +81,7 @@ class VehiclePort(asyncio.DatagramProtocol):
                     # One message that cannot be sent must not stop the other vehicles.
                     logger.exception("cannot encode %s", outgoing.message)
                     continue
-                self.outward.carry(frame, address, self.autopilot.now_s)
+                self.outward.carry(frame, address)
 
     def close(self) -> None:
         """Close the socket."""

@@ -30,10 +30,10 @@ logger = logging.getLogger(__name__)
 class SimulatedVehicle:
     """The true state of a vehicle, whatever its telemetry says, and access to its autopilot."""
 
-    def __init__(self, port: VehiclePort, seed: int) -> None:
+    def __init__(self, port: VehiclePort) -> None:
         self.port = port
         self.autopilot: Autopilot = port.autopilot
-        self.faults = Faults(port, seed)
+        self.faults = Faults(port)
 
     @property
     def address(self) -> Address:
@@ -94,7 +94,6 @@ class Simulator:
         speed: float = 1.0,
         to: Address | None = ("127.0.0.1", 14550),
         listen: Address | None = None,
-        seed: int = 0,
     ) -> None:
         self.speed = speed
         self._to, self._listen = to, listen
@@ -104,7 +103,7 @@ class Simulator:
             if spec.system in self._vehicles:
                 raise ValueError(f"two vehicles have the system id {spec.system}")
             autopilot = Autopilot(spec, step_s=step_s)
-            self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot), seed)
+            self._vehicles[spec.system] = SimulatedVehicle(VehiclePort(autopilot))
         self.now_s = 0.0
         self._moved = asyncio.Event()
         self._task: asyncio.Task[None] | None = None

@@ -1,7 +1,6 @@
 """Which messages go to whom how often. ArduPilot sends little until it is asked.
 
-Each peer has its own rates, set by SET_MESSAGE_INTERVAL or (old) REQUEST_DATA_STREAM. Rates are in
-simulated time.
+Each peer has its own rates, set by SET_MESSAGE_INTERVAL, in simulated time.
 """
 
 from collections.abc import Mapping
@@ -13,21 +12,9 @@ from m2pem_plugin_mavlink.simulator.interfaces import (
     AutopilotInterface,
     CommandHandler,
     Component,
-    MessageHandler,
     ReportMaker,
 )
-from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result, Sender
-
-STREAM_GROUPS: Mapping[int, tuple[int, ...]] = {
-    dialect.MAV_DATA_STREAM_RAW_SENSORS: (27, 116, 129, 29),
-    dialect.MAV_DATA_STREAM_EXTENDED_STATUS: (1, 125, 42, 24, 62, 147, 162),
-    dialect.MAV_DATA_STREAM_RC_CHANNELS: (36, 65),
-    dialect.MAV_DATA_STREAM_POSITION: (33, 32),
-    dialect.MAV_DATA_STREAM_EXTRA1: (30,),
-    dialect.MAV_DATA_STREAM_EXTRA2: (74,),
-    dialect.MAV_DATA_STREAM_EXTRA3: (2, 193, 241, 136),
-}
-"""MAV_DATA_STREAM to ids of messages, as ArduPilot groups them."""
+from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result
 
 
 class Streams(Component):
@@ -45,11 +32,6 @@ class Streams(Component):
         for id_, interval_s in self.autopilot.firmware.default_streams().items():
             if id_ in self.makers:
                 self._set(peer, id_, interval_s)
-
-    def interval_s(self, peer: Peer, id_: int) -> float | None:
-        """Return the interval of a message for a peer; None: it is not sent."""
-        entry = self._due.get(peer, {}).get(id_)
-        return entry[0] if entry else None
 
     def _set(self, peer: Peer, id_: int, interval_s: float) -> None:
         self._due[peer][id_] = [interval_s, self.autopilot.now_s]
@@ -74,16 +56,11 @@ class Streams(Component):
         self._next_s = next_s
 
     def commands(self) -> Mapping[int, CommandHandler]:
-        """Setting, asking for and getting."""
+        """Setting, and asking for one message."""
         return {
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
-            dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
             dialect.MAV_CMD_REQUEST_MESSAGE: self._request,
         }
-
-    def messages(self) -> Mapping[str, MessageHandler]:
-        """The old way to ask."""
-        return {"REQUEST_DATA_STREAM": self._request_stream}
 
     def _set_interval(self, command: Command) -> Result:
         id_, interval_us = int(command.param1), command.param2
@@ -106,15 +83,6 @@ class Streams(Component):
             self._set(peer, id_, interval_us * 1e-6)
         return Result.ACCEPTED
 
-    def _get_interval(self, command: Command) -> Result:
-        id_, peer = int(command.param1), command.sender.peer
-        if id_ not in self.makers:
-            return Result.FAILED
-        interval_s = self.interval_s(peer, id_)
-        interval_us = -1 if interval_s is None else round(interval_s * 1e6)
-        self.autopilot.send(dialect.MAVLink_message_interval_message(id_, interval_us), peer)
-        return Result.ACCEPTED
-
     def _request(self, command: Command) -> Result:
         """ArduPilot acknowledges it even if there is nothing to send; PX4 denies it."""
         id_, firmware = int(command.param1), self.autopilot.firmware
@@ -126,17 +94,3 @@ class Streams(Component):
         if not firmware.is_ardupilot:
             return Result.DENIED if message is None else Result.ACCEPTED
         return Result.ACCEPTED if known else Result.FAILED
-
-    def _request_stream(self, message: Any, sender: Sender) -> None:
-        group = message.req_stream_id
-        groups = STREAM_GROUPS if group == dialect.MAV_DATA_STREAM_ALL else (group,)
-        rate_hz = message.req_message_rate if message.start_stop else 0
-        fastest_s = 1 / self.autopilot.firmware.loop_hz
-        for each in groups:
-            for id_ in STREAM_GROUPS.get(each, ()):
-                if id_ not in self.makers:
-                    continue
-                if rate_hz:
-                    self._set(sender.peer, id_, max(1 / rate_hz, fastest_s))
-                else:
-                    self._due[sender.peer].pop(id_, None)

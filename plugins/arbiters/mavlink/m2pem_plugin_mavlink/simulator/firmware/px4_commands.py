@@ -49,7 +49,6 @@ class Px4Commands(Component):
             dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda _: self._enter(RETURN),
             dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda _: self._enter(HOLD),
             dialect.MAV_CMD_CONDITION_YAW: lambda _: Result.UNSUPPORTED,
-            dialect.MAV_CMD_DO_PAUSE_CONTINUE: lambda _: Result.UNSUPPORTED,
         }
         if self.autopilot.spec.kind is Kind.COPTER:
             handlers[dialect.MAV_CMD_NAV_TAKEOFF] = self._take_off

@@ -66,8 +66,7 @@ class OffboardMonitor(Component):
 
     def messages(self) -> Mapping[str, MessageHandler]:
         """The setpoints; what they ask for is the maneuver's."""
-        names = ("LOCAL_NED", "GLOBAL_INT")
-        return {f"SET_POSITION_TARGET_{name}": self._received for name in names}
+        return {"SET_POSITION_TARGET_LOCAL_NED": self._received}
 
     def _received(self, message: Any, sender: Sender) -> None:
         self._received_s = self.autopilot.now_s

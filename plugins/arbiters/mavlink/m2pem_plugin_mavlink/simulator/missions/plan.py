@@ -73,23 +73,16 @@ INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_ALTITUDE = 6, 10, 11, 12
 NAVIGATION: dict[int, str] = {
     16: "WP",
     17: "LoitUnlim",
-    18: "LoitTurns",
-    19: "LoitTime",
     20: "RTL",
     21: "Land",
     22: "Takeoff",
-    31: "LoitAltitude",
-    82: "SplineWP",
-    93: "Delay",
 }
-"""What the vehicle does one after the other: MAV_CMD to ArduPilot's name."""
+"""What the vehicle does one after the other, of those that m2pem uploads or recorded conversations
+have: MAV_CMD to ArduPilot's name."""
 
 ACTIONS: dict[int, str] = {
-    112: "CondDelay",
     115: "CondYaw",
-    177: "Jump",
     178: "ChangeSpeed",
-    179: "SetHome",
     181: "SetRelay",
     183: "SetServo",
     189: "LandStart",
@@ -98,7 +91,6 @@ ACTIONS: dict[int, str] = {
     197: "SetROI",
     201: "SetROI",
     203: "DigiCamCtrl",
-    205: "MountControl",
     206: "SetCamTrigDst",
     207: "FenceEnable",
     211: "Gripper",
@@ -106,7 +98,7 @@ ACTIONS: dict[int, str] = {
 }
 """What it does on the way."""
 
-WITH_PLACE = frozenset({16, 17, 18, 19, 21, 31, 82})
+WITH_PLACE = frozenset({16, 17, 21})
 """Those that are of no use with a place off the Earth."""
 FENCE_COMMANDS = frozenset(range(5000, 5005))
 RALLY_COMMANDS = frozenset({5100})
@@ -115,17 +107,7 @@ FRAMES = GLOBAL_FRAMES | {1, MISSION_FRAME}
 
 
 def item_of(message: Any) -> Item:
-    """The item in MISSION_ITEM_INT, or in the old MISSION_ITEM (degrees as floats).
-
-    Raises:
-        ValueError: a coordinate is not a number.
-        OverflowError: a coordinate is infinite.
-    """
-    x, y = message.x, message.y
-    if message.get_msgId() == dialect.MAVLINK_MSG_ID_MISSION_ITEM:
-        x, y = round(x * 1e7), round(y * 1e7)
-        if max(abs(x), abs(y)) >= 1 << 31:
-            raise OverflowError(f"{message.x}, {message.y} is no place")
+    """The item in MISSION_ITEM_INT."""
     return Item(
         message.frame,
         message.command,
@@ -133,8 +115,8 @@ def item_of(message: Any) -> Item:
         message.param2,
         message.param3,
         message.param4,
-        x,
-        y,
+        message.x,
+        message.y,
         message.z,
         message.autocontinue,
     )
@@ -162,17 +144,9 @@ def fault_of(kind: int, item: Item) -> int:
     return ACCEPTED if math.isfinite(item.z) else INVALID_ALTITUDE
 
 
-def message_of(
-    item: Item, seq: int, kind: int, current: bool, to: tuple[int, int], whole: bool
-) -> Any:
-    """As MISSION_ITEM_INT, or (not `whole`) as the old MISSION_ITEM."""
-    make = dialect.MAVLink_mission_item_int_message
-    x: float = item.x
-    y: float = item.y
-    if not whole:
-        make = dialect.MAVLink_mission_item_message
-        x, y = x * 1e-7, y * 1e-7
-    return make(
+def message_of(item: Item, seq: int, kind: int, current: bool, to: tuple[int, int]) -> Any:
+    """As MISSION_ITEM_INT."""
+    return dialect.MAVLink_mission_item_int_message(
         *to,
         seq,
         item.frame,
@@ -183,8 +157,8 @@ def message_of(
         item.param2,
         item.param3,
         item.param4,
-        x,
-        y,
+        item.x,
+        item.y,
         item.z,
         kind,
     )

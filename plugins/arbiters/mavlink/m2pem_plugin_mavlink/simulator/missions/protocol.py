@@ -23,16 +23,20 @@ from m2pem_plugin_mavlink.simulator.missions.plan import (
 
 @dataclass(slots=True)
 class Upload:
-    """Who uploads which kind of plan, the next item, the one behind the last."""
+    """Who uploads which kind of plan of how many items, and the items that came. They become the
+    plan of PX4 all at once."""
 
     uploader: Sender
     kind: int
-    next: int
-    end: int
+    count: int
     asked_s: float
     received_s: float
     items: list[Item] = field(default_factory=list)
-    """Those that came, where they become the plan all at once."""
+
+    @property
+    def next(self) -> int:
+        """The index of the item that is to come."""
+        return len(self.items)
 
     def should_ask(self, now_s: float, after_s: float) -> bool:
         """It is time to ask again for an item that did not come."""
@@ -44,7 +48,7 @@ class Upload:
 
 
 ERROR, UNSUPPORTED, NO_SPACE = 1, 3, 4
-INVALID, INVALID_SEQUENCE, DENIED, CANCELLED = 5, 13, 14, 15
+INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
 """MAV_MISSION_RESULT."""
 ALL = 255
 """MAV_MISSION_TYPE of a request to clear all plans."""
@@ -75,12 +79,9 @@ class MissionServer(Component):
         """The protocol."""
         return {
             "MISSION_COUNT": self._begin,
-            "MISSION_WRITE_PARTIAL_LIST": self._begin_partial,
             "MISSION_ITEM_INT": self._take,
-            "MISSION_ITEM": self._take,
             "MISSION_REQUEST_LIST": self._count,
             "MISSION_REQUEST_INT": self._give,
-            "MISSION_REQUEST": self._give,
             "MISSION_CLEAR_ALL": self._clear,
             "MISSION_ACK": self._acknowledged,
         }
@@ -119,20 +120,9 @@ class MissionServer(Component):
             self._replace(kind, ())
             self._complete(sender, kind)
         else:
-            self._start(sender, kind, 0, count)
-
-    def _begin_partial(self, message: Any, sender: Sender) -> None:
-        """PX4 does not know it."""
-        kind, first, last = message.mission_type, message.start_index, message.end_index
-        if not self._ardupilot:
-            return
-        if not self._may_upload(kind, sender):
-            return
-        if not 0 <= first <= last < len(self.autopilot.plans[kind]):
-            self.autopilot.warn("Flight plan update rejected")
-            self._acknowledge(sender, kind, ERROR)
-            return
-        self._start(sender, kind, first, last + 1)
+            now_s = self.autopilot.now_s
+            self.upload = Upload(sender, kind, count, now_s, now_s)
+            self._ask(self.upload)
 
     def _may_upload(self, kind: int, sender: Sender) -> bool:
         if kind not in MOST_ITEMS:
@@ -142,11 +132,6 @@ class MissionServer(Component):
         if other:
             self._acknowledge(sender, kind, DENIED if self._ardupilot else ERROR)
         return not other
-
-    def _start(self, sender: Sender, kind: int, first: int, end: int) -> None:
-        now_s = self.autopilot.now_s
-        self.upload = Upload(sender, kind, first, end, now_s, now_s)
-        self._ask(self.upload)
 
     def _ask(self, upload: Upload) -> None:
         upload.asked_s = self.autopilot.now_s
@@ -170,11 +155,8 @@ class MissionServer(Component):
         if sender != upload.uploader:
             self._acknowledge(sender, kind, DENIED)
             return
-        try:
-            item = item_of(message)
-            fault = fault_of(kind, item)
-        except (ValueError, OverflowError):
-            fault = INVALID
+        item = item_of(message)
+        fault = fault_of(kind, item)
         if fault != ACCEPTED:
             self.upload = None
             if not self._ardupilot:
@@ -186,8 +168,7 @@ class MissionServer(Component):
             self._counted(kind)
         upload.items.append(item)
         upload.received_s = self.autopilot.now_s
-        upload.next += 1
-        if upload.next < upload.end:
+        if upload.next < upload.count:
             self._ask(upload)
         else:
             self.upload = None
@@ -246,10 +227,8 @@ class MissionServer(Component):
         if self._ardupilot:
             item = item._replace(frame=KEPT_FRAMES.get(item.frame, item.frame))
         current = kind == MISSION and seq == autopilot.mission.current
-        whole = message.get_type() == "MISSION_REQUEST_INT"
         to = (sender.system, sender.component)
-        message = message_of(item, seq, kind, current=current, to=to, whole=whole)
-        autopilot.send(message, sender.peer)
+        autopilot.send(message_of(item, seq, kind, current=current, to=to), sender.peer)
 
     def _home(self) -> Item:
         """Item 0 is the home position, whatever was uploaded there."""
