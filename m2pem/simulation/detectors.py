@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
+from m2pem.api.simulator_settings import Coordinates
 from m2pem.api.telemetry import Detection, GeoPosition
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.settings import Coordinates
 from m2pem.simulation.trajectory import US_PER_S
 from m2pem.simulation.vehicles import SimVehicle
 

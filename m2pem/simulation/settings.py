@@ -8,6 +8,7 @@ from itertools import chain
 from typing import Any
 
 from m2pem.api.arbiter import Connection
+from m2pem.api.simulator_settings import Coordinates, coordinates, fraction, number
 from m2pem.errors import FleetError
 from m2pem.findings import Finding, Severity
 from m2pem.geo.local_frame import Origin
@@ -16,8 +17,6 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.faults import Fault, read_faults
 from m2pem.simulation.kinematics import DEFAULTS, Kinematics
 from m2pem.units import Dimension, quantity
-
-Coordinates = tuple[float, float, float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +177,7 @@ class _Reader:
         if key == "endurance" and value == math.inf:
             return math.inf
         try:
-            return _plain(value) if dimension is None else quantity(value, dimension)
+            return number(value) if dimension is None else quantity(value, dimension)
         except ValueError as error:
             self.wrong(key, error)
             return default
@@ -196,16 +195,10 @@ class _Reader:
         if value is None:
             return default
         try:
-            if isinstance(value, str) and value.strip().endswith("%"):
-                number = float(value.strip()[:-1]) / 100
-            else:
-                number = _plain(value)
-        except ValueError:
-            number = math.nan
-        if not 0 <= number <= 1:
-            self.wrong(key, f"{value!r} is neither a percentage ('80 %') nor a fraction (0.8)")
+            return fraction(value)
+        except ValueError as error:
+            self.wrong(key, error)
             return default
-        return number
 
     def text(self, key: str) -> str:
         value = self._settings.get(key, "")
@@ -225,7 +218,7 @@ class _Reader:
         if value is None:
             return None
         try:
-            place = _coordinates(value)
+            place = coordinates(value)
         except ValueError as error:
             self.wrong(key, error)
             return None
@@ -256,35 +249,14 @@ class _Reader:
         return tuple(found)
 
 
-def _plain(value: object) -> float:
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f"{value!r} is not a number")
-    return number
-
-
-def _coordinates(value: object) -> Coordinates:
-    if isinstance(value, Mapping):
-        value = [value.get("lat"), value.get("lon"), *([value["alt"]] if "alt" in value else [])]
-    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
-        raise ValueError(f"{value!r} is not a position; write [lat, lon] or [lat, lon, alt]")
-    latitude, longitude = _plain(value[0]), _plain(value[1])
-    if abs(latitude) > 90 or abs(longitude) > 180:
-        raise ValueError(f"{list(value)} is not a position: latitude comes first, in degrees")
-    return latitude, longitude, _plain(value[2]) if len(value) == 3 else None
-
-
 def _detection(item: Mapping[str, Any]) -> PlannedDetection:
     position = item.get("position")
     return PlannedDetection(
         quantity(item["at"], Dimension.DURATION),
         str(item["type"]),
-        None if position is None else _coordinates(position),
+        None if position is None else coordinates(position),
     )
 
 
 def _target(item: Mapping[str, Any]) -> Target:
-    return Target(str(item["type"]), _coordinates(item["position"]))
+    return Target(str(item["type"]), coordinates(item["position"]))

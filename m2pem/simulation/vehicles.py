@@ -109,6 +109,9 @@ class SimVehicle:
 
     def battery_at(self, now_us: int) -> float:
         """What is left, as a fraction."""
+        # A function of time, as a rehearsal jumps to the moment at which a level is reached. The
+        # simulators of plugins integrate in steps instead: by the load that an autopilot reports,
+        # or by the distance driven.
         standing = 1.0 if self.aloft(now_us) else STANDING_LOAD
         used = self.track.load_s(now_us, standing) / self.kinematics.endurance_s
         return max(0.0, self.battery - used)

@@ -70,9 +70,9 @@ def test_home_is_where_it_starts() -> None:
         ("acceleration", "brisk", "acceleration: 'brisk' is not a number"),
         ("heading", 60, "heading: 60 has no unit"),
         ("battery", "120 %", "battery: '120 %' is neither a percentage"),
-        ("home", [95.0, 8.0], "home: [95.0, 8.0] is not on Earth"),
-        ("home", "here", "home: 'here' is not [lat, lon]"),
-        ("home", ["a", "b"], "home: ['a', 'b'] is not [lat, lon]"),
+        ("home", [95.0, 8.0], "home: [95.0, 8.0] is not a position: latitude comes first"),
+        ("home", "here", "home: 'here' is not a position; write [lat, lon]"),
+        ("home", ["a", "b"], "home: 'a' is not a number"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(key: str, value: Any, said: str) -> None:

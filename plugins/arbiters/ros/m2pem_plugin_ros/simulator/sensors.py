@@ -86,6 +86,7 @@ class Odometer:
 
 FULL_V, EMPTY_V = 29.4, 21.0
 LOW_FRACTION = 0.2
+"""Below it the vehicle reports a problem."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from m2pem.api import Dimension, GeoPosition, UnitError, quantity
+from m2pem.api.simulator_settings import coordinates, fraction
 from m2pem_plugin_ros.frames import Origin, to_local
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.settings import Settings
@@ -109,23 +110,14 @@ def _unknown(key: str, known: Collection[str]) -> SettingError:
     return SettingError(f"{key}: simulated vehicles know no such setting; {hint}")
 
 
-def position(value: Any, altitude_m: float = 0.0) -> GeoPosition:
-    """Read [lat, lon] or [lat, lon, alt], in degrees and metres above mean sea level.
+def position(value: Any, altitude_m: float) -> GeoPosition:
+    """Read [lat, lon] or [lat, lon, alt]; without an altitude it is `altitude_m`.
 
     Raises:
-        WordError: it is something else.
+        ValueError: it is something else.
     """
-    if isinstance(value, Mapping):
-        value = [value[key] for key in ("lat", "lon", "alt") if key in value]
-    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
-        raise SettingError(f"{value!r} is not [lat, lon] or [lat, lon, alt], such as [38.1, -77.3]")
-    try:
-        latitude, longitude, altitude = (*map(float, value), altitude_m)[:3]
-    except (TypeError, ValueError):
-        raise SettingError(f"{value!r} is not [lat, lon], such as [38.1, -77.3]") from None
-    if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-        raise SettingError(f"{value!r} is not on Earth: latitude comes first, in degrees")
-    return GeoPosition(latitude, longitude, altitude)
+    latitude, longitude, altitude = coordinates(value)
+    return GeoPosition(latitude, longitude, altitude_m if altitude is None else altitude)
 
 
 def _target(item: Any, origin: Origin) -> Target:
@@ -139,24 +131,11 @@ def _target(item: Any, origin: Origin) -> Target:
 Read = Callable[[str, Any], float]
 
 
-def _number(key: str, value: Any) -> float:
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise SettingError(f"{key}: {value!r} is not a number")
-    return number
-
-
 def _fraction(key: str, value: Any) -> float:
-    percent = isinstance(value, str) and value.strip().endswith("%")
-    number = _number(key, value.strip()[:-1] if percent else value) / (100 if percent else 1)
-    if not 0 <= number <= 1:
-        raise SettingError(
-            f"{key}: {value!r} is neither a percentage ('80 %') nor a fraction (0.8)"
-        )
-    return number
+    try:
+        return fraction(value)
+    except ValueError as error:
+        raise SettingError(f"{key}: {error}") from error
 
 
 def _quantity(dimension: Dimension) -> Read:
@@ -208,7 +187,7 @@ def _applied(key: str, value: Any, spec: VehicleSpec) -> VehicleSpec:
     if read is None:
         try:
             place = position(value, spec.origin[2])
-        except SettingError as error:
+        except ValueError as error:
             raise SettingError(f"{key}: {error}") from error
         east_m, north_m, _ = to_local(place, spec.origin)
         return replace(

@@ -8,7 +8,7 @@ from m2pem.api import GeoPosition
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist
 from m2pem_plugin_ros.simulator.dynamics import Dynamics
-from m2pem_plugin_ros.simulator.sensors import Battery, Detector, Found, Odometer
+from m2pem_plugin_ros.simulator.sensors import LOW_FRACTION, Battery, Detector, Found, Odometer
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 
 STEP_S = 0.02
@@ -42,7 +42,7 @@ class Vehicle:
         """The problems in its own diagnostics."""
         found = {
             "no satellites": self.gps_lost,
-            "battery low": self.battery.fraction < 0.2,
+            "battery low": self.battery.fraction < LOW_FRACTION,
             "wheels stuck": self.body.stuck,
         }
         return tuple(text for text, is_so in found.items() if is_so)
