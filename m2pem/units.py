@@ -14,6 +14,9 @@ from enum import StrEnum
 from m2pem.errors import M2pemError
 from m2pem.suggestions import did_you_mean
 
+US_PER_S = 1_000_000
+"""Microseconds in a second: times of clocks and records are microseconds."""
+
 
 class Dimension(StrEnum):
     """What a quantity measures; its SI unit is the first one in `UNITS`."""

@@ -111,7 +111,7 @@ if TYPE_CHECKING:
     from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
     from m2pem.suggestions import did_you_mean
-    from m2pem.units import Dimension, UnitError, quantity
+    from m2pem.units import US_PER_S, Dimension, UnitError, quantity
 
 # Loaded when asked for: an arbiter's module need not pay for what an OCU imports.
 _MODULES = {
@@ -170,7 +170,7 @@ _MODULES = {
     "m2pem.geo.polygon": "edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.suggestions": "did_you_mean",
-    "m2pem.units": "Dimension UnitError quantity",
+    "m2pem.units": "US_PER_S Dimension UnitError quantity",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -180,6 +180,7 @@ __all__ = [
     "MAX_REASON_CHARACTERS",
     "OPERATIONS",
     "SHARED",
+    "US_PER_S",
     "AddressedArbiter",
     "AdjustingArbiter",
     "Alert",

@@ -20,11 +20,10 @@ from contextvars import Context, copy_context
 from typing import Any, Protocol, TypeVar, TypeVarTuple, Unpack
 
 from m2pem.errors import InternalError
+from m2pem.units import US_PER_S
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
-
-US_PER_S = 1_000_000
 
 
 class Clock(Protocol):

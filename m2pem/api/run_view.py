@@ -13,11 +13,10 @@ import msgspec
 
 from m2pem.api import records as r
 from m2pem.api.control import RunId, RunStatus, RunSummary, StampedRecord
+from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
     from m2pem.mission.mission import Mission
-
-US_PER_S = 1_000_000
 
 FINISHED = 20
 """The last tokens that left an element, as many as `RunView.finished` keeps."""

@@ -14,8 +14,7 @@ from m2pem.cli.standard_streams import LineWriter, writer_for
 from m2pem.engine.records import RunEnded
 from m2pem.journal.codec import record_line
 from m2pem.mission.mission import Mission
-
-US_PER_S = 1_000_000
+from m2pem.units import US_PER_S
 
 TURN = 200
 """Records printed before other tasks may run."""

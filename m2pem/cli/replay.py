@@ -106,9 +106,10 @@ async def _print(
 ) -> int:
     from m2pem.api.control import StampedRecord
     from m2pem.cli.line_formatter import LineFormatter
-    from m2pem.cli.output import US_PER_S, wants_colour
+    from m2pem.cli.output import wants_colour
     from m2pem.cli.status import RunStatusView
     from m2pem.journal.codec import record_line
+    from m2pem.units import US_PER_S
 
     standing = RunStatusView(line)
     lines = LineFormatter(lambda _: standing.mission, colour=wants_colour(sys.stdout))
@@ -192,8 +193,8 @@ def _say(output: str, text: str) -> None:
 
 def _show(steps: "Sequence[Step]", lines: "LineFormatter", output: str) -> None:
     from m2pem.api.control import StampedRecord
-    from m2pem.cli.output import US_PER_S
     from m2pem.journal.codec import record_line
+    from m2pem.units import US_PER_S
 
     for step in steps:
         for seq, record in enumerate(step.records, step.seq):

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import click
 
 from m2pem.cli.options import as_json, example, format_option, journal_option
+from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
     from m2pem.api.control import RunSummary
-
-US_PER_S = 1_000_000
 
 
 @click.command(epilog=example("m2pem runs"))

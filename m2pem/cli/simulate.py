@@ -17,13 +17,12 @@ from m2pem.cli.options import (
     path_option,
     process_option,
 )
+from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
     from m2pem.api.control import StampedRecord
     from m2pem.fleet.fleet import Fleet
     from m2pem.mission.values import Value
-
-US_PER_S = 1_000_000
 
 
 def _read_start(_: click.Context, __: click.Parameter, text: str | None) -> int | None:

@@ -18,6 +18,7 @@ from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.polygon import hull_distance_m
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
+from m2pem.units import US_PER_S
 
 STOPS = frozenset({"hold", "drive_stop"})
 """Never refused: it is no safer not to stop."""
@@ -27,8 +28,6 @@ BY_HAND = frozenset({"teleop"})
 
 DISCERNIBLE_M = 1.0
 """Nearer than this, the direction in which two vehicles may part is not known."""
-
-US_PER_S = 1_000_000
 
 
 @dataclass(slots=True)

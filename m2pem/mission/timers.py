@@ -31,6 +31,7 @@ from cronsim import CronSim, CronSimError
 from m2pem.errors import ExpressionSyntaxError
 from m2pem.mission.expression.literals import describe, shorten
 from m2pem.mission.values import Value
+from m2pem.units import US_PER_S
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
@@ -279,7 +280,6 @@ def _wrong(text: str, message: str) -> ExpressionSyntaxError:
 
 _WHAT = "a cycle such as R3/PT10S, R/PT1M or R3/2026-01-01T12:00:00Z/PT10S"
 _CYCLE = re.compile(r"R(?P<repetitions>[0-9]{0,9})/(?P<first>[^/]*)(?:/(?P<second>[^/]*))?")
-_US_PER_S = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,5 +390,5 @@ def cycle(text: Value) -> Cycle:
 
 
 def _between(start_us: int, end_us: int) -> str:
-    seconds, rest_us = divmod(max(0, end_us - start_us), _US_PER_S)
+    seconds, rest_us = divmod(max(0, end_us - start_us), US_PER_S)
     return f"PT{seconds}.{rest_us:06}S" if rest_us else f"PT{seconds}S"

@@ -37,6 +37,7 @@ from m2pem.rehearsal.answers_file import (
     check,
     read_answers,
 )
+from m2pem.units import US_PER_S
 
 log = logging.getLogger("m2pem.answers")
 
@@ -45,8 +46,6 @@ BY_SCRIPT = "answers file"
 
 BY_DEFAULT = "default"
 """Who has taken the first decision of a prompt without a script."""
-
-US_PER_S = 1_000_000
 
 
 class Answers:

@@ -43,6 +43,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, check_answers, load_answers
 from m2pem.rehearsal.answers_file import ServiceEntry
 from m2pem.rehearsal.scripted import ScriptedPlugins
+from m2pem.units import US_PER_S
 
 NO_FLEET = Fleet("", "no fleet", {})
 

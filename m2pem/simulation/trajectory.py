@@ -9,8 +9,8 @@ import msgspec
 
 from m2pem.simulation.kinematics import Kinematics
 from m2pem.simulation.segments import Curve, Pivot, Pose, Profile, Stand, Travel, along, chain
+from m2pem.units import US_PER_S
 
-US_PER_S = 1_000_000
 _NOTHING_S = 1e-9
 
 

@@ -14,6 +14,7 @@ from m2pem.teams.member import Member
 from m2pem.teams.partition import Partition
 from m2pem.teams.plan import MemberPose, Plan
 from m2pem.teams.restart import Reference
+from m2pem.units import US_PER_S
 
 PERIOD_S = 0.25
 """Period of the formation controller."""
@@ -25,8 +26,6 @@ STIRS_WITHIN_S = 120.0
 STIR_M = 0.01
 ACCEPT_WITHIN_S = 15.0
 """A member that has reported nothing about its part by then has failed to start it."""
-
-US_PER_S = 1_000_000
 
 _log = logging.getLogger("m2pem.teams")
 

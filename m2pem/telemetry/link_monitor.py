@@ -16,8 +16,8 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
 from m2pem.engine.inputs import ResourceFault
 from m2pem.mission.catalogue import ResourceId
+from m2pem.units import US_PER_S
 
-US_PER_S = 1_000_000
 STALL_US = 500_000
 """A check that is later than this shows that this process was not running, not a lost link."""
 

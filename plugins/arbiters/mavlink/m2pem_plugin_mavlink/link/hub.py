@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
-from m2pem.api import Clock
+from m2pem.api import US_PER_S, Clock
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.endpoint import Endpoint
 from m2pem_plugin_mavlink.link.route import Peer, Route
@@ -21,7 +21,6 @@ from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.url import SerialUrl, Url, Way
 
-US_PER_S = 1_000_000
 HEARTBEAT_US = US_PER_S
 PEERS_AT_ONCE = 64
 """Peers that receive heartbeats before other tasks run."""

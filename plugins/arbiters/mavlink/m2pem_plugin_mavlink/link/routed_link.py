@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from m2pem.api import Clock
+from m2pem.api import US_PER_S, Clock
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.hub import Hub, shared_hub
 from m2pem_plugin_mavlink.link.route import Route
@@ -27,8 +27,6 @@ SILENT_S = 2.5
 
 WORSE_LOSS = 0.1
 """An endpoint is left for another one whose loss is smaller by this fraction."""
-
-US_PER_S = 1_000_000
 
 
 async def open_link(

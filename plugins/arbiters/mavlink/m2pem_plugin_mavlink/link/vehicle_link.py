@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Callable, Hashable, Iterable
 from contextlib import asynccontextmanager
 from typing import Any, Protocol, TypeAlias, TypeVar
 
-from m2pem.api import Clock
+from m2pem.api import US_PER_S, Clock
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import Transaction
@@ -75,9 +75,6 @@ class VehicleLink(Protocol):
         """Return the quality over the endpoint in use; None if the autopilot has never sent
         anything."""
         ...
-
-
-US_PER_S = 1_000_000
 
 
 class Exchange:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import Clock
+from m2pem.api import US_PER_S, Clock
 from m2pem_plugin_mavlink.link.vehicle_link import Exchange, KeyedLock, Listener
 from m2pem_plugin_mavlink.mavsdk_driver import json_fields, library
 from m2pem_plugin_mavlink.microservices.mission_items import (
@@ -126,7 +126,6 @@ def _transaction_error(error: Exception) -> ExchangeError:
     return RefusedError(reason, result, temporary=is_temporary(result))
 
 
-US_PER_S = 1_000_000
 _logger = logging.getLogger(__name__)
 
 UNSENT = 50

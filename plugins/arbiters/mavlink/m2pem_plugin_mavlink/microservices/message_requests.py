@@ -6,13 +6,13 @@ from typing import TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from m2pem.api import US_PER_S
 from m2pem_plugin_mavlink.microservices.commands import CommandExchange, Request, message_name
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import RETRIES, RetryPolicy
 
 T = TypeVar("T")
 
-US_PER_S = 1_000_000
 SLOWER = 2.0
 SLOWER_TRIES = 4
 """Attempts after a refused rate, each slower by the factor `SLOWER`: autopilots deny rates that are
