@@ -1,17 +1,23 @@
-"""Answers to a formula about a net without a mission, with and without reduction."""
+"""Answers about a mission, or a net without one, with and without reduction."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from random import Random
 from types import SimpleNamespace
 
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.mission import Mission
 from m2pem.verify.ltl import formula as f
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.model_check import Result, check
 from m2pem.verify.net.petri_net import Action, Kind, PetriNet, Role
 from m2pem.verify.net.simplify import simplify
+from m2pem.verify.requirements.check import Answer, check_requirement, net_for, reduction_for
 from m2pem.verify.requirements.propositions import ExploredRuns, Labels
+from m2pem.verify.requirements.requirement import Requirement
 from m2pem.verify.search.explore import Exploration, Limits, explore
 from m2pem.verify.search.stubborn_sets import StubbornSets
+from m2pem.verify.translate import Options
 
 FEW = Limits(states=1_500, tokens=3, seconds=1e9)
 NO_FEWER = Limits(states=2 * FEW.states, tokens=3, seconds=1e9)
@@ -105,3 +111,30 @@ def both(net: PetriNet, formula: f.Formula, whole: Exploration | None = None) ->
     reduced = explore(small, NO_FEWER, reduction=StubbornSets(small, labels.visible_transitions()))
     answers.append(check(ExploredRuns(reduced, labels), formula).result)
     return Both(whole, reduced, (answers[0], answers[1]))
+
+
+def check_mission(
+    mission: Mission,
+    fleet: Fleet,
+    requirements: Sequence[Requirement],
+    *,
+    process: str | None = None,
+    options: Options | None = None,
+    limits: Limits | None = None,
+    reduce: bool = False,
+) -> list[Answer]:
+    """Translate, explore and check in one call.
+
+    With `reduce`, a reduction is used for requirements that allow one.
+    """
+    net = net_for(mission, fleet, requirements, process=process, options=options)
+    whole: Exploration | None = None
+    answers = []
+    for each in requirements:
+        reduction = reduction_for(net, mission, fleet, each) if reduce else None
+        if reduction is not None:
+            found = explore(net, limits, reduction=reduction)
+        else:
+            found = whole = whole or explore(net, limits)
+        answers.append(check_requirement(found, mission, fleet, each))
+    return answers

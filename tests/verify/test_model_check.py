@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from itertools import islice
 
 import pytest
@@ -6,9 +7,7 @@ from hypothesis import given, settings
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Always, Completed, Eventually, Formula, Implies, Next
 from m2pem.verify.ltl.model_check import (
-    Limits,
     Move,
-    Progress,
     Result,
     Run,
     Stopped,
@@ -16,6 +15,7 @@ from m2pem.verify.ltl.model_check import (
     breaks,
     check,
 )
+from m2pem.verify.search.explore import Limits
 from tests.verify import formulas
 from tests.verify.small_systems import SmallSystem, is_fair, runs, systems
 
@@ -122,11 +122,15 @@ def test_what_was_found_before_a_limit_counts() -> None:
 
 
 def test_an_interruption_says_what_was_seen() -> None:
-    def stop(progress: Progress) -> None:
-        if progress.states > 1_000:
-            raise KeyboardInterrupt
+    class Interrupted(SmallSystem):
+        def successors(self, state: int) -> Sequence[tuple[int, int]]:
+            if state > 1_000:
+                raise KeyboardInterrupt
+            return self.steps[state]
 
-    verdict: Verdict = check(counter(5_000), parse("[] !active(b)"), progress=stop)
+    whole = counter(5_000)
+    system = Interrupted(whole.steps, whole.of_states, whole.of_transitions)
+    verdict: Verdict = check(system, parse("[] !active(b)"))
     assert (verdict.result, verdict.stopped) == (Result.UNDECIDED, Stopped.INTERRUPTED)
     assert 1_000 < verdict.states < 2_000
 

@@ -6,10 +6,11 @@ from m2pem.verify.ltl import parse, propositions
 from m2pem.verify.ltl.model_check import Result
 from m2pem.verify.net.petri_net import Action
 from m2pem.verify.requirements import Names, parse_spec
-from m2pem.verify.requirements.check import Answer, check_mission
+from m2pem.verify.requirements.check import Answer
 from m2pem.verify.requirements.propositions import Labels
 from m2pem.verify.search.explore import Limits
 from m2pem.verify.translate import Options, translate
+from tests.verify.answers import check_mission
 from tests.verify.missions import approval, in_a_row, pair, survey, task
 
 HOLDS, VIOLATED, UNDECIDED = Result.HOLDS, Result.VIOLATED, Result.UNDECIDED

@@ -11,7 +11,6 @@ from m2pem.verify.ltl.formula import Active, Completed, Formula, Proposition, re
 from m2pem.verify.ltl.model_check import Result
 from m2pem.verify.requirements import Requirement
 from m2pem.verify.requirements.check import (
-    check_mission,
     check_requirement,
     net_for,
     reduction_for,
@@ -21,6 +20,7 @@ from m2pem.verify.search.stubborn_sets import states_to_expand
 from m2pem.verify.translate import Options
 from tests.bpmn.bpmn_text import flow
 from tests.verify import formulas
+from tests.verify.answers import check_mission
 from tests.verify.branches import branches, shapes
 from tests.verify.missions import ask
 from tests.verify.missions import mission as build

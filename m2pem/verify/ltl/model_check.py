@@ -23,15 +23,7 @@ from m2pem.verify.ltl.automaton import components
 from m2pem.verify.ltl.formula import Formula, needs_steps
 from m2pem.verify.ltl.lasso import Moment, holds
 from m2pem.verify.ltl.product import QUIET, STUTTER, LabelledSystem, Product
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits of a search. `states`: pairs of the system's states and the automaton's."""
-
-    states: int = 2_000_000
-    seconds: float = 600.0
-    memory_mb: float = 2_000.0
+from m2pem.verify.search.explore import Limits
 
 
 class Stopped(StrEnum):
@@ -42,15 +34,6 @@ class Stopped(StrEnum):
     MEMORY = "the limit of memory"
     SYSTEM = "states beyond which the mission was not searched"
     INTERRUPTED = "an interruption by hand"
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Progress of a search: pairs of states found, pairs still to expand, seconds so far."""
-
-    states: int
-    waiting: int
-    seconds: float
 
 
 class Result(StrEnum):
@@ -345,9 +328,10 @@ def check(
     *,
     fair: Mapping[int, int] | None = None,
     limits: Limits | None = None,
-    progress: Callable[[Progress], None] | None = None,
 ) -> Verdict:
     """Check whether a formula holds of all runs of a system.
+
+    `limits`: its `states` are pairs of the system's states and the automaton's.
 
     `fair`: the outcome of each transition; only runs count in which each outcome that is possible
     again and again happens again and again. None: all runs count. KeyboardInterrupt ends the search
@@ -365,7 +349,7 @@ def check(
     product = Product(system, observer, steps=steps)
     search = _Search(product, Fairness(product, None if fair is None else dict(fair)), began)
     try:
-        run, stopped = search.run(limits or Limits(), progress)
+        run, stopped = search.run(limits or Limits())
     except KeyboardInterrupt:
         run, stopped = None, Stopped.INTERRUPTED
     if run is not None and not breaks(system, formula, run, steps=steps):
@@ -383,9 +367,7 @@ class _Search:
         self.fairness = fairness
         self.began = began
 
-    def run(
-        self, limits: Limits, progress: Callable[[Progress], None] | None
-    ) -> tuple[Run | None, Stopped | None]:
+    def run(self, limits: Limits) -> tuple[Run | None, Stopped | None]:
         product = self.product
         look_at = _FIRST_LOOK
         while len(product.moves) < len(product):
@@ -393,10 +375,7 @@ class _Search:
                 return run_to(product, product.broken), None
             done = len(product.moves)
             if done % _LOOK_EVERY == 0:
-                seconds = time.monotonic() - self.began
-                if progress is not None:
-                    progress(Progress(len(product), len(product) - done, seconds))
-                stopped = self._beyond(limits, seconds)
+                stopped = self._beyond(limits, time.monotonic() - self.began)
                 if stopped is not None:
                     return self._round(), stopped
             if done >= look_at:

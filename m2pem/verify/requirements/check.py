@@ -1,6 +1,6 @@
 """Check requirements with the built-in search."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from m2pem.fleet.fleet import Fleet
@@ -8,14 +8,13 @@ from m2pem.mission.expression import Expression
 from m2pem.mission.mission import Mission
 from m2pem.verify.ltl import propositions
 from m2pem.verify.ltl.formula import Data, needs_steps
-from m2pem.verify.ltl.model_check import Limits, Progress, Result, Run, Stopped, Verdict, check
+from m2pem.verify.ltl.model_check import Result, Run, Stopped, Verdict, check
 from m2pem.verify.net.petri_net import PetriNet, Transition
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.requirements.propositions import ExploredRuns, Labels, UnknownDataError
 from m2pem.verify.requirements.requirement import Requirement
-from m2pem.verify.search.explore import Exploration, explore
-from m2pem.verify.search.explore import Limits as ExploreLimits
+from m2pem.verify.search.explore import Exploration, Limits
 from m2pem.verify.search.explore import Stopped as ExploreStopped
 from m2pem.verify.search.stubborn_sets import Reduction, StubbornSets
 from m2pem.verify.translate import Options, translate
@@ -85,33 +84,6 @@ def net_for(
     return simplify(net, places, transitions, size_limit)
 
 
-def check_mission(
-    mission: Mission,
-    fleet: Fleet,
-    requirements: Sequence[Requirement],
-    *,
-    process: str | None = None,
-    options: Options | None = None,
-    limits: ExploreLimits | None = None,
-    reduce: bool = False,
-) -> list[Answer]:
-    """Translate, explore and check in one call.
-
-    With `reduce`, a reduction is used for requirements that allow one.
-    """
-    net = net_for(mission, fleet, requirements, process=process, options=options)
-    whole: Exploration | None = None
-    answers = []
-    for each in requirements:
-        reduction = reduction_for(net, mission, fleet, each) if reduce else None
-        if reduction is not None:
-            found = explore(net, limits, reduction=reduction)
-        else:
-            found = whole = whole or explore(net, limits)
-        answers.append(check_requirement(found, mission, fleet, each))
-    return answers
-
-
 def reduction_for(
     net: PetriNet, mission: Mission, fleet: Fleet, requirement: Requirement
 ) -> Reduction | None:
@@ -135,7 +107,6 @@ def check_requirement(
     requirement: Requirement,
     *,
     limits: Limits | None = None,
-    progress: Callable[[Progress], None] | None = None,
 ) -> Answer:
     """Check a requirement on an exploration that kept its edges.
 
@@ -150,7 +121,7 @@ def check_requirement(
     try:
         runs = ExploredRuns(exploration, Labels(net, mission, fleet, asked))
         fair: Mapping[int, int] | None = runs.outcomes() if requirement.fair else None
-        verdict = check(runs, requirement.formula, fair=fair, limits=limits, progress=progress)
+        verdict = check(runs, requirement.formula, fair=fair, limits=limits)
     except UnknownDataError as error:
         return Answer(requirement, Result.UNDECIDED, why=str(error))
     return _answer(requirement, verdict, exploration, net)

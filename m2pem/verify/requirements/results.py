@@ -46,8 +46,7 @@ class _Asking:
     def answer(self, requirement: Requirement) -> Answer:
         found = self._search(requirement)
         self.interrupted |= found.stopped is Stopped.INTERRUPTED
-        limits = model_check.Limits(self.limits.states, self.limits.seconds, self.limits.memory_mb)
-        return check_requirement(found, self.mission, self.fleet, requirement, limits=limits)
+        return check_requirement(found, self.mission, self.fleet, requirement, limits=self.limits)
 
     def _search(self, requirement: Requirement) -> Exploration:
         """Explore all if it is small, else with a reduction if the requirement allows one."""
