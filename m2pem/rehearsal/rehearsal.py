@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from m2pem.api.authoring import MissionSource
-from m2pem.api.clock import US_PER_S, VirtualClock, run_virtual
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.control import (
     RunStatus,
     RunSummary,

@@ -32,8 +32,9 @@ from m2pem.simulation.planning import Planner
 from m2pem.simulation.settings import own_faults, read_settings
 from m2pem.simulation.simulation import SCRIPTED, Simulation
 from m2pem.simulation.state_file import Memory, StateFile
-from m2pem.simulation.trajectory import US_PER_S, Warp
+from m2pem.simulation.trajectory import Warp
 from m2pem.simulation.vehicles import SimVehicle, carrier_of
+from m2pem.units import US_PER_S
 
 
 class RadioRange:

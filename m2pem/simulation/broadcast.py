@@ -10,8 +10,8 @@ from m2pem.simulation.executions import Body
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.segments import Look, Vector
-from m2pem.simulation.trajectory import US_PER_S
 from m2pem.simulation.vehicles import SimVehicle
+from m2pem.units import US_PER_S
 
 DEFAULT_HZ = 5.0
 SLOWEST_HZ = 1.0

@@ -10,8 +10,8 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.frame import FlatFrame
 from m2pem.simulation.payloads import SimPayload
-from m2pem.simulation.trajectory import US_PER_S
 from m2pem.simulation.vehicles import SimVehicle
+from m2pem.units import US_PER_S
 
 STEPS_AT_ONCE = 500
 _SHORTEST_STEP_S = 0.02

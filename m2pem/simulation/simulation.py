@@ -27,8 +27,9 @@ from m2pem.simulation.payloads import SimPayload
 from m2pem.simulation.planning import Assignment, Planner
 from m2pem.simulation.pursuit import STEP_S, Pursuit, steer
 from m2pem.simulation.state_file import Memory
-from m2pem.simulation.trajectory import US_PER_S, Plan
+from m2pem.simulation.trajectory import Plan
 from m2pem.simulation.vehicles import SimVehicle
+from m2pem.units import US_PER_S
 
 STEP = 0.05
 """Of a full battery."""

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any, Protocol, cast
 
 from m2pem.api import (
+    US_PER_S,
     ArbiterContext,
     BehaviorRequest,
     Clock,
@@ -18,7 +19,6 @@ from m2pem.api import (
     ResourceId,
     VehicleState,
 )
-from m2pem.api.clock import US_PER_S
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, DriverSetup, Health
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.pose import Pose, Twist

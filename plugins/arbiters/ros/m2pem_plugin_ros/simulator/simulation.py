@@ -11,8 +11,7 @@ from typing import Any, Self
 
 from rcl_interfaces.msg import SetParametersResult
 
-from m2pem.api import SystemClock
-from m2pem.api.clock import US_PER_S
+from m2pem.api import US_PER_S, SystemClock
 from m2pem.api.faults import FaultError, FaultSchedule, PlannedFault
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.simulator.faults import GRAMMAR, FaultTarget, check

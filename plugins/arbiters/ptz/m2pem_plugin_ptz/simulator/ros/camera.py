@@ -11,8 +11,8 @@ from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
 
-from m2pem.api import Clock, Connection
-from m2pem.api.clock import US_PER_S, RateTimer
+from m2pem.api import US_PER_S, Clock, Connection
+from m2pem.api.clock import RateTimer
 from m2pem.api.faults import Effect, FaultError, FaultGrammar, FaultKind, FaultSchedule, fixed
 from m2pem_plugin_ptz.drivers.ros.settings import Axis, Command, RosSettings
 from m2pem_plugin_ptz.gimbal import Reach
