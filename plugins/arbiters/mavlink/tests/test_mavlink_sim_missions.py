@@ -247,6 +247,19 @@ def test_a_mission_that_is_flown_is_not_cleared() -> None:
     assert len(bench.autopilot.plans[0]) == 2
 
 
+def test_jumps_are_counted() -> None:
+    bench = Bench().airborne()
+    near, far = bench.offset(10, 0), bench.offset(20, 0)
+    fly(bench, item(1, 16, near, 20.0), item(2, 16, far, 20.0), item(3, 177, (0, 0), 0, 1, 2))
+    assert reached_at_last(bench) == [1, 2, 1, 2, 1, 2]
+
+
+def test_jumps_in_a_circle_without_navigation_end() -> None:
+    bench = Bench().airborne()
+    fly(bench, item(1, 178, (0, 0), 0, 1, 5), item(2, 177, (0, 0), 0, 1, -1))
+    assert reached_at_last(bench) == []
+
+
 def test_actions_are_done_on_the_way() -> None:
     bench = Bench().airborne()
     fly(
@@ -262,16 +275,34 @@ def test_actions_are_done_on_the_way() -> None:
     assert bench.autopilot.modes.speed_mps == 2.0
 
 
-def test_a_copter_waits_at_a_waypoint() -> None:
+@pytest.mark.parametrize(
+    ("command", "params", "shortest_s", "longest_s"),
+    [(16, (8,), 8, 16), (19, (10,), 10, 18), (93, (12,), 12, 13)],
+)
+def test_waiting_takes_its_time(
+    command: int, params: tuple[float, ...], shortest_s: float, longest_s: float
+) -> None:
     bench = Bench().airborne()
-    bench.upload([HOME, item(1, 16, bench.offset(10, 0), 20.0, 8)])
+    bench.upload([HOME, item(1, command, bench.offset(10, 0), 20.0, *params)])
     bench.command(START)
     took_s = bench.run_until(lambda: bench.autopilot.mission.complete)
-    assert 8 <= took_s <= 16
+    assert shortest_s <= took_s <= longest_s
 
 
-def test_items_that_m2pem_never_uploads_are_unsupported() -> None:
-    assert Bench().airborne().upload([HOME, item(1, 93, (0.0, 0.0), 20.0, 5)]) == 3
+def test_turns_are_flown_around_the_place() -> None:
+    bench = Bench().airborne()
+    centre = bench.offset(40, 0)
+    bench.upload([HOME, item(1, 18, centre, 20.0, 2, 0, 15)])
+    bench.command(START)
+    point = bench.autopilot.home.point
+    distances = []
+    bench.run(15)
+    while not bench.autopilot.mission.complete:
+        bench.run(0.5)
+        body = bench.autopilot.body
+        distances.append(((body.north_m - point.north_m - 40) ** 2 + body.east_m**2) ** 0.5)
+    assert min(distances) > 14
+    assert max(distances) < 16
 
 
 def test_a_copter_lands_where_the_mission_says_and_is_then_at_its_beginning() -> None:
@@ -322,14 +353,15 @@ def test_a_plane_takes_off_flies_and_lands() -> None:
             HOME,
             item(1, 22, z=60.0),
             item(2, 16, bench.offset(600, 300), 80.0),
-            item(3, 16, bench.offset(-800, 0), 40.0),
-            item(4, 21, bench.offset(0, 0)),
+            item(3, 18, bench.offset(0, 600), 80.0, 1),
+            item(4, 16, bench.offset(-800, 0), 40.0),
+            item(5, 21, bench.offset(0, 0)),
         ]
     )
     assert bench.command(START) == 0
     assert bench.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
     bench.run_until(lambda: bench.autopilot.mission.complete, 600)
-    assert reached_at_last(bench) == [1, 2, 3, 4]
+    assert reached_at_last(bench) == [1, 2, 3, 4, 5]
     assert not bench.autopilot.arming.armed
     assert any(text.startswith("Reached waypoint #2 dist ") for text in bench.texts())
     assert bench.autopilot.position.distance_m(bench.autopilot.home.point) < 120

@@ -13,6 +13,7 @@ from m2pem_plugin_mavlink.simulator.missions.legs import NAV_TAKEOFF, Leg, Retur
 from m2pem_plugin_mavlink.simulator.missions.plan import ACTIONS, MISSION, NAVIGATION, Item
 from m2pem_plugin_mavlink.simulator.specification import Kind
 
+CONDITION_DELAY = 112
 ITSELF = Sender(None, 0, 0)
 """The sender of commands that come from the mission."""
 UNREPORTED = frozenset({181, 183, 203, 206, 211, 1000})
@@ -20,12 +21,13 @@ UNREPORTED = frozenset({181, 183, 203, 206, 211, 1000})
 
 
 class Actions:
-    """Does the actions that were begun, one in each step."""
+    """Does the actions that were begun; a delay holds up those behind it."""
 
     def __init__(self, autopilot: AutopilotInterface) -> None:
         self.autopilot = autopilot
         self._waiting: list[int] = []
         self._current: int | None = None
+        self._delay_s = 0.0
 
     def begin(self, indices: Iterable[int]) -> None:
         """Do these; what is left of the ones before is dropped."""
@@ -37,9 +39,10 @@ class Actions:
         while self._current is not None:
             self._done(self._current)
 
-    def step(self) -> None:
+    def step(self, dt_s: float) -> None:
         """Report what is done by now, and begin the next one."""
-        if self._current is not None:
+        self._delay_s -= dt_s
+        if self._current is not None and self._delay_s <= 0:
             self._done(self._current)
 
     def _done(self, index: int) -> None:
@@ -57,7 +60,9 @@ class Actions:
         item = autopilot.mission.items[self._current]
         if autopilot.firmware.is_ardupilot:
             autopilot.say(f"Mission: {self._current} {ACTIONS[item.command]}")
-        self._perform(item)
+        self._delay_s = item.param1 if item.command == CONDITION_DELAY else 0.0
+        if item.command != CONDITION_DELAY:
+            self._perform(item)
 
     def _perform(self, item: Item) -> None:
         """As if it had been commanded; what the vehicle cannot do, it leaves out."""
@@ -154,7 +159,7 @@ class AutoMission(Maneuver):
         if waiting or not progress.running:
             return self._stay.step(dt_s)
         self._notice_a_change()
-        self._actions.step()
+        self._actions.step(dt_s)
         if self._leg is None or self._index is None:
             return self._stay.step(dt_s)
         setpoint = self._leg.step(dt_s)

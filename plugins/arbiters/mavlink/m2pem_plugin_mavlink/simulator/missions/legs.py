@@ -1,13 +1,15 @@
 """The legs of a mission: one item of navigation each, from its beginning until it is done."""
 
+import math
 from collections.abc import Mapping
 
 from m2pem_plugin_mavlink.simulator.dynamics import (
+    CircleSetpoint,
     MotionSetpoint,
     NoThrust,
     PositionSetpoint,
 )
-from m2pem_plugin_mavlink.simulator.geometry import Location, Point
+from m2pem_plugin_mavlink.simulator.geometry import Location, Point, wrapped_rad
 from m2pem_plugin_mavlink.simulator.interfaces import AutopilotInterface, Maneuver
 from m2pem_plugin_mavlink.simulator.maneuvers import ReturnToLaunch, descend_to_land
 from m2pem_plugin_mavlink.simulator.missions.plan import Item
@@ -115,6 +117,44 @@ class Loiter(Leg):
         return self.stay(self.place)
 
 
+class LoiterTime(Loiter):
+    """Stay there as many seconds as the first parameter says."""
+
+    def there(self, dt_s: float) -> MotionSetpoint:
+        """Stay."""
+        self.done = self._there_s >= self.item.param1
+        return super().there(dt_s)
+
+
+class LoiterLaps(Leg):
+    """Go around as often as the first parameter says; the third is the radius."""
+
+    _turned_rad = 0.0
+    _bearing_rad: float | None = None
+
+    def step(self, dt_s: float) -> MotionSetpoint:
+        """Go around, and count."""
+        autopilot = self.autopilot
+        radius_m = self.item.param3 or autopilot.tuning.loiter_radius_m
+        distance_m = autopilot.position.distance_m(self.place)
+        bearing = self.place.bearing_rad(autopilot.position)
+        if abs(distance_m - abs(radius_m)) < max(2.0, abs(radius_m) / 3):
+            if self._bearing_rad is not None:
+                self._turned_rad += abs(wrapped_rad(bearing - self._bearing_rad))
+            self._bearing_rad = bearing
+        self.done = self._turned_rad >= math.tau * self.item.param1
+        return CircleSetpoint(self.place, radius_m, autopilot.modes.speed_mps)
+
+
+class LoiterToAltitude(Leg):
+    """Go there, and be done at the height."""
+
+    def there(self, dt_s: float) -> MotionSetpoint:
+        """It was there at that height."""
+        self.done = True
+        return self.stay(self.place)
+
+
 class Return(Leg):
     """RTL, within the mission."""
 
@@ -166,12 +206,30 @@ class Land(Leg):
         return setpoint
 
 
+class Delay(Leg):
+    """Wait as many seconds as the first parameter says."""
+
+    def step(self, dt_s: float) -> MotionSetpoint:
+        """Wait here."""
+        self._there_s = max(self._there_s, 0.0) + dt_s
+        self.done = self._there_s >= self.item.param1
+        return self.stay(self.place)
+
+    def _place(self) -> Point:
+        return self.autopilot.position
+
+
 LEGS: Mapping[int, type[Leg]] = {
     16: Leg,
     17: Loiter,
+    18: LoiterLaps,
+    19: LoiterTime,
     20: Return,
     21: Land,
     NAV_TAKEOFF: Takeoff,
+    31: LoiterToAltitude,
+    82: Leg,
+    93: Delay,
 }
 """By MAV_CMD; one for each of `plan.NAVIGATION`."""
 

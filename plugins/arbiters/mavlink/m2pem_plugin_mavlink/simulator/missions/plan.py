@@ -73,15 +73,21 @@ INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_ALTITUDE = 6, 10, 11, 12
 NAVIGATION: dict[int, str] = {
     16: "WP",
     17: "LoitUnlim",
+    18: "LoitTurns",
+    19: "LoitTime",
     20: "RTL",
     21: "Land",
     22: "Takeoff",
+    31: "LoitAltitude",
+    82: "SplineWP",
+    93: "Delay",
 }
-"""What the vehicle does one after the other, of those that m2pem uploads or recorded conversations
-have: MAV_CMD to ArduPilot's name."""
+"""What the vehicle does one after the other: MAV_CMD to ArduPilot's name."""
 
 ACTIONS: dict[int, str] = {
+    112: "CondDelay",
     115: "CondYaw",
+    177: "Jump",
     178: "ChangeSpeed",
     181: "SetRelay",
     183: "SetServo",
@@ -98,7 +104,7 @@ ACTIONS: dict[int, str] = {
 }
 """What it does on the way."""
 
-WITH_PLACE = frozenset({16, 17, 21})
+WITH_PLACE = frozenset({16, 17, 18, 19, 21, 31, 82})
 """Those that are of no use with a place off the Earth."""
 FENCE_COMMANDS = frozenset(range(5000, 5005))
 RALLY_COMMANDS = frozenset({5100})

@@ -20,6 +20,9 @@ from m2pem_plugin_mavlink.simulator.missions.plan import MISSION, NAVIGATION, It
 from m2pem_plugin_mavlink.simulator.px4_maneuvers import TakeOff
 from m2pem_plugin_mavlink.simulator.specification import Kind
 
+MOST_JUMPS = 64
+"""So many items without navigation in a row are a mission that goes around in circles."""
+
 A_MOMENT_S = 0.1
 MISSION_MODE_ACTIVE, MISSION_MODE_SUSPENDED = 1, 2
 
@@ -48,6 +51,7 @@ class MissionProgress(Component):
         super().__init__(autopilot)
         self.current = self.resume_at = 0
         self.begun = self.complete = self.released = self.running = False
+        self._jumps: dict[int, int] = {}
         self._reached: list[tuple[float, int]] = []  # when, and which item
 
     @property
@@ -92,6 +96,7 @@ class MissionProgress(Component):
         """Be at the beginning."""
         self.current = self.resume_at = self.first
         self.begun = self.complete = False
+        self._jumps.clear()
 
     def replaced(self) -> None:
         """Another mission was uploaded: PX4 begins it, at once if it flies the mission."""
@@ -117,16 +122,34 @@ class MissionProgress(Component):
         if flies_it and autopilot.spec.kind is not Kind.COPTER:
             return
         self.current = self.resume_at = 0
+        self._jumps.clear()
         if self.running and isinstance(autopilot.modes.maneuver, AutoMission):
             autopilot.modes.maneuver.go_on(self.first)
 
     def advance(self, index: int) -> tuple[list[int], int | None]:
-        """What comes from an item on: indices of actions on the way, and of the next navigation."""
+        """What comes from an item on: indices of actions on the way, and of the next navigation.
+
+        Jumps are followed, and counted.
+        """
         actions: list[int] = []
-        for following in range(index, len(self.items)):
-            if self.items[following].command in NAVIGATION:
-                return actions, following
-            actions.append(following)
+        jumped = 0
+        while index < len(self.items):
+            item = self.items[index]
+            if item.command in NAVIGATION:
+                return actions, index
+            if item.command != dialect.MAV_CMD_DO_JUMP:
+                actions.append(index)
+                index += 1
+                continue
+            done = self._jumps.get(index, 0)
+            jumped += 1
+            if jumped > MOST_JUMPS:
+                return actions, None
+            if item.param2 < 0 or done < item.param2:
+                self._jumps[index] = done + 1
+                index = max(self.first, int(item.param1))
+            else:
+                index += 1
         return actions, None
 
     def set_current(self, index: int) -> bool:
@@ -137,6 +160,8 @@ class MissionProgress(Component):
         index = max(index, self.first)
         if index >= len(self.items):
             return False
+        if index == self.first or self.complete:
+            self._jumps.clear()
         maneuver = self.autopilot.modes.maneuver
         if self.running and isinstance(maneuver, AutoMission):
             maneuver.go_on(index)
