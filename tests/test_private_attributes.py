@@ -19,8 +19,11 @@ FILES = [
 ]
 PRODUCT = re.compile(r"(m2pem|bench|tools)\b|m2pem_plugin_\w+")
 PRIVATE = re.compile(r"_(?!_)\w+")
-PUBLIC = {"_asdict", "_fields", "_replace", "_exit", "_Element"}
-"""Of named tuples, `os` and `lxml.etree`: public in spite of their names."""
+PUBLIC = {
+    *("_asdict", "_fields", "_replace", "_exit", "_current_frames", "_Element"),
+    *("_repr_html_", "_repr_svg_"),
+}
+"""Of named tuples, `os`, `sys`, `lxml.etree` and IPython: public in spite of their names."""
 
 EXCEPTIONS = {
     ("tests/verify/test_interrupted_search.py", "_Search"): "Ctrl-C comes at each line of the "

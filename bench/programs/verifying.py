@@ -20,11 +20,12 @@ from typing import Any, TypeVar
 
 from bench.measured import peak_kb
 from m2pem.bpmn import parse_mission
-from m2pem.cli.verify import findings, search_request
+from m2pem.cli.verify import findings
 from m2pem.executive.loading import load_source
 from m2pem.executive.verification import SearchEngine
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.mission.mission import Mission
+from m2pem.scripting.verification import search_request
 from m2pem.verify.check import search as search_as_it_does
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.model_check import Result as Answered

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from m2pem.cli.options import MADE_UP, as_json, example, format_option, journal_option
+from m2pem.cli.options import as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
     from m2pem.executive.fleet_connections import FleetArbiters
@@ -28,9 +28,10 @@ def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str
         return
     if fleet_file is None:
         raise click.UsageError("name a fleet file, or say --schema")
-    if fleet_file == MADE_UP:
-        raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
-    from m2pem.cli.arguments import arbiters_of
+    from m2pem.scripting.sources import DEFAULT_FLEET, arbiters_of
+
+    if fleet_file == DEFAULT_FLEET:
+        raise click.UsageError(f"{DEFAULT_FLEET!r} is made up from a mission; name a fleet file")
     from m2pem.cli.journals import interrupted_runs
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.plugins import PluginManager

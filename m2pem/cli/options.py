@@ -13,9 +13,6 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-MADE_UP = "sim"
-"""The fleet's name that stands for one made up from the mission."""
-
 
 class UnusableError(M2pemError):
     """A file or value of the command line is missing or cannot be used."""

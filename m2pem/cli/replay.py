@@ -153,15 +153,15 @@ def replay_counterexample(
     file: Path, mission_file: str | None, fleet_file: str | None, number: int, output: str
 ) -> int:
     """Play violation `number` (from 1) of a JSON report. 0: the engine did all of the run."""
-    from m2pem.cli.arguments import get_fleet
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import wants_colour
+    from m2pem.scripting.sources import DEFAULT_FLEET, fleet_of
     from m2pem.verify.conformance_run import ConformanceRun, NotPlayableError
 
     report = _read(file)
     violation = _violation(file, report, number)
     mission = _mission(file, report, mission_file)
-    fleet = get_fleet(fleet_file or "sim", mission)
+    fleet = fleet_of(fleet_file or DEFAULT_FLEET, mission)
     player = ConformanceRun(mission, fleet, report["process"], report["data"])
     lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")

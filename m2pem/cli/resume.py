@@ -55,8 +55,9 @@ async def _resume(
     from m2pem.cli.journals import existing_journal, find_run, last_decided_us, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
-    from m2pem.cli.session import drive_run, make_executive, tidy_up
+    from m2pem.cli.session import drive_run, make_executive
     from m2pem.engine.state import RunStatus
+    from m2pem.executive.simulated_state import tidy_up
     from m2pem.journal import file_of
     from m2pem.journal.mission import fleet_of, mission_of
     from m2pem.plugins import PluginManager

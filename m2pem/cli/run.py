@@ -93,22 +93,24 @@ async def _run(
     output: str,
 ) -> int:
     from m2pem.api.clock import SystemClock
-    from m2pem.cli.arguments import get_answers, get_fleet
+    from m2pem.cli.arguments import get_answers
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
-    from m2pem.cli.session import drive_run, make_executive, refuse_speed, tidy_up, with_own_state
+    from m2pem.cli.session import drive_run, make_executive, refuse_speed
     from m2pem.executive.loading import load_source, without_effect
+    from m2pem.executive.simulated_state import tidy_up, with_own_state
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
+    from m2pem.scripting.sources import fleet_of
 
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
     url = url_of(journal_url)
     mission = load_source(mission_file, search_path)
     answers = get_answers(answers_file, mission)
-    fleet = get_fleet(fleet_name, mission)
+    fleet = fleet_of(fleet_name, mission)
     fleet = with_own_state(simulated_fleet(fleet) if simulated else fleet, file_of(url))
     refuse_speed(fleet, speed)
     async with journal_at(url) as journal:

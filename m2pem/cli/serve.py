@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from m2pem.cli.options import (
-    MADE_UP,
     example,
     fleet_option,
     format_option,
@@ -63,14 +62,18 @@ async def _serve(
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
-    from m2pem.cli.session import driving, make_executive, refuse_speed, tidy_up, with_shared_state
+    from m2pem.cli.session import driving, make_executive, refuse_speed
+    from m2pem.executive.simulated_state import tidy_up, with_shared_state
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
+    from m2pem.scripting.sources import DEFAULT_FLEET
 
-    if fleet_file == MADE_UP:
-        raise click.UsageError(f"--fleet {MADE_UP}: a fleet is made up from a mission; name a file")
+    if fleet_file == DEFAULT_FLEET:
+        raise click.UsageError(
+            f"--fleet {DEFAULT_FLEET}: a fleet is made up from a mission; name a file"
+        )
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
     url = url_of(journal_url)

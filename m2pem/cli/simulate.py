@@ -83,14 +83,15 @@ def simulate(
     Every vehicle is simulated; the same mission, fleet and answers give the same records, byte for
     byte. Needs no fleet if the mission commands nothing. Ends as `m2pem run` does.
     """
-    from m2pem.cli.arguments import get_answers, get_fleet
+    from m2pem.cli.arguments import get_answers
     from m2pem.cli.output import output_of
     from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager
     from m2pem.rehearsal.rehearsal import START_US, rehearse
+    from m2pem.scripting.sources import fleet_of
 
     loaded = load_source(mission, search_path)
-    fleet = get_fleet(fleet_file, loaded) if fleet_file is not None else None
+    fleet = fleet_of(fleet_file, loaded) if fleet_file is not None else None
     script = get_answers(answers, loaded)
     kept: list[StampedRecord] = []
     with output_of(output) as out:

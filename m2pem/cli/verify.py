@@ -24,7 +24,6 @@ from m2pem.cli.options import (
 
 if TYPE_CHECKING:
     from m2pem.executive.verification import SearchEngine, SearchRequest
-    from m2pem.mission.mission import Mission
     from m2pem.mission.values import Value
     from m2pem.verify.report.findings import DescribedViolation, Findings
     from m2pem.verify.search.explore import Progress
@@ -126,6 +125,7 @@ def verify(
     _refuse_what_does_not_go_together(engine, storage, emit, reports)
     from m2pem.executive.loading import load_source
     from m2pem.executive.verification import SearchEngine
+    from m2pem.scripting.verification import TOKENS_ON_A_PLACE, search_request
     from m2pem.verify.report.data import as_data
     from m2pem.verify.search.explore import Limits
 
@@ -140,7 +140,7 @@ def verify(
     if emit is not None:
         _emit(promela(asked), emit.partition("=")[2])
         return 0
-    limits = Limits(states=max_states, seconds=max_seconds, tokens=3)
+    limits = Limits(states=max_states, seconds=max_seconds, tokens=TOKENS_ON_A_PLACE)
     found = findings(asked, SearchEngine(engine, storage, limits), strict=strict)
     for file in reports:
         write(file, found)
@@ -187,35 +187,6 @@ def _text(found: "Findings") -> str:
 _QUIET_S = 1.0
 """A shorter search shows no progress."""
 _BETWEEN_LINES_S = 0.2
-
-
-def search_request(
-    mission: "Mission",
-    fleet_file: str | None,
-    process: str | None,
-    data: "Mapping[str, Value]",
-    spec: Path | None = None,
-    *,
-    timers_in_order: bool = False,
-) -> "SearchRequest":
-    """Return the search of a mission in which `m2pem check` finds no errors. `spec`: more
-    requirements.
-
-    Raises:
-        MissionError: there are errors; it lists all.
-        FleetError: the fleet cannot be used.
-        RequirementsError: requirements cannot be read, or do not fit; it lists all findings.
-    """
-    from m2pem.cli.arguments import arbiters_of, get_fleet
-    from m2pem.executive import verification
-    from m2pem.plugins import PluginManager
-
-    plugins = PluginManager()
-    fleet = get_fleet(fleet_file, mission) if fleet_file is not None else None
-    arbiters = arbiters_of(fleet, plugins) if fleet is not None else None
-    return verification.search_request(
-        mission, arbiters, plugins, process, data, spec, timers_in_order=timers_in_order
-    )
 
 
 def findings(asked: "SearchRequest", engine: "SearchEngine", *, strict: bool) -> "Findings":

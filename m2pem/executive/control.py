@@ -75,14 +75,14 @@ class Control:
 
     async def start(
         self,
-        mission: MissionSource,
+        mission: MissionSource | Mission,
         *,
         process: str | None = None,
         data: Mapping[str, Value] | None = None,
         by: str = "",
         even_if_busy: bool = False,
     ) -> RunId:
-        """Start a mission; returns when its beginning is in the journal."""
+        """Start a mission, also one that was loaded; returns when the journal has its beginning."""
         return await self._supervisor.start(
             mission, process, _bounded(data), by, even_if_busy=even_if_busy
         )

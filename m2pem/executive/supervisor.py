@@ -200,14 +200,19 @@ class Supervisor:
         return loaded.process(process).id
 
     def _load(
-        self, mission: MissionSource, process: str | None, data: Mapping[str, Value] | None
+        self,
+        mission: MissionSource | Mission,
+        process: str | None,
+        data: Mapping[str, Value] | None,
     ) -> tuple[Mission, str]:
+        if isinstance(mission, Mission):
+            return mission, self.admit(mission, process, data)
         loaded = load_source(mission, self.settings.search_path)
         return loaded, self.admit(loaded, process, data)
 
     async def start(
         self,
-        mission: MissionSource,
+        mission: MissionSource | Mission,
         process: str | None,
         data: Mapping[str, Value] | None,
         by: str,

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import VirtualClock, run_virtual
@@ -207,17 +206,6 @@ def rehearse(
     return RehearsalResult(
         summary, tuple(collected), tuple(rehearsal.samples), tuple(loaded.files())
     )
-
-
-async def rehearse_async(
-    mission: MissionSource | Mission, fleet: Fleet | None, **options: Any
-) -> RehearsalResult:
-    """As `rehearse`, with its options, in a thread: the event loop goes on meanwhile.
-
-    `on_record` is called in that thread. A rehearsal whose caller is cancelled goes on to its end,
-    or to `max_steps`.
-    """
-    return await asyncio.to_thread(rehearse, mission, fleet, **options)
 
 
 def _load(answers: Path | str | bytes | None) -> Answers:

@@ -7,9 +7,10 @@ from typing import Any, cast
 import click
 import pytest
 
-from m2pem.cli.session import refuse_speed, tidy_up, with_own_state, with_shared_state
+from m2pem.cli.session import refuse_speed
 from m2pem.engine.state import RunStatus
 from m2pem.executive.executive import Executive
+from m2pem.executive.simulated_state import tidy_up, with_own_state, with_shared_state
 from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from tests.command_line import FLEET

@@ -39,7 +39,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal import rehearsal
 from m2pem.rehearsal.answers import load_answers
-from m2pem.rehearsal.rehearsal import START_US, RehearsalResult, Sampler, rehearse, rehearse_async
+from m2pem.rehearsal.rehearsal import START_US, RehearsalResult, Sampler, rehearse
 from m2pem.rehearsal.worker import rehearse_in_subprocess
 
 SAMPLED_FROM_US = 1_000_000_000
@@ -682,22 +682,3 @@ def test_answers_that_were_loaded_can_be_handed_in() -> None:
     answers = load_answers(ANSWERS / "vignette1_abort.yaml")
     result = rehearse(VIGNETTE, load_fleet(VIGNETTE_FLEET), plugins=PLUGINS, answers=answers)
     assert result.summary.status is RunStatus.TERMINATED
-
-
-async def test_a_rehearsal_in_a_running_event_loop_is_the_same() -> None:
-    fleet = load_fleet(VIGNETTE_FLEET)
-    options: dict[str, Any] = {
-        "plugins": PLUGINS,
-        "answers": ANSWERS / "vignette1_detection.yaml",
-    }
-    at_once = rehearse(VIGNETTE, fleet, **options)
-    assert at_once.summary.status is RunStatus.TERMINATED
-    rehearsal = asyncio.create_task(rehearse_async(VIGNETTE, fleet, **options))
-    turns = 0
-    while not rehearsal.done():
-        turns += 1
-        await asyncio.sleep(0)
-    assert turns > 1
-    assert (await rehearsal).records == at_once.records
-    with pytest.raises(MissionError):
-        await rehearse_async(b"nothing", fleet, **options)

@@ -6,12 +6,12 @@ import pytest
 from m2pem_plugin_web.templates import templates
 from rest_world import VIGNETTE, rest_world
 
-from m2pem.cli.arguments import arbiters_of
 from m2pem.executive.loading import findings_for, load_source
 from m2pem.executive.verification import SearchEngine, search, search_request
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
+from m2pem.scripting.sources import arbiters_of
 from m2pem.verify.search.explore import Limits
 
 NAMES = ("escort", "patrol", "search", "survey", "sweep_and_detect")

@@ -1,0 +1,72 @@
+"""The file beside a journal in which simulated vehicles keep where they are, for a resume."""
+
+import hashlib
+import secrets
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from m2pem.engine.state import RunStatus
+from m2pem.executive.executive import Executive
+from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, dump
+
+STATE = "state"
+"""The setting of a simulated resource that names its file."""
+
+
+def with_own_state(fleet: Fleet, journal: Path | None) -> Fleet:
+    """Return the fleet with its state in a new file beside the journal, for this run alone."""
+    return _with_state(fleet, journal, secrets.token_hex(4))
+
+
+def with_shared_state(fleet: Fleet, journal: Path | None, written: Fleet) -> Fleet:
+    """Return the fleet with its state in the file that belongs to this fleet and journal.
+
+    `written`: the fleet as its own file says.
+    """
+    name = hashlib.sha256(dump(written)).hexdigest()[:8]
+    return _with_state(fleet, journal, name)
+
+
+def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
+    if journal is None:
+        return fleet
+    path = f"{_prefix(journal)}{name}"
+
+    def settings(arbiter: str, own: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the settings; those of the fleet have precedence."""
+        return {STATE: path, **own} if arbiter == SIMULATED else own
+
+    return replace(
+        fleet,
+        vehicles={
+            name: replace(vehicle, settings=settings(vehicle.arbiter, vehicle.settings))
+            for name, vehicle in fleet.vehicles.items()
+        },
+        payloads={
+            name: replace(payload, settings=settings(payload.arbiter, payload.settings))
+            for name, payload in fleet.payloads.items()
+        },
+    )
+
+
+def tidy_up(executive: Executive, journal: Path | None) -> None:
+    """Delete the files made here, unless a run has not ended and needs them to be resumed."""
+    if journal is None or any(
+        runner.failure is not None or runner.run.state.status is not RunStatus.ENDED
+        for runner in executive.runners.values()
+    ):
+        return
+    everything: list[Vehicle | Payload] = [
+        *executive.fleet.vehicles.values(),
+        *executive.fleet.payloads.values(),
+    ]
+    for path in {str(each.settings.get(STATE, "")) for each in everything}:
+        if path.startswith(_prefix(journal)):
+            for suffix in ("", "-wal", "-shm"):
+                Path(f"{path}{suffix}").unlink(missing_ok=True)
+
+
+def _prefix(journal: Path) -> str:
+    return f"{journal.resolve()}-sim-"

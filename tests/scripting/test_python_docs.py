@@ -1,0 +1,49 @@
+"""The code of docs/python.md runs, and prints what its comments say."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.console import REPOSITORY, environment, first_unprinted, make_workspace
+
+PAGE = REPOSITORY / "docs" / "python.md"
+TEXT = PAGE.read_text(encoding="utf-8")
+BLOCKS = {
+    TEXT.count("\n", 0, found.start()) + 1: found[1]
+    for found in re.finditer(r"^```python\n(.*?)^```$", TEXT, re.M | re.S)
+}
+
+
+def output(code: str) -> tuple[str, ...]:
+    """What a block says that it prints: comments of their own, and behind a `print`."""
+    said = [re.search(r"^# (.*)$|^print\(.*\)  # (.*)$", line) for line in code.splitlines()]
+    return tuple(found[1] or found[2] for found in said if found)
+
+
+def test_comments_are_read_as_output() -> None:
+    assert output("x = 1  # one\nprint(x)  # 1\n# two\n    # no\n") == ("1", "two")
+    assert len(BLOCKS) >= 7
+    assert sum(bool(output(code)) for code in BLOCKS.values()) >= 5
+
+
+@pytest.mark.parametrize("line", BLOCKS)
+def test_a_block_does_what_it_says(line: int, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "workspace")
+    done = subprocess.run(
+        [sys.executable, "-c", BLOCKS[line]],
+        cwd=workspace,
+        env=environment(tmp_path / "home"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    expected = output(BLOCKS[line])
+    if expected:
+        missing = first_unprinted(expected, done.stdout)
+        assert missing is None, f"{done.stdout}\nnot as shown: {missing}"
