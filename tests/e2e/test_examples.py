@@ -23,7 +23,7 @@ from tests.console import (
     make_workspace,
 )
 
-EXAMPLES = sorted(path for path in (REPOSITORY / "examples").iterdir() if path.is_dir())
+EXAMPLES = sorted(path for path in (REPOSITORY / "examples").glob("t[0-9]*") if path.is_dir())
 NEEDS_A_PLUGIN = "t13_own_service"
 NOT_INSTALLED = {"M2PEM_BLOCK_PLUGINS": "wind_gauge"}
 """As if that plugin was not there, in an environment where somebody has followed the README."""
