@@ -14,6 +14,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[1]
@@ -118,7 +119,8 @@ def assert_does_what_is_shown(
     """Run a command and compare status and output; of an interactive one, look at the options."""
     if command.interactive:
         words = shlex.split(command.text, comments=True)
-        usage = run(shlex.join([*words[:2], "--help"]), workspace, environment)
+        named = takewhile(lambda word: not word.startswith("-"), words)
+        usage = run(shlex.join([*named, "--help"]), workspace, environment)
         assert usage.returncode == 0, usage.stdout
         options = [word.split("=")[0] for word in words if word.startswith("--")]
         assert [option for option in options if option not in usage.stdout] == []

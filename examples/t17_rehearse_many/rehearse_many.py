@@ -4,12 +4,10 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from m2pem import load_fleet
+import m2pem
 from m2pem.engine.records import BehaviorEnded, BehaviorRequested
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import ResourceId
-from m2pem.plugins import PluginManager
-from m2pem.rehearsal.rehearsal import rehearse
 
 HERE = Path(__file__).parent
 PERCENT = range(10, 101, 10)
@@ -24,8 +22,8 @@ def with_battery(fleet: Fleet, vehicle: ResourceId, percent: int) -> Fleet:
 
 def rehearsed(percent: int) -> str:
     """One rehearsal, as a line of the table."""
-    fleet = with_battery(load_fleet(HERE / "fleet.yaml"), ResourceId("uav1"), percent)
-    result = rehearse(HERE / "mission.bpmn", fleet, plugins=PluginManager())
+    fleet = with_battery(m2pem.load_fleet(HERE / "fleet.yaml"), ResourceId("uav1"), percent)
+    result = m2pem.rehearse(HERE / "mission.bpmn", fleet)
     who: dict[str, str] = {}
     by = "none"
     for stamped in result.records:
@@ -36,7 +34,7 @@ def rehearsed(percent: int) -> str:
                 by = who[ended.behavior]
             case _:
                 pass
-    return f"{percent:6} %  {result.summary.status:10} {by:8} {result.records[-1].t_s:6.1f} s"
+    return f"{percent:6} %  {result.outcome:10} {by:8} {result.records[-1].t_s:6.1f} s"
 
 
 def main() -> None:

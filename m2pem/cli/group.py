@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
 
 COMMANDS = {
+    "init": "Make a folder with a mission, a fleet, answers and a README.",
+    "examples": "List the examples, or copy one.",
     "demo": "Show missions on simulated vehicles.",
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from m2pem.demo.programs import Programs, copy_once, examples, m2pem
+from m2pem.demo.programs import Programs, copy_once, m2pem
+from m2pem.demo.shipped_files import examples
 from m2pem.errors import OperatorError
 
 SIMULATED_SPEED = 20

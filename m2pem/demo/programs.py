@@ -16,23 +16,6 @@ ENDS_WITHIN_S = 30.0
 """A program that runs on so long after SIGTERM gets SIGKILL."""
 
 
-def examples() -> Path:
-    """Return the folder that holds `missions` and `fleet_configs`.
-
-    It is inside of an installed package, and the root of a clone of the repository.
-
-    Raises:
-        OperatorError: neither has them.
-    """
-    package = Path(__file__).parents[1]
-    for folder in (package / "examples", package.parent):
-        if (folder / "missions").is_dir() and (folder / "fleet_configs").is_dir():
-            return folder
-    raise OperatorError(
-        f"the missions of the demonstrations are not in {package / 'examples'}: install m2pem anew"
-    )
-
-
 class Programs:
     """Programs that end with the `with` block, the one that was started last first.
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.demo.programs import Programs, examples, m2pem
+from m2pem.demo.programs import Programs, m2pem
+from m2pem.demo.shipped_files import examples
 from m2pem.errors import OperatorError
 from tests.command_line import REPOSITORY
 
@@ -45,10 +46,10 @@ def test_a_demonstration_without_its_plugin_names_the_plugin(
 def test_the_missions_of_an_installed_package_are_found_inside_of_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from m2pem.demo import programs
+    from m2pem.demo import shipped_files
 
     package = tmp_path / "site" / "m2pem"
-    monkeypatch.setattr(programs, "__file__", str(package / "demo" / "programs.py"))
+    monkeypatch.setattr(shipped_files, "__file__", str(package / "demo" / "shipped_files.py"))
     with pytest.raises(OperatorError, match="install m2pem anew"):
         examples()
     for name in ("missions", "fleet_configs"):

@@ -1,6 +1,7 @@
 """`make demo-air`: the mission of two copters and a rover, with real processes over real UDP."""
 
 import json
+import shlex
 import socket
 import subprocess
 import sys
@@ -78,6 +79,46 @@ def test_the_second_copter_takes_over_what_the_first_one_leaves(
             ("area_survey", "uav1", "LOST"): 1,
             ("area_survey", "uav2", "SUCCEEDED"): 2,
             ("return_to_launch", "uav2", "SUCCEEDED"): 1,
+        }
+    )
+
+
+def test_the_folder_that_init_makes_runs_on_the_autopilots_of_its_readme(
+    port: int, tmp_path: Path
+) -> None:
+    folder = tmp_path / "made"
+    subprocess.run(m2pem("init", folder, "--for", "mavlink"), check=True)
+    fleet = folder / "fleet.yaml"
+    fleet.write_text(fleet.read_text(encoding="utf-8").replace("14550", str(port)))
+    readme = (folder / "README.md").read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = [line for line in readme.splitlines() if line.startswith("m2pem ")]
+    typed = [shlex.split(line, comments=True) for line in lines]
+    (simulate,) = [words for words in typed if words[:3] == ["m2pem", "sim", "mavlink"]]
+    run = next(words for words in typed if words[:2] == ["m2pem", "run"])
+    autopilots = subprocess.Popen(
+        m2pem(*simulate[1:], "--to", f"udp://127.0.0.1:{port}"), stdout=subprocess.DEVNULL
+    )
+    try:
+        done = subprocess.run(
+            m2pem(*run[1:], "--journal", "memory:", "--ocu", "none", "--format", "json"),
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=ENDED_WITHIN_S,
+            check=False,
+        )
+    finally:
+        autopilots.terminate()
+        autopilots.wait()
+    assert done.returncode == 0, done.stderr
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    assert ends(records) == Counter(
+        {
+            ("single_vehicle_routing", "rover", "SUCCEEDED"): 1,
+            ("goto", "rover", "SUCCEEDED"): 1,
+            ("takeoff", "uav1", "SUCCEEDED"): 1,
+            ("area_survey", "uav1", "SUCCEEDED"): 1,
+            ("return_to_launch", "uav1", "SUCCEEDED"): 1,
         }
     )
 
