@@ -16,6 +16,7 @@ import selectors
 import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from contextvars import Context, copy_context
 from typing import Any, Protocol, TypeVar, TypeVarTuple, Unpack
 
@@ -130,20 +131,28 @@ def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> 
     """Run `main` to its end in virtual time that begins at `start_us`, as `asyncio.run` would.
 
     Where an event loop runs already (a notebook, an async test), `main` gets a thread of its own;
-    that event loop waits for it.
+    that event loop waits for it, and an interrupt (Ctrl-C) cancels it.
 
     Raises:
         DeadlockError: nothing can happen any more, and `main` has not ended.
     """
-    if asyncio._get_running_loop() is None:
-        return _run_virtual(main, start_us)
-    with ThreadPoolExecutor(1) as threads:
-        return threads.submit(copy_context().run, _run_virtual, main, start_us).result()
-
-
-def _run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> T:
     loop = VirtualLoop()
+    if asyncio._get_running_loop() is None:
+        return _run_virtual(loop, main, start_us)
+    with ThreadPoolExecutor(1) as threads:
+        ending = threads.submit(copy_context().run, _run_virtual, loop, main, start_us)
+        try:
+            return ending.result()
+        except KeyboardInterrupt:
+            # In the main thread asyncio does that itself. The thread is waited for afterwards.
+            with suppress(RuntimeError):  # it has ended meanwhile
+                loop.call_soon_threadsafe(loop.cancel_main)
+            raise
 
+
+def _run_virtual(
+    loop: "VirtualLoop", main: Callable[[VirtualClock], Awaitable[T]], start_us: int
+) -> T:
     async def entry() -> T:
         return await main(VirtualClock(loop, start_us))
 
@@ -177,6 +186,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
         self.elapsed_us = 0
         self.when_idle: Callable[[float | None], bool] = lambda _: False
+        self._main: asyncio.Task[Any] | None = None
         self._threads_at_work = 0
         self._timer_numbers = itertools.count()
         super().__init__(_JumpingSelector(self))
@@ -184,6 +194,17 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         # fires one early, as all are due at whole ones; the default, a nanosecond, is lost when
         # added to a float of some months, and then the timer would never be due.
         self._clock_resolution = _RESOLUTION_S
+
+    def create_task(self, coro: Any, **options: Any) -> "asyncio.Task[Any]":
+        """Create a task. The first is the main one, which the loop runs until it has ended."""
+        task = super().create_task(coro, **options)
+        self._main = self._main or task
+        return task
+
+    def cancel_main(self) -> None:
+        """Cancel the main task."""
+        if self._main is not None:
+            self._main.cancel()
 
     def pass_rest(self, rest_us: int) -> None:
         """Let pass what a timer came too early: centuries in seconds are no exact floats."""

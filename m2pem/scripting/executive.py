@@ -173,7 +173,11 @@ async def _rehearse(*arguments: Any, **options: Any) -> SimulationResult:
 
 
 class Executive:
-    """Connects to the vehicles of a fleet and executes missions, within an `async with` block.
+    """Connects to the vehicles of a fleet and executes missions.
+
+    Within an `async with` block; or from `connect` to `close`, so that a notebook starts a run in
+    one cell and steers it in the next. The end stops what still runs, and waits until its vehicles
+    are released.
 
     `fleet`: one that was loaded, or the path of a fleet file. `simulate`: every vehicle and payload
     is simulated. `speed`: of simulated vehicles and timers against the wall clock. `journal`: a
@@ -181,9 +185,8 @@ class Executive:
     `search_path`: folders of processes that missions call. `by`: the operator's name in the
     journal; None: M2PEM_OPERATOR, else user and host.
 
-    The end of the block stops what still runs, and waits until its vehicles are released. The
-    executive lives in the event loop of the block: code that blocks this loop delays STOP, too, and
-    an alert says so.
+    The executive lives in the event loop that it was connected in: code that blocks this loop
+    delays STOP, too, and an alert says so.
 
     Raises:
         FleetError: the fleet cannot be used.
@@ -205,60 +208,62 @@ class Executive:
         self._url = default_url() if journal is None else str(journal)
         self._search_path: Sequence[Path] = [Path(each) for each in search_path]
         self._by = operator_name() if by is None else by
-        self._stack = AsyncExitStack()
         self._control: Control | None = None
+        self._closing = asyncio.Event()
+        self._serving: asyncio.Task[None] | None = None
 
     @property
     def control(self) -> Control:
         """All that operators can do, over all runs: see `m2pem.api.MissionControl`.
 
         Raises:
-            OperatorError: outside of the `async with` block.
+            OperatorError: the executive is not connected.
         """
         if self._control is None:
-            raise OperatorError("the executive is not connected: use it in `async with`")
+            raise OperatorError(
+                "the executive is not connected: use it in `async with`, or await connect()"
+            )
         return self._control
 
-    async def __aenter__(self) -> Self:
+    async def connect(self) -> Self:
         """Open the journal and connect to the vehicles.
 
         Raises:
+            OperatorError: it is connected already.
             FleetError: the fleet names an arbiter that no plugin provides, or has real vehicles
                 and the speed is not 1.
             JournalError: the journal cannot be opened.
             VehicleInUseError: another executive commands a vehicle of the fleet.
         """
-        file = file_of(self._url)
-        async with AsyncExitStack() as stack:
-            journal = open_journal(self._url)
-            stack.push_async_callback(journal.close)
-            fleet = with_own_state(self._fleet, file)
-            try:
-                executive = core.Executive(
-                    fleet,
-                    journal,
-                    PluginManager(),
-                    SystemClock(self._speed),
-                    speed=self._speed,
-                    search_path=self._search_path,
-                    rehearse=_rehearse,
-                )
-            except PluginError as error:
-                raise FleetError(f"{fleet.file}: {error}", ()) from error
-            if self._speed != 1.0 and not executive.arbiters.nothing_is_real:
-                raise FleetError(
-                    f"{fleet.file}: speed {self._speed:g} is for simulated vehicles alone: add "
-                    "simulate=True, or mark what is software in the loop with `sitl: true`",
-                    (),
-                )
-            stack.callback(tidy_up, executive, file)
-            # First, as nothing may come between connecting and taking up a run.
-            await stack.enter_async_context(ControlSocket(executive.control, file))
-            await stack.enter_async_context(executive)
-            await stack.enter_async_context(LoopMonitor(executive.events))
-            self._stack = stack.pop_all()
-        self._control = executive.control
+        if self._serving is not None:
+            raise OperatorError("the executive is connected already")
+        self._closing.clear()
+        connected: asyncio.Future[Control] = asyncio.get_running_loop().create_future()
+        # A task of its own: what is opened must be closed in the same task, and `connect` and
+        # `close` may be called in two.
+        self._serving = asyncio.create_task(self._serve(connected), name="executive")
+        try:
+            self._control = await connected
+        except BaseException:
+            self._serving.cancel()
+            await asyncio.wait([self._serving])
+            self._serving = None
+            raise
         return self
+
+    async def close(self) -> None:
+        """Stop what still runs, wait until its vehicles are released, and close the journal.
+
+        Nothing happens if it is not connected.
+        """
+        self._control = None
+        self._closing.set()
+        if self._serving is not None:
+            await asyncio.shield(self._serving)
+            self._serving = None
+
+    async def __aenter__(self) -> Self:
+        return await self.connect()
 
     async def __aexit__(
         self,
@@ -266,9 +271,7 @@ class Executive:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop what still runs, wait until its vehicles are released, and close the journal."""
-        self._control = None
-        await self._stack.aclose()
+        await self.close()
 
     async def start(
         self,
@@ -292,3 +295,46 @@ class Executive:
             mission, process=process, data=data, by=self._by, even_if_busy=even_if_busy
         )
         return Run(control, run, await control.mission(run), self._by)
+
+    async def _serve(self, connected: "asyncio.Future[Control]") -> None:
+        """Be connected until `close` is called."""
+        try:
+            async with AsyncExitStack() as stack:
+                control = await self._open(stack)
+                connected.set_result(control)
+                await self._closing.wait()
+        except Exception as error:
+            if connected.done():
+                raise
+            connected.set_exception(error)
+
+    async def _open(self, stack: AsyncExitStack) -> Control:
+        """Open all that `stack` then closes."""
+        file = file_of(self._url)
+        journal = open_journal(self._url)
+        stack.push_async_callback(journal.close)
+        fleet = with_own_state(self._fleet, file)
+        try:
+            executive = core.Executive(
+                fleet,
+                journal,
+                PluginManager(),
+                SystemClock(self._speed),
+                speed=self._speed,
+                search_path=self._search_path,
+                rehearse=_rehearse,
+            )
+        except PluginError as error:
+            raise FleetError(f"{fleet.file}: {error}", ()) from error
+        if self._speed != 1.0 and not executive.arbiters.nothing_is_real:
+            raise FleetError(
+                f"{fleet.file}: speed {self._speed:g} is for simulated vehicles alone: add "
+                "simulate=True, or mark what is software in the loop with `sitl: true`",
+                (),
+            )
+        stack.callback(tidy_up, executive, file)
+        # First, as nothing may come between connecting and taking up a run.
+        await stack.enter_async_context(ControlSocket(executive.control, file))
+        await stack.enter_async_context(executive)
+        await stack.enter_async_context(LoopMonitor(executive.events))
+        return executive.control

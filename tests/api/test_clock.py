@@ -1,9 +1,12 @@
 import asyncio
 import math
+import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
+from types import FrameType
 
 import pytest
 
@@ -266,3 +269,35 @@ def test_an_error_of_the_main_function_comes_out() -> None:
 
     with pytest.raises(LookupError, match="mine"):
         run_virtual(main, START_US)
+
+
+async def test_an_interrupt_cancels_what_runs_in_virtual_time_beside_an_event_loop() -> None:
+    """As that of a notebook's kernel while a cell rehearses."""
+    ended: list[str] = []
+
+    async def main(clock: VirtualClock) -> None:
+        try:
+            while not main_thread_waits():
+                await clock.sleep(1)
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            while True:
+                await clock.sleep(1)
+        finally:
+            ended.append(threading.current_thread().name)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run_virtual(main, START_US)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(ended) == 1
+    assert ended != [threading.current_thread().name]
+
+
+def main_thread_waits() -> bool:
+    """Whether the main thread waits for the result of another one."""
+    frame: FrameType | None = sys._current_frames()[threading.main_thread().ident or 0]
+    while frame is not None and frame.f_code.co_name != "result":
+        frame = frame.f_back
+    return frame is not None

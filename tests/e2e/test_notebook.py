@@ -73,11 +73,12 @@ def test_rehearsals_are_awaited_together(executed: list[Any]) -> None:
     assert "('completed', 'EndAborted', 0)" in results
 
 
-def test_an_executive_in_the_kernels_loop_is_steered_by_the_notebook(executed: list[Any]) -> None:
-    (cell,) = [each for each in executed if "m2pem.Executive(" in each.source]
-    assert cell.outputs[0]["text"] == (
-        "Road and field are free. Begin? {'begin': 'Begin', 'abort': 'Not today'}\n"
-    )
-    result = cell.outputs[-1]["data"]["text/html"]
+def test_an_executive_runs_in_the_background_and_is_steered_from_cell_to_cell(
+    executed: list[Any],
+) -> None:
+    prompt = shown(executed, "m2pem.Executive(")["text/plain"]
+    assert prompt == "<Prompt AskOperator: Road and field are free. Begin? [begin, abort]>"
+    assert shown(executed, "await run.pause()")["text/plain"] == "paused\n"
+    result = shown(executed, "await run.wait()")["text/html"]
     assert ">completed</strong>" in result
     assert result.count("<svg") == 2

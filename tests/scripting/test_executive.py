@@ -142,3 +142,34 @@ async def test_real_vehicles_are_never_sped_up(tmp_path: Path) -> None:
     with pytest.raises(m2pem.FleetError, match=r"fleet\.yaml: there is no arbiter 'rso'"):
         async with m2pem.Executive(file, journal="memory:"):
             pass
+
+
+async def test_it_is_connected_in_one_task_and_closed_in_another(fleet: m2pem.api.Fleet) -> None:
+    """As the cells of a notebook may be."""
+    connected = executive(fleet)
+    await asyncio.create_task(connected.connect())
+    with pytest.raises(OperatorError, match="connected already"):
+        await connected.connect()
+    run = await asyncio.create_task(connected.start(MISSION))
+    watching = asyncio.create_task(run.wait())
+    await asyncio.create_task(connected.close())
+    assert (await watching).outcome is RunStatus.STOPPED
+    with pytest.raises(OperatorError, match="not connected"):
+        await connected.start(MISSION)
+    await connected.close()
+    async with connected:
+        assert (await connected.start(MISSION)).id == "r1"  # a journal in memory begins anew
+
+
+async def test_a_caller_that_gives_up_while_connecting_leaves_nothing_open(
+    fleet: m2pem.api.Fleet, tmp_path: Path
+) -> None:
+    connected = executive(fleet, tmp_path / "journal.db")
+    connecting = asyncio.create_task(connected.connect())
+    await asyncio.sleep(0)
+    connecting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await connecting
+    assert [each.get_name() for each in asyncio.all_tasks() if each.get_name() == "executive"] == []
+    async with connected:
+        assert (await connected.start(MISSION)).id == "r1"
