@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import click
 
     from m2pem.api.arbiter import Arbiter
+    from m2pem.api.health import HealthCheck
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service
     from m2pem.engine.records import Record
@@ -60,3 +61,9 @@ def m2pem_check_mission(mission: "Mission", fleet: "Fleet | None") -> "Sequence[
 @hookspec
 def m2pem_records_committed(run_id: str, records: "Sequence[Record]") -> None:
     """Observe records after they were committed."""
+
+
+@hookspec
+def m2pem_check_host(fleet: "Fleet | None") -> "Sequence[HealthCheck]":
+    """Return what of this host is right for the plugin, and what is not, for `m2pem doctor`."""
+    return ()

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from m2pem.api.capabilities import arbiter_problem, ocu_problem
+from m2pem.api.health import HealthCheck, HealthStatus
 from m2pem.errors import InternalError, PluginError
 from m2pem.findings import Finding, Severity
 from m2pem.plugin_loading import (
@@ -60,6 +61,7 @@ _PROBLEM_OF: Mapping[str, Callable[[object], str]] = {
 """What is wrong in the capabilities that a factory declares, by the kind of what it makes."""
 
 _CHECK = "m2pem_check_mission"
+_CHECK_HOST = "m2pem_check_host"
 _OBSERVE = "m2pem_records_committed"
 PUBLISHED = ("mavlink", "mocu", "ptz", "ros", "terminal", "web")
 """What the plugins of m2pem itself are called, installed or not."""
@@ -189,7 +191,8 @@ class PluginManager:
         findings: list[Finding] = []
         for plugin in self._having(_CHECK):
             try:
-                findings += _findings(plugin.call(_CHECK, mission=mission, fleet=fleet))
+                returned = plugin.call(_CHECK, mission=mission, fleet=fleet)
+                findings += _all_of(Finding, "findings", returned)
             except Exception as error:
                 broken = self._failed(plugin.origin, error, _CHECK)
                 remedy = "ask its author; to check without it, block the plugin"
@@ -205,6 +208,20 @@ class PluginManager:
                     )
                 )
         return findings
+
+    def check_host(self, fleet: "Fleet | None") -> list[HealthCheck]:
+        """The plugins' checks of this host; for one that breaks, a check with the warning."""
+        checks: list[HealthCheck] = []
+        for plugin in self._having(_CHECK_HOST):
+            try:
+                returned = plugin.call(_CHECK_HOST, fleet=fleet)
+                checks += _all_of(HealthCheck, "checks", returned)
+            except Exception as error:
+                broken = str(self._failed(plugin.origin, error, _CHECK_HOST))
+                remedy = "ask its author; what it needs of this host was not checked"
+                name = f"plugin {plugin.origin.name}"
+                checks.append(HealthCheck(name, HealthStatus.WARNING, broken, remedy))
+        return checks
 
     def records_committed(self, run_id: str, records: "Sequence[Record]") -> None:
         """Call the observers; an exception of one is logged, and affects no other."""
@@ -326,7 +343,11 @@ class PluginManager:
             for name, offer in self._offers[kind].items()
             if offer.origin is origin
         ]
-        for hook, what in ((_CHECK, "mission checks"), (_OBSERVE, "record observer")):
+        for hook, what in (
+            (_CHECK, "mission checks"),
+            (_CHECK_HOST, "host checks"),
+            (_OBSERVE, "record observer"),
+        ):
             if any(plugin.origin is origin for plugin in self._having(hook)):
                 provides.append(what)
         errors = [
@@ -366,12 +387,13 @@ def _taken(known: set[str], cli: "click.Group", own: "click.Group") -> Iterator[
             yield name
 
 
-def _findings(result: object) -> list[Finding]:
+def _all_of(kind: type[T], what: str, result: object) -> list[T]:
+    """What a hook returned, if all of it is of that kind; `what`: its name for the message."""
     if result is None:
         return []
     if not isinstance(result, Iterable):
-        raise PluginError(f"it returned {result!r}, not findings")
-    findings = list(result)
-    if wrong := [each for each in findings if not isinstance(each, Finding)]:
-        raise PluginError(f"it returned {wrong[0]!r} among its findings")
-    return findings
+        raise PluginError(f"it returned {result!r}, not {what}")
+    returned = list(result)
+    if wrong := [each for each in returned if not isinstance(each, kind)]:
+        raise PluginError(f"it returned {wrong[0]!r} among its {what}")
+    return returned

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
+    from m2pem.api.health import HealthCheck, HealthStatus, listening_check
     from m2pem.api.latest_task import LatestTask
     from m2pem.api.ocu import Ocu
     from m2pem.api.operations import (
@@ -136,6 +137,7 @@ _MODULES = {
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
+    "m2pem.api.health": "HealthCheck HealthStatus listening_check",
     "m2pem.api.behavior_parameters": "BehaviorParameters decode_parameters encode_parameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
@@ -215,6 +217,8 @@ __all__ = [
     "GeoPosition",
     "GoalArbiter",
     "HandedOver",
+    "HealthCheck",
+    "HealthStatus",
     "BehaviorTracker",
     "Importance",
     "Kind",
@@ -286,6 +290,7 @@ __all__ = [
     "encode_parameters",
     "follow",
     "lawn_mower",
+    "listening_check",
     "longest_edge_yaw",
     "middle_of",
     "offset",

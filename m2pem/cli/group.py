@@ -41,6 +41,7 @@ COMMANDS = {
     "attach": "Serve an operator of an executive that is running on this host.",
     "plugins": "List the plugins and what they provide.",
     "fleet": "Show a fleet: who is there and can do what.",
+    "doctor": "Check this host: what is right, and what to do about the rest.",
     "completion": "Print what makes a shell complete m2pem's words.",
 }
 """Built-in commands and the first lines of their help."""

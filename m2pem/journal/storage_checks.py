@@ -37,14 +37,23 @@ def min_free_mb() -> float:
     return bound
 
 
+def free_space_mb(journal: Path) -> float:
+    """Return the free space of a journal's disk for this user, in megabytes.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    disk = os.statvfs(journal.parent)
+    return disk.f_bavail * disk.f_frsize / _BYTES
+
+
 def space_shortage(journal: Path) -> str:
     """Say what is wrong with the free space of a journal's disk, and the remedy; "": nothing.
 
     Raises:
         OSError: the free space cannot be read.
     """
-    disk = os.statvfs(journal.parent)
-    free_mb = disk.f_bavail * disk.f_frsize / _BYTES
+    free_mb = free_space_mb(journal)
     bound = min_free_mb()
     if free_mb >= bound:
         return ""

@@ -9,7 +9,11 @@ transactions to perform on it. A name is loaded when it is first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from m2pem_plugin_mavlink.hooks import m2pem_register_arbiters, m2pem_register_commands
+from m2pem_plugin_mavlink.hooks import (
+    m2pem_check_host,
+    m2pem_register_arbiters,
+    m2pem_register_commands,
+)
 
 if TYPE_CHECKING:
     from m2pem_plugin_mavlink.link.routed_link import RoutedLink, open_link
@@ -36,6 +40,7 @@ __all__ = [
     "camera_images",
     "gimbal",
     "gimbal_status",
+    "m2pem_check_host",
     "m2pem_register_arbiters",
     "m2pem_register_commands",
     "message_type",

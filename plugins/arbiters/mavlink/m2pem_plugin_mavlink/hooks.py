@@ -1,6 +1,6 @@
-"""The hooks of this plugin: the arbiter `mavlink` and the commands; each is loaded when used."""
+"""The hooks of this plugin: the arbiter `mavlink`, commands and host checks, loaded when used."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem import hookimpl
@@ -8,7 +8,7 @@ from m2pem import hookimpl
 if TYPE_CHECKING:
     import click
 
-    from m2pem.api import Arbiter
+    from m2pem.api import Arbiter, Fleet, HealthCheck
 
 
 @hookimpl
@@ -25,3 +25,13 @@ def m2pem_register_commands(cli: "click.Group") -> None:
     from m2pem_plugin_mavlink.commands import add_to  # noqa: PLC0415  # starting up must be fast
 
     add_to(cli.commands)
+
+
+@hookimpl
+def m2pem_check_host(fleet: "Fleet | None") -> "Sequence[HealthCheck]":
+    """Check the ports of a fleet's MAVLink vehicles, and whether their autopilots are received."""
+    if fleet is None or all(each.arbiter != "mavlink" for each in fleet.vehicles.values()):
+        return ()
+    from m2pem_plugin_mavlink.host_checks import check_fleet  # noqa: PLC0415  # starting up must be fast
+
+    return check_fleet(fleet)

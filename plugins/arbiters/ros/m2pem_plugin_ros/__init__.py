@@ -7,7 +7,11 @@ package can be imported where there is no ROS. `RosRuntime` and `qos` need rclpy
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from m2pem_plugin_ros.hooks import m2pem_register_arbiters, m2pem_register_commands
+from m2pem_plugin_ros.hooks import (
+    m2pem_check_host,
+    m2pem_register_arbiters,
+    m2pem_register_commands,
+)
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.drivers.driver import DriverEvents
@@ -30,6 +34,7 @@ __all__ = [
     "TargetBus",
     "DriverEvents",
     "keep_on_loopback",
+    "m2pem_check_host",
     "m2pem_register_arbiters",
     "m2pem_register_commands",
     "qos",

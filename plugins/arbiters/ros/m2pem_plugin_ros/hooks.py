@@ -1,6 +1,6 @@
 """The hooks of this plugin: the arbiter `ros`, and the commands `sim ros` and `ros onboard`."""
 
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, MutableMapping, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem import hookimpl
@@ -8,7 +8,7 @@ from m2pem import hookimpl
 if TYPE_CHECKING:
     import click
 
-    from m2pem.api import Arbiter
+    from m2pem.api import Arbiter, Fleet, HealthCheck
 
 
 @hookimpl
@@ -41,3 +41,11 @@ def add_commands(commands: "MutableMapping[str, click.Command]") -> None:
             "Run the m2pem node of a vehicle on board.",
         )
     )
+
+
+@hookimpl
+def m2pem_check_host(fleet: "Fleet | None") -> "Sequence[HealthCheck]":
+    """Check that there is one ROS 2, and the settings of DDS."""
+    from m2pem_plugin_ros.host_checks import check_host  # noqa: PLC0415  # starting up must be fast
+
+    return check_host(fleet)

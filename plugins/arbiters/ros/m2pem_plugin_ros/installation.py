@@ -71,6 +71,13 @@ def require_interfaces(package: str) -> ModuleType:
     return module
 
 
+def installed_as() -> str:
+    """Return how ROS 2 comes to this process, for people; "" if it does not."""
+    ways = [f"wheels in {sys.prefix}"] if _has_wheels() else []
+    ways += [f"sourced from {prefix}" for prefix in _sourced_prefixes()[:1]]
+    return " and ".join(ways)
+
+
 def _has_wheels() -> bool:
     try:
         importlib.metadata.distribution("ros-rclpy")

@@ -1,6 +1,6 @@
 """Missions in a browser: the modeler and the operator page (docs/web.md)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem import hookimpl
@@ -8,6 +8,7 @@ from m2pem import hookimpl
 if TYPE_CHECKING:
     import click
 
+    from m2pem.api import HealthCheck
     from m2pem.api.ocu import Ocu
 
 
@@ -25,3 +26,11 @@ def m2pem_register_commands(cli: "click.Group") -> None:
     from m2pem_plugin_web.commands import add_to  # noqa: PLC0415  # starting up must be fast
 
     add_to(cli.commands)
+
+
+@hookimpl
+def m2pem_check_host() -> "Sequence[HealthCheck]":
+    """Check the settings of the page, and its port."""
+    from m2pem_plugin_web.host_checks import check_host  # noqa: PLC0415  # starting up must be fast
+
+    return check_host()

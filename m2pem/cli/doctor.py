@@ -1,0 +1,61 @@
+"""`m2pem doctor`: what of this host is right for missions, and what to do about the rest."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from m2pem.cli.options import MADE_UP, as_json, example, fleet_option, format_option, journal_option
+
+if TYPE_CHECKING:
+    from m2pem.api.health import HealthCheck
+
+COLOURS = {"ok": "green", "warning": "yellow", "error": "red"}
+
+
+@click.command(epilog=example("m2pem doctor --fleet fleet_configs/vignette1.yaml"))
+@fleet_option(required=False)
+@journal_option
+@format_option
+def doctor(fleet_file: str | None, journal: str | None, output: str) -> int:
+    """Check this host: what is right, and what to do about the rest.
+
+    With a fleet also what that one needs. Nothing is sent to a vehicle. Ends with 0 if nothing is
+    an error, and else with 1.
+    """
+    if fleet_file == MADE_UP:
+        raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
+    return _show(_host(fleet_file, journal), output)
+
+
+def _host(fleet_file: str | None, journal: str | None) -> "list[HealthCheck]":
+    from m2pem.cli.host_checks import check_fleet, check_host
+    from m2pem.plugins import PluginManager
+
+    plugins = PluginManager()
+    checks = list(check_host(plugins, journal))
+    fleet = None
+    if fleet_file is not None:
+        of_fleet, fleet = check_fleet(fleet_file, plugins, journal)
+        checks += of_fleet
+        if fleet is None:
+            return checks
+    return checks + plugins.check_host(fleet)
+
+
+def _show(checks: "Sequence[HealthCheck]", output: str) -> int:
+    from m2pem.findings import escaped
+
+    errors = sum(check.status == "error" for check in checks)
+    warnings = sum(check.status == "warning" for check in checks)
+    if output == "json":
+        click.echo(as_json({"ok": not errors, "checks": checks}))
+        return 1 if errors else 0
+    width = max(len(check.name) for check in checks)
+    for check in checks:
+        status = click.style(f"{check.status.value:<7}", fg=COLOURS[check.status.value])
+        click.echo(f"{status}  {check.name:<{width}}  {escaped(check.message)}")
+        if check.remedy:
+            click.echo(f"{'':{width + 11}}{escaped(check.remedy)}")
+    click.echo(f"{len(checks)} checks; errors: {errors}, warnings: {warnings}")
+    return 1 if errors else 0
