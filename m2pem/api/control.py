@@ -15,6 +15,7 @@ from m2pem.api.authoring import (
     SearchLimits,
     SearchProgress,
 )
+from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.engine.records import Record
 from m2pem.findings import Finding
@@ -309,6 +310,14 @@ class MissionControl(Protocol):
 
     def speed(self) -> float:
         """Seconds of mission time in a real second."""
+        ...
+
+    async def health(self) -> Sequence[HealthCheck]:
+        """Whether this executive can do its work now: `journal`, `arbiters`, `event loop`.
+
+        It answers within two seconds, whatever hangs. Vehicles do not count: their links are in
+        the telemetry.
+        """
         ...
 
     def journal_file(self) -> Path | None:

@@ -26,6 +26,7 @@ from m2pem.api.control import (
     StampedRecord,
     TakeEffect,
 )
+from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import dump, restore
@@ -228,6 +229,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("catalogue", Nothing, dict[ResourceId, tuple[BehaviorSpec, ...]], kept=True),
         Operation("simulated", Nothing, bool, kept=True),
         Operation("speed", Nothing, float, kept=True),
+        Operation("health", Nothing, list[HealthCheck], alone=True),
         Operation(
             "journal_file",
             Nothing,

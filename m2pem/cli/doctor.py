@@ -1,6 +1,7 @@
 """`m2pem doctor`: what of this host is right for missions, and what to do about the rest."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -10,19 +11,28 @@ from m2pem.cli.options import MADE_UP, as_json, example, fleet_option, format_op
 if TYPE_CHECKING:
     from m2pem.api.health import HealthCheck
 
+ANSWERED_WITHIN_S = 5.0
+
 COLOURS = {"ok": "green", "warning": "yellow", "error": "red"}
 
 
 @click.command(epilog=example("m2pem doctor --fleet fleet_configs/vignette1.yaml"))
 @fleet_option(required=False)
+@click.option(
+    "--running", is_flag=True, help="Ask the executives that serve the journal instead of the host."
+)
 @journal_option
 @format_option
-def doctor(fleet_file: str | None, journal: str | None, output: str) -> int:
+def doctor(fleet_file: str | None, running: bool, journal: str | None, output: str) -> int:
     """Check this host: what is right, and what to do about the rest.
 
     With a fleet also what that one needs. Nothing is sent to a vehicle. Ends with 0 if nothing is
     an error, and else with 1.
     """
+    if running:
+        if fleet_file is not None:
+            raise click.UsageError("--running asks an executive, which has a fleet: omit --fleet")
+        return _show(_running(journal), output)
     if fleet_file == MADE_UP:
         raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
     return _show(_host(fleet_file, journal), output)
@@ -41,6 +51,35 @@ def _host(fleet_file: str | None, journal: str | None) -> "list[HealthCheck]":
         if fleet is None:
             return checks
     return checks + plugins.check_host(fleet)
+
+
+def _running(journal: str | None) -> "list[HealthCheck]":
+    """Return what the executives of a journal say of themselves."""
+    import msgspec
+
+    from m2pem.api.health import HealthCheck, HealthStatus
+    from m2pem.cli.run_control import journal_file
+    from m2pem.control_socket.client import ask
+    from m2pem.control_socket.paths import live_sockets
+    from m2pem.errors import M2pemError
+
+    path = journal_file(journal)
+    checks: list[HealthCheck] = []
+    for socket in live_sockets(path):
+        name = f"executive {socket.stem}"
+        try:
+            said = msgspec.convert(
+                ask(socket, "health", timeout_s=ANSWERED_WITHIN_S), list[HealthCheck]
+            )
+        except (M2pemError, msgspec.ValidationError) as error:
+            remedy = "it may be blocked by a plugin: use the vehicles' own stop if they must stop"
+            checks.append(HealthCheck(name, HealthStatus.ERROR, str(error), remedy))
+        else:
+            checks += [replace(check, name=f"{name}: {check.name}") for check in said]
+    if not checks:
+        why = f"none serves {path}"
+        checks.append(HealthCheck("executive", HealthStatus.ERROR, why, "m2pem serve starts one"))
+    return checks
 
 
 def _show(checks: "Sequence[HealthCheck]", output: str) -> int:

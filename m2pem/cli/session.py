@@ -72,7 +72,7 @@ async def driving(
         async with (
             ControlSocket(executive.control, journal),
             executive,
-            LoopMonitor(executive.events),
+            LoopMonitor(executive.events, executive.health),
         ):
             notices = executive.control.subscribe(size=BACKLOG)
             printing = asyncio.create_task(output.follow(notices))

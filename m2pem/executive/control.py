@@ -25,6 +25,7 @@ from m2pem.api.control import (
     StampedRecord,
     TakeEffect,
 )
+from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import Telemetry
 from m2pem.editing.editable import editable
 from m2pem.editing.outline import outline
@@ -32,6 +33,7 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import MissionError, OperatorError
+from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
@@ -65,10 +67,12 @@ class Control:
         self,
         supervisor: Supervisor,
         bus: Bus,
+        health: ExecutiveHealth,
         rehearse: Rehearse | None = None,
     ) -> None:
         self._supervisor = supervisor
         self._bus = bus
+        self._health = health
         self._rehearse = rehearse
 
     # --- runs -----------------------------------------------------------------------------------
@@ -288,6 +292,10 @@ class Control:
     def journal_file(self) -> Path | None:
         """Where the journal is; None: in memory."""
         return self._supervisor.journal.file
+
+    async def health(self) -> Sequence[HealthCheck]:
+        """Whether this executive can do its work now."""
+        return await self._health.checks()
 
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()

@@ -22,6 +22,7 @@ from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
+from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.supervisor import RunSettings, Supervisor
@@ -97,7 +98,8 @@ class Executive:
         self._connections = FleetConnections(
             self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
         )
-        self.control = Control(self._supervisor, self.bus, rehearse)
+        self.health = ExecutiveHealth(journal)
+        self.control = Control(self._supervisor, self.bus, self.health, rehearse)
         self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file), journal.file)
         self._speed = speed
         self._watch_links = watch_links
@@ -119,6 +121,7 @@ class Executive:
         except BaseException:
             self._locks.release()
             raise
+        self.health.connected = True
         self._stack.enter_context(LoggedAlerts(self.events))
         if self._observers is not None and isinstance(self.clock, SystemClock):
             self._observers.start()
@@ -145,7 +148,9 @@ class Executive:
         finally:
             for listener in self._listeners:
                 listener.cancel()
+            self.health.connected = False
             await self._connections.close()
+            self.health.close()
             self._locks.release()
             if self._observers is not None:
                 await self._observers.close()
@@ -162,6 +167,7 @@ class Executive:
                 await listening()
             except Exception:  # a broken arbiter must not end the executive; its links will age
                 log.exception("%s broke off", what)
+                self.health.broke_off(what)
 
         self._listeners.append(group.create_task(listen(), name=what))
 

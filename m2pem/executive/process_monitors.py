@@ -1,6 +1,6 @@
 """Monitors of the executive's own process: its event loop, and the disk of its journal.
 
-    async with LoopMonitor(executive.events):
+    async with LoopMonitor(executive.events, executive.health):
         ...
 
 A plugin that blocks the event loop delays everything, STOP included. A thread sees that the loop
@@ -19,6 +19,7 @@ from typing import Self
 
 from m2pem.api.control import Alert
 from m2pem.executive.control_events import ControlEvents
+from m2pem.executive.health import ExecutiveHealth
 from m2pem.journal.storage_checks import space_shortage
 
 log = logging.getLogger("m2pem.loop")
@@ -32,10 +33,12 @@ class LoopMonitor:
     """Watch the event loop in which the block runs.
 
     While the loop is blocked, the log says so; operators get an alert as soon as it turns again.
+    `health` notes it, too.
     """
 
-    def __init__(self, events: ControlEvents) -> None:
+    def __init__(self, events: ControlEvents, health: ExecutiveHealth) -> None:
         self._events = events
+        self._health = health
         self._ticked_s = time.monotonic()
         self._ended = threading.Event()
         self._blocked_by = ""
@@ -65,6 +68,7 @@ class LoopMonitor:
             )
             self._blocked_by = ""
             self._events.publish(Alert("", "BLOCKED", text))
+            self._health.blocked(text)
         self._timer = self._loop.call_later(TICK_S, self._tick)
 
     def _watch(self) -> None:

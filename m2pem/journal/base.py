@@ -161,6 +161,14 @@ class Journal(Protocol):
         """
         ...
 
+    async def check(self) -> None:
+        """Return if it can write now and runs may begin; nothing is written.
+
+        Raises:
+            JournalError: as `append` and `create` would, and why.
+        """
+        ...
+
     def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
         """Yield the entries whose first record comes after `after_seq`, in order, in constant
         memory.

@@ -85,6 +85,10 @@ class MemoryJournal:
         for entry in entries:
             self._keep_entry(self._find(entry.run), entry)
 
+    async def check(self) -> None:
+        """See `Journal.check`."""
+        self._check_open()
+
     def _keep_entry(self, run: _Run, entry: Entry) -> None:
         run.entries.append(entry)
         # At twice as many, so that dropping costs nothing per entry.

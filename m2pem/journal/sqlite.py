@@ -169,6 +169,11 @@ class SqliteJournal:
             rows = [EntryRow(run_number(e.run), e, encode_body(e)) for e in entries]
             await self._writer.submit(partial(WriteTransaction.append, rows=rows))
 
+    async def check(self) -> None:
+        """See `Journal.check`; it waits for its turn, as what is written does."""
+        self._check_open()
+        await self._writer.submit(WriteTransaction.check)
+
     async def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
         """See `Journal.read`; entries that are appended meanwhile are included."""
         number = run_number(run)

@@ -81,6 +81,11 @@ class WriteTransaction:
             self._known.clear()
             self._data_version = version
 
+    def check(self) -> None:
+        """Check that the files are where they were opened, and that there is room for a run."""
+        self._presence.check()
+        self._refuse_while_short()
+
     def create(self, header: RunHeader) -> str:
         """Add a run that is claimed with epoch 1, and return its id."""
         self._refuse_while_short()

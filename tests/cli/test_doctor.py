@@ -4,6 +4,7 @@ import ctypes
 import json
 import os
 import resource
+import signal
 import socket
 from pathlib import Path
 from typing import Any
@@ -259,6 +260,43 @@ def test_a_plugin_that_cannot_be_loaded_is_a_warning(m2pem: CommandLine, tmp_pat
     _, checks = installed(m2pem, tmp_path, "import no_such_module")
     assert checks["plugin boat"]["status"] == "warning"
     assert "no_such_module" in checks["plugin boat"]["message"]
+
+
+# --- a running executive ------------------------------------------------------------------------
+
+
+def test_an_executive_that_runs_says_how_it_is(m2pem: CommandLine, tmp_path: Path) -> None:
+    journal = tmp_path / "journal.db"
+    serving = m2pem.start(
+        *("serve", "--fleet", FLEET, "--simulate", "--ocu", "none", "--journal", journal),
+        PYTHONUNBUFFERED="1",
+    )
+    assert serving.process.stderr is not None
+    assert "serving" in serving.process.stderr.readline()
+    words = ("doctor", "--running", "--format", "json", "--journal", journal)
+    status, out, _ = m2pem.run(*words)
+    said = {check["name"]: check["status"] for check in json.loads(out)["checks"]}
+    name = f"executive {serving.process.pid}"
+    assert status == 0
+    assert said == {f"{name}: {each}": "ok" for each in ("journal", "arbiters", "event loop")}
+    status, out, _ = m2pem.run(*words, M2PEM_MIN_FREE_MB="1e15")  # it counts where it serves
+    assert status == 0
+    serving.process.send_signal(signal.SIGSTOP)
+    try:
+        status, out, _ = m2pem.run(*words)
+    finally:
+        serving.process.send_signal(signal.SIGCONT)
+    assert status == 1
+    assert [each["name"] for each in json.loads(out)["checks"]] == [name]
+    serving.process.terminate()
+    assert serving.rest()[0] == 0
+    status, out, _ = m2pem.run(*words)
+    assert status == 1
+    assert json.loads(out)["checks"][0]["remedy"] == "m2pem serve starts one"
+
+
+def test_a_running_executive_has_its_own_fleet(invoke: Invoke) -> None:
+    assert invoke("doctor", "--running", "--fleet", FLEET)[0] == 2
 
 
 # --- ports --------------------------------------------------------------------------------------

@@ -39,6 +39,7 @@ OTHERWISE = {
     "catalogue": "m2pem fleet asks the arbiters of the file",
     "telemetry": "the terminal unit in m2pem attach shows it",
     "journal_file": "--journal names it",
+    "health": "m2pem doctor --running",
 }
 NO_COMMAND = {
     "message": "programs send messages: over the control socket, REST or ROS",

@@ -15,6 +15,7 @@ from m2pem.engine.records import BehaviorRequested, RunPaused
 from m2pem.errors import OperatorError
 from m2pem.executive import process_monitors
 from m2pem.executive.control_events import MAX_WAITING, ControlEvents, RecordObservers
+from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.process_monitors import LATE_AFTER_S, TICK_S, LoopMonitor, blocking
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry
@@ -312,7 +313,7 @@ async def test_an_observer_that_hangs_delays_nobody_and_is_waited_for_within_a_b
 
 
 async def test_what_blocks_the_event_loop_is_named(caplog: pytest.LogCaptureFixture) -> None:
-    notices = ControlEvents()
+    notices, health = ControlEvents(), ExecutiveHealth(MemoryJournal())
     told = notices.subscribe(None, 10)
     found = threading.Event()
     caplog.set_level("ERROR")
@@ -322,13 +323,14 @@ async def test_what_blocks_the_event_loop_is_named(caplog: pytest.LogCaptureFixt
             found.wait(0.01)
         found.set()
 
-    async with LoopMonitor(notices):
+    async with LoopMonitor(notices, health):
         threading.Thread(target=look, daemon=True).start()
         assert found.wait(30)  # this blocks the loop, until the monitor has said so
         alert = await anext(told)
     assert isinstance(alert, Alert)
     assert alert.code == "BLOCKED"
     assert "test_what_blocks_the_event_loop_is_named" in alert.text
+    assert (await health.checks())[-1].message == alert.text
 
 
 async def test_what_runs_the_event_loop_is_not_named_for_what_blocks_it() -> None:
@@ -355,9 +357,9 @@ async def test_an_alert_says_how_long_the_loop_was_blocked_though_it_has_turned_
         return "a plugin"
 
     monkeypatch.setattr(process_monitors, "blocking", named_late)
-    notices = ControlEvents()
+    notices, health = ControlEvents(), ExecutiveHealth(MemoryJournal())
     alerts = notices.subscribe(None, 10)
-    async with LoopMonitor(notices):
+    async with LoopMonitor(notices, health):
         assert noticed.wait(30)  # this blocks the loop, until the monitor has noticed it
         await asyncio.sleep(TICK_S / 2)  # the monitor's own timer was due before
         turned.set()

@@ -220,6 +220,16 @@ class JournalContract(Contract):
             for run in runs:
                 assert [found.seq for found in await written(journal, run)] == [1, 2, 3, 4, 5]
 
+    async def test_a_check_writes_nothing(self, open_journal: OpenJournal) -> None:
+        """It returns, whether a run is driven or not."""
+        async with opened(open_journal) as journal:
+            await journal.check()
+            assert await journal.runs() == []
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1)])
+            await journal.check()
+            assert [each.last_seq for each in await journal.runs()] == [1]
+
     async def test_nothing_to_append_is_no_error(self, open_journal: OpenJournal) -> None:
         """An empty append writes nothing."""
         async with opened(open_journal) as journal:
@@ -335,6 +345,7 @@ class JournalContract(Contract):
             journal.claim(run),
             journal.release(run),
             journal.append([entry(run, 1)]),
+            journal.check(),
             written(journal, run),
             journal.runs(),
         ):

@@ -66,6 +66,7 @@ NOT_SERVED = {
     "catalogue": "operators over ROS start missions that are drawn elsewhere",
     "simulated": "settings of DDS depend on it; operators do not see it",
     "speed": "missions with operators over ROS run in real time",
+    "health": "m2pem doctor --running asks it on the executive's machine",
     "journal_file": "a path of the executive's machine",
 }
 

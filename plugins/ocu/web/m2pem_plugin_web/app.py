@@ -7,7 +7,7 @@ from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 from starlette.types import ASGIApp
 
-from m2pem_plugin_web import pages
+from m2pem_plugin_web import pages, probes
 from m2pem_plugin_web import tiles as map_tiles
 from m2pem_plugin_web.access.guard import Guard
 from m2pem_plugin_web.access.requests import BoundedBodies, SafeHeaders
@@ -58,6 +58,7 @@ def routers_of(
         geometries.router(control),
         map_tiles.router(tiles),
         socket.router(hub, entry),
+        probes.router(control),
         pages.router(Pages()),
     ]
 

@@ -62,6 +62,7 @@ NOT_SERVED = {
     "telemetry": "the WebSocket sends the latest states, as fast as the browser takes them",
     "simulated": "a field of the session",
     "speed": "a field of the session",
+    "health": "GET /readyz says whether all is well, without a session",
     "journal_file": "a path of the executive's machine",
 }
 

@@ -9,6 +9,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from m2pem_plugin_web.access.permissions import SCOPE_KEY
 from m2pem_plugin_web.access.requests import SAFE_METHODS, foreign, wrong_host
 from m2pem_plugin_web.access.sign_in import KEY_HEADER, Entry, key_of
+from m2pem_plugin_web.probes import LIVE, READY
 from m2pem_plugin_web.problems import problem
 from m2pem_plugin_web.server import Slots
 
@@ -77,6 +78,6 @@ class Guard:
             self._slots.known(tuple(scope["client"]))
         if person is None and scope["path"].startswith(TILES):
             scope[SCOPE_KEY] = self._entry.person_of_cookie(cookies)
-        if self._slots.full and not scope["path"].endswith(STOPS):
+        if self._slots.full and not scope["path"].endswith((*STOPS, LIVE, READY)):
             return 503, "too many connections are open: close other pages", {}
         return None
