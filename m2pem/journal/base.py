@@ -5,6 +5,7 @@
 
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 from uuid import UUID
@@ -12,6 +13,7 @@ from uuid import UUID
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.mission.library import Source
+from m2pem.units import US_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +120,23 @@ class RunInfo:
         return self.loss is not None and self.loss.found is None
 
 
+@dataclass(frozen=True, slots=True)
+class Deletion:
+    """A run that was deleted on request: how many records it had, and who deleted it when.
+
+    `deleted_us`: microseconds since the Unix epoch, by the wall clock.
+    """
+
+    run: str
+    records: int
+    deleted_us: int
+    by: str
+
+    def __str__(self) -> str:
+        when = datetime.fromtimestamp(self.deleted_us / US_PER_S, UTC)
+        return f"{self.run} was deleted on {when:%Y-%m-%d at %H:%M:%S} UTC by {self.by}"
+
+
 class Journal(Protocol):
     """Opened by its constructor's `open` class method; one per executive."""
 
@@ -180,6 +199,21 @@ class Journal(Protocol):
 
     async def runs(self) -> Sequence[RunInfo]:
         """Return every run, in order of its number."""
+        ...
+
+    async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
+        """Delete runs with all that the journal has of them; their ids are not given again.
+
+        `by`: who asks. `unended`: delete runs that have not ended, too, but never a driven one.
+
+        Raises:
+            JournalError: a run is unknown, driven, not ended, or has lost entries; then nothing is
+                deleted.
+        """
+        ...
+
+    async def deletions(self) -> Sequence[Deletion]:
+        """Return the runs that were deleted, in order of their numbers."""
         ...
 
     async def close(self) -> None:

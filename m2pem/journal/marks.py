@@ -224,6 +224,8 @@ def _loss(
     if mark.state is MarkState.ACCEPTED:
         return None
     if position is None:
+        if _is_deleted(connection, number, mark):
+            return None
         return Loss(mark.seq, None, resumable=False)
     epoch, last_seq, hash_, outcome = position
     if epoch >= mark.epoch and last_seq >= mark.seq:
@@ -239,3 +241,17 @@ def _loss(
         if (there or NO_HASH) == mark.hash or (mark.seq == 0 and last_seq > 0):
             return None
     return Loss(mark.seq, last_seq, resumable=last_seq > 0 and outcome is None)
+
+
+def _is_deleted(connection: sqlite3.Connection, number: int, mark: Mark) -> bool:
+    """Whether the run was deleted on request, with all that had been acknowledged."""
+    row = connection.execute(
+        "SELECT epoch, last_seq, hash FROM deletions WHERE run = ?", (number,)
+    ).fetchone()
+    if row is None:
+        return False
+    epoch, last_seq, hash_ = row
+    if epoch < mark.epoch or last_seq < mark.seq:
+        return False
+    # What came after the mark was written, and not acknowledged, before a crash.
+    return last_seq > mark.seq or (hash_ or NO_HASH) == mark.hash

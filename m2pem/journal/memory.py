@@ -1,6 +1,7 @@
 """The journal in memory: for simulation, tests and missions that need no resume."""
 
 import os
+import time
 from bisect import bisect_right
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from pathlib import Path
 from uuid import UUID, uuid4
 
 from m2pem.errors import InternalError, JournalError
-from m2pem.journal.base import Entry, RunHeader, RunInfo
+from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
 from m2pem.journal.codec import run_id, run_number, unknown_run
 from m2pem.journal.position import RunPosition
 
@@ -35,7 +36,9 @@ class MemoryJournal:
     def __init__(self, keep: int | None = None) -> None:
         self._keep = keep
         self._identity = uuid4()
-        self._runs: list[_Run] = []
+        self._runs: dict[int, _Run] = {}
+        self._deletions: dict[int, Deletion] = {}
+        self._last = 0
         self._closed = False
 
     @property
@@ -52,8 +55,9 @@ class MemoryJournal:
         """See `Journal.create`."""
         self._check_open()
         position = RunPosition(epoch=1, pid=os.getpid(), started_us=header.created_us)
-        self._runs.append(_Run(header, position))
-        return run_id(len(self._runs))
+        self._last += 1
+        self._runs[self._last] = _Run(header, position)
+        return run_id(self._last)
 
     async def claim(self, run: str) -> int:
         """See `Journal.claim`."""
@@ -67,8 +71,8 @@ class MemoryJournal:
     async def release(self, run: str) -> None:
         """See `Journal.release`."""
         self._check_open()
-        if (number := run_number(run)) <= len(self._runs):
-            self._runs[number - 1].driven = False
+        if (found := self._runs.get(run_number(run))) is not None:
+            found.driven = False
 
     async def append(self, entries: Sequence[Entry]) -> None:
         """See `Journal.append`."""
@@ -123,21 +127,42 @@ class MemoryJournal:
         self._check_open()
         return [
             found.position.info(run_id(number), found.header, found.driven)
-            for number, found in enumerate(self._runs, 1)
+            for number, found in self._runs.items()
         ]
+
+    async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
+        """See `Journal.delete`."""
+        for run in runs:
+            found = self._find(run)
+            if found.driven:
+                raise JournalError(f"{run} is not deleted: it is driven by this process")
+            if found.position.outcome is None and not unended:
+                raise JournalError(f"{run} is not deleted: it has not ended")
+        now_us = time.time_ns() // 1000
+        for run in dict.fromkeys(runs):
+            number = run_number(run)
+            records = self._runs.pop(number).position.last_seq
+            self._deletions[number] = Deletion(run, records, now_us, by)
+
+    async def deletions(self) -> Sequence[Deletion]:
+        """See `Journal.deletions`."""
+        self._check_open()
+        return [self._deletions[number] for number in sorted(self._deletions)]
 
     async def close(self) -> None:
         """See `Journal.close`."""
         self._closed = True
-        for found in self._runs:
+        for found in self._runs.values():
             found.driven = False
 
     def _find(self, run: str) -> _Run:
         self._check_open()
         number = run_number(run)
-        if number > len(self._runs):
+        if number in self._deletions:
+            raise JournalError(str(self._deletions[number]))
+        if number not in self._runs:
             raise unknown_run(run)
-        return self._runs[number - 1]
+        return self._runs[number]
 
     def _check_open(self) -> None:
         if self._closed:

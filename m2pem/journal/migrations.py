@@ -77,11 +77,31 @@ def hash_chain(connection: sqlite3.Connection) -> None:
     connection.execute("ALTER TABLE identity ADD COLUMN marked INTEGER NOT NULL DEFAULT 0")
 
 
+def deletions(connection: sqlite3.Connection) -> None:
+    """0.5: the runs that were deleted on request, which therefore count as no loss.
+
+    Other columns than `emptied` are those of `standings` at that time, and who deleted the run when.
+    `emptied`: its entries are removed, too.
+    """
+    connection.execute(
+        """CREATE TABLE deletions (
+            run INTEGER PRIMARY KEY,
+            epoch INTEGER NOT NULL,
+            last_seq INTEGER NOT NULL,
+            hash BLOB,
+            deleted_us INTEGER NOT NULL,
+            deleted_by TEXT NOT NULL,
+            emptied INTEGER NOT NULL
+        )"""
+    )
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
     identity_of_the_journal,
     hash_chain,
+    deletions,
 )
 
 

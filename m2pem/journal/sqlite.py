@@ -4,6 +4,7 @@ import asyncio
 import logging
 import sqlite3
 import struct
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, suppress
@@ -13,21 +14,27 @@ from typing import Any, TypeVar
 from uuid import UUID
 
 from m2pem.errors import JournalError
-from m2pem.journal.base import Entry, Loss, RunHeader, RunInfo
+from m2pem.journal.base import Deletion, Entry, Loss, RunHeader, RunInfo
 from m2pem.journal.codec import (
     decode_body,
     decode_library,
     encode_body,
     run_id,
     run_number,
-    unknown_run,
 )
 from m2pem.journal.database import explained_error, open_for_reading, open_for_writing
 from m2pem.journal.hash_chain import entry_hash, header_hash
 from m2pem.journal.marks import MarkFile, find_losses, identity_in, of_another_journal
 from m2pem.journal.run_locks import RunLocks, run_locks
 from m2pem.journal.storage_checks import OpenFiles, min_free_mb
-from m2pem.journal.transaction import EntryRow, WriteTransaction, mark_of, position_from
+from m2pem.journal.transaction import (
+    EntryRow,
+    WriteTransaction,
+    deletions_in,
+    mark_of,
+    no_run,
+    position_from,
+)
 from m2pem.journal.writer import GroupWriter
 
 T = TypeVar("T")
@@ -244,13 +251,15 @@ class SqliteJournal:
 
     def _header_hash(self, number: int) -> bytes:
         row = self._reading.execute("SELECT * FROM runs WHERE run = ?", (number,)).fetchone()
+        if row is None:
+            raise no_run(self._reading, number)
         return header_hash(row)
 
     def _check_end(self, number: int, before: bytes | None) -> None:
         query = "SELECT * FROM standings JOIN runs USING (run) WHERE run = ?"
         row = self._reading.execute(query, (number,)).fetchone()
         if row is None:
-            raise unknown_run(run_id(number))
+            raise no_run(self._reading, number)
         position = position_from(row[:_POSITION_COLUMNS])
         if position.hash is not None and position.hash != (before or self._header_hash(number)):
             raise self._damaged(
@@ -307,6 +316,22 @@ class SqliteJournal:
         """
         self._check_open()
         await self._writer.submit(partial(WriteTransaction.accept_loss, number=run_number(run)))
+
+    async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
+        """See `Journal.delete`. The file keeps its size: `compact` makes it smaller."""
+        self._check_open()
+        numbers = [run_number(run) for run in dict.fromkeys(runs)]
+        now_us = time.time_ns() // 1000
+        await self._writer.submit(
+            lambda transaction: transaction.delete(numbers, by, now_us, unended=unended)
+        )
+        # Also what an earlier deletion has left, if it was ended by a crash.
+        while await self._writer.submit(WriteTransaction.empty):
+            pass
+
+    async def deletions(self) -> Sequence[Deletion]:
+        """See `Journal.deletions`."""
+        return await self._read(lambda: deletions_in(self._reading))
 
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()

@@ -15,7 +15,7 @@ from typing import Any
 
 from m2pem.engine.records import RunOutcome
 from m2pem.errors import InternalError, JournalError
-from m2pem.journal.base import Entry, RunHeader
+from m2pem.journal.base import Deletion, Entry, RunHeader
 from m2pem.journal.codec import encode_library, run_id, unknown_run
 from m2pem.journal.hash_chain import entry_hash, header_hash, position_seal
 from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState, find_loss, find_losses
@@ -48,6 +48,10 @@ _ROWS = 90
 """To a statement: SQLite before 3.32 takes 999 parameters."""
 
 
+_EMPTIED_ENTRIES = 2000
+"""To a transaction: inputs of runs under way wait for it."""
+
+
 class WriteTransaction:
     """Transactions, one after the other: `begin`, any number of calls, `commit` or `rollback`.
 
@@ -72,6 +76,7 @@ class WriteTransaction:
         self._locked: list[int] = []
         self._appended: set[int] = set()
         self._lossy: set[int] = set()
+        self._deleting = False
 
     def begin(self) -> None:
         """Start a transaction; it sees what another process has committed before."""
@@ -91,7 +96,9 @@ class WriteTransaction:
         self._refuse_while_short()
         marks = self._marks.read()
         self._refuse_while_lossy(marks)
-        last = self._connection.execute("SELECT max(run) FROM runs").fetchone()[0]
+        last = self._connection.execute(
+            "SELECT max(run) FROM (SELECT run FROM runs UNION ALL SELECT run FROM deletions)"
+        ).fetchone()[0]
         number = 1 + max(last or 0, *marks, 0)
         row = (
             number,
@@ -154,6 +161,59 @@ class WriteTransaction:
             raise JournalError(f"{run} can be resumed: {loss.remedy(run)}")
         self._marks.write({number: replace(mark, state=MarkState.ACCEPTED)})
 
+    def delete(self, numbers: Sequence[int], by: str, now_us: int, *, unended: bool) -> None:
+        """Delete runs; `empty` removes their entries, which may be too many for one transaction.
+
+        No other process takes a run's lock meanwhile: it does so in a transaction, too.
+        """
+        for number in numbers:
+            self._refuse_deletion(number, unended=unended)
+        for number in numbers:
+            self._connection.execute(
+                "REPLACE INTO deletions SELECT run, epoch, last_seq, hash, ?, ?, 0 FROM standings"
+                " WHERE run = ?",
+                (now_us, by, number),
+            )
+            self._connection.execute("DELETE FROM standings WHERE run = ?", (number,))
+            self._connection.execute("DELETE FROM runs WHERE run = ?", (number,))
+            self._known.pop(number, None)
+        self._deleting = True
+
+    def _refuse_deletion(self, number: int, *, unended: bool) -> None:
+        run = run_id(number)
+        position = self._position(number)
+        if self._locks.held(number):
+            raise JournalError(
+                f"{run} is not deleted: it is driven by process {position.pid}, which is alive; "
+                f"`m2pem stop {run}` ends the run"
+            )
+        if (loss := find_loss(self._connection, number, self._marks.of(number))) is not None:
+            raise JournalError(f"{run} is not deleted: {loss}. {loss.remedy(run)}")
+        if position.outcome is None and not unended:
+            raise JournalError(f"{run} is not deleted: it has not ended, and can be resumed")
+
+    def empty(self) -> bool:
+        """Remove some entries of deleted runs; False: there were none left."""
+        found = self._connection.execute(
+            "SELECT run FROM deletions WHERE NOT emptied LIMIT 1"
+        ).fetchone()
+        if found is None:
+            return False
+        (number,) = found
+        beyond = self._connection.execute(
+            "SELECT seq FROM entries WHERE run = ? ORDER BY seq LIMIT 1 OFFSET ?",
+            (number, _EMPTIED_ENTRIES),
+        ).fetchone()
+        if beyond is None:
+            self._connection.execute("DELETE FROM entries WHERE run = ?", (number,))
+            self._connection.execute("UPDATE deletions SET emptied = 1 WHERE run = ?", (number,))
+        else:
+            self._connection.execute(
+                "DELETE FROM entries WHERE run = ? AND seq < ?", (number, *beyond)
+            )
+        self._deleting = True
+        return True
+
     def append(self, rows: Sequence[EntryRow]) -> None:
         """Add entries."""
         changed: dict[int, RunPosition] = {}
@@ -193,7 +253,7 @@ class WriteTransaction:
             "REPLACE INTO standings", [_columns(*changed) for changed in self._changed.items()]
         )
         self._connection.execute("COMMIT")
-        wrote = bool(self._changed)
+        wrote = bool(self._changed) or self._deleting
         if wrote:
             self._presence.check()
             self._mark()
@@ -259,7 +319,7 @@ class WriteTransaction:
                 "SELECT * FROM standings WHERE run = ?", (number,)
             ).fetchone()
             if row is None:
-                raise unknown_run(run_id(number))
+                raise no_run(self._connection, number)
             position = self._known[number] = position_from(row)
         return position
 
@@ -268,11 +328,29 @@ class WriteTransaction:
         self._rows.clear()
         self._appended.clear()
         self._locked.clear()
+        self._deleting = False
 
 
 @cache
 def _placeholders(rows: int, columns: int) -> str:
     return ", ".join([f"({', '.join('?' * columns)})"] * rows)
+
+
+def no_run(connection: sqlite3.Connection, number: int) -> JournalError:
+    """Return the error for a run that the journal does not have, or has no more."""
+    found = deletions_in(connection, "WHERE run = ?", number)
+    return JournalError(str(found[0])) if found else unknown_run(run_id(number))
+
+
+def deletions_in(
+    connection: sqlite3.Connection, where: str = "", *parameters: int
+) -> list[Deletion]:
+    """Return the deletions of a journal that a clause selects, in order of their runs' numbers."""
+    rows = connection.execute(
+        f"SELECT run, last_seq, deleted_us, deleted_by FROM deletions {where} ORDER BY run",
+        parameters,
+    )
+    return [Deletion(run_id(number), *columns) for number, *columns in rows]
 
 
 def mark_of(position: RunPosition) -> Mark:

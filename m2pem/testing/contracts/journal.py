@@ -50,6 +50,9 @@ HEADER = RunHeader(
     ),
 )
 
+ENDED = (RunStarted("PATROL", 5), RunEnded(RunOutcome.COMPLETED, ""))
+"""Records of a run that has ended."""
+
 OpenJournal: TypeAlias = Callable[[], Journal]
 
 
@@ -334,6 +337,56 @@ class JournalContract(Contract):
             assert [found.seq for found in await written(journal, run)] in ([], [1, 2])
             assert (await info(journal, run)).last_seq == len(await written(journal, run))
 
+    async def test_a_deleted_run_is_gone_and_its_id_is_not_given_again(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Other runs are untouched, and the journal says who deleted it."""
+        async with opened(open_journal) as journal:
+            runs = [await journal.create(HEADER) for _ in range(2)]
+            for run in runs:
+                await journal.append([entry(run, 1, *ENDED)])
+                await journal.release(run)
+            kept = (await journal.runs())[0]
+            await journal.delete(["r2"], by="ann")
+            assert await journal.runs() == [kept]
+            assert len(await written(journal, "r1")) == 1
+            assert [(each.run, each.records, each.by) for each in await journal.deletions()] == [
+                ("r2", 2, "ann")
+            ]
+            for asked in (
+                journal.claim("r2"),
+                written(journal, "r2"),
+                journal.delete(["r2"], by="bob"),
+            ):
+                with pytest.raises(JournalError, match=r"r2 was deleted on .* UTC by ann"):
+                    await asked
+            assert await journal.create(HEADER) == "r3"
+
+    async def test_a_run_that_is_driven_is_not_deleted(self, open_journal: OpenJournal) -> None:
+        """Nor is any other run of the same call."""
+        async with opened(open_journal) as journal:
+            ended = await journal.create(HEADER)
+            await journal.append([entry(ended, 1, *ENDED)])
+            await journal.release(ended)
+            driven = await journal.create(HEADER)
+            with pytest.raises(JournalError, match=f"{driven} is not deleted: it is driven"):
+                await journal.delete([ended, driven], by="ann", unended=True)
+            assert [found.run for found in await journal.runs()] == [ended, driven]
+            assert await journal.deletions() == []
+
+    async def test_a_run_that_has_not_ended_is_deleted_only_on_purpose(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """With `unended`."""
+        async with opened(open_journal) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1)])
+            await journal.release(run)
+            with pytest.raises(JournalError, match=f"{run} is not deleted: it has not ended"):
+                await journal.delete([run], by="ann")
+            await journal.delete([run], by="ann", unended=True)
+            assert await journal.runs() == []
+
     async def test_a_closed_journal_says_so(self, open_journal: OpenJournal) -> None:
         """Whatever is asked of it; closing it again does nothing."""
         journal = open_journal()
@@ -348,6 +401,8 @@ class JournalContract(Contract):
             journal.check(),
             written(journal, run),
             journal.runs(),
+            journal.delete([run], by="ann"),
+            journal.deletions(),
         ):
             with pytest.raises(JournalError, match="closed"):
                 await asked
