@@ -111,6 +111,9 @@ async def find_run(journal: Journal, run: str) -> RunInfo:
     """
     lines = {line.run: line for line in await journal.runs()}
     if run not in lines:
+        for deletion in await journal.deletions():
+            if deletion.run == run:
+                raise UnusableError(str(deletion))
         there = f"it has {', '.join(lines)}" if lines else "it has none yet"
         raise UnusableError(f"the journal has no run {run!r}; {there}")
     line = lines[run]
@@ -166,13 +169,14 @@ async def interrupted_runs(url: str | None) -> list[Interrupted]:
     """The interrupted runs of a journal, by what its records say."""
     async with journal_to_read(url) as journal:
         return [
-            await _interrupted(journal, line)
+            await interruption(journal, line)
             for line in await journal.runs()
             if line.outcome is None and not line.driven and line.last_seq > 0
         ]
 
 
-async def _interrupted(journal: Journal, line: RunInfo) -> Interrupted:
+async def interruption(journal: Journal, line: RunInfo) -> Interrupted:
+    """What an interrupted run was doing, by what its records say."""
     standing = RunStatusView(line)
     async for entry in journal.read(line.run):
         for record in entry.records:

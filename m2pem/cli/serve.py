@@ -1,6 +1,7 @@
 """`m2pem serve`: the executive as a service; operators start missions."""
 
 import asyncio
+import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +25,20 @@ if TYPE_CHECKING:
     from m2pem.journal.base import Journal, RunHeader, RunInfo
 
 
+class DaysOption(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
+    """A number of days or hours, in seconds: 30d, 12h."""
+
+    name = "days"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        found = re.fullmatch(r"(\d{1,6}) ?([dh])", str(value))
+        if found is None or int(found[1]) == 0:
+            self.fail(f"{value!r} is not a number of days or hours, such as 30d or 12h", param, ctx)
+        return int(found[1]) * (3600.0 if found[2] == "h" else 86_400.0)
+
+
 @click.command(epilog=example("m2pem serve --fleet fleet_configs/vignette1.yaml --ocu plain"))
 @fleet_option(required=True)
 @journal_option
@@ -31,6 +46,14 @@ if TYPE_CHECKING:
 @path_option
 @simulate_option
 @speed_option
+@click.option(
+    "--keep",
+    "keep_s",
+    type=DaysOption(),
+    metavar="DAYS",
+    help="Delete runs that ended longer ago than this, such as 30d or 12h, at the start and each "
+    "day  [default: keep all]",
+)
 @format_option
 def serve(
     fleet_file: str,
@@ -39,6 +62,7 @@ def serve(
     search_path: tuple[Path, ...],
     simulate: bool,
     speed: float,
+    keep_s: float | None,
     output: str,
 ) -> int:
     """Serve operators, who start missions, until stopped.
@@ -46,7 +70,9 @@ def serve(
     Takes up runs of the journal that were interrupted, if they had this fleet. Ctrl-C or SIGTERM
     stop the runs, wait until their vehicles are released, and end it with 0.
     """
-    return asyncio.run(_serve(fleet_file, journal, ocu_names, search_path, simulate, speed, output))
+    return asyncio.run(
+        _serve(fleet_file, journal, ocu_names, search_path, simulate, speed, keep_s, output)
+    )
 
 
 async def _serve(
@@ -56,13 +82,16 @@ async def _serve(
     search_path: tuple[Path, ...],
     simulated: bool,
     speed: float,
+    keep_s: float | None,
     output: str,
 ) -> int:
     from m2pem.api.clock import SystemClock
+    from m2pem.api.operator import operator_name
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import driving, make_executive, refuse_speed
+    from m2pem.executive.retention import keep_runs
     from m2pem.executive.simulated_state import tidy_up, with_shared_state
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.fleet.fleet_file import load_fleet
@@ -83,13 +112,8 @@ async def _serve(
     refuse_speed(fleet, speed)
     async with journal_at(url) as journal:
         mine, others = await interrupted_runs(journal, fleet, speed)
-        executive = make_executive(
-            fleet,
-            journal,
-            plugins,
-            SystemClock(speed, await _start_us(journal, mine)),
-            search_path=search_path,
-        )
+        clock = SystemClock(speed, await _start_us(journal, mine))
+        executive = make_executive(fleet, journal, plugins, clock, search_path=search_path)
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:
                 who = ", ".join(operators.names) or "none"
@@ -101,7 +125,13 @@ async def _serve(
                         err=True,
                     )
                 await _take_up(executive, mine)
+                retention: asyncio.Task[None] | None = None
+                if keep_s is not None:
+                    kept = keep_runs(journal, keep_s, clock, by=operator_name())
+                    retention = asyncio.create_task(kept, name="retention of runs")
                 await interruption.asked.wait()
+                if retention is not None:
+                    retention.cancel()
         tidy_up(executive, file_of(url))
     return 0
 

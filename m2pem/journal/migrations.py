@@ -80,7 +80,7 @@ def hash_chain(connection: sqlite3.Connection) -> None:
 def deletions(connection: sqlite3.Connection) -> None:
     """0.5: the runs that were deleted on request, which therefore count as no loss.
 
-    Other columns than `emptied` are those of `standings` at that time, and who deleted the run when.
+    The position is that of `standings` at that time; `deleted_us` and `deleted_by`: when, and who.
     `emptied`: its entries are removed, too.
     """
     connection.execute(

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from m2pem.fleet.fleet import restore
 from m2pem.journal.base import RunHeader
 from m2pem.journal.sqlite import SqliteJournal
 from tests.cli.conftest import Invoke
-from tests.command_line import ANSWERS, FLEET, MISSION
+from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine
 
 ABORT = ("--answers", ANSWERS / "vignette1_abort.yaml", "--ocu", "none")
 
@@ -71,3 +72,70 @@ def test_a_journal_that_nothing_opens_is_told(invoke: Invoke, url: str) -> None:
     assert status == 1
     assert "secret" not in err
     assert "Traceback" not in err
+
+
+def two_runs(invoke: Invoke) -> None:
+    for _ in range(2):
+        invoke("run", MISSION, "--fleet", FLEET, *ABORT)
+
+
+def test_named_runs_are_listed_alone(invoke: Invoke) -> None:
+    two_runs(invoke)
+    listed = json.loads(invoke("runs", "r2", "--format", "json")[1])
+    assert [each["run"] for each in listed] == ["r2"]
+
+
+def test_runs_are_deleted(invoke: Invoke) -> None:
+    two_runs(invoke)
+    assert invoke("runs", "--delete", "r1") == (0, "deleted: r1\n", "")
+    assert [each["run"] for each in json.loads(invoke("runs", "--format", "json")[1])] == ["r2"]
+    assert invoke("replay", "r2", "--verify")[0] == 0
+    for words in (("replay", "r1"), ("runs", "--delete", "r1"), ("resume", "r1")):
+        status, _, err = invoke(*words)
+        assert status == 2
+        assert re.match(r"m2pem: r1 was deleted on .* UTC by ", err)
+
+
+def test_runs_are_deleted_together_or_not_at_all(invoke: Invoke) -> None:
+    two_runs(invoke)
+    status, _, err = invoke("runs", "--delete", "r1", "r7")
+    assert (status, err) == (2, "m2pem: the journal has no run 'r7'; it has r1, r2\n")
+    assert len(json.loads(invoke("runs", "--format", "json")[1])) == 2
+
+
+def test_an_interrupted_run_is_deleted_with_force_alone(m2pem: CommandLine) -> None:
+    program = m2pem.start("run", MISSION, "--fleet", FLEET, *ABORT[:0], "--format", "json")
+    program.until_record("PromptOpened")
+    status, _, err = m2pem.run("runs", "--delete", "r1", "--force")
+    assert status == 1
+    assert f"r1 is not deleted: it is driven by process {program.process.pid}" in err
+    program.kill()
+    status, _, err = m2pem.run("runs", "--delete", "r1")
+    assert status == 1
+    assert "not deleted: r1" in err
+    assert "`m2pem resume r1 --stop` stops it; --force deletes it all the same" in err
+    status, out, err = m2pem.run("runs", "--delete", "--force", "r1")
+    assert (status, out) == (0, "deleted: r1\n")
+    assert "deleted although r1" in err
+    assert m2pem.run("runs") == (0, "no runs yet\n", "")
+
+
+def test_an_exported_run_has_its_mission_fleet_and_records(invoke: Invoke) -> None:
+    invoke("run", MISSION, "--fleet", FLEET, *ABORT)
+    status, out, _ = invoke("runs", "--export", "r1")
+    assert status == 0
+    head, *records = out.splitlines()
+    assert records == invoke("replay", "r1", "--format", "json")[1].splitlines()
+    exported = json.loads(head)
+    assert (exported["export"], exported["run"], exported["outcome"]) == (1, "r1", "terminated")
+    assert exported["records"] == len(records)
+    assert exported["mission"] == {"name": str(MISSION), "text": MISSION.read_text("utf-8")}
+    fleet = restore(json.dumps({"version": 1, "fleet": exported["fleet"]}).encode())
+    assert "evsg1" in fleet.vehicles
+
+
+@pytest.mark.parametrize(
+    "words", [("--delete",), ("--export",), ("--force", "r1"), ("--delete", "--export", "r1")]
+)
+def test_options_that_do_not_go_together_are_refused(invoke: Invoke, words: tuple[str]) -> None:
+    assert invoke("runs", *words)[0] == 2

@@ -1,7 +1,11 @@
 """The executive as a service."""
 
+import asyncio
 import signal
+from pathlib import Path
 
+from m2pem.journal.sqlite import SqliteJournal
+from m2pem.testing.contracts.journal import ENDED, HEADER, entry, opened
 from tests.command_line import FLEET, MISSION, CommandLine, Program
 
 
@@ -103,3 +107,29 @@ def test_a_run_waits_for_what_operators_started_beside_it(m2pem: CommandLine) ->
     program.type("abort")
     program.until_text("r2 terminated")
     assert program.rest()[0] == 0
+
+
+def test_runs_that_ended_long_ago_are_deleted_and_named(m2pem: CommandLine, tmp_path: Path) -> None:
+    path = tmp_path / "journal.db"
+
+    async def old_run() -> None:
+        async with opened(lambda: SqliteJournal.open(path)) as journal:
+            run = await journal.create(HEADER)
+            await journal.append([entry(run, 1, *ENDED)])
+
+    asyncio.run(old_run())
+    program = serving(m2pem, "--journal", str(path), "--keep", "12h")
+    assert program.process.stderr is not None
+    assert "deleted what ended longer ago than is kept: r1" in program.process.stderr.readline()
+    program.type(f"start {MISSION}")
+    program.until_text("UserSendRoute")
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 0
+    assert m2pem.run("runs", "--journal", path)[1].splitlines()[1].startswith("r2")
+
+
+def test_a_time_to_keep_runs_that_is_none_is_refused(m2pem: CommandLine) -> None:
+    for text in ("30", "0d", "-1d", "month"):
+        status, _, err = m2pem.run("serve", "--fleet", FLEET, "--keep", text)
+        assert status == 2
+        assert f"{text!r} is not a number of days or hours, such as 30d or 12h" in err

@@ -49,7 +49,11 @@ async def test_the_chains_of_other_runs_are_whole_after_a_deletion(open_journal,
 
 @pytest.mark.parametrize(
     "change",
-    ["DELETE FROM deletions", "UPDATE deletions SET last_seq = 3", "UPDATE deletions SET hash = ''"],
+    [
+        "DELETE FROM deletions",
+        "UPDATE deletions SET last_seq = 3",
+        "UPDATE deletions SET hash = ''",
+    ],
 )
 async def test_a_deletion_that_does_not_fit_what_was_acknowledged_is_a_loss(
     open_journal, path, change
