@@ -116,7 +116,7 @@ def choose_executive(journal: Path, name: str | None) -> Path:
         raise _not_driven(journal)
     if name is None and len(paths) == 1:
         return paths[0]
-    fleets = {path: restore(b64decode(ask(path, "fleet"))).name for path in paths}
+    fleets = {path: fleet_name(path) for path in paths}
     chosen = [path for path, fleet in fleets.items() if name in (path.stem, fleet)]
     if len(chosen) == 1:
         return chosen[0]
@@ -126,6 +126,15 @@ def choose_executive(journal: Path, name: str | None) -> Path:
         f"{what} with the journal {journal}; running are {listed}. Say which: --run-on "
         f"{next(iter(fleets)).stem}"
     )
+
+
+def fleet_name(path: Path) -> str:
+    """The name of the fleet of the executive that listens at `path`.
+
+    Raises:
+        ControlSocketError: it is gone, or does not answer.
+    """
+    return restore(b64decode(ask(path, "fleet"))).name
 
 
 def _not_driven(journal: Path) -> NotDrivenError:
