@@ -4,12 +4,12 @@ import asyncio
 
 import click
 
-from m2pem.cli.options import example, journal_option, ocu_option
+from m2pem.cli.options import example, journal_option, ocu_option, optional_run_argument
 from m2pem.cli.run_control import journal_file
 
 
 @click.command(epilog=example("m2pem attach r1"))
-@click.argument("run_id", metavar="[RUN]", required=False)
+@optional_run_argument
 @journal_option
 @ocu_option
 def attach(run_id: str | None, journal: str | None, ocu_names: str | None) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from m2pem.cli.options import MADE_UP, as_json, example, fleet_option, format_option, journal_option
+from m2pem.cli.options import as_json, example, fleet_option, format_option, journal_option
 
 if TYPE_CHECKING:
     from m2pem.api.health import HealthCheck
@@ -33,8 +33,10 @@ def doctor(fleet_file: str | None, running: bool, journal: str | None, output: s
         if fleet_file is not None:
             raise click.UsageError("--running asks an executive, which has a fleet: omit --fleet")
         return _show(_running(journal), output)
-    if fleet_file == MADE_UP:
-        raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
+    from m2pem.scripting.sources import DEFAULT_FLEET
+
+    if fleet_file == DEFAULT_FLEET:
+        raise click.UsageError(f"{DEFAULT_FLEET!r} is made up from a mission; name a fleet file")
     return _show(_host(fleet_file, journal), output)
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from m2pem.cli.completers import file_or
 from m2pem.cli.options import as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @click.command(epilog=example("m2pem fleet fleet_configs/vignette1.yaml"))
-@click.argument("fleet_file", metavar="FLEET", required=False)
+@click.argument("fleet_file", metavar="FLEET", required=False, shell_complete=file_or())
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of fleet files instead.")
 @journal_option
 @format_option

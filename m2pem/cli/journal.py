@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from m2pem.cli.completers import file_or
 from m2pem.cli.options import UnusableError, as_json, example, format_option
 
 if TYPE_CHECKING:
     from m2pem.journal import Journal, RunInfo
     from m2pem.journal.base import Deletion
 
-file_argument = click.argument("file", metavar="[FILE]", required=False)
+file_argument = click.argument("file", metavar="[FILE]", required=False, shell_complete=file_or())
 
 
 @click.group(epilog=example("m2pem journal info"))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from m2pem.cli.completers import file_or, operator_units, processes_of_mission, runs_of_journal
 from m2pem.errors import M2pemError
 
 if TYPE_CHECKING:
@@ -20,11 +21,13 @@ class UnusableError(M2pemError):
     exit_status = 2
 
 
-mission_argument = click.argument("mission")
+mission_argument = click.argument("mission", shell_complete=file_or())
 
-run_argument = click.argument("run_id", metavar="RUN")
+run_argument = click.argument("run_id", metavar="RUN", shell_complete=runs_of_journal(ended=False))
 
-optional_run_argument = click.argument("run_id", metavar="[RUN]", required=False)
+optional_run_argument = click.argument(
+    "run_id", metavar="[RUN]", required=False, shell_complete=runs_of_journal(ended=False)
+)
 
 format_option = click.option(
     "--format",
@@ -38,6 +41,7 @@ format_option = click.option(
 journal_option = click.option(
     "--journal",
     metavar="URL",
+    shell_complete=file_or("memory:"),
     help="Where runs are kept: a path, sqlite:///path or memory:  "
     "[default: m2pem/journal.db in $XDG_STATE_HOME or ~/.local/state]",
 )
@@ -50,12 +54,16 @@ def fleet_option(*, required: bool) -> Callable[[F], F]:
         "fleet_file",
         metavar="FLEET",
         required=required,
+        shell_complete=file_or("sim"),
         help="The fleet file; `sim` makes vehicles up for the mission.",
     )
 
 
 process_option = click.option(
-    "--process", metavar="ID", help="The process to begin with  [default: the mission's main one]"
+    "--process",
+    metavar="ID",
+    shell_complete=processes_of_mission,
+    help="The process to begin with  [default: the mission's main one]",
 )
 
 
@@ -115,6 +123,7 @@ ocu_option = click.option(
     "--ocu",
     "ocu_names",
     metavar="NAMES",
+    shell_complete=operator_units,
     help="Operator control units, separated by commas; none for no unit  "
     "[default: terminal if it is installed and this is one, else plain]",
 )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
+from m2pem.cli.completers import runs_of_journal
 from m2pem.cli.options import (
     UnusableError,
     as_json,
@@ -19,20 +20,17 @@ from m2pem.cli.options import (
     format_option,
     journal_option,
 )
-from m2pem.cli.status import run_of
 from m2pem.findings import unreadable_remedy
-from m2pem.journal.base import Entry, RunInfo
-from m2pem.journal.codec import record_line
 
 if TYPE_CHECKING:
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.engine.run import Step
-    from m2pem.journal.base import Journal
+    from m2pem.journal.base import Entry, Journal, RunInfo
     from m2pem.mission.mission import Mission
 
 
 @click.command(epilog=example("m2pem replay r1 --verify"))
-@click.argument("run_id", metavar="RUN", required=False)
+@click.argument("run_id", metavar="RUN", required=False, shell_complete=runs_of_journal(ended=True))
 @journal_option
 @click.option(
     "--verify",
@@ -242,7 +240,9 @@ def _mission(file: Path, report: dict[str, Any], mission_file: str | None) -> "M
 class Verification:
     """`difference` says where the first one is; it is empty as long as there is none."""
 
-    def __init__(self, line: RunInfo) -> None:
+    def __init__(self, line: "RunInfo") -> None:
+        from m2pem.cli.status import run_of
+
         self.difference: dict[str, Any] = {}
         self._run_id = line.run
         self._loss = line.loss
@@ -250,7 +250,7 @@ class Verification:
         self._inputs = 0
         self._records = 0
 
-    def agrees(self, entry: Entry) -> bool:
+    def agrees(self, entry: "Entry") -> bool:
         """Decide the entry's input, and compare what comes of it with the entry's records."""
         step = self._run.receive(entry.input, entry.at_us)
         then = [self._line(entry.seq + n, entry.t_us, each) for n, each in enumerate(entry.records)]
@@ -272,6 +272,8 @@ class Verification:
         return False
 
     def _line(self, seq: int, t_us: int, record: Any) -> str:
+        from m2pem.journal.codec import record_line
+
         return record_line(self._run_id, seq, t_us, record).decode()
 
     def as_data(self) -> dict[str, Any]:

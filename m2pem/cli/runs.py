@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from m2pem.cli.completers import runs_of_journal
 from m2pem.cli.options import as_json, example, format_option, journal_option
 from m2pem.units import US_PER_S
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command(epilog=example("m2pem runs --export r1 > r1.jsonl"))
-@click.argument("run_ids", metavar="[RUN]...", nargs=-1)
+@click.argument("run_ids", metavar="[RUN]...", nargs=-1, shell_complete=runs_of_journal(ended=True))
 @journal_option
 @click.option("--export", is_flag=True, help="Print these runs as JSON Lines, to keep them apart.")
 @click.option("--delete", is_flag=True, help="Delete these runs, with their tracks.")
