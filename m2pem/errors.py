@@ -6,7 +6,7 @@ The class says whose fault it is, the message says where it is and what would be
   wrong; the first three carry *every* finding at once.
 * `OperatorError`: a request that cannot be met now (unknown run, prompt already answered).
 * `PluginError`: a plugin broke its contract.
-* `JournalError`: the journal cannot be read or written.
+* `JournalError`: the journal cannot be read or written; `JournalUrlError`: what names it is none.
 * `InternalError`: m2pem is wrong; please report it.
 
 Anything a running mission may handle (a behavior failed, a vehicle was lost, an expression
@@ -91,6 +91,12 @@ class PluginError(M2pemError):
 
 class JournalError(M2pemError):
     """The journal cannot be opened, read or written."""
+
+
+class JournalUrlError(JournalError):
+    """What a person gave as a journal's path or URL cannot be one; nothing was opened."""
+
+    exit_status = 2
 
 
 class StaleEpochError(JournalError):

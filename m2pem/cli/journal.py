@@ -232,6 +232,8 @@ def _path(file: str | None) -> Path:
     from m2pem.cli.run_control import journal_file
 
     path = journal_file(file)
+    if path.is_dir():
+        raise UnusableError(f"{path} is a folder; name a file in it")
     if not path.exists():
         raise UnusableError(f"there is no journal {path}")
     return path

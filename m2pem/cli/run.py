@@ -98,8 +98,9 @@ async def _run(
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import drive_run, make_executive, refuse_speed
-    from m2pem.executive.loading import load_source, without_effect
+    from m2pem.executive.loading import load_source
     from m2pem.executive.simulated_state import tidy_up, with_own_state
+    from m2pem.findings import lines
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
@@ -123,8 +124,8 @@ async def _run(
             answers=answers,
             search_path=search_path,
         )
-        process_id = executive.admit(mission, process, data)
-        for line in without_effect(mission):
+        process_id, warnings = executive.admit(mission, process, data)
+        for line in lines(warnings):
             click.echo(line, err=True)
         with output_of(output) as out:
             status = await drive_run(

@@ -27,6 +27,7 @@ from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.supervisor import RunSettings, Supervisor
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
+from m2pem.findings import Finding
 from m2pem.fleet.allocation import Availability, spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
@@ -194,8 +195,10 @@ class Executive:
         """What the owners of a behavior's state say of it now; see `behavior_lifecycle`."""
         return self._supervisor.views(behavior, resources)
 
-    def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
-        """Check a mission; returns the id of the process to begin with.
+    def admit(
+        self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None
+    ) -> tuple[str, list[Finding]]:
+        """Check a mission; returns the id of the process to begin with, and the warnings.
 
         Raises:
             MissionError: with every finding.

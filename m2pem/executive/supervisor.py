@@ -42,7 +42,7 @@ from m2pem.executive.recovery import replay, take_over
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
-from m2pem.findings import Severity
+from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import Availability
 from m2pem.fleet.fleet import Fleet, dump
 from m2pem.geo.geojson import GeometryError, parse_geojson
@@ -182,8 +182,10 @@ class Supervisor:
         given = {name: parse_geojson(each.geometry) for name, each in self.handed_over.items()}
         return replace(self.fleet, geometries={**self.fleet.geometries, **given})
 
-    def admit(self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None) -> str:
-        """Check a mission; returns the id of the process to begin with.
+    def admit(
+        self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None
+    ) -> tuple[str, list[Finding]]:
+        """Check a mission; returns the id of the process to begin with, and the warnings.
 
         Raises:
             MissionError: with every finding.
@@ -197,7 +199,7 @@ class Supervisor:
             handed_over=self.handed_over,
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
-        return loaded.process(process).id
+        return loaded.process(process).id, findings
 
     def _load(
         self,
@@ -208,7 +210,8 @@ class Supervisor:
         if isinstance(mission, Mission):
             return mission, self.admit(mission, process, data)
         loaded = load_source(mission, self.settings.search_path)
-        return loaded, self.admit(loaded, process, data)
+        process_id, _ = self.admit(loaded, process, data)
+        return loaded, process_id
 
     async def start(
         self,

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
-from m2pem.errors import JournalError
+from m2pem.errors import JournalError, JournalUrlError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.journal.memory import MemoryJournal
 
@@ -34,24 +34,24 @@ def file_of(url: str) -> Path | None:
     """The file of the journal that `url` names; None for one in memory.
 
     Raises:
-        JournalError: nothing opens such a URL.
+        JournalUrlError: nothing opens such a URL.
     """
     if url == "memory:":
         return None
     parts = urlsplit(url)
     if parts.scheme == "sqlite":
         if parts.netloc or parts.query or parts.fragment or not parts.path.strip("/"):
-            raise JournalError(
+            raise JournalUrlError(
                 f"{url} is not a journal's URL: write sqlite:///absolute/path, or the path alone"
             )
         return Path(unquote(parts.path))
     if parts.scheme in ("postgresql", "postgres"):
-        raise JournalError(
+        raise JournalUrlError(
             f"{_without_password(url)}: journals in PostgreSQL are reserved for a later version; "
             "use a path or sqlite:///absolute/path"
         )
     if "://" in url or not url:
-        raise JournalError(
+        raise JournalUrlError(
             f"{_without_password(url)!r} is not a journal's URL: "
             "write a path, sqlite:///absolute/path or memory:"
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import quote
 from uuid import UUID
 
-from m2pem.errors import JournalError
+from m2pem.errors import JournalError, JournalUrlError
 from m2pem.journal.marks import of_another_journal
 from m2pem.journal.migrations import check, migrate
 
@@ -28,13 +28,14 @@ def open_for_writing(path: Path, marked: UUID | None = None) -> sqlite3.Connecti
     missions and fleets contain positions of vehicles.
 
     Raises:
-        JournalError: there is no such folder, no permission, it is not a journal, ...
+        JournalUrlError: it is a folder, or its folder does not exist.
+        JournalError: no permission, it is not a journal, ...
     """
     try:
         if path.is_dir():
-            raise JournalError(f"{path} is a folder; name a file in it")
+            raise JournalUrlError(f"{path} is a folder; name a file in it")
         if not path.parent.is_dir():
-            raise JournalError(f"{path}: the folder {path.parent} does not exist; make it")
+            raise JournalUrlError(f"{path}: the folder {path.parent} does not exist; make it")
         new = not path.exists()
         connection = _connect(path, "rwc")
         try:

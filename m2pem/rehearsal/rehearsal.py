@@ -257,7 +257,7 @@ class _Rehearsal:
             limit=self._limit,
             on_records=self._answers.seen,
         )
-        process_id = executive.admit(self._mission, process, data)
+        process_id, _ = executive.admit(self._mission, process, data)
         async with executive:
             run = await executive.begin(self._mission, process_id, data, "")
             runner = executive.runner(run)

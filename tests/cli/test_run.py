@@ -50,6 +50,19 @@ def test_an_unknown_process_is_refused(invoke: Invoke, two: Path) -> None:
     assert "there is no process 'Nope'; name one of: Well, Badly" in err
 
 
+def test_warnings_are_printed_before_the_run_starts(invoke: Invoke, tmp_path: Path) -> None:
+    mission = tmp_path / "warned.bpmn"
+    objects = "".join(f'<dataObject id="D{number}" nmae="x"/>' for number in range(25))
+    mission.write_text(TWO.replace("</process>", f"{objects}</process>", 1), encoding="utf-8")
+    *warnings, summary = invoke("check", mission, "--fleet", FLEET)[1].splitlines()
+    assert "warning" in summary
+    assert len(warnings) >= 21  # 20 of a rule, and how many more there are
+    status, out, err = invoke("run", mission, "--fleet", FLEET, *NOBODY, *MEMORY)
+    assert status == 0
+    assert err.splitlines() == warnings
+    assert "warning" not in out
+
+
 def test_data_is_there_from_the_start(invoke: Invoke, two: Path) -> None:
     words = ("--data", "mission.speed=2.5", "--data", "areas=[north]", "--format", "json")
     _, out, _ = invoke("run", two, "--fleet", FLEET, *NOBODY, *MEMORY, *words)
@@ -109,7 +122,7 @@ def test_answers_for_another_mission_are_refused(invoke: Invoke, tmp_path: Path)
 def test_a_journal_that_cannot_be_made_is_told(invoke: Invoke, tmp_path: Path) -> None:
     journal = tmp_path / "no" / "journal.db"
     status, _, err = invoke("run", MISSION, "--fleet", FLEET, *NOBODY, "--journal", journal)
-    assert status == 1
+    assert status == 2
     assert f"the folder {journal.parent} does not exist" in err
 
 

@@ -69,7 +69,7 @@ def test_a_journal_that_is_named_must_exist(invoke: Invoke, tmp_path: Path) -> N
 @pytest.mark.parametrize("url", ["postgresql://me:secret@host/db", "ftp://host/db"])
 def test_a_journal_that_nothing_opens_is_told(invoke: Invoke, url: str) -> None:
     status, _, err = invoke("runs", "--journal", url)
-    assert status == 1
+    assert status == 2
     assert "secret" not in err
     assert "Traceback" not in err
 
