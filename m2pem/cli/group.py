@@ -132,7 +132,8 @@ class _Names(click.Group):
 )
 @click.version_option(m2pem.__version__, prog_name="m2pem")
 @click.option("--debug", is_flag=True, help="Log everything, and show tracebacks.")
-def cli(debug: bool) -> None:
+@click.option("--quiet", is_flag=True, help="Print no notes, no progress and no warnings of files.")
+def cli(debug: bool, quiet: bool) -> None:  # `quiet` is read by m2pem.cli.notes
     """Plan, check, rehearse and run missions of unmanned vehicles, drawn in BPMN 2.0."""
     _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
 

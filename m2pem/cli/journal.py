@@ -80,7 +80,7 @@ def backup(file: str | None, copy: Path | None) -> int:
     Prints the path of the copy. Ends with 1 if entries of it are lost or damaged; then they are in
     the journal, too.
     """
-    from m2pem.cli.progress import progress_line, share
+    from m2pem.cli.notes import progress_line, share
     from m2pem.journal.maintenance import back_up
 
     path = _path(file)
@@ -167,7 +167,7 @@ class Content:
 async def _content(path: Path) -> Content:
     """Read all entries of a journal."""
     from m2pem.cli.journals import journal_to_read
-    from m2pem.cli.progress import progress_line, share
+    from m2pem.cli.notes import progress_line, share
 
     async with journal_to_read(str(path)) as opened:
         lines = list(await opened.runs())

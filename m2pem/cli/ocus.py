@@ -10,6 +10,7 @@ import click
 
 from m2pem.api.capabilities import ocu_capabilities
 from m2pem.api.control import MissionControl
+from m2pem.cli.notes import note
 from m2pem.errors import PluginError
 from m2pem.plugins import PluginManager
 
@@ -43,7 +44,7 @@ def chosen(names: str | None, plugins: PluginManager) -> tuple[str, ...]:
         except PluginError as error:
             raise click.UsageError(str(error)) from error
         if ocu_capabilities(factory).takes_terminal and not on_terminal:
-            click.echo(f"m2pem: no terminal here for --ocu {name}; using {PLAIN}", err=True)
+            note(f"m2pem: no terminal here for --ocu {name}; using {PLAIN}")
             name = PLAIN  # noqa: PLW2901
         found[name] = None
     if sum(ocu_capabilities(plugins.ocu(name)).takes_terminal for name in found) > 1:

@@ -36,6 +36,11 @@ class Output:
         self._ends: list[str] = []
         self.writer: LineWriter = writer_for(stream)
 
+    @property
+    def shown_to_a_person(self) -> bool:
+        """Whether records are printed on a terminal."""
+        return self._stream.isatty()
+
     def format_with(
         self, mission: Callable[[RunId], Mission | None], *, one: bool, asks: bool
     ) -> None:

@@ -3,11 +3,10 @@
 import asyncio
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -88,19 +87,27 @@ def replay(
 
 async def _replay(run_id: str, url: str | None, verify: bool, state_only: bool, output: str) -> int:
     from m2pem.cli.journals import find_run, journal_to_read
+    from m2pem.cli.notes import progress_line, share
 
     async with journal_to_read(url) as journal:
         line = await find_run(journal, run_id)
         # On a terminal the records themselves are the progress.
-        shown = verify or state_only or not sys.stdout.isatty()
-        with progress(f"{run_id}: records", line.last_seq, shown=shown) as done:
+        wanted = verify or state_only or not sys.stdout.isatty()
+        with progress_line(wanted=wanted) as show:
+            read = 0
+
+            def done(records: int) -> None:
+                nonlocal read
+                read += records
+                show(lambda: share(read, line.last_seq, "records"))
+
             if verify:
                 return await _verify(journal, line, output, done)
             return await _print(journal, line, state_only, output, done)
 
 
 async def _print(
-    journal: "Journal", line: "RunInfo", state_only: bool, output: str, done: "Progress"
+    journal: "Journal", line: "RunInfo", state_only: bool, output: str, done: Callable[[int], None]
 ) -> int:
     from m2pem.api.control import StampedRecord
     from m2pem.cli.line_formatter import LineFormatter
@@ -130,7 +137,9 @@ async def _print(
     return 0
 
 
-async def _verify(journal: "Journal", line: "RunInfo", output: str, done: "Progress") -> int:
+async def _verify(
+    journal: "Journal", line: "RunInfo", output: str, done: Callable[[int], None]
+) -> int:
 
     verification = Verification(line)
     async for entry in journal.read(line.run):
@@ -298,20 +307,3 @@ class Verification:
             f"  journal: {self.difference['journal'] or 'no more records'}\n"
             f"  decided: {self.difference['decided'] or 'no more records'}{loss}"
         )
-
-
-Progress: TypeAlias = Callable[[int], None]
-"""Called with the number of records processed since the last call."""
-
-LONG = 10_000
-"""Shorter work needs no progress bar."""
-
-
-@contextmanager
-def progress(label: str, length: int, *, shown: bool = True) -> Iterator[Progress]:
-    """Show a progress bar within the block, for long work and on a terminal."""
-    if not shown or length < LONG or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    with click.progressbar(length=length, label=label, file=sys.stderr) as bar:
-        yield bar.update

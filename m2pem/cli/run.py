@@ -95,6 +95,7 @@ async def _run(
     from m2pem.api.clock import SystemClock
     from m2pem.cli.arguments import get_answers
     from m2pem.cli.journals import journal_at, url_of
+    from m2pem.cli.notes import note
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import drive_run, make_executive, refuse_speed
@@ -126,7 +127,7 @@ async def _run(
         )
         process_id, warnings = executive.admit(mission, process, data)
         for line in lines(warnings):
-            click.echo(line, err=True)
+            note(line)
         with output_of(output) as out:
             status = await drive_run(
                 executive,

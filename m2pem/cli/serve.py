@@ -88,6 +88,7 @@ async def _serve(
     from m2pem.api.clock import SystemClock
     from m2pem.api.operator import operator_name
     from m2pem.cli.journals import journal_at, url_of
+    from m2pem.cli.notes import note
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import driving, make_executive, refuse_speed
@@ -117,7 +118,7 @@ async def _serve(
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:
                 who = ", ".join(operators.names) or "none"
-                click.echo(f"m2pem: serving {fleet.name}; operators: {who}", err=True)
+                note(f"m2pem: serving {fleet.name}; operators: {who}")
                 for line in others:
                     click.echo(
                         f"m2pem: {line.run} was interrupted with other vehicles, or at another "

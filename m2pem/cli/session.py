@@ -16,6 +16,7 @@ import click
 from m2pem.api.clock import SystemClock
 from m2pem.api.control import RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
+from m2pem.cli.notes import note
 from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.options import UnusableError
 from m2pem.cli.output import Output
@@ -87,10 +88,9 @@ async def driving(
                     what = f"serving goes on; {what or 'no mission runs'}"
                 if what:
                     start = "" if one else ", m2pem start MISSION starts one"
-                    click.echo(
+                    note(
                         f"m2pem: no operator at this terminal any more; {what} "
-                        f"(m2pem attach shows them{start}, and Ctrl-C stops everything)",
-                        err=True,
+                        f"(m2pem attach shows them{start}, and Ctrl-C stops everything)"
                     )
 
             try:

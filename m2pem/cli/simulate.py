@@ -84,6 +84,7 @@ def simulate(
     byte. Needs no fleet if the mission commands nothing. Ends as `m2pem run` does.
     """
     from m2pem.cli.arguments import get_answers
+    from m2pem.cli.notes import progress_line
     from m2pem.cli.output import output_of
     from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager
@@ -94,11 +95,13 @@ def simulate(
     fleet = fleet_of(fleet_file, loaded) if fleet_file is not None else None
     script = get_answers(answers, loaded)
     kept: list[StampedRecord] = []
-    with output_of(output) as out:
+    # On a terminal the records themselves are the progress.
+    with output_of(output) as out, progress_line(wanted=not out.shown_to_a_person) as progress:
         out.format_with(lambda _: loaded, one=True, asks=True)
 
         def show(stamped: "StampedRecord") -> None:
             out.show(stamped)
+            progress(lambda: f"{stamped.t_s:,.0f} s rehearsed, {stamped.seq:,} records")
             if gantt is not None:
                 kept.append(stamped)
             if out.writer.full:

@@ -51,13 +51,14 @@ def start(
     """
     from m2pem.api.operations import mission_files
     from m2pem.api.operator import operator_name
+    from m2pem.cli.notes import note
     from m2pem.control_socket.client import LONG_TIMEOUT_S, ask, choose_executive
     from m2pem.executive.loading import load_source, without_effect
 
     path = choose_executive(journal_file(journal), run_on)
     loaded = load_source(mission, search_path)
     for line in without_effect(loaded):
-        click.echo(line, err=True)
+        note(line)
     run = ask(
         path,
         "start",

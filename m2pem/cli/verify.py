@@ -2,7 +2,6 @@
 
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -184,11 +183,6 @@ def _text(found: "Findings") -> str:
     return as_text(found)
 
 
-_QUIET_S = 1.0
-"""A shorter search shows no progress."""
-_BETWEEN_LINES_S = 0.2
-
-
 def findings(asked: "SearchRequest", engine: "SearchEngine", *, strict: bool) -> "Findings":
     """Search, and return the findings."""
     from m2pem.executive.verification import search
@@ -223,24 +217,14 @@ def _ended_as_by_hand() -> Iterator[None]:
 
 @contextmanager
 def progress() -> "Iterator[Callable[[Progress], None] | None]":
-    """A line on standard error that counts up, for a person who looks."""
-    if not sys.stderr.isatty():
+    """Show how far a search is, for a person who looks; None: no person does."""
+    from m2pem.cli.notes import progress_line, shows_progress
+
+    if not shows_progress():
         yield None
         return
-    shown_at = 0.0
-
-    def show(searched: "Progress") -> None:
-        nonlocal shown_at
-        now = time.monotonic()
-        if searched.seconds > _QUIET_S and now > shown_at + _BETWEEN_LINES_S:
-            shown_at = now
-            _write(f"\r\033[K{_line(searched)} (Ctrl-C to stop)")
-
-    try:
-        yield show
-    finally:
-        if shown_at:
-            _write("\r\033[K")
+    with progress_line() as show:
+        yield lambda searched: show(lambda: f"{_line(searched)} (Ctrl-C to stop)")
 
 
 def _line(searched: "Progress") -> str:
@@ -250,10 +234,6 @@ def _line(searched: "Progress") -> str:
     if searched.waiting:
         said.append(f"{searched.waiting:,} of them to be searched")
     return ", ".join(said)
-
-
-def _write(text: str) -> None:
-    print(text, end="", file=sys.stderr, flush=True)
 
 
 KINDS = (".md", ".json", ".svg")

@@ -1,10 +1,15 @@
-"""The progress of long work: a line on the standard error of a terminal, erased in the end."""
+"""Notes and the progress of long work, on standard error. `m2pem --quiet` turns both off.
+
+Errors, alerts and all that concerns vehicles are no notes: they are printed in any case.
+"""
 
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
+
+import click
 
 AFTER_S = 2.0
 """Shorter work shows no progress."""
@@ -15,10 +20,30 @@ Show: TypeAlias = Callable[[Callable[[], str]], None]
 """Called often; calls its argument for the text, when it is time to show one."""
 
 
+def is_quiet() -> bool:
+    """Whether the command line has `--quiet`."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.find_root().params.get("quiet"))
+
+
+def note(text: str) -> None:
+    """Print a note, unless the command line has `--quiet`."""
+    if not is_quiet():
+        print(text, file=sys.stderr, flush=True)
+
+
+def shows_progress() -> bool:
+    """Whether a person may look: standard error is a terminal, and there is no `--quiet`."""
+    return sys.stderr.isatty() and not is_quiet()
+
+
 @contextmanager
-def progress_line() -> Iterator[Show]:
-    """Show how far work is within the block, if it takes long and standard error is a terminal."""
-    if not sys.stderr.isatty():
+def progress_line(*, wanted: bool = True) -> Iterator[Show]:
+    """Show on one line how far work is within the block, if it takes long; erase it in the end.
+
+    `wanted` False: the results themselves show it.
+    """
+    if not (wanted and shows_progress()):
         yield lambda _: None
         return
     next_s = time.monotonic() + AFTER_S
