@@ -63,8 +63,16 @@ _PROBLEM_OF: Mapping[str, Callable[[object], str]] = {
 _CHECK = "m2pem_check_mission"
 _CHECK_HOST = "m2pem_check_host"
 _OBSERVE = "m2pem_records_committed"
-PUBLISHED = ("mavlink", "mocu", "ptz", "ros", "terminal", "web")
-"""What the plugins of m2pem itself are called, installed or not."""
+PUBLISHED: Mapping[str, Sequence[str]] = {
+    "arbiter": ("mavlink", "ptz", "ros"),
+    "ocu": ("mocu", "terminal", "web"),
+}
+"""What the plugins of m2pem itself provide, installed or not. Plugin NAME provides NAME alone."""
+
+
+def how_to_install(distribution: str) -> str:
+    """Say how a plugin of m2pem is installed: no public package index has it."""
+    return f"pip install '{distribution}' (docs/install.md says from where)"
 
 
 _logger = logging.getLogger(__name__)
@@ -257,10 +265,10 @@ class PluginManager:
         parts = [f"there is no {kind} {name!r}; known: {', '.join(sorted(offers)) or 'none'}"]
         if hint := did_you_mean(name, offers):
             parts.append(hint)
-        elif kind in ("arbiter", "ocu") and re.fullmatch(r"[a-z][a-z0-9_-]*", name):
-            known = nearest(canonical(name), PUBLISHED, 0.6)
+        elif kind in PUBLISHED and re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+            known = nearest(canonical(name), PUBLISHED[kind], 0.6)
             parts.append(
-                f"{known!r} is in a plugin: pip install m2pem-plugin-{known}"
+                f"{known!r} is in a plugin: {how_to_install(f'm2pem-plugin-{known}')}"
                 if known
                 else "is the plugin that has it installed?"
             )

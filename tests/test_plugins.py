@@ -17,7 +17,13 @@ from m2pem import hookspecs
 from m2pem.errors import InternalError, PluginError
 from m2pem.findings import Finding, Severity
 from m2pem.mission.mission import Mission
-from m2pem.plugins import DEFAULT_PLUGINS, PluginFailure, PluginInfo, PluginManager
+from m2pem.plugins import (
+    DEFAULT_PLUGINS,
+    PUBLISHED,
+    PluginFailure,
+    PluginInfo,
+    PluginManager,
+)
 from m2pem.services.detector import Detector
 
 MISSION = cast("Mission", type("FakeMission", (), {"file": "survey.bpmn"})())
@@ -538,7 +544,8 @@ def test_an_unknown_arbiter_is_an_error_that_says_what_there_is_and_where_to_get
         manager().arbiter("mavlink")
     assert str(raised.value) == (
         "there is no arbiter 'mavlink'; known: boat, car; "
-        "'mavlink' is in a plugin: pip install m2pem-plugin-mavlink"
+        "'mavlink' is in a plugin: pip install 'm2pem-plugin-mavlink' "
+        "(docs/install.md says from where)"
     )
 
 
@@ -624,11 +631,25 @@ def test_every_hook_is_documented_with_its_arguments() -> None:
 @pytest.mark.parametrize(
     ("name", "hint"),
     [
-        ("mavlnk", "'mavlink' is in a plugin: pip install m2pem-plugin-mavlink"),
-        ("boat", "is the plugin that has it installed?"),
+        ("arbiter mavlnk", "'mavlink' is in a plugin: pip install 'm2pem-plugin-mavlink' ("),
+        ("ocu termnal", "'terminal' is in a plugin: pip install 'm2pem-plugin-terminal' ("),
+        ("arbiter boat", "is the plugin that has it installed?"),
+        ("arbiter termnal", "is the plugin that has it installed?"),
+        ("ocu mavlnk", "is the plugin that has it installed?"),
     ],
 )
-def test_a_misspelled_plugin_is_not_recommended(name: str, hint: str) -> None:
-    error = str(PluginManager(block=("all",)).unknown("arbiter", name))
+def test_a_plugin_that_does_not_exist_is_not_recommended(name: str, hint: str) -> None:
+    kind, name = name.split()
+    error = str(PluginManager(block=("all",)).unknown(kind, name))
     assert hint in error
     assert f"m2pem-plugin-{name}" not in error
+
+
+def test_the_plugins_that_are_recommended_are_those_of_the_repository() -> None:
+    folders = DOCS.parent.parent / "plugins"
+    for kind, folder in (("arbiter", "arbiters"), ("ocu", "ocu")):
+        there = {path.parent.name for path in (folders / folder).glob("*/pyproject.toml")}
+        assert set(PUBLISHED[kind]) == there
+        for name in there:
+            project = (folders / folder / name / "pyproject.toml").read_text(encoding="utf-8")
+            assert f'name = "m2pem-plugin-{name}"' in project

@@ -11,6 +11,7 @@ from pathlib import Path
 from m2pem.demo.programs import Programs, copy_once, m2pem
 from m2pem.demo.shipped_files import examples
 from m2pem.errors import OperatorError
+from m2pem.plugins import how_to_install
 
 SIMULATED_SPEED = 20
 AIR_SPEED = 10
@@ -216,7 +217,7 @@ def _loopback(domain: int) -> Mapping[str, str]:
 
 def _needs(module: str, distribution: str) -> None:
     if find_spec(module) is None:
-        raise OperatorError(f"this demonstration needs a plugin: pip install '{distribution}'")
+        raise OperatorError(f"this demonstration needs a plugin: {how_to_install(distribution)}")
 
 
 def _say(text: str) -> None:
