@@ -50,7 +50,7 @@ class VehicleLocks:
                 for address in addresses:
                     holder = self._take(address)
                     if holder is not None:
-                        taken.setdefault(holder, []).append(resource)
+                        taken.setdefault(_refusal(holder), []).append(resource)
         except OSError as error:
             self.release()
             raise VehicleInUseError(
@@ -59,7 +59,8 @@ class VehicleLocks:
             ) from error
         if taken:
             self.release()
-            raise VehicleInUseError("\n".join(_refusal(*each) for each in taken.items()))
+            refusals = (f"{', '.join(dict.fromkeys(who))}: {why}" for why, who in taken.items())
+            raise VehicleInUseError("\n".join(refusals))
 
     def release(self) -> None:
         """Give them back."""
@@ -125,18 +126,17 @@ def _command() -> list[str]:
     return [name, *sys.argv[1:]]
 
 
-def _refusal(holder: str, resources: Iterable[ResourceId]) -> str:
-    names = ", ".join(dict.fromkeys(resources))
+def _refusal(holder: str) -> str:
+    """Who has a vehicle, of what the holder of its lock has written, and what to do."""
     try:
         read = json.loads(holder)
         pid, command, journal = int(read["pid"]), str(read["command"]), read.get("journal")
     except (ValueError, KeyError, TypeError):
-        return f"{names}: another executive commands it, which has just begun; try again"
+        return "another executive commands it, which has just begun; try again"
     start = "Start the mission there"
     if journal:
         start += f" (m2pem start MISSION --journal {shlex.quote(journal)} --run-on {pid})"
     return (
-        f"{names}: process {pid} commands it already: {command}; one executive commands a vehicle. "
-        f"{start}, or end that one first: kill {pid} (it stops its missions and "
-        "releases its vehicles)"
+        f"process {pid} commands it already: {command}; one executive commands a vehicle. {start}, "
+        f"or end that one first: kill {pid} (it stops its missions and releases its vehicles)"
     )

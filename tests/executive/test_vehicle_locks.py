@@ -65,3 +65,16 @@ def test_a_vehicle_of_any_arbiter_has_one_executive(
     second.acquire()
     second.release()
     elsewhere.release()
+
+
+def test_an_executive_that_has_several_vehicles_is_named_once() -> None:
+    addresses = {ResourceId(name): [f"{name} a", f"{name} b"] for name in ("uav1", "uav2")}
+    first, second = VehicleLocks(addresses), VehicleLocks(addresses)
+    first.acquire()
+    try:
+        with pytest.raises(VehicleInUseError) as refused:
+            second.acquire()
+    finally:
+        first.release()
+    assert str(refused.value).startswith(f"uav1, uav2: process {os.getpid()} commands it already")
+    assert str(refused.value).count("commands it already") == 1
