@@ -197,6 +197,7 @@ docs: python-packages ## build the documentation into site/
 
 pictures: npm-packages page ## draw the missions and examples, and the web page, for the docs (needs Chromium)
 	@cd $(JS) && node draw_bpmn.mjs ../../docs/images ../../missions/*.bpmn && \
+	node draw_bpmn.mjs ../../docs/tutorials/patrol ../../docs/tutorials/patrol/*.bpmn && \
 	for example in ../../examples/*/; do node draw_bpmn.mjs "$$example" "$$example"*.bpmn; done
 	@$(BIN)/python -m tools.broken_mission_pictures
 	@M2PEM_PICTURES=1 $(BIN)/pytest --quiet plugins/ocu/web/tests/test_web_mission_drawn.py

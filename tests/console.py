@@ -3,22 +3,31 @@
 In a `console` block, a line that starts with `$ ` is a command and what follows it is its output,
 in which `...` stands for anything (alone on a line: for any lines). A block without `$ ` has only
 commands. A comment says what is special: `# exit 1`, or `# interactive` for a command that needs a
-person or never ends; of that one only the options are checked.
+person or never ends; of that one only the options are checked. `# leave it running` is a command of
+a terminal of its own: `follow` runs a page from its first command to its last, as its reader does.
 """
 
 import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[1]
-WHAT_COMMANDS_READ = ("missions", "fleet_configs", "examples", "docs/broken")
+WHAT_COMMANDS_READ = (
+    *("missions", "fleet_configs", "examples", "docs/broken", "docs/tutorials/patrol"),
+)
+INSTALLING = frozenset({"make", "pip", "python3", "source"})
+"""Commands of a page that `follow` leaves out: the environment of the tests is what they make."""
+BOUND_S = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +49,10 @@ class Command:
     @property
     def interactive(self) -> bool:
         return self.text.endswith("# interactive")
+
+    @property
+    def left_running(self) -> bool:
+        return self.text.endswith("# leave it running")
 
 
 def read_block(block: str) -> tuple[Command, ...]:
@@ -108,7 +121,7 @@ def run(
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=100,
+        timeout=BOUND_S,
         check=False,
     )
 
@@ -130,3 +143,69 @@ def assert_does_what_is_shown(
     if command.output:
         missing = first_unprinted(command.output, done.stdout)
         assert missing is None, f"{command.text}\n{done.stdout}\nnot as shown: {missing}"
+
+
+def follow(
+    page: Path,
+    workspace: Path,
+    environment: Mapping[str, str],
+    replaced: Mapping[str, str] | None = None,
+) -> None:
+    """Do what a page says in its order: save the blocks that have a title, run the commands.
+
+    `replaced` has texts of the page, such as a port, and what is used in their place here.
+    Programs that are left running get what a terminal sends for Ctrl-C when the page has ended.
+    """
+    folder = workspace
+    block_or_file = re.compile(r'^```(console|\w+ title="([^"]+)")\n(.*?)^```$', re.M | re.S)
+    text = page.read_text(encoding="utf-8")
+    for old, new in (replaced or {}).items():
+        text = text.replace(old, new)
+    with ExitStack() as running:
+        for kind, title, content in block_or_file.findall(text):
+            if kind != "console":
+                (folder / title).write_text(content, encoding="utf-8")
+                continue
+            for command in read_block(content):
+                if command.program == "cd":
+                    target = command.text.split()[1].replace("~", environment["HOME"])
+                    folder = folder / target
+                elif command.left_running:
+                    running.enter_context(_left_running(command, folder, environment))
+                elif command.program not in INSTALLING:
+                    assert_does_what_is_shown(command, folder, environment)
+
+
+@contextmanager
+def _left_running(command: Command, folder: Path, environment: Mapping[str, str]) -> Iterator[None]:
+    """Start a program and wait until it has printed what is shown, or else its first line."""
+    process = subprocess.Popen(
+        shlex.split(command.text, comments=True),
+        cwd=folder,
+        env={**environment, "PYTHONUNBUFFERED": "1"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert process.stdout is not None
+    overdue = threading.Timer(BOUND_S, process.kill)
+    overdue.start()
+    try:
+        printed = process.stdout.readline()
+        while command.output and first_unprinted((*command.output, "..."), printed) is not None:
+            line = process.stdout.readline()
+            assert line, f"{command.text}\n{printed}\nnot as shown: {command.output}"
+            printed += line
+        assert printed, f"{command.text} printed nothing"
+        overdue.cancel()
+        reader = threading.Thread(target=process.stdout.read, daemon=True)
+        reader.start()  # A full pipe would hold the program up.
+        yield
+    finally:
+        overdue.cancel()
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(BOUND_S)
+        finally:
+            process.kill()

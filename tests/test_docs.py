@@ -6,6 +6,8 @@ else holds of them is said in `tests.console`.
 
 import re
 import shlex
+import shutil
+import socket
 from pathlib import Path
 
 import pytest
@@ -16,11 +18,18 @@ from tests.console import (
     blocks,
     environment,
     first_unprinted,
+    follow,
     make_workspace,
     read_block,
 )
 
-PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+DOCS = REPOSITORY / "docs"
+PAGES = [REPOSITORY / "README.md", *sorted(DOCS.glob("*.md")), *sorted(DOCS.glob("tutorials/*.md"))]
+FROM_THE_CLONE = (DOCS / "start.md", DOCS / "troubleshooting.md")
+FOLLOWED = (*FROM_THE_CLONE, *sorted(DOCS.glob("tutorials/*.md")))
+"""Pages whose commands are run one after the other, as a reader does."""
+NEEDS_ROS = DOCS / "tutorials" / "ros2.md"
+"""The tests of the ROS plugin follow it."""
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
     *("setup", "demo", "demo-air", "demo-ros", "demo-team", "demo-web", "test", "test-long"),
@@ -33,12 +42,24 @@ BLOCKS = {
     for page in PAGES
     for line, commands in blocks(page)
 }
-RUNNING_M2PEM = [name for name, block in BLOCKS.items() if any(c.program == "m2pem" for c in block)]
+RUNNING_M2PEM = [
+    name
+    for name, block in BLOCKS.items()
+    if any(c.program == "m2pem" for c in block)
+    and not any(name.startswith(str(page.relative_to(REPOSITORY))) for page in FOLLOWED)
+]
 
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
     return make_workspace(tmp_path / "workspace")
+
+
+@pytest.fixture
+def unused_udp_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_port:
+        any_port.bind(("127.0.0.1", 0))
+        return int(any_port.getsockname()[1])
 
 
 @pytest.mark.parametrize("block", RUNNING_M2PEM)
@@ -47,6 +68,21 @@ def test_m2pem_commands_do_what_the_page_says(block: str, workspace: Path, tmp_p
     for command in BLOCKS[block]:
         if command.program == "m2pem":
             assert_does_what_is_shown(command, workspace, shell)
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in FOLLOWED if page != NEEDS_ROS], ids=lambda page: page.stem
+)
+def test_a_page_can_be_followed_from_its_first_command_to_its_last(
+    page: Path, workspace: Path, tmp_path: Path, unused_udp_port: int
+) -> None:
+    shell = environment(tmp_path / "home")
+    ports = {"14550": str(unused_udp_port)}
+    if page not in FROM_THE_CLONE:
+        patrol = shutil.copytree(DOCS / "tutorials" / "patrol", tmp_path / "home" / "patrol")
+        fleet = patrol / "fleet_mavlink.yaml"
+        fleet.write_text(fleet.read_text().replace("14550", ports["14550"]))
+    follow(page, workspace, shell, ports)
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -77,9 +113,9 @@ def test_links_between_files_lead_somewhere(page: Path) -> None:
 
 
 def test_every_page_is_linked_from_the_index() -> None:
-    index = (REPOSITORY / "docs" / "index.md").read_text(encoding="utf-8")
-    pages = {page.name for page in PAGES} - {"README.md", "index.md"}
-    assert pages <= set(re.findall(r"\]\(([^)#/]+\.md)", index))
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    pages = {str(page.relative_to(DOCS)) for page in PAGES[1:]} - {"index.md"}
+    assert pages <= set(re.findall(r"\]\(([^)#]+\.md)", index))
 
 
 def test_a_block_is_read_as_commands_with_their_output() -> None:

@@ -71,10 +71,26 @@ def test_links_to_files_of_the_repository_lead_to_them(site: Path) -> None:
     count = 0
     for page in (REPOSITORY / "docs").glob("*.md"):
         built = site / page.relative_to(REPOSITORY / "docs").with_suffix(".html")
-        links = re.findall(r'href="(repository/[^"#]+)"', built.read_text(encoding="utf-8"))
+        text = built.read_text(encoding="utf-8").partition("<article")[2]
+        links = re.findall(r'href="(repository/[^"#]+)', text)
         targets = written.findall(page.read_text(encoding="utf-8"))
         assert len(links) == len(targets), page
         for link, target in zip(links, targets, strict=True):
-            assert (site / link).read_bytes() == (REPOSITORY / target).read_bytes()
+            if target.endswith(".md"):
+                assert "<article" in (site / link).read_text(encoding="utf-8")
+            else:
+                assert (site / link).read_bytes() == (REPOSITORY / target).read_bytes()
             count += 1
     assert count > 20
+
+
+def test_readmes_are_pages_whose_links_lead_somewhere(site: Path) -> None:
+    readmes = [REPOSITORY / "README.md", *(REPOSITORY / "examples").rglob("README.md")]
+    assert len(readmes) > 20
+    for readme in readmes:
+        page = site / "repository" / readme.relative_to(REPOSITORY).with_name("index.html")
+        article = (
+            page.read_text(encoding="utf-8").partition("<article")[2].partition("</article")[0]
+        )
+        links = re.findall(r'(?:href|src)="(?!\w+:|#)([^"#]+)', article)
+        assert [link for link in links if not (page.parent / link).exists()] == []

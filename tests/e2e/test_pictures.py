@@ -1,5 +1,6 @@
 """The docs' pictures of missions are those of the files as they are. `make pictures` draws them."""
 
+import os
 import re
 from hashlib import sha256
 from pathlib import Path
@@ -11,18 +12,20 @@ REPOSITORY = Path(__file__).parents[2]
 IMAGES = REPOSITORY / "docs" / "images"
 MISSIONS = sorted((REPOSITORY / "missions").glob("*.bpmn"))
 EXAMPLES = sorted((REPOSITORY / "examples").glob("*/*.bpmn"))
+TUTORIALS = sorted((REPOSITORY / "docs" / "tutorials").glob("*/*.bpmn"))
+BESIDE = (*EXAMPLES, *TUTORIALS)
 
 SVG = "{http://www.w3.org/2000/svg}"
 BPMNDI = "{http://www.omg.org/spec/BPMN/20100524/DI}"
 
 every_mission = pytest.mark.parametrize(
-    "mission", [*MISSIONS, *EXAMPLES], ids=lambda path: f"{path.parent.name}-{path.stem}"
+    "mission", [*MISSIONS, *BESIDE], ids=lambda path: f"{path.parent.name}-{path.stem}"
 )
 
 
 def image(mission: Path) -> Path:
-    """An example's is beside it."""
-    return mission.with_suffix(".svg") if mission in EXAMPLES else IMAGES / f"{mission.stem}.svg"
+    """That of an example or a tutorial is beside it."""
+    return mission.with_suffix(".svg") if mission in BESIDE else IMAGES / f"{mission.stem}.svg"
 
 
 def picture(mission: Path) -> etree._Element:
@@ -53,9 +56,10 @@ def test_the_picture_shows_everything_that_the_mission_draws(mission: Path) -> N
 @every_mission
 def test_the_picture_is_shown_in_the_docs(mission: Path) -> None:
     example = mission.with_name("README.md")
-    pages = [example] if mission in EXAMPLES else [*(REPOSITORY / "docs").glob("*.md")]
-    shown = image(mission).relative_to(pages[0].parent)
-    assert any(f"]({shown})" in page.read_text(encoding="utf-8") for page in pages)
+    pages = [example] if mission in EXAMPLES else [*(REPOSITORY / "docs").rglob("*.md")]
+    shown = [f"]({os.path.relpath(image(mission), page.parent)})" for page in pages]
+    texts = [page.read_text(encoding="utf-8") for page in pages]
+    assert any(each in text for each, text in zip(shown, texts, strict=True))
 
 
 def test_no_picture_is_left_of_a_mission_that_is_gone() -> None:
@@ -68,5 +72,5 @@ def test_no_picture_is_left_of_a_mission_that_is_gone() -> None:
 
 def test_pictures_do_not_reach_out_to_the_network() -> None:
     reaching = re.compile(r'(?:href|src)="(?!#)|url\((?!["\']?(?:&quot;)?#)')
-    images = sorted([*IMAGES.glob("*.svg"), *map(image, EXAMPLES)])
+    images = sorted([*IMAGES.glob("*.svg"), *map(image, BESIDE)])
     assert [path.name for path in images if reaching.search(path.read_text("utf-8"))] == []

@@ -14,6 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.console import environment as shell_of
+from tests.console import follow, make_workspace
+
 REPOSITORY = Path(__file__).parents[2]
 PLUGINS = sorted(path.parent for path in REPOSITORY.glob("plugins/*/*/pyproject.toml"))
 THIS = f"3.{sys.version_info.minor}"
@@ -108,6 +111,10 @@ def test_wheels_alone_do_what_the_first_pages_show(
     shown = run(m2pem, "demo", cwd=home)
     assert "The second way" in shown
     assert "terminated by mission ended" in shown
+    shell = shell_of(tmp_path / "reader")
+    shell.update(PATH=f"{environment / 'bin'}:{os.environ['PATH']}")
+    del shell["PYTHONPATH"]
+    follow(REPOSITORY / "docs" / "start.md", make_workspace(tmp_path / "clone"), shell)
 
 
 @pytest.mark.parametrize("name", ["m2pem", *(plugin.name for plugin in PLUGINS)])
