@@ -26,6 +26,7 @@ from m2pem.bpmn.rules.activities import AMBIGUOUS_CALL, NO_CALLED_ELEMENT
 from m2pem.bpmn.rules.files import IMPORT_UNREADABLE, NOT_BPMN, NOT_EXECUTED, UNUSABLE_FILE
 from m2pem.bpmn.rules.references import DANGLING_REFERENCE
 from m2pem.bpmn.subprocesses import read_process
+from m2pem.bpmn.template_properties import read_template_properties
 from m2pem.bpmn.xml import BPMN, Document, XmlError, call_by_role, local, parse_xml
 from m2pem.errors import MissionError
 from m2pem.findings import Finding
@@ -142,6 +143,8 @@ def open_part(data: bytes, name: str, qualifier: str = "") -> Part:
         _not_bpmn(findings, document)
         raise MissionError(f"{name}: no BPMN 2.0 file", findings.all)
     call_by_role(document.root)
+    document = read_template_properties(document, findings)
+    findings.line = document.line
     return Part(name, data, document, ReadingContext(findings), qualifier)
 
 

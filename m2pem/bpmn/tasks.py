@@ -11,7 +11,7 @@ from m2pem.bpmn.children import Children, own_extensions
 from m2pem.bpmn.context import KEY, MessageUse, PendingPrompt, ReadingContext, association, text_of
 from m2pem.bpmn.events import look_up
 from m2pem.bpmn.extensions import unknown_content
-from m2pem.bpmn.foreign_syntax import script_remedy, statement_remedy
+from m2pem.bpmn.foreign_syntax import script_remedy, statement_remedy, time_remedy
 from m2pem.bpmn.rules.activities import BAD_SCRIPT, DECISION_VALUE, EMPTY_SCRIPT, SCRIPT_LANGUAGE
 from m2pem.bpmn.rules.behaviors import DUPLICATE_PROPERTY, NO_SERVICE, TWO_BEHAVIORS, TWO_SERVICES
 from m2pem.bpmn.rules.data import BAD_KEY
@@ -306,7 +306,8 @@ class _Asked:
         try:
             duration_us(self.timeout.evaluate(lambda _: None), 0)
         except (ExpressionSyntaxError, ExpressionError) as error:
-            self._error(element, TIMER_TIME, f"timeout: {error}", 'write for example "PT5M"')
+            remedy = time_remedy("timeDuration", text)
+            self._error(element, TIMER_TIME, f"timeout: {error}", remedy)
 
     def _decision(self, element: etree._Element) -> None:
         value = element.get("value", element.get(M2PEM + "value"))

@@ -55,10 +55,11 @@ _READ = frozenset(
             "loopCharacteristics",
             "subscription",
             "taskDefinition",
+            "userTask",
         )
     ]
 )
-"""Other engines' elements that m2pem reads (docs/missions.md)."""
+"""Other engines' elements that m2pem reads (docs/missions.md), or that say what it does anyway."""
 
 _EDITORS = (
     "http://www.omg.org/",
