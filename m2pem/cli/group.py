@@ -43,6 +43,7 @@ COMMANDS = {
     "plugins": "List the plugins and what they provide.",
     "fleet": "Show a fleet: who is there and can do what.",
     "doctor": "Check this host: what is right, and what to do about the rest.",
+    "templates": "Make forms of a fleet's behaviors for BPMN editors.",
     "completion": "Print what makes a shell complete m2pem's words.",
 }
 """Built-in commands and the first lines of their help."""

@@ -32,7 +32,7 @@ Offset: TypeAlias = tuple[float, float]
 
 _OFFSETS_REMEDY = "write [[behind, left], ...] in metres, one for each member after the lead"
 
-_DIMENSIONS = {
+DIMENSIONS = {
     ParameterKind.DURATION: Dimension.DURATION,
     ParameterKind.DISTANCE: Dimension.DISTANCE,
     ParameterKind.ALTITUDE: Dimension.DISTANCE,
@@ -273,8 +273,8 @@ def _boolean(value: Value) -> bool:
 
 def _number(kind: ParameterKind, value: Value) -> float | int:
     try:
-        if kind in _DIMENSIONS:
-            return quantity(value, _DIMENSIONS[kind])
+        if kind in DIMENSIONS:
+            return quantity(value, DIMENSIONS[kind])
         number = plain_number(value)
     except UnitError as error:
         raise _ProblemError("bad-value", str(error)) from None
@@ -286,7 +286,7 @@ def _number(kind: ParameterKind, value: Value) -> float | int:
 
 
 def _bounded(spec: ParameterSpec, number: float | int) -> float | int:
-    dimension = _DIMENSIONS.get(spec.kind)
+    dimension = DIMENSIONS.get(spec.kind)
     unit = f" {next(iter(UNITS[dimension]))}" if dimension else ""
     if spec.minimum is not None and number < spec.minimum:
         message = f"{number:g}{unit} is below {spec.minimum:g}{unit}"
