@@ -7,7 +7,7 @@ OMG's XML schemas. `make setup` installs it under tests/js.
 import json
 import shutil
 import subprocess
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -38,6 +38,31 @@ def read_with_moddle(files: Iterable[Path]) -> Mapping[str, Mapping[str, object]
     assert done.returncode == 0, done.stderr
     results: Mapping[str, Mapping[str, object]] = json.loads(done.stdout)
     return results
+
+
+def draw_from_templates(
+    modeler: str, templates: Path, steps: Sequence[Mapping[str, object]]
+) -> tuple[str, list[str]]:
+    """Draw a mission of element templates by filling in their forms in a headless Chromium.
+
+    `modeler`: "cloud" (Camunda 8) or "platform" (Camunda 7). A step has the `template`'s name, its
+    `category`, and the `values` of fields by label. Returns the saved file, and what the validator
+    of templates, the forms, or reading it with bpmn-moddle found wrong.
+    """
+    node = shutil.which("node")
+    if node is None or not (JS / "node_modules" / "camunda-bpmn-js").exists():
+        pytest.fail("needs Node.js 18 or newer and the packages of tests/js: run `make setup`")
+    done = subprocess.run(
+        [node, "apply_templates.mjs", modeler, str(templates)],
+        cwd=JS,
+        input=json.dumps(steps),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    return result["xml"], result["errors"]
 
 
 def schema() -> etree.XMLSchema:
