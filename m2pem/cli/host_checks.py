@@ -246,9 +246,9 @@ def check_fleet(
 
     The fleet is None if it cannot be used.
     """
-    from m2pem.cli.arguments import arbiters_of
     from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of
     from m2pem.fleet.fleet_file import load_fleet
+    from m2pem.scripting.sources import arbiters_of
 
     try:
         fleet = load_fleet(file)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from m2pem.cli.options import MADE_UP, UnusableError, as_json, example, fleet_option
+from m2pem.cli.options import UnusableError, as_json, example, fleet_option
 
 
 @click.group(
@@ -38,9 +38,10 @@ def export(fleet_file: str, editor: str, out: Path | None) -> None:
 
     docs/editors.md says where an editor looks for them.
     """
-    if fleet_file == MADE_UP:
-        raise click.UsageError(f"{MADE_UP!r} is made up from a mission; name a fleet file")
-    from m2pem.cli.arguments import arbiters_of
+    from m2pem.scripting.sources import DEFAULT_FLEET, arbiters_of
+
+    if fleet_file == DEFAULT_FLEET:
+        raise click.UsageError(f"{DEFAULT_FLEET!r} is made up from a mission; name a fleet file")
     from m2pem.editing.element_templates import Editor, element_templates
     from m2pem.fleet.fleet_file import load_fleet
     from m2pem.plugins import PluginManager

@@ -207,9 +207,11 @@ class Supervisor:
         process: str | None,
         data: Mapping[str, Value] | None,
     ) -> tuple[Mission, str]:
-        if isinstance(mission, Mission):
-            return mission, self.admit(mission, process, data)
-        loaded = load_source(mission, self.settings.search_path)
+        loaded = (
+            mission
+            if isinstance(mission, Mission)
+            else load_source(mission, self.settings.search_path)
+        )
         process_id, _ = self.admit(loaded, process, data)
         return loaded, process_id
 

@@ -336,5 +336,5 @@ class Executive:
         # First, as nothing may come between connecting and taking up a run.
         await stack.enter_async_context(ControlSocket(executive.control, file))
         await stack.enter_async_context(executive)
-        await stack.enter_async_context(LoopMonitor(executive.events))
+        await stack.enter_async_context(LoopMonitor(executive.events, executive.health))
         return executive.control
