@@ -35,7 +35,7 @@ PIP_FAILED = { echo "pip could not install what is needed (its own message is ab
   Then the same make command again" >&2; exit 1; }
 
 .PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team
-.PHONY: test test-long test-ros fuzz lint format docs pictures
+.PHONY: check test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean dist ros
 
 help: ## list the targets
@@ -173,9 +173,17 @@ format: setup ## put the code into shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
+# Tests of vehicles, browsers and processes wait more than they compute: more workers than processors.
+WORKERS := 4
+UNITS := $(addprefix tests/,api bpmn control_socket deconfliction diagram editing engine executive fleet geo journal \
+  mission rehearsal scripting services simulation teams telemetry)
+
+check: lint ## check style, types, layers and the core's unit tests: two minutes
+	@$(BIN)/pytest -n 2 -m "not long" $(UNITS)
+
 test: lint bench-quick ## check all but the long tests
 	@cd $(UI) && npm run --silent test
-	@$(BIN)/pytest -n 2 -m "not long"
+	@$(BIN)/pytest -n $(WORKERS) -m "not long"
 	@$(MAKE) --silent test-ros
 
 test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too

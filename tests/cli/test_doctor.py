@@ -13,7 +13,7 @@ import pytest
 
 from m2pem.api.health import HealthStatus, listening_check
 from m2pem.cli import host_checks
-from m2pem.cli.arguments import arbiters_of
+from m2pem.scripting.sources import arbiters_of
 from m2pem.executive.runtime_directory import VARIABLE
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.fleet.fleet_file import load_fleet

@@ -17,7 +17,8 @@ LONG_S = 300.0
 
 def run(make: Callable[[Random], str], dice: Random) -> None:
     mission, text = with_compensation(make(dice), dice)
-    game = RandomPlay(mission, dice.choice(BATCHES))
+    batch = dice.choice(BATCHES)
+    game = RandomPlay(mission, batch)
     game.go([dice.randrange(10_000) for _ in range(dice.randrange(40))])
     game.finish()
     play = game.play
@@ -26,7 +27,7 @@ def run(make: Callable[[Random], str], dice: Random) -> None:
             assert play.run.wants_continue or play.awaits()
         if make is structured:
             assert not play.detail.startswith("stuck"), play.detail
-        check_taken_up(play, dice.randrange(len(play.steps)))
+        check_taken_up(play, batch, dice.randrange(len(play.steps)))
         game.end()
         play.verify()
     except Exception as error:
