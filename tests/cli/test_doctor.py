@@ -13,12 +13,12 @@ import pytest
 
 from m2pem.api.health import HealthStatus, listening_check
 from m2pem.cli import host_checks
-from m2pem.scripting.sources import arbiters_of
 from m2pem.executive.runtime_directory import VARIABLE
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 from m2pem.plugins import PluginManager
+from m2pem.scripting.sources import arbiters_of
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, CommandLine, fleet_with_state, install_plugin
 
