@@ -173,8 +173,8 @@ format: setup ## put the code into shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-# Tests of vehicles, browsers and processes wait more than they compute: more workers than processors.
-WORKERS := 4
+# One for each processor: with more, it takes a third less, but browsers come to wait for longer than tests do.
+WORKERS := 2
 UNITS := $(addprefix tests/,api bpmn control_socket deconfliction diagram editing engine executive fleet geo journal \
   mission rehearsal scripting services simulation teams telemetry)
 

@@ -29,6 +29,8 @@ from m2pem.testing import scenarios
 WITHIN_S = 10.0
 VEHICLE = "ugv1"
 SPEED = 20.0
+SLOW_S = 60.0
+"""A machine on which many tests run may take that long to answer."""
 PASSWORD = "correct horse"
 
 
@@ -110,7 +112,9 @@ class Browser:
 
     def __init__(self, base: str, verify: Any = True) -> None:
         self.base = base
-        self.http = httpx.AsyncClient(base_url=base, headers={"Origin": base}, verify=verify)
+        self.http = httpx.AsyncClient(
+            base_url=base, headers={"Origin": base}, verify=verify, timeout=SLOW_S
+        )
         self.lives: list[Live] = []
 
     @property
