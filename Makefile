@@ -13,7 +13,7 @@ JS := tests/js
 UI := plugins/ocu/web/ui
 UI_SOURCES := $(shell find $(UI) -path $(UI)/node_modules -prune -o -type f -print)
 PAGE := plugins/ocu/web/m2pem_plugin_web/static/index.html
-DEBIAN_PACKAGES := chromium curl nodejs npm spin tcc tmux
+DEBIAN_PACKAGES := chromium curl nodejs npm spin systemd tcc tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
 # Each target adds what it needs: a demonstration a few packages, the tests all (`installed`).

@@ -4,7 +4,7 @@ In a `console` block, a line that starts with `$ ` is a command and what follows
 in which `...` stands for anything (alone on a line: for any lines). A block without `$ ` has only
 commands. A comment says what is special: `# exit 1`, or `# interactive` for a command that needs a
 person or never ends; of that one only the options are checked. `# leave it running` is a command of
-a terminal of its own: `follow` runs a page from its first command to its last, as its reader does.
+another terminal: `follow` runs a page from its first command to its last, as its reader does.
 """
 
 import os

@@ -1,6 +1,6 @@
 """Tests see of the product what its users see: no test touches a private attribute of it.
 
-A class of the tests may have private attributes of its own; only it uses them (`self._x`).
+A class of the tests may have private attributes; only it uses them (`self._x`).
 """
 
 import ast
@@ -29,7 +29,7 @@ EXCEPTIONS = {
     ("tests/verify/test_interrupted_search.py", "_Search"): "Ctrl-C comes at each line of the "
     "loop of the search, which only its frame tells",
     ("tests/verify/test_interrupted_search.py", "_loop"): "as above",
-    ("tests/test_site.py", "_LAZY"): "a name that can be loaded and is missing in `__all__` stands "
+    ("tests/test_site.py", "_LAZY"): "a name that can be loaded and is missing in `__all__` is "
     "in this table only",
     ("plugins/arbiters/mavlink/tests/test_mavlink_sitl_planes.py", "_controllers"): "a landing is "
     "stored on a real plane by the driver under test, as MAVSDK shares its port with no other link",

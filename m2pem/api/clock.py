@@ -6,7 +6,7 @@ time for rehearsals and tests.
 Virtual time is an event loop, so that all code that waits with asyncio runs in it unchanged: when
 nothing is ready, the loop jumps to the next timer. Time is counted in whole microseconds (a float
 would drift), timers of the same microsecond fire in the order in which they were made, and nothing
-real can be waited for but work handed to a thread, during which virtual time stands still.
+real can be waited for but work handed to a thread, during which virtual time does not advance.
 """
 
 import asyncio
@@ -113,7 +113,7 @@ class VirtualClock:
         """Have `act` called when nothing is ready, each time before the loop jumps ahead.
 
         Its argument is by how many seconds, or None when no timer is set. If it returns True, it
-        has made something happen now, and time stands still for it.
+        has made something happen now, and time does not advance.
         """
         self._loop.when_idle = act
 
@@ -130,7 +130,7 @@ class VirtualClock:
 def run_virtual(main: Callable[[VirtualClock], Awaitable[T]], start_us: int) -> T:
     """Run `main` to its end in virtual time that begins at `start_us`, as `asyncio.run` would.
 
-    Where an event loop runs already (a notebook, an async test), `main` gets a thread of its own;
+    Where an event loop runs already (a notebook, an async test), `main` runs in another thread;
     that event loop waits for it, and an interrupt (Ctrl-C) cancels it.
 
     Raises:
@@ -229,7 +229,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def run_in_executor(  # type: ignore[override]  # the stubs' own signature is not typed either
         self, executor: Any, func: Callable[..., T], *args: Any
     ) -> "asyncio.Future[T]":
-        """Run in a thread; virtual time stands still until it is done."""
+        """Run in a thread; virtual time does not advance until it is done."""
         future: asyncio.Future[T] = super().run_in_executor(executor, func, *args)
         self._threads_at_work += 1
         future.add_done_callback(self._thread_done)

@@ -62,7 +62,7 @@ def check_plugins(plugins: "PluginManager") -> Iterator[HealthCheck]:
 def check_journal(url: str | None) -> Iterator[HealthCheck]:
     """Check the journal's folder, its files, its free space, and the executives that write to it.
 
-    `url`: None stands for the user's own journal.
+    `url`: None means the user's own journal.
     """
     try:
         path = file_of(url or default_url())
@@ -156,9 +156,7 @@ def _disk(path: Path) -> HealthCheck:
 def _control(path: Path) -> HealthCheck:
     folder = folder_of(path)
     if folder.is_symlink() or (folder.exists() and folder.lstat().st_uid != os.geteuid()):
-        why = (
-            f"{folder} is not a folder of this user's own: m2pem start and stop reach no executive"
-        )
+        why = f"{folder} does not belong to this user: m2pem start and stop reach no executive"
         return HealthCheck("control socket", ERROR, why, f"remove {folder}")
     running = ", ".join(socket.stem for socket in live_sockets(path))
     found = f"processes that serve this journal: {running}" if running else "no executive serves"
@@ -270,9 +268,8 @@ def check_fleet(
         locks.acquire()
         locks.release()
     except VehicleInUseError as error:
-        what, _, remedy = str(error).partition(". Start the mission there")
-        remedy = f"start missions there{remedy}" if remedy else "look at `m2pem doctor` without it"
-        checks.append(HealthCheck("vehicles", WARNING, what, remedy))
+        remedy = "start missions there (m2pem start), or end that process first"
+        checks.append(HealthCheck("vehicles", WARNING, str(error), remedy))
     except M2pemError:
         pass  # the check of the journal says it
     else:

@@ -25,7 +25,7 @@ from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import PluginError
 from m2pem.executive.executive import Executive
 from m2pem.executive.process_monitors import LoopMonitor
-from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle
+from m2pem.fleet.fleet import Fleet, real_resources
 from m2pem.journal.base import Journal
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager, Plugins
@@ -219,16 +219,7 @@ def refuse_speed(fleet: Fleet, speed: float) -> None:
     Raises:
         UsageError: the fleet has real vehicles, and the speed is not 1.
     """
-    if speed == 1.0:
-        return
-    everything: list[Vehicle | Payload] = [*fleet.vehicles.values(), *fleet.payloads.values()]
-    sitl = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.sitl}
-    real = [
-        each.id
-        for each in everything
-        if each.arbiter != SIMULATED and each.id.partition("/")[0] not in sitl
-    ]
-    if real:
+    if speed != 1.0 and (real := real_resources(fleet)):
         raise click.UsageError(
             f"--speed {speed:g}: {', '.join(real)} of {fleet.file} would be real; add --simulate, "
             "or mark what is software in the loop with `sitl: true`"

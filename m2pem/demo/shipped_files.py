@@ -45,7 +45,7 @@ def examples() -> Path:
         if (folder / "missions").is_dir() and (folder / "fleet_configs").is_dir():
             return folder
     raise OperatorError(
-        f"the missions of the demonstrations are not in {package / 'examples'}: install m2pem anew"
+        f"the missions of the demonstrations are not in {package / 'examples'}: install m2pem again"
     )
 
 

@@ -90,4 +90,4 @@ class ExecutiveHealth:
         if time.monotonic() < self._blocked_until_s:
             remedy = "tell the plugin's author, and serve without it"
             return HealthCheck("event loop", ERROR, self._blocked_by, remedy)
-        return HealthCheck("event loop", OK, "it turns")
+        return HealthCheck("event loop", OK, "it runs")

@@ -115,6 +115,17 @@ class Fleet:
         return all(each.arbiter == SIMULATED for each in everything)
 
 
+def real_resources(fleet: Fleet) -> list[ResourceId]:
+    """The vehicles and payloads that are neither simulated nor software in the loop."""
+    everything: list[Vehicle | Payload] = [*fleet.vehicles.values(), *fleet.payloads.values()]
+    sitl = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.sitl}
+    return [
+        each.id
+        for each in everything
+        if each.arbiter != SIMULATED and each.id.partition("/")[0] not in sitl
+    ]
+
+
 def simulated_fleet(fleet: Fleet, settings: Mapping[str, Any] | None = None) -> Fleet:
     """The fleet with the simulated arbiter in place of every other; `settings` are added to the
     connection of every resource, in place of its own of the same names."""

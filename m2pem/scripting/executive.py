@@ -37,7 +37,7 @@ from m2pem.executive import executive as core
 from m2pem.executive.control import Control
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.executive.simulated_state import tidy_up, with_own_state
-from m2pem.fleet.fleet import Fleet, simulated_fleet
+from m2pem.fleet.fleet import Fleet, real_resources, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import default_url, file_of, open_journal
 from m2pem.mission.mission import Mission
@@ -128,7 +128,7 @@ class Run:
                 if isinstance(event, OpenPrompt):
                     yield Prompt(self._control, event, self._by)
             if ended.done():
-                ended.result()  # raises what has ended the run without an end of its own
+                ended.result()  # raises the error that has ended the run
         finally:
             ended.cancel()
 
@@ -239,7 +239,7 @@ class Executive:
             raise OperatorError("the executive is connected already")
         self._closing.clear()
         connected: asyncio.Future[Control] = asyncio.get_running_loop().create_future()
-        # A task of its own: what is opened must be closed in the same task, and `connect` and
+        # A separate task: what is opened must be closed in the same task, and `connect` and
         # `close` may be called in two.
         self._serving = asyncio.create_task(self._serve(connected), name="executive")
         try:
@@ -314,6 +314,12 @@ class Executive:
         journal = open_journal(self._url)
         stack.push_async_callback(journal.close)
         fleet = with_own_state(self._fleet, file)
+        if self._speed != 1.0 and (real := real_resources(fleet)):
+            raise FleetError(
+                f"speed {self._speed:g}: {', '.join(real)} of {fleet.file} would be real; add "
+                "simulate=True, or mark what is software in the loop with `sitl: true`",
+                (),
+            )
         try:
             executive = core.Executive(
                 fleet,
@@ -326,12 +332,6 @@ class Executive:
             )
         except PluginError as error:
             raise FleetError(f"{fleet.file}: {error}", ()) from error
-        if self._speed != 1.0 and not executive.arbiters.nothing_is_real:
-            raise FleetError(
-                f"{fleet.file}: speed {self._speed:g} is for simulated vehicles alone: add "
-                "simulate=True, or mark what is software in the loop with `sitl: true`",
-                (),
-            )
         stack.callback(tidy_up, executive, file)
         # First, as nothing may come between connecting and taking up a run.
         await stack.enter_async_context(ControlSocket(executive.control, file))

@@ -36,7 +36,7 @@ class RunResult:
 
     @property
     def ok(self) -> bool:
-        """Whether the mission came to an end of its own: completed or terminated."""
+        """Whether the mission completed or terminated itself."""
         return self.outcome in (RunStatus.COMPLETED, RunStatus.TERMINATED)
 
     @property

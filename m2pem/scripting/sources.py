@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from m2pem.plugins import PluginManager
 
 DEFAULT_FLEET = "sim"
-"""The fleet's name that stands for simulated vehicles that are made up from the mission."""
+"""The name of a fleet of simulated vehicles that is made up from the mission."""
 
 FleetSource: TypeAlias = Union[Fleet, str, Path]
 """A fleet that was loaded, the path of a fleet file, or "sim" for one made up from the mission."""

@@ -93,7 +93,7 @@ async def test_a_descriptor_that_does_not_block_is_waited_for(pipe: Pipe) -> Non
 
 
 def test_a_program_that_reads_can_end(pipe: Pipe) -> None:
-    """Its input stays open, and nobody types: it ends all the same, and quietly."""
+    """Its input stays open, and nothing is typed: it ends all the same, and quietly."""
     code = """
 import asyncio
 from m2pem.api.foreground import Lines

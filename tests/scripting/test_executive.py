@@ -135,7 +135,7 @@ async def test_real_vehicles_are_never_sped_up(tmp_path: Path) -> None:
         "version: 1\nvehicles: {uav1: {domain: air, arbiter: mavlink, "
         "connection: {url: 'udpin://127.0.0.1:14999', system_id: 1}}}\n"
     )
-    with pytest.raises(m2pem.FleetError, match="speed 2 is for simulated vehicles"):
+    with pytest.raises(m2pem.FleetError, match="speed 2: uav1 of .* would be real"):
         async with m2pem.Executive(file, journal="memory:", speed=2):
             pass
     file.write_text("version: 1\nvehicles: {a: {domain: ground, arbiter: rso}}\n")
@@ -158,7 +158,7 @@ async def test_it_is_connected_in_one_task_and_closed_in_another(fleet: m2pem.ap
         await connected.start(MISSION)
     await connected.close()
     async with connected:
-        assert (await connected.start(MISSION)).id == "r1"  # a journal in memory begins anew
+        assert (await connected.start(MISSION)).id == "r1"  # a journal in memory begins empty
 
 
 async def test_a_caller_that_gives_up_while_connecting_leaves_nothing_open(

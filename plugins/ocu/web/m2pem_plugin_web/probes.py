@@ -27,7 +27,7 @@ def router(control: MissionControl) -> APIRouter:
 
     @routes.api_route(LIVE, methods=["GET", "HEAD"])
     async def live() -> JSONResponse:
-        """The event loop turns: it has answered."""
+        """The event loop runs: it has answered."""
         return JSONResponse({"status": "live"}, headers=NO_STORE)
 
     @routes.api_route(READY, methods=["GET", "HEAD"])
