@@ -139,6 +139,6 @@ def fleet_name(path: Path) -> str:
 
 def _not_driven(journal: Path) -> NotDrivenError:
     return NotDrivenError(
-        f"no executive with the journal {journal} is running here; "
-        "name the journal of the one you mean with --journal"
+        f"no executive with the journal {journal} is running here: "
+        "m2pem serve starts one; if it has another journal, name that with --journal"
     )
