@@ -50,7 +50,7 @@ def test_the_missions_of_an_installed_package_are_found_inside_of_it(
 
     package = tmp_path / "site" / "m2pem"
     monkeypatch.setattr(shipped_files, "__file__", str(package / "demo" / "shipped_files.py"))
-    with pytest.raises(OperatorError, match="install m2pem anew"):
+    with pytest.raises(OperatorError, match="install m2pem again"):
         examples()
     for name in ("missions", "fleet_configs"):
         shutil.copytree(REPOSITORY / name, package / "examples" / name)
