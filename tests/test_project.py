@@ -11,7 +11,9 @@ import pytest
 import m2pem
 
 REPOSITORY = Path(__file__).parents[1]
-REGISTRIES = re.compile(rb"\b(?:pypi|pythonhosted|npmjs|debian)\.(?:org|com|io)\b")
+REGISTRIES = re.compile(
+    rb"\b(?:pypi|pythonhosted|npmjs|debian|unpkg|jsdelivr)\.(?:org|com|io|net)\b"
+)
 PLUGIN_MODULES = re.compile(r"^\s*(?:from|import) (m2pem_plugin_\w+)\.([\w.]+)", re.MULTILINE)
 HOME_PATHS = re.compile(rb"(?<![\w.])/(?:home|Users)/\w+|(?<![\w./])/root[/]")
 

@@ -38,7 +38,9 @@ QUESTIONS: Sequence[Mapping[str, str]] = (
 """The decisions of the templates for user tasks: labels by stored values."""
 
 _ABSENT = "(not given)"
-_SCHEMA = "https://unpkg.com/@camunda/{}element-templates-json-schema/resources/schema.json"
+_SCHEMA = "urn:@camunda/{}element-templates-json-schema"
+"""An editor knows by the name of the schema's package that a template is for Camunda 8; it loads no
+schema from this address."""
 
 
 class Editor(StrEnum):
