@@ -135,7 +135,7 @@ async def test_real_vehicles_are_never_sped_up(tmp_path: Path) -> None:
         "version: 1\nvehicles: {uav1: {domain: air, arbiter: mavlink, "
         "connection: {url: 'udpin://127.0.0.1:14999', system_id: 1}}}\n"
     )
-    with pytest.raises(m2pem.FleetError, match="speed 2: uav1 of .* would be real"):
+    with pytest.raises(m2pem.FleetError, match=r"speed 2: uav1 of .* would be real"):
         async with m2pem.Executive(file, journal="memory:", speed=2):
             pass
     file.write_text("version: 1\nvehicles: {a: {domain: ground, arbiter: rso}}\n")
