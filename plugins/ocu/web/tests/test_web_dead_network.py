@@ -1,19 +1,15 @@
 """A network that stops passing bytes without closing: what operators see, and what happens."""
 
 import re
-import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, Locator, Page, expect
-from web_browsing import page_at
-from web_desk import FLEET, IN_ONE_LOOP, element
+from playwright.async_api import Locator, Page, expect
+from web_desk import IN_ONE_LOOP, Desk, element, forget
 from web_proxy import Proxy, proxy_to
 from web_running import answer, press_twice, wait_for_status
-from web_served import REPOSITORY, Served, served
 
 pytestmark = IN_ONE_LOOP
 
@@ -25,7 +21,6 @@ LATE = re.compile(r"was delivered \d+ s after it was given")
 class Field:
     """An operator in the field: their page reaches the executive through `proxy` alone."""
 
-    executive: Served
     proxy: Proxy
     page: Page
     origin: str
@@ -60,22 +55,28 @@ class Field:
 
 
 @asynccontextmanager
-async def field(chromium: Browser, folder: Path) -> AsyncIterator[Field]:
-    shutil.copytree(REPOSITORY / "missions", folder / "missions")
-    words = ("--simulate", "--speed", "2", "--journal", "memory:")
-    with served(folder, fleet=FLEET, words=words) as executive:
-        async with proxy_to(executive.origin) as proxy:
-            origin = f"http://127.0.0.1:{proxy.port}"
-            url = executive.url.replace(executive.origin, origin)
-            async with page_at(chromium, url) as it:
-                yield Field(executive, proxy, it.page, origin)
+async def field(desk: Desk) -> AsyncIterator[Field]:
+    async with proxy_to(desk.executive.origin) as proxy:
+        origin = f"http://127.0.0.1:{proxy.port}"
+        # The cookie of the session is valid at all ports of a host; its key is kept by each page.
+        page = await desk.watched.context.new_page()
+        await forget(desk.watched.context, page, origin, desk.key)
+        yield Field(proxy, page, origin)
+        await page.close()
 
 
-@pytest.mark.parametrize("directions", ["both", "up", "down"])
+@pytest.mark.parametrize(
+    "directions",
+    [
+        "both",
+        pytest.param("up", marks=pytest.mark.long),
+        pytest.param("down", marks=pytest.mark.long),
+    ],
+)
 async def test_a_stop_that_is_not_delivered_is_said_and_carried_out_when_the_network_heals(
-    chromium: Browser, tmp_path: Path, directions: str
+    desk: Desk, directions: str
 ) -> None:
-    async with field(chromium, tmp_path) as here:
+    async with field(desk) as here:
         await here.start()
         here.proxy.stall(directions)
         await here.is_dead()
@@ -96,9 +97,9 @@ async def test_a_stop_that_is_not_delivered_is_said_and_carried_out_when_the_net
 
 
 async def test_a_stop_of_a_moment_ago_is_said_before_the_stream_is_known_to_be_dead(
-    chromium: Browser, tmp_path: Path
+    desk: Desk,
 ) -> None:
-    async with field(chromium, tmp_path) as here:
+    async with field(desk) as here:
         await here.start()
         await here.stop.click()
         await expect(here.stop).to_have_text("Again to STOP")
@@ -112,9 +113,9 @@ async def test_a_stop_of_a_moment_ago_is_said_before_the_stream_is_known_to_be_d
 
 
 async def test_an_answer_that_the_network_held_back_is_not_given(
-    chromium: Browser, tmp_path: Path
+    desk: Desk,
 ) -> None:
-    async with field(chromium, tmp_path) as here:
+    async with field(desk) as here:
         await here.start()
         here.proxy.stall("up")
         await answer(here.page, "Continue").click()
@@ -144,9 +145,9 @@ PIECES = """
 
 
 async def test_no_line_is_drawn_where_nothing_was_known_of_a_vehicle(
-    chromium: Browser, tmp_path: Path
+    desk: Desk,
 ) -> None:
-    async with field(chromium, tmp_path) as here:
+    async with field(desk) as here:
         await here.page.add_init_script(PIECES)
         await here.start()
         await answer(here.page, "Continue").click()

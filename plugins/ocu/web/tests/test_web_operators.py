@@ -3,25 +3,18 @@
 import asyncio
 import shutil
 import socket
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 
-import pytest
-from m2pem_plugin_web.access.passwords import hash_password
-from m2pem_plugin_web.access.roles import Role
-from m2pem_plugin_web.access.users import User, write_users
 from playwright.async_api import Browser, Page, expect
-from web_browsing import KEY, Watched, page_at
-from web_desk import IN_ONE_LOOP, element
+from web_browsing import KEY, page_at
+from web_desk import IN_ONE_LOOP, Desk, element, named_users, signed_in
 from web_running import answer, wait_for_status
 from web_served import REPOSITORY, Served, served
+from web_world import PASSWORD
 
 pytestmark = IN_ONE_LOOP
 
 NAME = "vignette1"
-PASSWORD = "correct horse battery"
-ROLES = {"anna": Role.COMMANDER, "otto": Role.OPERATOR, "vera": Role.VIEWER}
 # Steering that the page has for those who may, and that the server refuses to those who may not.
 STEERING = ["STOP", "Pause", "Stop this run", "Signal…", "Message…", "Take over", "Continue"]
 STEERED = ["pause", "resume", "stop"]
@@ -32,74 +25,28 @@ REFUSED = """async ([run, what]) => {
 }""".replace("HEADERS", f'{{ {KEY}, "Content-Type": "application/json" }}')
 
 
-def put(executive: Served) -> None:
-    shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
-
-
-def named_users(folder: Path) -> dict[str, str]:
-    """Settings with users: all have the same password."""
-    path = folder / "users.json"
-    hashed = hash_password(PASSWORD)
-    write_users(path, {name: User(role, hashed) for name, role in ROLES.items()})
-    return {"M2PEM_WEB_USERS": str(path)}
-
-
-@pytest.fixture(scope="module")
-def staffed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """An executive with a commander, an operator and a viewer."""
-    folder = tmp_path_factory.mktemp("staffed")
-    with served(folder, environment=named_users(folder)) as executive:
-        put(executive)
-        yield executive
-
-
-@asynccontextmanager
-async def signed_in(chromium: Browser, executive: Served, name: str) -> AsyncIterator[Watched]:
-    """Somebody's own browser, on the first page."""
-    async with page_at(chromium, f"{executive.origin}/sign-in") as it:
-        await it.page.get_by_label("Name").fill(name)
-        await it.page.get_by_label("Password").fill(PASSWORD)
-        await it.page.get_by_role("button", name="Sign in").click()
-        await expect(it.page.get_by_role("link", name=NAME)).to_be_visible()
-        # Chromium logs that nobody was signed in when the page asked who is.
-        it.complaints[:] = [each for each in it.complaints if "401" not in each]
-        yield it
-
-
-async def start(page: Page, executive: Served) -> str:
-    """Start the mission from its page; the run's page."""
-    await page.goto(f"{executive.origin}/missions/{NAME}")
-    await page.get_by_role("tab", name="Run", exact=True).click()
-    await expect(page.locator(".link-open")).to_have_count(1)  # else nothing is sent
-    await page.get_by_role("button", name="Start", exact=True).click()
-    # A test before may have left its run under way.
-    confirm = page.get_by_role("button", name="Start all the same", exact=True)
-    await expect(confirm.or_(answer(page, "Continue"))).to_be_visible()
-    if await confirm.is_visible():
-        await confirm.click()
-    await page.wait_for_url("**/runs/*")
-    await expect(answer(page, "Continue")).to_be_visible()
-    return page.url
+async def see(it: Desk, run: str) -> Page:
+    """The page of somebody who looks at a run."""
+    it.watched.listen(it.page)
+    await it.page.goto(run)
+    return it.page
 
 
 async def test_operators_see_the_same_and_the_first_answer_counts(
-    chromium: Browser, staffed: Served
+    chromium: Browser, desk: Desk
 ) -> None:
-    async with (
-        signed_in(chromium, staffed, "anna") as anna,
-        signed_in(chromium, staffed, "otto") as otto,
-    ):
-        run = await start(anna.page, staffed)
-        await otto.page.goto(run)
-        await expect(answer(otto.page, "Abort")).to_be_enabled()
-        await answer(anna.page, "Continue").click()
-        told = "anna was first: “Continue”"
-        await expect(otto.page.locator(".toasts")).to_contain_text(told)
-        await expect(otto.page.get_by_role("alertdialog")).to_have_count(0)
-        await expect(anna.page.get_by_text("was first")).to_have_count(0)
+    async with signed_in(chromium, desk.executive, "otto") as otto:
+        await desk.start()
+        page = await see(otto, desk.page.url)
+        await expect(answer(page, "Abort")).to_be_enabled()
+        await see_who_has_taken_a_vehicle(desk.page, page)
+        await answer(desk.page, "Continue").click()
+        await expect(page.locator(".toasts")).to_contain_text("anna was first: “Continue”")
+        await expect(page.get_by_role("alertdialog")).to_have_count(0)
+        await expect(desk.page.get_by_text("was first")).to_have_count(0)
         # An operator, who cannot start runs, steers them.
-        await otto.page.get_by_role("button", name="Pause", exact=True).click()
-        for each in (anna, otto):
+        await page.get_by_role("button", name="Pause", exact=True).click()
+        for each in (desk, otto):
             log = each.page.get_by_role("region", name="Events")
             await expect(log).to_contain_text("USER SEND ROUTE: continue, answered by anna")
             await expect(element(each.page, "DriveRoute")).to_contain_class("m2-active")
@@ -107,37 +54,31 @@ async def test_operators_see_the_same_and_the_first_answer_counts(
             each.assert_well()
 
 
-async def test_all_see_who_has_taken_a_vehicle(chromium: Browser, staffed: Served) -> None:
-    async with (
-        signed_in(chromium, staffed, "anna") as anna,
-        signed_in(chromium, staffed, "otto") as otto,
-    ):
-        run = await start(anna.page, staffed)
-        await otto.page.goto(run)
-        taken = otto.page.locator(".card", has_text="evsg2")
-        await taken.get_by_role("button", name="Take over", exact=True).click()
-        seen = anna.page.locator(".card", has_text="evsg2")
-        await expect(seen).to_contain_text("with otto")
-        await expect(seen.get_by_role("button", name="Give back", exact=True)).to_be_disabled()
-        await taken.get_by_role("button", name="Give back", exact=True).click()
-        await expect(seen.get_by_role("button", name="Take over", exact=True)).to_be_enabled()
+async def see_who_has_taken_a_vehicle(page: Page, takes: Page) -> None:
+    taken = takes.locator(".card", has_text="evsg2")
+    await taken.get_by_role("button", name="Take over", exact=True).click()
+    seen = page.locator(".card", has_text="evsg2")
+    await expect(seen).to_contain_text("with otto")
+    await expect(seen.get_by_role("button", name="Give back", exact=True)).to_be_disabled()
+    await taken.get_by_role("button", name="Give back", exact=True).click()
+    await expect(seen.get_by_role("button", name="Take over", exact=True)).to_be_enabled()
 
 
 async def test_a_viewer_sees_all_and_finds_nothing_to_steer_with(
-    chromium: Browser, staffed: Served
+    chromium: Browser, desk: Desk
 ) -> None:
-    async with (
-        signed_in(chromium, staffed, "anna") as anna,
-        signed_in(chromium, staffed, "vera") as vera,
-    ):
-        page = vera.page
+    async with signed_in(chromium, desk.executive, "vera") as vera:
+        page = await see(vera, desk.executive.origin)
+        await desk.home()
         for name in ("New mission", "Upload", f"Remove {NAME}"):
-            await expect(anna.page.get_by_role("button", name=name)).to_have_count(1)
-            await expect(page.get_by_role("button", name=name)).to_have_count(0)
-        run = await start(anna.page, staffed)
+            button = desk.page.get_by_role("button", name=name, exact=True)
+            await expect(button).to_have_count(1)
+            await expect(page.get_by_role("button", name=name, exact=True)).to_have_count(0)
+        await desk.start()
+        run = desk.page.url
         await see_how_a_viewer_looks_at_a_run(page, run)
         for name in STEERING:
-            theirs = anna.page.get_by_role("button", name=name, exact=True)
+            theirs = desk.page.get_by_role("button", name=name, exact=True)
             await expect(theirs).not_to_have_count(0)
             await expect(page.get_by_role("button", name=name, exact=True)).to_have_count(0)
         await page.keyboard.press("1")
@@ -147,8 +88,8 @@ async def test_a_viewer_sees_all_and_finds_nothing_to_steer_with(
         for what in (*STEERED, "STOP"):
             assert await page.evaluate(REFUSED, [run.rpartition("/")[2], what]) == 403
         await wait_for_status(page, "Running")
-        await expect(answer(anna.page, "Continue")).to_be_visible()
-        await see_how_a_viewer_looks_at_a_mission(page, staffed)
+        await expect(answer(desk.page, "Continue")).to_be_visible()
+        await see_how_a_viewer_looks_at_a_mission(page, desk.executive)
 
 
 async def see_how_a_viewer_looks_at_a_run(page: Page, run: str) -> None:
@@ -175,18 +116,19 @@ async def see_how_a_viewer_looks_at_a_mission(page: Page, executive: Served) -> 
 
 
 async def test_who_signs_in_on_the_way_to_a_page_comes_there(
-    chromium: Browser, staffed: Served
+    chromium: Browser, executive: Served
 ) -> None:
-    async with page_at(chromium, f"{staffed.origin}/missions/{NAME}") as it:
+    shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
+    async with page_at(chromium, f"{executive.origin}/missions/{NAME}") as it:
         page = it.page
         await page.get_by_label("Name").fill("anna")
         await page.get_by_label("Password").fill("wrong")
         await page.keyboard.press("Enter")
         await expect(page.get_by_text("Name or password is wrong.")).to_be_visible()
         await page.get_by_label("Password").fill(PASSWORD)
-        await page.keyboard.press("Enter")
+        await page.get_by_role("button", name="Sign in").click()
         await expect(page.locator(".who")).to_contain_text("anna")
-        await expect(page).to_have_url(f"{staffed.origin}/missions/{NAME}")
+        await expect(page).to_have_url(f"{executive.origin}/missions/{NAME}")
 
 
 def free_port() -> int:
@@ -200,10 +142,9 @@ async def test_a_page_comes_back_when_the_executive_does(chromium: Browser, tmp_
     port = {"M2PEM_WEB_PORT": str(free_port()), **named_users(tmp_path)}
     words = ("--simulate", "--journal", str(tmp_path / "journal.db"))
     with served(tmp_path, words=words, environment=port) as executive:
-        put(executive)
+        shutil.copy(REPOSITORY / "missions" / f"{NAME}.bpmn", executive.missions)
         async with signed_in(chromium, executive, "anna") as anna:
-            page = anna.page
-            await start(page, executive)
+            page = await anna.start()
             executive.process.kill()
             await asyncio.to_thread(executive.process.wait)
             gone = page.get_by_text("Not connected to the executive")

@@ -1,6 +1,5 @@
 """A real browser, and what went wrong in it."""
 
-import json
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -11,7 +10,6 @@ from playwright.async_api import (
     BrowserContext,
     ConsoleMessage,
     Page,
-    StorageState,
     async_playwright,
     expect,
 )
@@ -54,14 +52,15 @@ KEY = """"M2pem-Key": JSON.parse(localStorage.getItem("m2pem.key"))"""
 """A header, for requests of scripts of tests in a page that has signed in."""
 
 
-def key_of(state: StorageState) -> str:
-    """The key of a session, from what a browser has stored."""
-    stored = {
-        each["name"]: each["value"]
-        for origin in state["origins"]
-        for each in origin["localStorage"]
-    }
-    return str(json.loads(stored["m2pem.key"]))
+SIGN_IN = """async ([name, password]) => {
+  const body = JSON.stringify({ name, password });
+  const headers = { "Content-Type": "application/json" };
+  const answer = await fetch("/api/session", { method: "POST", headers, body });
+  const { key } = await answer.json();
+  localStorage.setItem("m2pem.key", JSON.stringify(key));
+  return key;
+}"""
+"""Signs in where the page does not: with name and password. Returns the key of the session."""
 
 
 @dataclass(slots=True)
@@ -95,18 +94,13 @@ async def page_at(
     width: int = 1440,
     height: int = 900,
     dark: bool = False,
-    state: StorageState | None = None,
 ) -> AsyncIterator[Watched]:
-    """A page of its own profile, so of its own operator, at an address.
-
-    `state`: cookies and key of somebody who has signed in.
-    """
+    """A page of its own profile, so of its own operator, at an address."""
     context = await started.new_context(
         viewport={"width": width, "height": height},
         color_scheme="dark" if dark else "light",
         accept_downloads=True,
         permissions=["clipboard-read", "clipboard-write"],
-        storage_state=state,
     )
     context.set_default_timeout(TIMEOUT_MS)
     page = await context.new_page()

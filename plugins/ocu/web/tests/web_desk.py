@@ -1,5 +1,8 @@
 """A desk for each test: one server and one browser serve all of them, for both take long to start.
 
+The desks of one operator also share a browser profile. It has loaded the page before, which takes a
+browser longer than most tests; what a test leaves in it is removed.
+
 Tests that use these fixtures run in the browser's event loop: `pytestmark = IN_ONE_LOOP`.
 """
 
@@ -7,21 +10,26 @@ import asyncio
 import json
 import shutil
 from collections.abc import AsyncIterator, Iterator
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, Locator, Page, StorageState, expect
-from web_browsing import TIMEOUT_MS, Watched, browser, key_of, page_at
+from m2pem_plugin_web.access.roles import Role
+from m2pem_plugin_web.access.users import User, write_users
+from playwright.async_api import Browser, BrowserContext, Locator, Page, expect
+from web_browsing import SIGN_IN, TIMEOUT_MS, Watched, browser, page_at
 from web_running import answer
 from web_served import REPOSITORY, Served, served
+from web_world import HASHED, PASSWORD
 
 IN_ONE_LOOP = pytest.mark.asyncio(loop_scope="session")
 FLEET = REPOSITORY / "fleet_configs" / "mehds.yaml"
 MISSION = "vignette1"
 OPERATOR = "anna"
+PEOPLE = {OPERATOR: Role.COMMANDER, "otto": Role.OPERATOR, "vera": Role.VIEWER}
 OVER = {"completed", "terminated", "failed", "stopped"}
 
 
@@ -124,35 +132,68 @@ async def chromium() -> AsyncIterator[Browser]:
         yield started
 
 
+def named_users(folder: Path) -> dict[str, str]:
+    """Settings of an executive for `PEOPLE`, who have the same password."""
+    path = folder / "users.json"
+    write_users(path, {name: User(role, HASHED()) for name, role in PEOPLE.items()})
+    return {"M2PEM_WEB_USERS": str(path)}
+
+
 @pytest.fixture(scope="session")
 def executive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """An executive with the fleet of the field tests, all simulated."""
-    with served(tmp_path_factory.mktemp("executive"), fleet=FLEET) as running:
+    """An executive with the fleet of the field tests, all simulated, and with named users."""
+    folder = tmp_path_factory.mktemp("executive")
+    with served(folder, fleet=FLEET, environment=named_users(folder)) as running:
         yield running
 
 
+@asynccontextmanager
+async def signed_in(chromium: Browser, executive: Served, name: str) -> AsyncIterator[Desk]:
+    """The desk of somebody who has a browser profile of their own and has just signed in."""
+    async with page_at(chromium, f"{executive.origin}/healthz") as it:
+        key = await it.page.evaluate(SIGN_IN, [name, PASSWORD])
+        yield Desk(executive, it, key)
+
+
 @pytest_asyncio.fixture(scope="session", loop_scope="session")
-async def signed_in(chromium: Browser, executive: Served) -> StorageState:
-    """Cookie and key of somebody who has signed in: the printed address does so once."""
-    async with page_at(chromium, executive.url) as it:
-        await it.page.get_by_role("heading", name="Missions").wait_for()
-        return await it.context.storage_state()
+async def profile(chromium: Browser, executive: Served) -> AsyncIterator[Desk]:
+    """What all desks of the operator have in common."""
+    async with signed_in(chromium, executive, OPERATOR) as first:
+        yield first
+
+
+async def forget(context: BrowserContext, page: Page, origin: str, key: str) -> None:
+    """Remove what pages have stored, but for the key of the session."""
+    session = await context.new_cdp_session(page)
+    stored = {"origin": origin, "storageTypes": "indexeddb,local_storage"}
+    await session.send("Storage.clearDataForOrigin", stored)
+    await session.detach()
+    await page.goto(f"{origin}/healthz")
+    await page.evaluate("key => localStorage.setItem('m2pem.key', JSON.stringify(key))", key)
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def desk(
-    request: pytest.FixtureRequest,
-    chromium: Browser,
-    executive: Served,
-    signed_in: StorageState,
-) -> AsyncIterator[Desk]:
+async def desk(request: pytest.FixtureRequest, profile: Desk) -> AsyncIterator[Desk]:
     """A desk; dark if the test has a parameter `dark` that says so."""
+    executive, context = profile.executive, profile.watched.context
     shutil.rmtree(executive.missions)
     shutil.copytree(REPOSITORY / "missions", executive.missions)
     dark = "callspec" in dir(request.node) and request.node.callspec.params.get("dark", False)
+    page = await context.new_page()
+    await page.emulate_media(color_scheme="dark" if dark else "light")
+    await forget(context, page, executive.origin, profile.key)
+    watched = Watched(page, context)
+    watched.listen(page)
+    here = Desk(executive, watched, profile.key)
     async with AsyncExitStack() as stack:
-        opening = page_at(chromium, "about:blank", dark=dark, state=signed_in)
-        here = Desk(executive, await stack.enter_async_context(opening), key_of(signed_in))
+        stack.push_async_callback(close_pages, profile)
         stack.push_async_callback(here.release)
         yield here
     here.assert_well()
+
+
+async def close_pages(profile: Desk) -> None:
+    """Close all that tests have opened; a profile without a page takes longer to open the next."""
+    for page in profile.watched.context.pages:
+        if page is not profile.page:
+            await page.close()
