@@ -1,9 +1,6 @@
 """Vehicles that another run or an operator has, and runs that ended before they were looked at."""
 
-import asyncio
-
 from playwright.async_api import expect
-from web_browsing import TIMEOUT_MS
 from web_desk import IN_ONE_LOOP, OVER, Desk
 from web_running import wait_for_status
 
@@ -23,19 +20,12 @@ async def begun(desk: Desk) -> str:
     return str((await desk.ask("POST", "/api/runs", wanted))["run"])
 
 
-async def over(desk: Desk, run: str) -> None:
-    """Wait until a run has ended."""
-    async with asyncio.timeout(TIMEOUT_MS / 1000):
-        while (await desk.ask("GET", f"/api/runs/{run}"))["status"] not in OVER:
-            await desk.page.evaluate("new Promise(requestAnimationFrame)")
-
-
 def run_of(desk: Desk) -> str:
     """The run that the page shows."""
     return desk.page.url.rpartition("/")[2]
 
 
-async def test_the_time_line_says_which_run_drives_a_vehicle(desk: Desk) -> None:
+async def test_pages_of_other_runs_say_which_run_drives_a_vehicle(desk: Desk) -> None:
     page = await desk.driving()
     driver = run_of(desk)
     own = page.locator(".timeline .held")
@@ -50,8 +40,30 @@ async def test_the_time_line_says_which_run_drives_a_vehicle(desk: Desk) -> None
     await expect(page.locator(".card", has_text=VEHICLE)).to_contain_text(f"driven by run {driver}")
     await desk.ask("POST", "/api/resources/evsg2/take")
     await expect(page.get_by_role("img", name="evsg2: with anna", exact=True)).to_be_visible()
+    await see_that_a_run_failed_before_its_page_loaded(desk)
+    await page.goto(f"{desk.executive.origin}/runs/{other}")
+    await expect(line).to_be_visible()
     await desk.ask("POST", f"/api/runs/{driver}/stop", {"reason": "the vehicle is needed"})
     await expect(line).to_have_count(0)
+
+
+async def see_that_a_run_failed_before_its_page_loaded(desk: Desk) -> None:
+    page = desk.page
+    run = await begun(desk)
+    await desk.until(f"/api/runs/{run}", lambda said: said["status"] in OVER)
+    await page.goto(f"{desk.executive.origin}/runs/{run}")
+    ended = page.get_by_role("dialog", name="The run has ended")
+    await expect(ended).to_contain_text("Failed")
+    await expect(ended).to_contain_text(f"{run} failed")
+    await expect(ended).to_contain_text("RESOURCE_UNAVAILABLE")
+    await ended.get_by_role("button", name="Keep looking").click()
+    await wait_for_status(page, "Failed")
+    task = page.locator(".drawing:not([hidden]) [data-element-id='Task1']").first
+    await expect(task).to_contain_class("m2-failed")
+    # Whoever comes for a moment of it is not told of its end.
+    await page.goto(f"{desk.executive.origin}/runs/{run}?t=0")
+    await page.get_by_role("slider", name="Position").wait_for()
+    await expect(ended).to_have_count(0)
 
 
 async def test_a_start_with_a_busy_vehicle_is_refused_until_it_is_confirmed(desk: Desk) -> None:
@@ -74,22 +86,3 @@ async def test_a_start_with_a_busy_vehicle_is_refused_until_it_is_confirmed(desk
     await page.wait_for_url("**/runs/*")
     assert run_of(desk) != driver
     assert len(await desk.ask("GET", "/api/runs")) == runs + 1
-
-
-async def test_a_run_that_ended_before_its_page_loaded_shows_its_end(desk: Desk) -> None:
-    page = await desk.driving()
-    run = await begun(desk)
-    await over(desk, run)
-    await page.goto(f"{desk.executive.origin}/runs/{run}")
-    ended = page.get_by_role("dialog", name="The run has ended")
-    await expect(ended).to_contain_text("Failed")
-    await expect(ended).to_contain_text(f"{run} failed")
-    await expect(ended).to_contain_text("RESOURCE_UNAVAILABLE")
-    await ended.get_by_role("button", name="Keep looking").click()
-    await wait_for_status(page, "Failed")
-    task = page.locator(".drawing:not([hidden]) [data-element-id='Task1']").first
-    await expect(task).to_contain_class("m2-failed")
-    # Whoever comes for a moment of it is not told of its end.
-    await page.goto(f"{desk.executive.origin}/runs/{run}?t=0")
-    await page.get_by_role("slider", name="Position").wait_for()
-    await expect(ended).to_have_count(0)

@@ -9,7 +9,7 @@ Tests that use these fixtures run in the browser's event loop: `pytestmark = IN_
 import asyncio
 import json
 import shutil
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +30,7 @@ FLEET = REPOSITORY / "fleet_configs" / "mehds.yaml"
 MISSION = "vignette1"
 OPERATOR = "anna"
 PEOPLE = {OPERATOR: Role.COMMANDER, "otto": Role.OPERATOR, "vera": Role.VIEWER}
+POLL_S = 0.05
 OVER = {"completed", "terminated", "failed", "stopped"}
 
 
@@ -108,9 +109,15 @@ class Desk:
         if any(each["status"] not in OVER for each in runs):
             await self.ask("POST", "/api/stop", {"reason": "the test is over"})
         # A run that has ended still has its vehicles until they have stopped.
+        await self.until("/api/resources", lambda said: not any(said["holders"].values()))
+
+    async def until(self, path: str, wanted: Callable[[Any], bool]) -> None:
+        """Ask the server again and again, until its answer is what is wanted."""
         async with asyncio.timeout(TIMEOUT_MS / 1000):
-            while any((await self.ask("GET", "/api/resources"))["holders"].values()):
-                await self.page.evaluate("new Promise(requestAnimationFrame)")
+            while True:
+                if wanted(await self.ask("GET", path)):
+                    return
+                await asyncio.sleep(POLL_S)
 
     def assert_well(self) -> None:
         """No page complained, but for refusals that the test has asked for."""

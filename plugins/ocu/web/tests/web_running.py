@@ -1,12 +1,12 @@
 """What is seen of a run on the page of operators."""
 
-import asyncio
 import shutil
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TypeAlias
 
 from playwright.async_api import Locator, Page, expect
+from playwright.async_api import TimeoutError as PlaywrightTimeoutError
 from web_served import FLEET
 
 GREEN = (61, 224, 88)
@@ -35,6 +35,11 @@ COLOUR = """([name]) => {
   return null;
 }"""
 
+IS_NEAR = f"""([name, wanted, near]) => {{
+  const found = ({COLOUR})([name]);
+  return found !== null && found.every((each, index) => Math.abs(each - wanted[index]) <= near);
+}}"""
+
 
 def fleet_with_mine(folder: Path) -> Path:
     """The fleet of VIGNETTE1; evsg1's radar finds something when it drives along route_alpha."""
@@ -54,12 +59,12 @@ Colour: TypeAlias = tuple[int, int, int]
 
 async def wait_for_colour(page: Page, element: str, wanted: Colour) -> None:
     """Until an element, known by its name or id, is drawn in a colour."""
-    found: list[int] | None = None
     try:
-        async with asyncio.timeout(WITHIN_S):
-            while not is_near(found := await page.evaluate(COLOUR, [element]), wanted):
-                await page.evaluate("new Promise(requestAnimationFrame)")
-    except TimeoutError:
+        await page.wait_for_function(
+            IS_NEAR, arg=[element, wanted, NEAR], polling=50, timeout=WITHIN_S * 1000
+        )
+    except PlaywrightTimeoutError:
+        found = await page.evaluate(COLOUR, [element])
         raise AssertionError(f"{element} is {found}, not {wanted}") from None
 
 
