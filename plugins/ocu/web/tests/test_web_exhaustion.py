@@ -48,15 +48,18 @@ async def test_every_stop_passes_a_flood_of_requests_that_never_come_whole(
         browser = await here.browser()
         live = await browser.live()
         await live.watch(None)
-        cookies, headers = browser.http.cookies, browser.http.headers
         flood = half_open(here, sent)
         sockets = await asyncio.to_thread(flood.__enter__)
         try:
-            for _ in range(99):
-                # Each on a connection of its own, as a page that has lost its own would do.
-                async with httpx.AsyncClient(
-                    base_url=here.base, cookies=cookies, headers=headers
-                ) as http:
+            # Each on a connection of its own, as a page that has lost its own would do.
+            async with httpx.AsyncClient(
+                base_url=here.base,
+                cookies=browser.http.cookies,
+                headers=browser.http.headers,
+                limits=httpx.Limits(max_keepalive_connections=0),
+                verify=False,
+            ) as http:
+                for _ in range(99):
                     assert (await http.post("/api/stop-all", json={})).status_code == 200
             assert len(sockets) == HALF_OPEN
             assert live.closed is None
