@@ -8,9 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.async_api import expect
-from web_browsing import browser, page_at
+from playwright.async_api import Browser, expect
+from web_browsing import page_at
+from web_desk import IN_ONE_LOOP
 from web_served import ENDS_WITHIN_S, REPOSITORY
+
+pytestmark = IN_ONE_LOOP
 
 
 @pytest.fixture
@@ -35,9 +38,9 @@ def demo(tmp_path: Path) -> Iterator[str]:
 
 
 async def test_the_demo_serves_a_page_with_the_mission_of_the_paper(
-    demo: str, tmp_path: Path
+    chromium: Browser, demo: str, tmp_path: Path
 ) -> None:
-    async with browser() as chromium, page_at(chromium, demo) as it:
+    async with page_at(chromium, demo) as it:
         await expect(it.page.get_by_role("link", name="vignette1", exact=True)).to_be_visible()
         it.assert_well()
     assert (tmp_path / "journal.db").is_file()

@@ -1,6 +1,5 @@
 """Pictures below the map, from an MBTiles file."""
 
-import shutil
 import sqlite3
 import struct
 import zlib
@@ -9,18 +8,12 @@ from pathlib import Path
 import pytest
 from m2pem_plugin_web.settings import SettingError, read_settings
 from m2pem_plugin_web.tiles import Tiles
-from playwright.async_api import expect
-from web_browsing import KEY, browser, page_at
-from web_served import REPOSITORY, served
+from playwright.async_api import Browser, expect
+from web_browsing import page_at
+from web_desk import IN_ONE_LOOP
+from web_world import MakeWorld
 
 ZOOM = 15
-START = """
-fetch("/api/runs", {
-  method: "POST",
-  headers: { KEY, "content-type": "application/json" },
-  body: JSON.stringify({ mission: "vignette1" }),
-}).then((answer) => answer.json()).then(({ run }) => run)
-""".replace("KEY", KEY)
 GREEN = (60, 160, 60)
 
 
@@ -75,26 +68,22 @@ def test_what_is_no_file_of_pictures_is_refused_by_name(tmp_path: Path) -> None:
         Tiles(mbtiles(tmp_path / "shapes.mbtiles", format_="pbf"))
 
 
-async def test_the_map_shows_them_and_whom_they_are_from(tmp_path: Path) -> None:
+@IN_ONE_LOOP
+async def test_the_map_shows_them_and_whom_they_are_from(
+    chromium: Browser, world: MakeWorld, tmp_path: Path
+) -> None:
     file = mbtiles(tmp_path / "map.mbtiles")
     with sqlite3.connect(file) as database:
         database.execute("DELETE FROM tiles WHERE zoom_level != 1")
         database.execute("INSERT INTO tiles SELECT 1, tile_column, 0, tile_data FROM tiles")
     database.close()
-    (tmp_path / "missions").mkdir()
-    shutil.copy(REPOSITORY / "missions" / "vignette1.bpmn", tmp_path / "missions")
-    with served(tmp_path, environment={"M2PEM_WEB_TILES": str(file)}) as executive:
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            page = it.page
-            run = await page.evaluate(START)
-            await page.goto(f"{executive.origin}/runs/{run}")
-            drawn = page.locator(".leaflet-tile-loaded").first
-            await expect(drawn).to_be_attached()
-            assert await drawn.evaluate("each => each.naturalWidth") == 256
-            whom = page.locator(".leaflet-control-attribution")
-            await expect(whom).to_have_text("A survey & Co")
-            it.assert_well()
-    with served(tmp_path) as executive:
-        async with browser() as chromium, page_at(chromium, executive.url) as it:
-            answer = await it.page.evaluate("fetch('/tiles/1/0/0.png').then((got) => got.status)")
-            assert answer == 204
+    async with world(M2PEM_WEB_TILES=str(file)) as here, page_at(chromium, here.ocu.url) as it:
+        page = it.page
+        run = (await here.asked()).run
+        await page.goto(f"{here.base}/runs/{run}")
+        drawn = page.locator(".leaflet-tile-loaded").first
+        await expect(drawn).to_be_attached()
+        assert await drawn.evaluate("each => each.naturalWidth") == 256
+        whom = page.locator(".leaflet-control-attribution")
+        await expect(whom).to_have_text("A survey & Co")
+        it.assert_well()
