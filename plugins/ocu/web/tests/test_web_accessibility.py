@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from collections.abc import Sequence
 
 import pytest
 from playwright.async_api import Browser, Page, expect
@@ -14,19 +15,32 @@ from web_served import REPOSITORY, Served
 
 pytestmark = IN_ONE_LOOP
 
-FORM = "aside"
+FORM, DIALOG, MENU, MAP = "aside", "[role=dialog]", "[role=menu]", ".map-pane"
+DARK = pytest.param(True, marks=pytest.mark.long)
+LIGHT_AND_DARK = pytest.mark.parametrize("dark", [False, DARK], ids=["light", "dark"])
 
 STUCK = REPOSITORY / "docs" / "broken" / "join_fed_by_one_branch.bpmn"
 # One of each kind that has a form of its own.
 KINDS = ["StartVignette1", "UserSendRoute", "CallDetection", "EscalationDetected", "Reverse"]
 KINDS += ["GatewayDecision", "Detector", "ThrowStop", "RoutePromptReference", "PoolVignette1"]
+SOME_KINDS = ["UserSendRoute", "Reverse", "PoolVignette1"]
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-async def test_first_page_and_editor_have_no_violation(desk: Desk, dark: bool) -> None:
+@pytest.mark.parametrize(
+    ("dark", "kinds"),
+    [
+        (False, SOME_KINDS),
+        pytest.param(False, KINDS, marks=pytest.mark.long),
+        pytest.param(True, KINDS, marks=pytest.mark.long),
+    ],
+    ids=["light", "light, more kinds", "dark, more kinds"],
+)
+async def test_first_page_and_editor_have_no_violation(
+    desk: Desk, dark: bool, kinds: Sequence[str]
+) -> None:
     eyes = await opened(desk, dark)
     await look_at_home(eyes)
-    await look_at_editor(eyes, desk)
+    await look_at_editor(eyes, desk, kinds)
     await look_at_dialogs(eyes)
     eyes.assert_well()
 
@@ -44,18 +58,18 @@ async def look_at_home(eyes: Accessibility) -> None:
     await eyes.look("home")
     await page.get_by_role("button", name="New mission").click()
     await expect(page.get_by_role("radio")).to_have_count(6)
-    await eyes.look("new mission")
+    await eyes.look("new mission", DIALOG)
     await page.keyboard.press("Escape")
     await page.get_by_role("button", name=f"Remove {MISSION}").click()
-    await eyes.look("remove mission")
+    await eyes.look("remove mission", DIALOG)
     await page.keyboard.press("Escape")
 
 
-async def look_at_editor(eyes: Accessibility, desk: Desk) -> None:
+async def look_at_editor(eyes: Accessibility, desk: Desk, kinds: Sequence[str]) -> None:
     page = await desk.edit()
     drawing = Drawing(page)
     await eyes.look("editor")
-    for kind in KINDS:
+    for kind in kinds:
         await drawing.select(kind)
         await eyes.look(f"form of {kind}", FORM)
     await drawing.select_flow("GatewayDecision", "CallDetection")
@@ -63,7 +77,7 @@ async def look_at_editor(eyes: Accessibility, desk: Desk) -> None:
     await drawing.select("Reverse")
     await drawing.fill("Distance", "10 s")
     await expect(page.locator(".m2-has-error").first).to_be_attached()
-    await eyes.look("form with an error")
+    await eyes.look("form with an error", FORM)
     await page.get_by_role("tab", name="Problems").click()
     await expect(page.locator(".m2-problem").first).to_be_visible()
     await eyes.look("problems", FORM)
@@ -74,9 +88,10 @@ async def look_at_editor(eyes: Accessibility, desk: Desk) -> None:
         await eyes.look(f"{action} menu", ".djs-popup")
         await drawing.close_menu()
     await page.get_by_role("combobox").first.click()
-    await eyes.look("list of a field")
+    await eyes.look("list of a field", FORM)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 async def test_panels_of_the_editor_have_no_violation(desk: Desk, dark: bool) -> None:
     shutil.copy(STUCK, desk.executive.missions)
@@ -95,17 +110,17 @@ async def look_at_verification(eyes: Accessibility) -> None:
     for pattern in ("", "operator_in_the_loop"):
         await parts.get_by_label("Pattern").last.select_option(pattern)
         await parts.get_by_role("button", name="Add", exact=True).click()
-    await eyes.look("requirements")
+    await eyes.look("requirements", FORM)
     verify = page.get_by_role("button", name="Verify", exact=True)
     await verify.click()
     await expect(page.get_by_role("alert").filter(has_text="not be verified")).to_be_visible()
-    await eyes.look("requirements that are wrong")
+    await eyes.look("requirements that are wrong", FORM)
     for _ in range(2):
         await page.get_by_role("button", name="Undo (Ctrl+Z)").click()
     await verify.click()
     report = page.get_by_role("region", name="Report")
     await expect(report.get_by_role("heading", name="Violated")).to_be_visible()
-    await eyes.look("report")
+    await eyes.look("report", FORM)
     await report.get_by_role("button", name=re.compile("Show the run")).first.click()
     await expect(page.get_by_role("region", name="A run that breaks it")).to_be_visible()
     await eyes.look("run step by step")
@@ -116,11 +131,11 @@ async def look_at_rehearsal(eyes: Accessibility) -> None:
     page = eyes.page
     await page.get_by_role("tab", name="Run", exact=True).click()
     await page.get_by_text("What happens in the rehearsal").click()
-    await eyes.look("run")
+    await eyes.look("run", FORM)
     await page.get_by_role("button", name="Rehearse").click()
     outcome = page.get_by_role("region", name="What came of it")
     await expect(outcome.get_by_role("heading").first).to_be_visible()
-    await eyes.look("rehearsed")
+    await eyes.look("rehearsed", FORM)
     async with page.expect_popup() as opening:
         await outcome.get_by_role("link", name="Watch the rehearsal").click()
     watched = Accessibility(await opening.value, eyes.wrong, eyes.looked)
@@ -137,21 +152,22 @@ async def look_at_dialogs(eyes: Accessibility) -> None:
     page = eyes.page
     for name in ("Versions", "Save under another name", "Keyboard shortcuts"):
         await page.get_by_role("button", name="More").click()
-        await eyes.look("menu")
+        if name == "Versions":  # the menu is the same for each
+            await eyes.look("menu", MENU)
         await page.get_by_role("menuitem", name=name).click()
         await expect(page.get_by_role("dialog")).to_be_visible()
-        await eyes.look(name)
+        await eyes.look(name, DIALOG)
         await page.keyboard.press("Escape")
         await expect(page.get_by_role("dialog")).to_have_count(0)
     for name in ("Lay the diagram out anew", "Add a process"):
         await page.get_by_role("button", name=name).click()
-        await eyes.look(name)
+        await eyes.look(name, DIALOG)
         await page.keyboard.press("Escape")
     await page.get_by_role("button", name="Overview of the diagram").click()
     await eyes.look("minimap")
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@LIGHT_AND_DARK
 async def test_signing_in_has_no_violation(
     chromium: Browser, executive: Served, dark: bool
 ) -> None:
@@ -165,7 +181,7 @@ async def test_signing_in_has_no_violation(
         eyes.assert_well()
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@LIGHT_AND_DARK
 async def test_runs_and_replays_have_no_violation(desk: Desk, dark: bool) -> None:
     eyes = await opened(desk, dark)
     await desk.start()
@@ -186,32 +202,32 @@ async def look_at_run(eyes: Accessibility) -> None:
     await eyes.look("selected element")
     await page.get_by_role("button", name="Signal…").click()
     await expect(page.get_by_role("dialog")).to_be_visible()
-    await eyes.look("signal")
+    await eyes.look("signal", DIALOG)
     await page.keyboard.press("Escape")
     await page.get_by_role("button", name="Pause", exact=True).click()
     await wait_for_status(page, "Paused")
-    await eyes.look("paused")
+    await eyes.look("paused", ".run-bar")
 
 
 async def look_at_map(eyes: Accessibility) -> None:
     page = eyes.page
     await page.get_by_role("button", name=re.compile("^Show")).first.click()
-    await eyes.look("what the map shows")
+    await eyes.look("what the map shows", MAP)
     await page.keyboard.press("Escape")
     await page.get_by_role("button", name=re.compile("^Draw")).click()
     await page.get_by_role("menuitem", name="New route").click()
-    await eyes.look("route drawn")
+    await eyes.look("route drawn", MAP)
     await page.keyboard.press("Escape")
 
 
 async def look_at_end(eyes: Accessibility) -> None:
     page = eyes.page
     await page.keyboard.press("Shift+Escape")
-    await eyes.look("STOP made ready")
+    await eyes.look("STOP made ready", "header")
     await expect(page.locator("header button.stop")).to_have_text("STOP")
     await press_twice(page, lambda: page.keyboard.press("Shift+Escape"))
     await expect(page.get_by_role("dialog", name="The run has ended")).to_be_visible()
-    await eyes.look("run ended")
+    await eyes.look("run ended", DIALOG)
     await page.get_by_role("button", name="Replay it").click()
     await expect(page.get_by_label("Position")).to_be_visible()
     await eyes.look("replay")

@@ -31,7 +31,9 @@ async def assert_stop_is_whole(page: Page, where: str) -> None:
     assert min(found["wide"], found["high"]) >= 44, (where, found)
 
 
-@pytest.mark.parametrize("width", [320, 390, 430])
+@pytest.mark.parametrize(
+    "width", [320, *(pytest.param(width, marks=pytest.mark.long) for width in (390, 430))]
+)
 async def test_stop_is_whole_on_every_page_of_a_phone(desk: Desk, width: int) -> None:
     page = desk.page
     await page.set_viewport_size({"width": width, "height": HEIGHT})
