@@ -2,9 +2,10 @@
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import pytest
 from playwright.async_api import FilePayload, Page, expect
 from web_desk import IN_ONE_LOOP, Desk
 from web_served import REPOSITORY
@@ -18,9 +19,9 @@ from tests.editing.same_model import model_of, new_names
 pytestmark = IN_ONE_LOOP
 
 CORPORA = os.environ.get("M2PEM_CORPORA", "")
-FILES = sorted(
+MISSIONS = sorted((REPOSITORY / "missions").glob("*.bpmn"))
+OTHERS = sorted(
     [
-        *(REPOSITORY / "missions").glob("*.bpmn"),
         *(REPOSITORY / "examples").glob("*/*.bpmn"),
         *(REPOSITORY / "docs" / "broken").glob("*.bpmn"),
         *(Path(CORPORA).rglob("*.bpmn") if CORPORA else ()),
@@ -56,9 +57,14 @@ def renamed(notes: Iterable[str]) -> Iterator[tuple[str, str]]:
             yield told[1], told[2]
 
 
-async def test_every_mission_goes_through_the_editor_without_loss(desk: Desk) -> None:
+@pytest.mark.parametrize(
+    "files", [MISSIONS, pytest.param(OTHERS, marks=pytest.mark.long)], ids=["missions", "others"]
+)
+async def test_every_mission_goes_through_the_editor_without_loss(
+    desk: Desk, files: Sequence[Path]
+) -> None:
     page = await desk.edit()
-    for number, file in enumerate(FILES):
+    for number, file in enumerate(files):
         source = file.read_bytes()
         try:
             before = parse_mission(source, str(file), SearchPath(file))
@@ -71,19 +77,19 @@ async def test_every_mission_goes_through_the_editor_without_loss(desk: Desk) ->
         assert model_of(after) == model_of(before, names), file
 
 
-async def test_every_element_has_its_form(desk: Desk) -> None:
-    page = desk.page
-    for mission in ("mehds_vignette_1", "team_column"):
-        await desk.edit(mission, page)
-        shapes = await page.locator("#m2-canvas .djs-container > svg .djs-shape").count()
-        await page.locator("svg[data-element-id]").first.focus()
-        seen = set()
-        for _ in range(shapes):
-            await page.keyboard.press("Tab")
-            chosen = page.locator(".djs-element.selected").first
-            seen.add(await chosen.get_attribute("data-element-id"))
-            await expect(page.get_by_label("Id", exact=False).first).to_be_visible()
-        assert len(seen) > 20
+@pytest.mark.long
+@pytest.mark.parametrize("mission", ["mehds_vignette_1", "team_column"])
+async def test_every_element_has_its_form(desk: Desk, mission: str) -> None:
+    page = await desk.edit(mission)
+    shapes = await page.locator("#m2-canvas .djs-container > svg .djs-shape").count()
+    await page.locator("svg[data-element-id]").first.focus()
+    seen = set()
+    for _ in range(shapes):
+        await page.keyboard.press("Tab")
+        chosen = page.locator(".djs-element.selected").first
+        seen.add(await chosen.get_attribute("data-element-id"))
+        await expect(page.get_by_label("Id", exact=False).first).to_be_visible()
+    assert len(seen) > 20
 
 
 async def test_what_is_copied_keeps_its_behavior_in_another_mission(desk: Desk) -> None:

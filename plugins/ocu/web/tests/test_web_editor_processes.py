@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+import pytest
 from playwright.async_api import Page, expect
 from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing
@@ -118,6 +119,7 @@ async def test_what_was_done_on_several_diagrams_is_undone_and_redone_in_one_row
     assert model(again) == model(source)
 
 
+@pytest.mark.long
 async def test_pools_that_were_removed_come_back_as_they_were(desk: Desk) -> None:
     page = await desk.edit("vignette1")
     source = REPOSITORY / "missions" / "vignette1.bpmn"
@@ -171,6 +173,7 @@ async def test_all_and_what_is_in_a_frame_are_of_the_diagram_that_is_shown(desk:
     await expect(Drawing(page).element("WestSurveyed")).to_be_visible()
 
 
+@pytest.mark.long
 async def test_a_second_diagram_of_the_same_process_is_drawn_when_it_is_opened(desk: Desk) -> None:
     file = desk.executive.missions / f"{NAME}.bpmn"
     text = file.read_text()

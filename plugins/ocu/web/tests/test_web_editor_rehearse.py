@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from playwright.async_api import Browser, Page, expect
 from web_browsing import KEY, page_at
 from web_desk import IN_ONE_LOOP, Desk
@@ -77,20 +78,10 @@ async def test_what_is_drawn_is_rehearsed_with_what_the_form_scripts(desk: Desk)
     assert "/rehearsals/" in watched.url
 
 
-async def test_answers_that_do_not_fit_are_refused_with_the_reason(desk: Desk) -> None:
-    page = await desk.edit(tab="Run")
-    part = page.get_by_role("region", name="Rehearse")
-    await part.get_by_text("What happens in the rehearsal").click()
-    await part.get_by_role("button", name="Write it as YAML").click()
-    yaml = part.get_by_label("Answers file (YAML)")
-    await yaml.fill("answers: {UserSendRout: [continue]}\n")
-    await yaml.blur()
-    await part.get_by_role("button", name="Rehearse").click()
-    refused = page.get_by_role("alert").filter(has_text="could not be rehearsed")
-    await expect(refused).to_contain_text("UserSendRoute")
-
-
-async def test_what_is_typed_as_yaml_is_read_back_into_the_form(desk: Desk) -> None:
+@pytest.mark.long
+async def test_what_is_typed_as_yaml_is_refused_with_the_reason_or_read_back_into_the_form(
+    desk: Desk,
+) -> None:
     page = await desk.edit(tab="Run")
     part = page.get_by_role("region", name="Rehearse")
     await part.get_by_text("What happens in the rehearsal").click()
@@ -103,6 +94,9 @@ async def test_what_is_typed_as_yaml_is_read_back_into_the_form(desk: Desk) -> N
     told = part.get_by_text("answers.UserSendRout: the form has no such task")
     await expect(told).to_be_visible()
     await expect(yaml).to_have_value(typed)
+    await part.get_by_role("button", name="Rehearse").click()
+    refused = page.get_by_role("alert").filter(has_text="could not be rehearsed")
+    await expect(refused).to_contain_text("UserSendRoute")
     await yaml.fill(typed.replace("Rout:", "Route:"))
     await back.click()
     visits = part.get_by_role("group", name="USER SEND ROUTE")

@@ -3,6 +3,7 @@
 import asyncio
 from pathlib import Path
 
+import pytest
 from playwright.async_api import Dialog, Page, expect
 from web_desk import IN_ONE_LOOP, MISSION, Desk
 from web_drawing import SAVED, Drawing
@@ -53,6 +54,7 @@ async def test_a_mission_is_overwritten_deliberately_and_theirs_is_kept(desk: De
     await expect(page.locator("[data-element-id=Reverse]").first).to_contain_text("THEIRS")
 
 
+@pytest.mark.long
 async def test_taking_theirs_draws_theirs(desk: Desk) -> None:
     page, _ = await saved_beside(desk)
     await page.get_by_role("button", name="Take theirs").click()

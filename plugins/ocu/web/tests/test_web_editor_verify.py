@@ -3,6 +3,7 @@
 import shutil
 from xml.etree import ElementTree
 
+import pytest
 from playwright.async_api import Locator, Page, expect
 from web_desk import IN_ONE_LOOP, MISSION, Desk
 from web_served import REPOSITORY
@@ -115,6 +116,7 @@ async def test_requirements_are_written_verified_undone_and_kept(desk: Desk) -> 
     ]
 
 
+@pytest.mark.long
 async def test_a_pattern_gets_its_arguments_from_pickers(desk: Desk) -> None:
     page = await desk.edit(tab="Verify")
     parts = page.get_by_role("region", name="Requirements of this mission")
@@ -136,6 +138,7 @@ async def test_a_pattern_gets_its_arguments_from_pickers(desk: Desk) -> None:
     await expect(parts).to_contain_text("an operator has answered 'USER SEND ROUTE'")
 
 
+@pytest.mark.long
 async def test_requirements_typed_as_yaml_are_pointed_at_where_they_are_wrong(desk: Desk) -> None:
     page = await desk.edit(tab="Verify")
     await page.get_by_text("Options", exact=True).click()

@@ -1,5 +1,6 @@
 """The editor as a whole: it loads soon, and the mark of its makers is seen."""
 
+import pytest
 from web_desk import IN_ONE_LOOP, Desk
 
 pytestmark = IN_ONE_LOOP
@@ -20,6 +21,7 @@ async def test_the_mark_of_bpmn_io_is_seen_whole(desk: Desk) -> None:
     assert covered == []
 
 
+@pytest.mark.long
 async def test_the_first_load_of_the_editor_is_small(desk: Desk) -> None:
     page = desk.page
     session = await page.context.new_cdp_session(page)
