@@ -144,6 +144,7 @@ PIECES = """
 """
 
 
+@pytest.mark.long
 async def test_no_line_is_drawn_where_nothing_was_known_of_a_vehicle(
     desk: Desk,
 ) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import pytest
 from m2pem_plugin_web.jobs import AT_ONCE, KEPT, MOST_WAITING
 from rest_world import REPOSITORY, VIGNETTE, WITHIN_S, Rest, rest_world
 
@@ -111,17 +112,21 @@ async def test_a_rehearsal_that_cannot_be_made_says_why(tmp_path: Path) -> None:
         await rest.get("/rehearsals/none/telemetry", 404)
 
 
-async def test_problems_name_missions_and_not_where_they_are(tmp_path: Path) -> None:
+@pytest.mark.parametrize("drafts", [False, pytest.param(True, marks=pytest.mark.long)])
+async def test_problems_name_missions_and_not_where_they_are(tmp_path: Path, drafts: bool) -> None:
     async with rest_world(tmp_path) as rest:
         broken = VIGNETTE.replace("route_alpha", "no_such_route")
         called = LARGE.replace('id="S"', 'id="S" name=""').replace("startEvent", "zzz", 1)
         (tmp_path / "broken.bpmn").write_text(called, encoding="utf-8")
         said = []
+        saved = {"mission": "broken"}
+        bodies = [{"xml": called}, {"xml": broken, "mission": "my"}] if drafts else [saved]
         for kind in ("verifications", "rehearsals"):
-            for body in ({"mission": "broken"}, {"xml": called}, {"xml": broken, "mission": "my"}):
+            for body in bodies:
                 job = await rest.until_over(await ordered(rest, f"/{kind}", body))
                 assert str(tmp_path) not in json.dumps([job["problem"], job["findings"]])
                 said.append(job["problem"])
-        assert [each for each in said if each and each.startswith("broken.bpmn: ")]
+        named = [each for each in said if each and each.startswith("broken.bpmn: ")]
+        assert bool(named) != drafts
         answer = await rest.post("/runs", {"mission": "broken"}, 422)
         assert str(tmp_path) not in json.dumps(answer)

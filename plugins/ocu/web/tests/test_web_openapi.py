@@ -17,12 +17,18 @@ expected-statuses = ["2xx", "401", "403", "404", "409", "422", "429"]
 """
 
 
+ALL_PHASES = "examples,coverage,fuzzing,stateful"
+
+
 @pytest.mark.parametrize(
-    "examples",
-    [2, pytest.param(100, marks=[pytest.mark.long, pytest.mark.timeout(1800)])],
+    ("phases", "examples"),
+    [
+        ("fuzzing", 2),
+        pytest.param(ALL_PHASES, 100, marks=[pytest.mark.long, pytest.mark.timeout(1800)]),
+    ],
 )
 async def test_the_description_of_the_api_is_true(
-    world: MakeWorld, tmp_path: Path, examples: int
+    world: MakeWorld, tmp_path: Path, phases: str, examples: int
 ) -> None:
     (tmp_path / "schemathesis.toml").write_text(CONFIGURATION)
     async with world() as here:
@@ -33,7 +39,16 @@ async def test_the_description_of_the_api_is_true(
         words = ["run", f"{here.base}/api/openapi.json", "--exclude-path", "/api/session"]
         words += ["-H", f"Cookie: {browser.cookie}", "-H", f"M2pem-Key: {browser.key}"]
         words += ["-H", f"Origin: {here.base}"]
-        words += ["--max-examples", str(examples), "--seed", "1", "--request-timeout", "30"]
+        words += [
+            "--phases",
+            phases,
+            "--max-examples",
+            str(examples),
+            "--seed",
+            "1",
+            "--request-timeout",
+            "30",
+        ]
         process = await asyncio.create_subprocess_exec(
             Path(sys.executable).with_name("schemathesis"),
             *("--config-file", str(tmp_path / "schemathesis.toml"), *words),

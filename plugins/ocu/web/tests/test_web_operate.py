@@ -3,6 +3,7 @@
 import asyncio
 import re
 
+import pytest
 from playwright.async_api import Page, WebSocketRoute, expect
 from web_desk import IN_ONE_LOOP, Desk, element
 from web_running import (
@@ -71,20 +72,19 @@ async def test_the_palette_is_what_elements_are_painted_with(desk: Desk) -> None
     await wait_for_colour(page, "DRIVE ROUTE", GREEN)
 
 
-async def test_what_is_over_fades_or_is_gray_at_once(desk: Desk) -> None:
-    for fade, fades in (("2 s", True), ("no fade", False)):
-        await desk.release()
-        page = await desk.start()
-        await page.get_by_label("Fade").select_option(fade)
-        await wait_for_colour(page, "USER SEND ROUTE", AMBER)
-        await page.evaluate(KEEP_SHADES, "USER SEND ROUTE")
-        await answer(page, "Continue").click()
-        await wait_for_colour(page, "USER SEND ROUTE", GRAY)
-        shades = await page.evaluate("shades")
-        between = [
-            each for each in shades if not any(is_near(each, it) for it in (AMBER, GREEN, GRAY))
-        ]
-        assert bool(between) == fades, shades
+@pytest.mark.parametrize(
+    ("fade", "fades"), [("2 s", True), pytest.param("no fade", False, marks=pytest.mark.long)]
+)
+async def test_what_is_over_fades_or_is_gray_at_once(desk: Desk, fade: str, fades: bool) -> None:
+    page = await desk.start()
+    await page.get_by_label("Fade").select_option(fade)
+    await wait_for_colour(page, "USER SEND ROUTE", AMBER)
+    await page.evaluate(KEEP_SHADES, "USER SEND ROUTE")
+    await answer(page, "Continue").click()
+    await wait_for_colour(page, "USER SEND ROUTE", GRAY)
+    shades = await page.evaluate("shades")
+    between = [each for each in shades if not any(is_near(each, it) for it in (AMBER, GREEN, GRAY))]
+    assert bool(between) == fades, shades
 
 
 async def test_a_signal_moves_the_token_that_waits_for_it(desk: Desk) -> None:
@@ -123,7 +123,7 @@ async def test_a_route_is_drawn_with_the_keyboard(desk: Desk) -> None:
     assert drawn["geometry"]["coordinates"][1][1:] == [38.1085, 70]
 
 
-async def test_a_vehicle_is_taken_and_given_back(desk: Desk) -> None:
+async def test_a_vehicle_and_its_payload_are_taken_and_given_back(desk: Desk) -> None:
     page = await desk.start()
     card = page.locator(".card", has_text="evsg2")
     log = page.get_by_role("region", name="Events")
@@ -136,11 +136,7 @@ async def test_a_vehicle_is_taken_and_given_back(desk: Desk) -> None:
     assert await holder(desk, "evsg2") == ""
     await expect(log.get_by_text("evsg2 given back by anna")).to_be_visible()
 
-
-async def test_a_payload_is_taken_without_its_vehicle(desk: Desk) -> None:
-    page = await desk.start()
-    card = page.locator(".card", has_text="evsg2")
-    await card.get_by_role("button", name="Take over ptz").click()
+    await card.get_by_role("button", name="Take over ptz").click()  # without its vehicle
     await expect(card).to_contain_text("with anna")
     assert await holder(desk, "evsg2/ptz") == "anna"
     assert await holder(desk, "evsg2") == ""
