@@ -16,7 +16,8 @@ from m2pem.testing import scenarios
 pytestmark = IN_ONE_LOOP
 
 FAR_PX = 20
-MISSION = scenarios.in_sequence("reverse", VEHICLE, *({"distance": "20 m"} for _ in range(4)))
+FAR = scenarios.one_behavior("reverse", VEHICLE, distance="60 m")
+NEAR = scenarios.one_behavior("reverse", VEHICLE, distance="1 m")
 
 PLACE = """([vehicle]) => {
   for (const marker of document.querySelectorAll(".map .vehicle")) {
@@ -59,9 +60,12 @@ async def have_run(folder: Path) -> list[str]:
     """Two runs, to their ends, by an executive that has ended."""
     async with AsyncExitStack() as stack:
         first = await begun(stack, folder)
+        live = await (await first.browser()).live()
+        await live.watch(None)
+        await live.until(lambda message: VEHICLE in message.get("vehicles", {}))
         runs = []
-        for _ in range(2):
-            runs.append(await first.control.start(MISSION))
+        for mission in (FAR, NEAR):
+            runs.append(await first.control.start(mission))
             assert (await first.control.wait(runs[-1])).status is RunStatus.COMPLETED
         return runs
 

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from playwright.async_api import Locator, Page, expect
+from playwright.async_api import TimeoutError as PlaywrightTimeoutError
 
 SAVED = ".m2-saved-state"
 SELECTED = ".djs-element.selected[data-element-id]"
@@ -75,9 +76,13 @@ class Drawing:
     async def flow(self, source: str, target: str) -> str:
         """The flow that begins at one element's symbol and ends at the other's."""
         ends = [await self.centre(source), await self.centre(target)]
-        found = await self.page.evaluate(FLOW_BETWEEN, ends)
-        assert found, f"no flow leads from {source} to {target}"
-        return str(found)
+        try:  # what was drawn just now may not be seen yet
+            found = await self.page.wait_for_function(
+                FLOW_BETWEEN, arg=ends, timeout=WITHIN_S * 1000
+            )
+        except PlaywrightTimeoutError:
+            raise AssertionError(f"no flow leads from {source} to {target}") from None
+        return str(await found.json_value())
 
     async def drag(self, element: str, x: float, y: float) -> None:
         """Move an element to a place on the screen, by the mouse."""
