@@ -6,10 +6,12 @@ By mouse and keyboard alone, in a real browser, with simulated vehicles.
 import re
 from collections import Counter
 from pathlib import Path
+from xml.etree import ElementTree
 
+import pytest
 from playwright.async_api import Browser, Page, expect
 from web_browsing import page_at
-from web_desk import IN_ONE_LOOP
+from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing, new_mission
 from web_pictures import picture
 from web_running import (
@@ -30,10 +32,26 @@ from m2pem import load_mission
 pytestmark = IN_ONE_LOOP
 
 NAME = "vignette1"
+PROCESS = "{http://www.omg.org/spec/BPMN/20100524/MODEL}process"
 FASTER = ("--simulate", "--speed", "5", "--journal", "memory:")
 PROBLEMS = ".m2-problems-head p"
 
 
+async def test_a_process_is_drawn_with_the_mouse(desk: Desk) -> None:
+    drawing = await new_mission(await desk.home(), "drawn")
+    await draw_main(drawing)
+    await drawing.save()
+    drawn = kinds_of_first_process(desk.executive.missions / "drawn.bpmn")
+    assert drawn == kinds_of_first_process(REPOSITORY / "missions" / f"{NAME}.bpmn")
+
+
+def kinds_of_first_process(path: Path) -> Counter[str]:
+    """How many of each kind of elements it has, but for data objects."""
+    process = next(ElementTree.parse(path).iter(PROCESS))
+    return Counter(each.tag for each in process if "dataObject" not in each.tag)
+
+
+@pytest.mark.long
 async def test_vignette1_is_drawn_from_an_empty_page_and_lives_its_whole_life(
     chromium: Browser, tmp_path: Path
 ) -> None:
