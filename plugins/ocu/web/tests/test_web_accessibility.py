@@ -238,6 +238,7 @@ async def test_a_run_needs_no_mouse(desk: Desk) -> None:
     await tab_to(page, MISSION)
     await page.keyboard.press("Enter")
     await page.wait_for_url("**/missions/*")
+    await expect(page.locator(".link-open")).to_have_count(1)  # else nothing is sent
     await tab_to(page, "Properties")
     await page.keyboard.press("End")
     await tab_to(page, "Start")

@@ -37,6 +37,7 @@ class Field:
         """The page of a run that asks its first question, started in the page."""
         await self.page.goto(f"{self.origin}/missions/{MISSION}")
         await self.page.get_by_role("tab", name="Run", exact=True).click()
+        await expect(self.page.locator(".link-open")).to_have_count(1)  # else nothing is sent
         await self.page.get_by_role("button", name="Start", exact=True).click()
         await expect(answer(self.page, "Continue")).to_be_enabled()
         await expect(self.page.locator(".link-open")).to_have_count(1)

@@ -66,6 +66,7 @@ class Desk:
         page = page or self.page
         await page.goto(f"{self.executive.origin}/missions/{mission}")
         await page.wait_for_selector(".djs-shape")
+        await expect(page.locator(".link-open")).to_have_count(1)  # else nothing is sent
         if tab:
             await page.get_by_role("tab", name=tab, exact=True).click()
         return page
