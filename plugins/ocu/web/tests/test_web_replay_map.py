@@ -74,7 +74,7 @@ async def test_a_replay_after_a_restart_shows_where_vehicles_were_or_why_not(
     chromium: Browser, tmp_path: Path
 ) -> None:
     run, other = await have_run(tmp_path)
-    (tmp_path / "journal.db-tracks" / f"{other}.jsonl").unlink()
+    (tmp_path / "journal.db-tracks" / f"{other}.jsonl").unlink(missing_ok=True)
     async with AsyncExitStack() as stack:
         second = await begun(stack, tmp_path)
         page = await stack.enter_async_context(opened(chromium, second))
