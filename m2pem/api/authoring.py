@@ -35,6 +35,15 @@ MissionSource: TypeAlias = Union[Path, str, bytes, Draft, MissionFiles]
 files that it calls (`MissionFiles`) or without."""
 
 
+def file_of(mission: MissionSource) -> str:
+    """The name of a mission's file; "mission.bpmn" for a mission that came as bytes."""
+    if isinstance(mission, MissionFiles):
+        return mission.file
+    if isinstance(mission, Draft):
+        return str(mission.path)
+    return "mission.bpmn" if isinstance(mission, bytes) else str(mission)
+
+
 @dataclass(frozen=True, slots=True)
 class Editable:
     """A mission as an editor takes it: UTF-8, with a diagram of everything (docs/missions.md).

@@ -18,7 +18,7 @@ from m2pem.api.authoring import (
 from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.engine.records import Record
-from m2pem.findings import Finding
+from m2pem.findings import Finding, has_errors
 from m2pem.mission.behavior import Decision
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.library import MissionFile
@@ -132,6 +132,47 @@ class TakeEffect:
         return f"{ends}. TAKEN_OVER is not handled: the mission will fail"
 
 
+@dataclass(frozen=True, slots=True)
+class RoleAssignment:
+    """What a role of a mission runs on in a fleet.
+
+    `resource`: the vehicle, payload or team that the mission names. `resources`: those of the
+    fleet; empty: the fleet lacks it.
+    """
+
+    role: str
+    resource: str
+    resources: tuple[ResourceId, ...]
+
+    def __str__(self) -> str:
+        if not self.resources:
+            return f"{self.role}: {self.resource}, which the fleet lacks"
+        team = "" if self.resources == (self.resource,) else f"{self.resource}: "
+        return f"{self.role}: {team}{', '.join(self.resources)}"
+
+
+@dataclass(frozen=True, slots=True)
+class StartPreview:
+    """What would begin with a mission: `file` as it was given, and its process with its name.
+
+    `findings`: those of `MissionControl.check`; an error among them refuses the start. `busy`: the
+    reason why the start has to be confirmed, which says who has what; "" when all is free. `name`
+    and `process` are "" if the mission cannot be read.
+    """
+
+    file: str
+    name: str = ""
+    process: str = ""
+    findings: tuple[Finding, ...] = ()
+    roles: tuple[RoleAssignment, ...] = ()
+    busy: str = ""
+
+    @property
+    def refused(self) -> bool:
+        """Whether the mission cannot start."""
+        return has_errors(self.findings)
+
+
 LOGGED = "LOGGED"
 """The code of alerts that are also logged: what an arbiter warns of, for instance. Who shows the
 log to an operator need not show them again."""
@@ -176,6 +217,22 @@ class MissionControl(Protocol):
         Raises:
             MissionError: with every finding, when it is not well or does not fit the fleet.
             BusyError: they have some, and that was not confirmed; it says who has what.
+        """
+        ...
+
+    async def missions(self) -> Sequence[str]:
+        """The paths of the mission files that are found where the executive runs.
+
+        They are in the folders of its search path, in its working folder, and in `missions` there.
+        """
+        ...
+
+    async def preview_start(
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
+    ) -> StartPreview:
+        """What `start` of a mission would begin with now, and what speaks against it.
+
+        `data`: names that are given at start. Operators see this before they start a mission.
         """
         ...
 

@@ -24,6 +24,7 @@ from m2pem.api.control import (
     RunId,
     RunSummary,
     StampedRecord,
+    StartPreview,
     TakeEffect,
 )
 from m2pem.api.health import HealthCheck
@@ -150,7 +151,7 @@ class Start(Params, frozen=True):
 
 
 class Check(Params, frozen=True):
-    """As `MissionControl.check`; the caller has read the mission's files."""
+    """As `MissionControl.check` and `preview_start`; the caller has read the mission's files."""
 
     mission: MissionFiles
     process: str | None = None
@@ -200,6 +201,8 @@ OPERATIONS: dict[str, Operation] = {
     for operation in (
         Operation("start", Start, RunId, alone=True),
         Operation("check", Check, list[Finding], alone=True, slow=True),
+        Operation("missions", Nothing, list[str], alone=True),
+        Operation("preview_start", Check, StartPreview, alone=True),
         Operation("answer", Answer),
         Operation("signal", Signal),
         Operation("message", Message),

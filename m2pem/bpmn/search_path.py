@@ -26,10 +26,8 @@ class SearchPath:
 
     def __init__(self, mission: Path | None = None, folders: Iterable[Path] = ()) -> None:
         own = [mission.parent] if mission is not None else []
-        named = os.environ.get(VARIABLE, "").split(os.pathsep)
-        also = [Path(each) for each in named if each and Path(each).is_dir()]
         unique: dict[Path, Path] = {}
-        for folder in [*own, *folders, *also]:
+        for folder in [*own, *folders, *_named_folders()]:
             unique.setdefault(folder.resolve(), folder)
         self._folders = list(unique.values())
         self._mission = mission
@@ -45,7 +43,7 @@ class SearchPath:
         """See `Library.called`."""
         if self._index is None:
             self._index = {}
-            for path in self._files():
+            for path in _bpmn_files(self._folders):
                 for identifier, of in _callable(path):
                     self._index.setdefault(identifier, []).append((path, of))
         known = self._index.get(element, [])
@@ -56,18 +54,6 @@ class SearchPath:
                 "give one of the two another id, move it away, or import the file that is meant",
             )
         return self._source(found[0]) if found else None
-
-    def _files(self) -> Iterator[Path]:
-        seen: set[Path] = set()
-        for folder in self._folders:
-            try:
-                inside = sorted(folder.iterdir())
-            except OSError:
-                continue
-            for path in inside:
-                if path.name.lower().endswith(_SUFFIXES) and path.resolve() not in seen:
-                    seen.add(path.resolve())
-                    yield path
 
     def imported(self, location: str, importer: str) -> Source:
         """See `Library.imported`. A mission that did not come from a file may import what is in the
@@ -98,6 +84,40 @@ class SearchPath:
             ) from error
         self._given[str(path)] = path
         return Source(str(path), data)
+
+
+def mission_files_in(folders: Iterable[Path]) -> list[Path]:
+    """The BPMN files directly in these folders and in those of `M2PEM_PATH` with which a run may
+    begin: those with a process, and those that cannot be read, of which a check says why."""
+    files = _bpmn_files([*folders, *_named_folders()])
+    return [path for path in files if _may_begin(path)]
+
+
+def _may_begin(path: Path) -> bool:
+    try:
+        root = parse_xml(_read(path)).root
+    except (OSError, XmlError):
+        return True
+    return root.tag != BPMN + "definitions" or root.find(BPMN + "process") is not None
+
+
+def _bpmn_files(folders: Iterable[Path]) -> Iterator[Path]:
+    """Yield the BPMN files directly in folders, each once; a folder that is not there has none."""
+    seen: set[Path] = set()
+    for folder in folders:
+        try:
+            inside = sorted(folder.iterdir())
+        except OSError:
+            continue
+        for path in inside:
+            if path.name.lower().endswith(_SUFFIXES) and path.resolve() not in seen:
+                seen.add(path.resolve())
+                yield path
+
+
+def _named_folders() -> list[Path]:
+    named = os.environ.get(VARIABLE, "").split(os.pathsep)
+    return [Path(each) for each in named if each and Path(each).is_dir()]
 
 
 def _read(path: Path) -> bytes:

@@ -5,6 +5,7 @@ import importlib
 import logging
 import sys
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 
 import click
 
@@ -61,19 +62,25 @@ class Operators:
         for factory in self._factories.values():
             for module in ocu_capabilities(factory).imports:
                 importlib.import_module(module)
-        self._tasks: list[asyncio.Task[None]] = []
+        self._tasks: list[asyncio.Task[bool]] = []
 
     @property
     def take_terminal(self) -> bool:
         """Whether one of them draws on the whole terminal."""
         return any(ocu_capabilities(each).takes_terminal for each in self._factories.values())
 
-    def begin(self, control: MissionControl, freed: Callable[[], None]) -> None:
-        """Let them serve. `freed` is called when one has given the terminal back."""
+    def begin(self, control: MissionControl, left: Callable[[], None]) -> None:
+        """Let them serve. `left` is called when the operator of one has left, and when one that
+        had the terminal broke."""
+
+        def ended(task: asyncio.Task[bool], *, had_terminal: bool) -> None:
+            if not task.cancelled() and (task.result() or had_terminal):
+                left()
+
         for name, factory in self._factories.items():
             task = asyncio.create_task(self._serve(name, factory(control).serve()), name=name)
-            if ocu_capabilities(factory).takes_terminal:
-                task.add_done_callback(lambda _: freed())
+            had_terminal = ocu_capabilities(factory).takes_terminal
+            task.add_done_callback(partial(ended, had_terminal=had_terminal))
             self._tasks.append(task)
 
     async def left(self) -> None:
@@ -86,8 +93,11 @@ class Operators:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def _serve(self, name: str, serving: Awaitable[None]) -> None:
+    async def _serve(self, name: str, serving: Awaitable[None]) -> bool:
+        """Return whether the operator has left; False: the unit broke."""
         try:
             await serving
         except Exception:
             log.exception("the operator control unit %s broke; missions go on without it", name)
+            return False
+        return True

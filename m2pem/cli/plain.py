@@ -20,6 +20,7 @@ from m2pem.api.foreground import Lines
 from m2pem.cli.standard_streams import writer_for
 from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
 from m2pem.errors import BusyError, M2pemError, OperatorError
+from m2pem.findings import lines
 from m2pem.mission.behavior import Decision
 
 NAME = "plain"
@@ -35,6 +36,8 @@ HELP = """\
   stop all           end every mission
   route NAME FILE    hand over a route, under the name that the mission uses
   area NAME FILE     hand over an area; point NAME FILE: a point
+  missions           list the mission files that are found here
+  check FILE         print what speaks against a start of it, and what its roles run on
   start FILE         start another mission
   start! FILE        the same, even if other runs or operators have its vehicles
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
@@ -69,6 +72,8 @@ class PlainOcu:
             "route": partial(self._hand_over, "route"),
             "area": partial(self._hand_over, "area"),
             "point": partial(self._hand_over, "point"),
+            "missions": self._missions,
+            "check": self._check,
             "start": self._start,
             "start!": partial(self._start, even_if_busy=True),
             "takeover": self._take,
@@ -251,6 +256,24 @@ class PlainOcu:
         geometry = await asyncio.to_thread(read_geometry, Path(file), kind)
         await self._control.set_geometry(name, as_geojson(geometry), by=NAME)
         self._say(f"{name} is handed over")
+
+    async def _missions(self, _: list[str]) -> None:
+        files = await self._control.missions()
+        for file in files:
+            self._say(file)
+        if not files:
+            self._say("no mission files are found here; start FILE takes any path")
+
+    async def _check(self, words: list[str]) -> None:
+        if not words:
+            raise OperatorError("say which: check FILE")
+        preview = await self._control.preview_start(" ".join(words))
+        for line in lines(preview.findings) or [f"{preview.file}: nothing found"]:
+            self._say(line)
+        for role in preview.roles:
+            self._say(str(role))
+        if preview.busy:
+            self._say(preview.busy)
 
     async def _start(self, words: list[str], *, even_if_busy: bool = False) -> None:
         if not words:

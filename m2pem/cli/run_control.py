@@ -32,12 +32,14 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
     """
     from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_driver
-    from m2pem.errors import NotDrivenError
+    from m2pem.errors import NotDrivenError, OperatorError
 
     path = journal_file(journal_url)
     try:
         ask_driver(path, run, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
+        if ended := _ended(journal_url, path, method, run):
+            raise OperatorError(ended) from error
         raise NotDrivenError(f"{error}{_left_behind(journal_url, path, run)}") from error
 
 
@@ -57,6 +59,23 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
         return ask_all(path, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
         raise NotDrivenError(f"{error}{_left_behind(journal_url, path)}") from error
+
+
+def _ended(journal_url: str | None, path: Path, request: str, run: str) -> str:
+    """How and when a run has ended, by the journal; "" if it has not, or is not known."""
+    from m2pem.cli.journals import find_run, journal_to_read
+    from m2pem.errors import M2pemError
+    from m2pem.executive.ended_runs import describe_end
+
+    async def found() -> str:
+        async with journal_to_read(journal_url) as journal:
+            line = await find_run(journal, run)
+        return describe_end(request, run, line) if line.outcome is not None else ""
+
+    if path.exists():
+        with suppress(M2pemError):  # what the executive refused matters more
+            return asyncio.run(found())
+    return ""
 
 
 def _left_behind(journal_url: str | None, path: Path, run: str | None = None) -> str:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import os
+import shlex
 import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -16,6 +17,7 @@ import click
 from m2pem.api.clock import SystemClock
 from m2pem.api.control import RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
+from m2pem.cli.journals import url_of
 from m2pem.cli.notes import note
 from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.options import UnusableError
@@ -26,6 +28,7 @@ from m2pem.errors import PluginError
 from m2pem.executive.executive import Executive
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.fleet.fleet import Fleet, real_resources
+from m2pem.journal import file_of
 from m2pem.journal.base import Journal
 from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager, Plugins
@@ -83,15 +86,9 @@ async def driving(
             def left() -> None:
                 output.uncover()
                 running = [key for key, each in executive.runners.items() if not each.done.is_set()]
-                what = f"missions go on: {', '.join(running)}" if running else ""
-                if not one:
-                    what = f"serving goes on; {what or 'no mission runs'}"
-                if what:
-                    start = "" if one else ", m2pem start MISSION starts one"
-                    note(
-                        f"m2pem: no operator at this terminal any more; {what} "
-                        f"(m2pem attach shows them{start}, and Ctrl-C stops everything)"
-                    )
+                if running or not one:
+                    here = ("Ctrl-C here stops everything",)
+                    note(what_goes_on(running, journal, here, serves=not one))
 
             try:
                 operators.begin(executive.control, left)
@@ -103,6 +100,28 @@ async def driving(
         await output.drain()
     if output.writer.broken:
         ignore_closed_stdout()
+
+
+def what_goes_on(
+    running: Sequence[RunId], journal: Path | None, how: Sequence[str] = (), *, serves: bool
+) -> str:
+    """Say what goes on when the operator of this terminal has left, and how to see and stop it.
+
+    `running`: the runs that have not ended. `journal`: its file, None: no other command finds the
+    executive. `how`: what else can be done. `serves`: whether it goes on without a run.
+    """
+    runs = f"missions go on: {', '.join(running)}" if running else "no mission runs"
+    what = f"serving goes on; {runs}" if serves else runs
+    can = []
+    if journal is not None:
+        option = (
+            "" if journal == file_of(url_of(None)) else f" --journal {shlex.quote(str(journal))}"
+        )
+        can = [f"`m2pem attach{option}` shows it"]
+        if serves:
+            can.append(f"`m2pem start MISSION{option}` starts a mission")
+        can += [f"`m2pem stop {run}{option}` stops {run}" for run in running[:1]]
+    return f"m2pem: no operator at this terminal any more; {what}. {', '.join([*can, *how])}"
 
 
 async def drive_run(

@@ -9,8 +9,8 @@ from typing import Any, cast
 
 import msgspec
 
-from m2pem.api.authoring import MissionFiles, MissionSource
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId
+from m2pem.api.authoring import MissionFiles, MissionSource, file_of
+from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StartPreview
 from m2pem.api.operations import OPERATIONS, STREAMED, Operation, mission_files
 from m2pem.bpmn import parse_mission
 from m2pem.control_socket.client import LONG_TIMEOUT_S, ask
@@ -93,6 +93,17 @@ class RemoteControl:
         params = {"mission": files, "process": process, "data": list(data)}
         found = ask(self._path, "check", timeout_s=LONG_TIMEOUT_S, **params)
         return msgspec.convert(found, list[Finding])
+
+    async def preview_start(self, mission: MissionSource, **options: Any) -> StartPreview:
+        """Send a mission's files to the executive, which says what would begin."""
+        try:
+            files = await asyncio.to_thread(self._files, mission)
+        except MissionError as error:
+            return StartPreview(file_of(mission), findings=error.findings)
+        preview: StartPreview = await self._call(
+            OPERATIONS["preview_start"], mission=files, **options
+        )
+        return preview
 
     def _files(self, mission: MissionSource) -> MissionFiles:
         if isinstance(mission, MissionFiles):

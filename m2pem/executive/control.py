@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,26 +14,31 @@ from m2pem.api.authoring import (
     Outline,
     SearchLimits,
     SearchProgress,
+    file_of,
 )
 from m2pem.api.control import (
     ControlEvent,
     HandedOver,
     OpenPrompt,
+    RoleAssignment,
     RunId,
     RunStatus,
     RunSummary,
     SimulationResult,
     StampedRecord,
+    StartPreview,
     TakeEffect,
 )
 from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import Telemetry
+from m2pem.bpmn.search_path import mission_files_in
 from m2pem.editing.editable import editable
 from m2pem.editing.outline import outline
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
-from m2pem.errors import MissionError, OperatorError
+from m2pem.errors import BusyError, MissionError, OperatorError
+from m2pem.executive.ended_runs import describe_end, in_words
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
@@ -40,6 +46,7 @@ from m2pem.executive.loading import findings_for, library_of, load_source, requi
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.findings import Finding
+from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import mission_of
@@ -91,11 +98,48 @@ class Control:
             mission, process, _bounded(data), by, even_if_busy=even_if_busy
         )
 
+    async def missions(self) -> Sequence[str]:
+        """The mission files of the search path, the working folder and `missions` in it."""
+        here = Path.cwd()
+        folders = (*self._supervisor.settings.search_path, here, here / "missions")
+        return [str(path) for path in await asyncio.to_thread(mission_files_in, folders)]
+
+    async def preview_start(
+        self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
+    ) -> StartPreview:
+        """What a start would begin with now, and what speaks against it."""
+        supervisor, given = self._supervisor, tuple(data)
+        try:
+            loaded = await asyncio.to_thread(load_source, mission, supervisor.settings.search_path)
+        except MissionError as error:
+            return StartPreview(file_of(mission), findings=error.findings)
+        findings = await asyncio.to_thread(self._findings, loaded, process, given)
+        names = {each.id: each.name for each in loaded.processes}
+        begun = process or loaded.process().id
+        roles = {(each.name, each.resource): each for each in roles_of_mission(loaded)}
+        fleet, busy = supervisor.fleet, ""
+        try:
+            supervisor.refuse_busy(loaded)
+        except BusyError as error:
+            busy = str(error)
+        return StartPreview(
+            loaded.file,
+            names.get(begun, ""),
+            begun,
+            tuple(findings),
+            tuple(
+                RoleAssignment(each.name, each.resource, resources_of(each, fleet))
+                for each in roles.values()
+            ),
+            busy,
+        )
+
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
         emergency = self._supervisor.emergency
-        asked = emergency.stop(self._supervisor.runner(run), by, reason)
-        await emergency.written("stop", {run: asked})
+        async with self._explain_end("stop", run):
+            asked = emergency.stop(self._supervisor.runner(run), by, reason)
+            await emergency.written("stop", {run: asked})
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended."""
@@ -106,12 +150,13 @@ class Control:
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""
         emergency = self._supervisor.emergency
-        asked = emergency.pause(self._supervisor.runner(run), by)
-        await emergency.written("pause", {run: asked})
+        async with self._explain_end("pause", run):
+            asked = emergency.pause(self._supervisor.runner(run), by)
+            await emergency.written("pause", {run: asked})
 
     async def resume(self, run: RunId, *, by: str = "") -> None:
         """Go on after a pause."""
-        await self._ask(run, i.ResumeRun(by))
+        await self._ask("resume", run, i.ResumeRun(by))
 
     async def signal(
         self,
@@ -123,6 +168,9 @@ class Control:
     ) -> None:
         """Emit a signal to one run or to all that are active."""
         given = _bounded(data)
+        if run is not None:
+            async with self._explain_end("signal", run):
+                self._supervisor.runner(run)
         runners = (
             [self._supervisor.runner(run)]
             if run is not None
@@ -150,13 +198,13 @@ class Control:
                 )
         for runner, ids in meant:
             for key in ids:
-                await self._ask(runner.id, i.SignalReceived(key, given, by))
+                await self._ask("signal", runner.id, i.SignalReceived(key, given, by))
 
     async def message(
         self, message: str, *, run: RunId, data: Mapping[str, Value] | None = None, by: str = ""
     ) -> None:
         """Send a message."""
-        await self._ask(run, i.MessageReceived(message, _bounded(data), by))
+        await self._ask("message", run, i.MessageReceived(message, _bounded(data), by))
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
         """Answer a prompt; the first answer wins."""
@@ -169,13 +217,20 @@ class Control:
                 case _:
                     raise unknown_decision(decision)
             return
-        await self._ask(run, i.PromptAnswer(prompt, decision, by))
+        await self._ask("answer", run, i.PromptAnswer(prompt, decision, by))
 
     async def set_geometry(
         self, name: str, geometry: Mapping[str, Value], *, run: RunId | None = None, by: str = ""
     ) -> None:
         """Hand over a route, area or point (GeoJSON)."""
-        self._supervisor.set_geometry(name, _bounded(geometry), run, by)
+        given = _bounded(geometry)
+        if run is None:
+            self._supervisor.set_geometry(name, given, None, by)
+            return
+        async with self._explain_end("set_geometry", run):
+            if self._has_ended(run):
+                raise OperatorError(f"{run} has ended")
+            self._supervisor.set_geometry(name, given, run, by)
 
     async def take(self, resource: str, *, by: str = "") -> None:
         """Take a vehicle or payload from the missions."""
@@ -193,14 +248,39 @@ class Control:
         """Who has each resource."""
         return self._supervisor.handover.holders()
 
-    async def _ask(self, run: RunId, item: i.Input) -> None:
+    async def _ask(self, request: str, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know.
 
         What came during a pause is decided with the resume, and may be ignored then: after it.
         """
-        match (await self._supervisor.runner(run).submit(item)).records:
-            case [r.InputIgnored(reason), *_]:
-                raise OperatorError(f"{run}: {reason}")
+        async with self._explain_end(request, run):
+            match (await self._supervisor.runner(run).submit(item)).records:
+                case [r.InputIgnored(reason), *_]:
+                    raise OperatorError(f"{run}: {in_words(item, reason)}")
+
+    @asynccontextmanager
+    async def _explain_end(self, request: str, run: RunId) -> AsyncIterator[None]:
+        """Say how and when a run has ended that refuses a request for that reason.
+
+        `request`: the method's name. A run that ended long ago is known to the journal alone.
+        """
+        try:
+            yield
+        except OperatorError as error:
+            runner = self._supervisor.runners.get(run)
+            if runner is not None and not self._has_ended(run):
+                raise
+            lines = {each.run: each for each in await self._supervisor.journal.runs()}
+            line = lines.get(run)
+            if runner is None and (line is None or line.outcome is None):
+                raise
+            held = "" if runner is None else ", ".join(runner.run.state.held)
+            raise OperatorError(describe_end(request, run, line, held)) from error
+
+    def _has_ended(self, run: RunId) -> bool:
+        """Whether a run has ended that this executive knows, and its journal has that."""
+        runner = self._supervisor.runner(run)
+        return runner.failure is None and runner.run.state.status is EngineStatus.ENDED
 
     # --- watching -------------------------------------------------------------------------------
 
@@ -301,12 +381,17 @@ class Control:
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> Sequence[Finding]:
         """All findings of `m2pem check` for a mission and the fleet in use."""
-        supervisor = self._supervisor
         try:
-            loaded = load_source(mission, supervisor.settings.search_path)
+            loaded = load_source(mission, self._supervisor.settings.search_path)
         except MissionError as error:
             return error.findings
-        names, arbiters, plugins = tuple(data), supervisor.arbiters, supervisor.plugins
+        return self._findings(loaded, process, tuple(data))
+
+    def _findings(
+        self, loaded: Mission, process: str | None, names: tuple[str, ...]
+    ) -> list[Finding]:
+        supervisor = self._supervisor
+        arbiters, plugins = supervisor.arbiters, supervisor.plugins
         return [
             *findings_for(
                 loaded,

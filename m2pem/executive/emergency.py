@@ -24,6 +24,7 @@ from m2pem.engine.state import RunStatus
 from m2pem.errors import M2pemError, OperatorError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
+from m2pem.executive.ended_runs import in_words
 from m2pem.executive.runner import Runner
 from m2pem.executive.runtime_directory import runtime_directory
 
@@ -141,7 +142,7 @@ def _problem(what: str, asked: "asyncio.Future[Step]") -> str:
         raise error
     match asked.result().records:
         case [r.InputIgnored(reason), *_]:
-            return reason
+            return in_words(asked.result().input, reason)
     return ""
 
 

@@ -235,11 +235,19 @@ class Supervisor:
         if even_if_busy:
             return await self.begin(loaded, process_id, data, by)
         async with self._starting:
-            ended = RunStatus.ENDED
-            over = {run for run, one in self.runners.items() if one.run.state.status is ended}
-            taken, holder = self.handover.taken, self.availability.holder
-            refuse_busy_resources(loaded, self.fleet, taken, holder, over)
+            self.refuse_busy(loaded)
             return await self.begin(loaded, process_id, data, by)
+
+    def refuse_busy(self, loaded: Mission) -> None:
+        """Check that everything that a mission names is free now.
+
+        Raises:
+            BusyError: other runs or operators have some of it.
+        """
+        ended = RunStatus.ENDED
+        over = {run for run, one in self.runners.items() if one.run.state.status is ended}
+        taken, holder = self.handover.taken, self.availability.holder
+        refuse_busy_resources(loaded, self.fleet, taken, holder, over)
 
     async def begin(
         self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str

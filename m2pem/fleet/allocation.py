@@ -1,6 +1,6 @@
 """Which resources fill the roles of a task, and which of them are free (paper, section 4.2)."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from m2pem.errors import M2pemError
@@ -58,14 +58,17 @@ def resources_of(role: Role, fleet: Fleet) -> tuple[ResourceId, ...]:
 def resources_of_mission(mission: Mission, fleet: Fleet) -> tuple[ResourceId, ...]:
     """Return every resource that roles of a mission name, each once, in the order of its tasks."""
     found = dict.fromkeys(
-        resource
-        for task in mission.activities()
-        for asked in (getattr(task, "behavior", None), getattr(task, "call", None))
-        if isinstance(asked, Behavior | ServiceCall)
-        for role in asked.roles
-        for resource in resources_of(role, fleet)
+        resource for role in roles_of_mission(mission) for resource in resources_of(role, fleet)
     )
     return tuple(found)
+
+
+def roles_of_mission(mission: Mission) -> Iterator[Role]:
+    """Yield the roles of all tasks, in the order of the tasks; a role comes once for each task."""
+    for task in mission.activities():
+        for asked in (getattr(task, "behavior", None), getattr(task, "call", None)):
+            if isinstance(asked, Behavior | ServiceCall):
+                yield from asked.roles
 
 
 def spelled_out(team: Team) -> tuple[ResourceId, ...]:

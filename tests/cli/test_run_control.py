@@ -22,6 +22,8 @@ CALLS = [
 OTHERWISE = {
     "start": "m2pem start, which tests/e2e/test_start.py tries",
     "check": "m2pem check asks no executive",
+    "missions": "missions in m2pem attach",
+    "preview_start": "check in m2pem attach",
     "stop_all": "m2pem stop --all",
     "set_geometry": "route, area and point in m2pem attach",
     "take": "takeover in m2pem attach",

@@ -114,3 +114,46 @@ def test_a_draft_imports_nothing_from_elsewhere(play, tmp_path: Path) -> None:
         return world.executive.control.check(Draft(folder / "new.bpmn", source))
 
     assert "import-unreadable" in [each.rule for each in play(story)]
+
+
+def test_missions_are_found_on_the_search_path_in_the_working_folder_and_in_missions(
+    play, tmp_path: Path, monkeypatch
+) -> None:
+    folders = [tmp_path / "named", tmp_path / "here", tmp_path / "here" / "missions"]
+    for folder in folders:
+        folder.mkdir()
+        (folder / f"in_{folder.name}.bpmn").write_bytes(mission(SEARCH))
+    task_alone = mission('<globalTask id="Ask"/>')
+    (folders[1] / "task_alone.bpmn").write_bytes(task_alone)
+    (folders[1] / "no_xml.bpmn").write_text("no XML", "utf-8")
+    (folders[1] / "notes.txt").write_text("no mission", "utf-8")
+    monkeypatch.chdir(folders[1])
+
+    async def story(world: World):
+        return await world.executive.control.missions()
+
+    found = play(story, search_path=[folders[0], folders[2]])
+    names = ["in_named.bpmn", "in_missions.bpmn", "in_here.bpmn", "no_xml.bpmn"]
+    assert [Path(each).name for each in found] == names
+    assert all(Path(each).is_absolute() for each in found)
+
+
+def test_a_preview_of_a_start_has_findings_roles_and_who_has_what(play, tmp_path: Path) -> None:
+    file = tmp_path / "search.bpmn"
+    file.write_bytes(mission(SEARCH))
+
+    async def story(world: World):
+        control = world.executive.control
+        missing = await control.preview_start(tmp_path / "missing.bpmn")
+        unknown = await control.preview_start(file, process="OTHER")
+        return missing, await control.preview_start(file), unknown
+
+    missing, preview, unknown = play(story)
+    assert (missing.refused, missing.findings[0].rule) == (True, "unreadable-file")
+    assert (preview.refused, preview.process, preview.roles, preview.busy) == (
+        False,
+        "SEARCH",
+        (),
+        "",
+    )
+    assert (unknown.refused, unknown.process) == (True, "OTHER")

@@ -59,6 +59,8 @@ SERVED_OTHERWISE = {
 }
 NOT_SERVED = {
     "check": "start_mission answers with the findings",
+    "missions": "start_mission names a file, or brings one",
+    "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",
     "holders": "no message has them; a refused take_vehicle names the holder",
     "records": "a client has them from topic events on; older ones are in the journal",

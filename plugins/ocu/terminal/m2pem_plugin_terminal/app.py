@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any, ClassVar
 
 from rich.text import Text
@@ -11,7 +12,7 @@ from textual.containers import VerticalScroll
 from m2pem.api import ResourceId, RunView
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
-from m2pem.errors import M2pemError, OperatorError
+from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem_plugin_terminal.dialogs import Choice, Choose, Confirm, Read, help_text
 from m2pem_plugin_terminal.display import Display
 from m2pem_plugin_terminal.handover import (
@@ -22,6 +23,8 @@ from m2pem_plugin_terminal.handover import (
     effects_text,
     with_operator,
 )
+from m2pem_plugin_terminal.missions import NO_MISSIONS, ChooseMission, preview_text
+from m2pem_plugin_terminal.missions import TITLE as TITLE_MISSIONS
 from m2pem_plugin_terminal.status_lines import STOP_ALL
 
 
@@ -39,6 +42,7 @@ class TerminalApp(Display):
         Binding("p", "pause"),
         Binding("s", "signals"),
         Binding("t", "take"),
+        Binding("m", "missions"),
         Binding("r", "runs"),
         Binding("slash", "filter"),
         Binding("question_mark", "help"),
@@ -244,6 +248,47 @@ class TerminalApp(Display):
             raise OperatorError(f"{resource} is with {holder}")
         await self.control.give_back(resource, by=self.by)
 
+    async def action_missions(self) -> None:
+        """Choose a mission file to start."""
+        try:
+            files = await self.control.missions()
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+        if not files:
+            await self.push_screen(Read(TITLE_MISSIONS, Text(NO_MISSIONS)))
+            return
+
+        def chosen(file: str | None) -> None:
+            if file is not None:
+                self._carry_out("Start", self._ask_to_start(file))
+
+        await self.push_screen(ChooseMission(files, self.control.preview_start), chosen)
+        self.show()
+
+    async def _ask_to_start(self, file: str) -> None:
+        """Show what would begin; `y` confirms. Show in full what refuses the start."""
+        preview = await self.control.preview_start(file)
+        name = Path(file).name
+        if preview.refused:
+            await self.push_screen(Read(f"{name} cannot start", preview_text(preview)))
+            self.show()
+            return
+
+        async def start() -> None:
+            try:
+                run = await self.control.start(file, by=self.by, even_if_busy=bool(preview.busy))
+            except BusyError:  # since the operator read that all is free
+                await self._ask_to_start(file)
+            except M2pemError as error:
+                await self.push_screen(Read(f"{name} was not started", Text(str(error))))
+                self.show()
+            else:
+                self.say(f"{name} was started: {run}")
+
+        question = f"Start {name} all the same?" if preview.busy else f"Start {name}?"
+        await self._confirm("Start", question, preview_text(preview), start)
+
     def _task_label(self, behavior: str) -> str:
         found = self._behavior(behavior)
         if found is None:
@@ -285,9 +330,9 @@ class TerminalApp(Display):
         self.show()
 
     async def action_leave(self) -> None:
-        """Quit; ask first if the mission has not ended."""
-        view = self.view
-        if view is None or view.status.ended:
+        """Quit; ask first if a mission has not ended."""
+        running = [each.run for each in self.follower.views.values() if not each.status.ended]
+        if not running:
             self.exit()
             return
 
@@ -295,8 +340,12 @@ class TerminalApp(Display):
             if choice == "leave":
                 self.exit()
 
-        choices = [Choice("leave", "Quit, and let the mission go on"), Choice("stay", "Stay")]
-        text = f"{view.run} is running. To stop it, press ^X twice."
+        go_on = "the mission" if len(running) == 1 else "the missions"
+        choices = [Choice("leave", f"Quit, and let {go_on} go on"), Choice("stay", "Stay")]
+        if running == [self.run_shown]:
+            text = f"{running[0]} is running. To stop it, press ^X twice."
+        else:
+            text = f"Not ended: {', '.join(running)}. To stop all, press ^A twice."
         await self.push_screen(Choose("Quit", choices, text), done)
         self.show()
 

@@ -8,7 +8,7 @@ from rich.text import Text
 from textual import events
 from textual.app import ComposeResult
 from textual.binding import BindingType
-from textual.containers import Vertical
+from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
@@ -39,7 +39,7 @@ class Choose(ModalScreen[str | None]):
     def __init__(self, title: str, choices: Sequence[Choice], text: str = "") -> None:
         super().__init__()
         self._title = title
-        self._choices = tuple(choices)
+        self.choices = tuple(choices)
         self._text = text
 
     def compose(self) -> ComposeResult:
@@ -49,11 +49,16 @@ class Choose(ModalScreen[str | None]):
             box.border_subtitle = "Enter or a digit: choose   Esc: close"
             if self._text:
                 yield Static(Text(self._text), classes="dialog-text")
-            yield OptionList(*[self._option(place) for place in range(len(self._choices))])
+            yield OptionList(*[self._option(place) for place in range(len(self.choices))])
+            yield from self.compose_below()
         yield StopBar()
 
+    def compose_below(self) -> ComposeResult:
+        """Compose what is below the list: nothing here."""
+        yield from ()
+
     def _option(self, place: int) -> Option:
-        choice = self._choices[place]
+        choice = self.choices[place]
         digit = f"{place + 1} " if place < 9 else "  "
         remark = f"  {choice.remark}" if choice.remark else ""
         label = shortened(choice.label, WIDTH - 6 - len(remark))
@@ -61,18 +66,24 @@ class Choose(ModalScreen[str | None]):
 
     def on_key(self, event: events.Key) -> None:
         """Choose the line of a digit."""
-        if event.key.isdigit() and 1 <= int(event.key) <= min(9, len(self._choices)):
+        if event.key.isdigit() and 1 <= int(event.key) <= min(9, len(self.choices)):
             event.stop()
-            self.dismiss(self._choices[int(event.key) - 1].value)
+            self.dismiss(self.choices[int(event.key) - 1].value)
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Choose the marked line at Enter."""
-        self.dismiss(self._choices[event.option_index].value)
+        self.dismiss(self.choices[event.option_index].value)
 
 
 class _TextDialog(ModalScreen[T]):
-    """A text. `HINT`: what the keys do."""
+    """A text, which the arrows move when it does not fit. `HINT`: what the keys do."""
 
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("up", "scroll(-1)", "Up"),
+        ("down", "scroll(1)", "Down"),
+        ("pageup", "scroll(-8)", "Page up"),
+        ("pagedown", "scroll(8)", "Page down"),
+    ]
     HINT: ClassVar[str]
 
     def __init__(self, title: str, text: Text) -> None:
@@ -85,8 +96,14 @@ class _TextDialog(ModalScreen[T]):
         with Vertical(classes="dialog") as box:
             box.border_title = self._title
             box.border_subtitle = self.HINT
-            yield Static(self._text, classes="dialog-text")
+            yield VerticalScroll(
+                Static(self._text, classes="dialog-text"), classes="dialog-scroll", can_focus=False
+            )
         yield StopBar()
+
+    def action_scroll(self, lines: int) -> None:
+        """Scroll the text."""
+        self.query_one(VerticalScroll).scroll_relative(y=lines, animate=False)
 
 
 class Confirm(_TextDialog[bool]):
@@ -114,6 +131,7 @@ KEYS = (
     ("^A ^A", "STOP all missions"),
     ("^C ^C", "as ^X; when nothing runs, quit"),
     ("s", "send a signal"),
+    ("m", "start a mission, chosen from the files there are"),
     ("t", "take a vehicle to steer by hand, or give it back"),
     ("r", "look at another run"),
     ("/", "log: only lines with a text; Esc: all"),

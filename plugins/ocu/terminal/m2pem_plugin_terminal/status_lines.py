@@ -31,6 +31,7 @@ HINTS = (
     ("p", "Pause"),
     ("s", "Signals"),
     ("t", "Take"),
+    ("m", "Start"),
     ("r", "Runs"),
     ("/", "Filter"),
     ("?", "Help"),

@@ -214,7 +214,7 @@ async def test_nothing_is_cut_off_in_80_columns(world: World) -> None:
         assert len(lines) == 24
         assert not terminal.shows("…")
         keys = " ".join(lines[-1].split())
-        assert keys == "^X STOP p Pause s Signals t Take r Runs / Filter ? Help q Quit"
+        assert keys == "^X STOP p Pause s Signals t Take m Start r Runs / Filter ? Help q Quit"
         await terminal.press("question_mark")
         await terminal.until_shown("answer the question", "done, given up, failed", "Esc: close")
 

@@ -17,6 +17,7 @@ RUN = (
     "run missions/vignette1.bpmn --fleet fleet_configs/vignette1.yaml --simulate --speed 20 "
     "--answers missions/answers/vignette1_detection_live.yaml"
 )
+SERVE = "serve --fleet fleet_configs/vignette1.yaml --simulate --speed 20"
 PATIENCE_S = 40.0
 NUMBERS = itertools.count(1)
 
@@ -166,3 +167,45 @@ def test_without_a_terminal_it_is_plain_lines(tmux: Tmux) -> None:
     assert done.returncode == 0, done.stdout
     assert "no terminal here for --ocu terminal; using plain" in done.stdout
     assert "\x1b" not in done.stdout
+
+
+def test_a_mission_is_started_from_the_list_and_goes_on_when_the_operator_quits(
+    tmux: Tmux,
+) -> None:
+    anna = tmux.terminal("anna@gcs1", SERVE)
+    anna.until_shown("no mission is running", "m Start")
+    anna.press("m")
+    anna.until_shown("Start a mission", "mehds_vignette_1.bpmn")
+    anna.until(lambda screen: "vignette1.bpmn: nothing found" in screen, press="Down")
+    anna.press("Enter")
+    anna.until_shown("Start vignette1.bpmn?", "y: yes")
+    anna.press("y")
+    anna.until_shown("RUNNING", "Question: USER SEND ROUTE")
+    bob = tmux.terminal("bob@gcs2", "attach")
+    bob.until_shown("Question: USER SEND ROUTE")
+    bob.press("q")
+    bob.until_shown("r1 is running. To stop it, press ^X twice.")
+    bob.press("1")
+    bob.until(lambda _: says(bob, "missions go on: r1. `m2pem attach` shows it"))
+    anna.press("q")
+    anna.until_shown("Quit, and let the mission go on")
+    anna.press("1")
+    anna.until(lambda _: says(anna, "serving goes on; missions go on: r1"))
+    anna.until(lambda _: says(anna, "`m2pem stop r1` stops r1, Ctrl-C here stops everything"))
+    assert tmux.m2pem("stop r1").returncode == 0
+    anna.press("C-c")
+    anna.until_shown("status 0")
+
+
+def test_the_plain_unit_says_what_goes_on_when_the_operator_quits(tmux: Tmux) -> None:
+    anna = tmux.terminal("anna@gcs1", f"{SERVE} --ocu plain")
+    anna.until_shown("serving mehds-vignette-1")
+    anna.press("quit", "Enter")
+    anna.until(lambda _: says(anna, "serving goes on; no mission runs"))
+    anna.press("C-c")
+    anna.until_shown("status 0")
+
+
+def says(pane: Pane, text: str) -> bool:
+    """Whether a text is on the screen, which may have wrapped it."""
+    return "".join(text.split()) in "".join(pane.screen.split())

@@ -56,6 +56,8 @@ QUERIES = {
 NOT_SERVED = {
     "start": "POST /api/runs names a mission of the server's folder, or brings its BPMN",
     "check": "POST /api/checks brings the BPMN of a draft",
+    "missions": "GET /api/missions lists the server's folder",
+    "preview_start": "POST /api/checks has the findings",
     "preview_take": "no page takes a vehicle, so that there is nothing to warn of",
     "wait": "a page follows the end of a run over its WebSocket",
     "subscribe": "the WebSocket sends what is committed, folded into views of runs",

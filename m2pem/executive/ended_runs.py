@@ -1,0 +1,54 @@
+"""What operators read when a run takes a request no more, or not in its state."""
+
+from datetime import UTC, datetime
+
+from m2pem.engine import inputs as i
+from m2pem.engine.inputs import Input
+from m2pem.engine.state import RunStatus
+from m2pem.journal.base import RunInfo
+from m2pem.units import US_PER_S
+
+NOTHING_TO_DO = {
+    "stop": "there was nothing to stop",
+    "pause": "there was nothing to pause",
+    "resume": "there is nothing to go on with: m2pem start begins its mission anew",
+    "answer": "no question of it is open",
+    "signal": "it takes no signals any more",
+    "message": "it takes no messages any more",
+    "set_geometry": "it takes no geometries any more",
+}
+"""By the method of `MissionControl`: what its end means for the request."""
+
+
+def describe_end(request: str, run: str, line: RunInfo | None, released: str = "") -> str:
+    """Say that a run has ended, how and when, and what that means for a request.
+
+    `line`: what the journal knows of the run, None: nothing yet. `released`: the resources that it
+    is releasing still.
+    """
+    how = ""
+    if line is not None and line.outcome is not None:
+        how = f" ({line.outcome.value}{f': {line.detail}' if line.detail else ''})"
+    when = ""
+    if line is not None and line.ended_us is not None:
+        at = datetime.fromtimestamp(line.ended_us / US_PER_S, UTC)
+        when = f" on {at:%Y-%m-%d at %H:%M:%S} UTC"
+    what = NOTHING_TO_DO.get(request, "")
+    if released and request == "stop":
+        what = f"STOP went to what it is still releasing: {released}"
+    return f"{run} has ended{when}{how}{f'; {what}' if what else ''}"
+
+
+def in_words(item: Input, reason: str) -> str:
+    """Return the reason why the engine ignored an input, as an operator understands it.
+
+    The reasons of the journal name the class of the input.
+    """
+    words: dict[tuple[type[Input], RunStatus], str] = {
+        (i.PauseRun, RunStatus.PAUSED): "it is paused already",
+        (i.ResumeRun, RunStatus.RUNNING): "it is not paused",
+    }
+    for (kind, status), text in words.items():
+        if isinstance(item, kind) and reason == f"{kind.__name__} while the run is {status.value}":
+            return text
+    return reason
