@@ -201,8 +201,6 @@ OPERATIONS: dict[str, Operation] = {
     for operation in (
         Operation("start", Start, RunId, alone=True),
         Operation("check", Check, list[Finding], alone=True, slow=True),
-        Operation("missions", Nothing, list[str], alone=True),
-        Operation("preview_start", Check, StartPreview, alone=True),
         Operation("answer", Answer),
         Operation("signal", Signal),
         Operation("message", Message),
@@ -215,6 +213,8 @@ OPERATIONS: dict[str, Operation] = {
         Operation("preview_take", Preview, list[TakeEffect]),
         Operation("give_back", Resource),
         Operation("holders", Nothing, dict[ResourceId, str]),
+        Operation("missions", Nothing, list[str], alone=True),
+        Operation("preview_start", Check, StartPreview, alone=True),
         Operation("runs", Nothing, list[RunSummary]),
         Operation("prompts", Nothing, list[OpenPrompt]),
         Operation("records", Page, list[StampedRecord]),

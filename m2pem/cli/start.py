@@ -46,24 +46,34 @@ def start(
 ) -> None:
     """Start a mission in an executive that is running on this host.
 
-    `m2pem serve` is one, with its fleet. Prints the id of the run. The files of the mission are
+    `m2pem serve` is one, with its fleet. Prints the id of the run, and before it, as notes, the
+    warnings that `m2pem check` has of the mission with that fleet. The files of the mission are
     read here, and sent.
     """
+    import msgspec
+
     from m2pem.api.operations import mission_files
     from m2pem.api.operator import operator_name
     from m2pem.cli.notes import note
     from m2pem.control_socket.client import LONG_TIMEOUT_S, ask, choose_executive
-    from m2pem.executive.loading import load_source, without_effect
+    from m2pem.executive.loading import load_source
+    from m2pem.findings import Finding, has_errors, lines
 
     path = choose_executive(journal_file(journal), run_on)
     loaded = load_source(mission, search_path)
-    for line in without_effect(loaded):
-        note(line)
+    files = mission_files(loaded)
+    found = ask(
+        path, "check", timeout_s=LONG_TIMEOUT_S, mission=files, process=process, data=list(data)
+    )
+    findings = msgspec.convert(found, list[Finding])
+    if not has_errors(findings):  # else the refusal has them all
+        for line in lines(findings):
+            note(line)
     run = ask(
         path,
         "start",
         timeout_s=LONG_TIMEOUT_S,
-        mission=mission_files(loaded),
+        mission=files,
         process=process,
         data=data,
         by=by or operator_name(),

@@ -10,14 +10,12 @@ from urllib.parse import unquote, urlsplit
 from m2pem.api.authoring import Draft, MissionFiles, MissionSource
 from m2pem.bpmn import parse_mission
 from m2pem.bpmn.lint import by_file, lint
-from m2pem.bpmn.rules.attributes import MISSPELLED_ATTRIBUTE
-from m2pem.bpmn.rules.extensions import FOREIGN_EXTENSION, MISPLACED_EXTENSION
 from m2pem.bpmn.rules.files import TOO_LARGE, UNREADABLE_FILE
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.bpmn.xml import max_bytes, too_large
 from m2pem.errors import MissionError
 from m2pem.executive.fleet_connections import FleetArbiters
-from m2pem.findings import Finding, Severity, has_errors, lines, unreadable_remedy
+from m2pem.findings import Finding, Severity, has_errors, unreadable_remedy
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_named
 from m2pem.fleet.default_fleet import fleet_for
@@ -162,16 +160,6 @@ def _unprovided(mission: Mission, services: Collection[str]) -> list[Finding]:
         for task in mission.activities()
         if isinstance(task, ServiceTask) and task.call and task.call.service not in services
     ]
-
-
-_WITHOUT_EFFECT = frozenset(
-    rule.slug for rule in (MISSPELLED_ATTRIBUTE, MISPLACED_EXTENSION, FOREIGN_EXTENSION)
-)
-
-
-def without_effect(mission: Mission) -> list[str]:
-    """What the author wrote and the run ignores, as printed when a run begins."""
-    return lines(each for each in mission.warnings if each.rule in _WITHOUT_EFFECT)
 
 
 def refuse_errors(what: str, findings: Sequence[Finding]) -> None:

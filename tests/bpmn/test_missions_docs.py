@@ -93,8 +93,8 @@ def test_every_error_that_the_program_throws_is_documented() -> None:
     package = Path(__file__).parent.parent.parent / "m2pem"
     thrown = {
         code
-        for folder in ("engine", "executive", "gateway", "sim")
-        for module in (package / folder).rglob("*.py")
+        for folder in ("engine", "executive", "simulation", "telemetry")
+        for module in sorted((package / folder).rglob("*.py"))
         for code in re.findall(CODE, ALERT.sub("", module.read_text()))
     }
     assert {"NO_FLOW", "LINK_LOST"} <= thrown

@@ -94,6 +94,17 @@ def test_every_file_of_an_example_is_used(example: Path) -> None:
     assert {part for part in parts if part not in used} == set()
 
 
+@every_example
+def test_a_copied_example_needs_no_file_of_another_folder(example: Path) -> None:
+    files = [
+        Path(word)
+        for command in commands(example)
+        for word in words(command)
+        if "/" in word and (REPOSITORY / word).exists()
+    ]
+    assert [file for file in files if not (REPOSITORY / file).is_relative_to(example)] == []
+
+
 # --- what the README shows --------------------------------------------------------------------
 
 

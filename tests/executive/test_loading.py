@@ -3,7 +3,7 @@
 import pytest
 
 from m2pem.bpmn import parse_mission
-from m2pem.executive.loading import findings_for, without_effect
+from m2pem.executive.loading import findings_for
 from m2pem.findings import Severity
 from m2pem.plugins import PluginManager
 
@@ -46,11 +46,3 @@ def test_a_behavior_without_a_role_is_an_error_without_a_fleet() -> None:
         mission = parse_mission(text.format(name).encode(), "mission.bpmn")
         findings = findings_for(mission, None, PluginManager(block=("all",)))
         assert [(each.rule, each.severity) for each in findings] == expected
-
-
-def test_what_a_run_ignores_is_listed_with_what_was_meant() -> None:
-    text = MISSION.replace("<serviceTask", '<serviceTask nmae="Look"')
-    mission = parse_mission(text.format(service="Detector").encode(), "mission.bpmn")
-    (line,) = without_effect(mission)
-    assert "'nmae'" in line
-    assert "did you mean 'name'?" in line
