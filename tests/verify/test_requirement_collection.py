@@ -187,3 +187,36 @@ def test_requirements_of_the_mission_and_beside_it_are_gathered(tmp_path) -> Non
         collect(names(mission), beside)
     with pytest.raises(RequirementsError, match="cannot be read"):
         collect(names(mission), tmp_path / "absent.yaml")
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        (
+            "pattern: response, args: {whn: Drive, then: Drive}",
+            "response takes no 'whn', and needs 'when'; did you mean 'when'?",
+        ),
+        (
+            "pattern: response, args: {trigger: Drive, then: Drive}",
+            "response takes no 'trigger', and needs 'when'; did you mean 'when'?",
+        ),
+        (
+            "pattern: response, args: {trigger: Drive, effect: Drive}",
+            "response takes no 'trigger' and no 'effect', and needs 'when' and 'then'; "
+            "known arguments: when, then, before, after, until",
+        ),
+        (
+            "pattern: response, args: {wen: Drive, thn: Drive}",
+            "response takes no 'wen' and no 'thn', and needs 'when' and 'then'; "
+            "'wen': did you mean 'when'?; 'thn': did you mean 'then'",
+        ),
+        (
+            "pattern: existence, args: {what: Drive, times: 2}",
+            "existence takes no 'times'; known arguments: what, before, after, until",
+        ),
+    ],
+)
+def test_wrong_arguments_are_named_with_those_that_were_meant(written: str, said: str) -> None:
+    with pytest.raises(RequirementsError) as caught:
+        spec(f"requirements: [{{id: a, {written}}}]\n")
+    assert said in str(caught.value)

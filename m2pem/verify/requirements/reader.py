@@ -1,12 +1,12 @@
 """The reader of requirements: what spec files and BPMN files have in common."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from m2pem.errors import ExpressionSyntaxError, M2pemError
-from m2pem.suggestions import suggest
+from m2pem.suggestions import did_you_mean, suggest
 from m2pem.verify.ltl import parse
 from m2pem.verify.ltl.formula import Completed, Formula, negated
 from m2pem.verify.ltl.observer import Observer
@@ -142,13 +142,8 @@ def _values(
 ) -> tuple[dict[str, Any], dict[str, Formula | None]]:
     scopes = [name for name in SCOPES if pattern.scoped and pattern.argument(name) is None]
     known = [*(each.name for each in pattern.arguments), *scopes]
-    for name in written.arguments:
-        if name not in known:
-            raise UnusableError(
-                f"args.{name}",
-                f"{pattern.name} takes no '{name}'",
-                suggest(name, known, "arguments"),
-            )
+    if unknown := [name for name in written.arguments if name not in known]:
+        raise _unknown_arguments(unknown, written, pattern, known)
     scope: dict[str, Formula | None] = dict.fromkeys(SCOPES)
     for name in scopes:
         if name in written.arguments:
@@ -165,6 +160,26 @@ def _values(
         else:
             values[argument.name] = argument.default
     return values, scope
+
+
+def _unknown_arguments(
+    unknown: Sequence[str], written: WrittenRequirement, pattern: Pattern, known: Sequence[str]
+) -> UnusableError:
+    """Name all arguments that a pattern does not take, and those that it lacks."""
+    free = [name for name in known if name not in written.arguments]
+    needed = [each.name for each in pattern.arguments if each.required and each.name in free]
+    message = f"{pattern.name} takes no {' and no '.join(map(repr, unknown))}"
+    if needed:
+        message += f", and needs {' and '.join(map(repr, needed))}"
+    hints = [did_you_mean(name, free) for name in unknown]
+    if all(hints):
+        each = [f"{name!r}: {hint}" for name, hint in zip(unknown, hints, strict=True)]
+        remedy = hints[0] if len(hints) == 1 else "; ".join(each)
+    elif len(unknown) == len(needed) == 1:
+        remedy = f"did you mean {needed[0]!r}?"
+    else:
+        remedy = f"known arguments: {', '.join(known)}"
+    return UnusableError(f"args.{unknown[0]}", message, remedy)
 
 
 def _value(argument: Argument, value: Any, names: Names, others: Mapping[str, Any]) -> Any:
