@@ -5,13 +5,15 @@ and have no end: those load, and are errors of `check`.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 
 from m2pem.bpmn import garbage_collection
 from m2pem.bpmn.busy_loops import busy_loops
+from m2pem.bpmn.covering_conditions import WrittenValues, uncovered
 from m2pem.bpmn.data_names import unwritten
 from m2pem.bpmn.rules.activities import CALL_RECURSION
 from m2pem.bpmn.rules.events import OUTSIDE_ONLY
-from m2pem.bpmn.rules.gateways import NO_CONDITIONS
+from m2pem.bpmn.rules.gateways import INCOMPLETE_CONDITIONS, NO_CONDITIONS
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.sequence_flows import unreachable
 from m2pem.findings import Finding
@@ -31,6 +33,7 @@ from m2pem.mission.elements import (
     SubProcess,
 )
 from m2pem.mission.events import (
+    ErrorEventDefinition,
     EventDefinition,
     Message,
     MessageEventDefinition,
@@ -58,6 +61,7 @@ def lint(
         findings = [
             *_unreachable(mission),
             *_undecided_gateways(mission),
+            *_incomplete_conditions(mission, known_names, service_writes, behavior_writes),
             *_outside_only(mission),
             *_recursion(mission),
             *busy_loops(mission, known_names),
@@ -109,6 +113,59 @@ def _undecided_gateways(mission: Mission) -> Iterator[Finding]:
                     "give the flows conditions",
                 ),
             )
+
+
+def _incomplete_conditions(
+    mission: Mission,
+    known_names: Iterable[str],
+    service_writes: Mapping[str, Sequence[str]] | None,
+    behavior_writes: Mapping[str, Sequence[str]] | None,
+) -> Iterator[Finding]:
+    """A warning for each gateway without a default that may find no condition true."""
+    undefaulted = [
+        node
+        for node in mission.nodes
+        if isinstance(node, ExclusiveGateway | InclusiveGateway) and node.default is None
+    ]
+    if not undefaulted or any(_catches_no_flow(node) for node in mission.nodes):
+        return
+    outside = {
+        *known_names,
+        *mission.associated,
+        *chain.from_iterable((service_writes or {}).values()),
+        *chain.from_iterable((behavior_writes or {}).values()),
+    }
+    written = WrittenValues(mission.nodes, outside)
+    for node in undefaulted:
+        if not node.outgoing or any(flow.condition is None for flow in node.outgoing):
+            continue
+        case = uncovered(node, written)
+        if case is None:
+            continue
+        kind = "exclusiveGateway" if isinstance(node, ExclusiveGateway) else "inclusiveGateway"
+        last = node.outgoing[-1].id
+        yield _warning(
+            mission,
+            node,
+            INCOMPLETE_CONDITIONS,
+            (
+                "no flow out of the gateway may be true"
+                + (f", for example if {case}" if case else "")
+                + "; the run then ends with error NO_FLOW, unless an event catches it",
+                f'make one the default, <{kind} id="{node.id}" default="{last}">, or cover the '
+                "case; m2pem verify shows whether a run can get there",
+            ),
+        )
+
+
+def _catches_no_flow(node: FlowNode) -> bool:
+    """Whether an event names the error, so that the author has thought of it."""
+    return isinstance(node, Event) and any(
+        isinstance(each, ErrorEventDefinition)
+        and each.error is not None
+        and each.error.code == "NO_FLOW"
+        for each in node.definitions
+    )
 
 
 # --- signals and messages -----------------------------------------------------------------------

@@ -170,7 +170,7 @@ class Control:
         given = _bounded(data)
         if run is not None:
             async with self._explain_end("signal", run):
-                self._supervisor.runner(run)
+                self._refuse_ended(run)
         runners = (
             [self._supervisor.runner(run)]
             if run is not None
@@ -228,8 +228,7 @@ class Control:
             self._supervisor.set_geometry(name, given, None, by)
             return
         async with self._explain_end("set_geometry", run):
-            if self._has_ended(run):
-                raise OperatorError(f"{run} has ended")
+            self._refuse_ended(run)
             self._supervisor.set_geometry(name, given, run, by)
 
     async def take(self, resource: str, *, by: str = "") -> None:
@@ -276,6 +275,10 @@ class Control:
                 raise
             held = "" if runner is None else ", ".join(runner.run.state.held)
             raise OperatorError(describe_end(request, run, line, held)) from error
+
+    def _refuse_ended(self, run: RunId) -> None:
+        if self._has_ended(run):
+            raise OperatorError(f"{run} has ended")
 
     def _has_ended(self, run: RunId) -> bool:
         """Whether a run has ended that this executive knows, and its journal has that."""

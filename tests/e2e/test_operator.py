@@ -79,7 +79,7 @@ def test_what_cannot_be_done_is_said_and_changes_nothing(m2pem: CommandLine) -> 
     status, errors = program.rest()
     assert status == 130
     assert "no run has a signal 'no such'; known: Stop driving" in errors
-    assert "r1: ResumeRun while the run is running" in errors
+    assert "r1: it is not paused" in errors
     assert "'2' is no command, and no prompt is open" in errors
     assert "say which: start FILE" in errors
     assert "r9 is not driven by this executive" in errors

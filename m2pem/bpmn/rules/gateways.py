@@ -29,6 +29,14 @@ NO_CONDITIONS = Rule(
     "no flow out of a gateway has a condition",
     "give the flows conditions",
 )
+INCOMPLETE_CONDITIONS = Rule(
+    315,
+    "incomplete-conditions",
+    "missions.md",
+    W,
+    "a gateway without a default may find none of its flows' conditions true",
+    "draw a default flow, or cover the case",
+)
 NO_ACTIVATION_CONDITION = Rule(
     10605,
     "no-activation-condition",
