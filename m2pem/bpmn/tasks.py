@@ -7,12 +7,19 @@ from typing import TypeVar
 from lxml import etree
 
 from m2pem.bpmn.behaviors import BehaviorReader, is_behavior
+from m2pem.bpmn.camunda_forms import form_definition, form_name, form_remedy
 from m2pem.bpmn.children import Children, own_extensions
 from m2pem.bpmn.context import KEY, MessageUse, PendingPrompt, ReadingContext, association, text_of
 from m2pem.bpmn.events import look_up
 from m2pem.bpmn.extensions import unknown_content
 from m2pem.bpmn.foreign_syntax import script_remedy, statement_remedy, time_remedy
-from m2pem.bpmn.rules.activities import BAD_SCRIPT, DECISION_VALUE, EMPTY_SCRIPT, SCRIPT_LANGUAGE
+from m2pem.bpmn.rules.activities import (
+    BAD_SCRIPT,
+    DECISION_VALUE,
+    EMPTY_SCRIPT,
+    FOREIGN_FORM,
+    SCRIPT_LANGUAGE,
+)
 from m2pem.bpmn.rules.behaviors import DUPLICATE_PROPERTY, NO_SERVICE, TWO_BEHAVIORS, TWO_SERVICES
 from m2pem.bpmn.rules.data import BAD_KEY
 from m2pem.bpmn.rules.events import TIMER_TIME
@@ -228,6 +235,16 @@ def resolve_prompts(context: ReadingContext) -> None:
         for each in pending.inputs:
             for source in each.source_refs:
                 asked.data_object(source, own_decisions=own > 0)
+        definition = form_definition(pending.element)
+        if definition is not None and not (asked.text or asked.decisions):
+            context.findings.warning(
+                definition,
+                pending.task.id,
+                FOREIGN_FORM,
+                f"the form ({form_name(definition)}) is Camunda's, and is not shown: the operator "
+                f"reads '{shorten(pending.documentation or pending.task.label)}' and answers Done",
+                form_remedy(definition),
+            )
         prompt = Prompt(
             asked.text or pending.documentation or pending.task.label,
             tuple(asked.decisions) or _DONE,

@@ -37,6 +37,14 @@ PASSES_EVERYTHING = Rule(
     "a call activity passes all its data",
     "list each value",
 )
+FOREIGN_FORM = Rule(
+    316,
+    "foreign-form",
+    "missions.md",
+    W,
+    "a form of Camunda's is not shown to operators",
+    "write the question as m2pem:prompt and m2pem:decision",
+)
 DECISION_VALUE = Rule(
     217,
     "decision-value",

@@ -51,15 +51,18 @@ _READ = frozenset(
         for name in (
             "adHoc",
             "calledElement",
+            "formDefinition",
             "ioMapping",
             "loopCharacteristics",
             "subscription",
             "taskDefinition",
             "userTask",
+            "userTaskForm",
         )
     ]
 )
-"""Other engines' elements that m2pem reads (docs/missions.md), or that say what it does anyway."""
+"""Other engines' elements that m2pem reads (docs/missions.md), that say what it does anyway, or
+that have a finding of their own."""
 
 _EDITORS = (
     "http://www.omg.org/",
