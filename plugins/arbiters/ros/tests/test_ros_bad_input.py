@@ -117,6 +117,7 @@ RunEnded completed
 """
 
 
+@pytest.mark.long
 def test_a_mission_goes_on_as_if_nothing_were_wrong(
     m2pem: Programs, watch: Watch, tmp_path: Path
 ) -> None:

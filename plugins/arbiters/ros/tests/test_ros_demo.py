@@ -84,6 +84,7 @@ def domain() -> Iterator[int]:
         yield domain
 
 
+@pytest.mark.long
 @pytest.mark.timeout(200)
 def test_a_hazard_is_found_and_the_second_time_the_route_is_driven_to_its_end(
     domain: int, tmp_path: Path

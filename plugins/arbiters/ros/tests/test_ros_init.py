@@ -15,6 +15,7 @@ def there(tmp_path: Path) -> Iterator[Programs]:
         yield started
 
 
+@pytest.mark.long
 @pytest.mark.timeout(200)
 def test_the_folder_runs_on_the_vehicle_of_its_readme(there: Programs) -> None:
     assert there.m2pem("init", "made", "--for", "ros").rest() == 0

@@ -11,7 +11,7 @@ from ros_e2e_watch import Watch, watching
 from ros_e2e_world import ALL_WAYS, convoy, fleet_file
 
 SPEED = 4.0
-FAR_M, NEAR_M = 450.0, 60.0
+FAR_M, NEAR_M = 350.0, 60.0
 """While they drive the longer one, the next executive can begin also on a busy computer."""
 
 END_M = 15.0
@@ -126,6 +126,7 @@ def test_vehicles_drive_on_while_nobody_is_there_and_nothing_is_begun_twice(
     assert min(since[since.index(stood_m) :]) > stood_m - 1.0  # it did not go back
 
 
+@pytest.mark.long
 def test_what_has_ended_meanwhile_is_not_done_again(m2pem: Programs, watch: Watch) -> None:
     first = drive(m2pem, watch, NEAR_M)
     first.until_record("BehaviorProgressed", count=len(ALL_WAYS), state="RUNNING")
@@ -145,12 +146,13 @@ def test_what_has_ended_meanwhile_is_not_done_again(m2pem: Programs, watch: Watc
     assert_begun_once(watch, NEAR_M)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "moment",
     [
         {"DIE_AT_REQUEST": "1"},
         {"DIE_WHEN_TOLD": "progress"},
-        pytest.param({"DIE_WHEN_TOLD": "ended"}, marks=pytest.mark.long),
+        {"DIE_WHEN_TOLD": "ended"},
     ],
     ids=lambda moment: "_".join(map("_".join, moment.items())).lower(),
 )

@@ -45,6 +45,7 @@ def ends(program: Program, vehicle: str) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.long
 def test_a_killed_node_is_a_lost_link_and_the_vehicle_is_used_again_after(
     m2pem: Programs, watch: Watch
 ) -> None:

@@ -140,9 +140,6 @@ SIMULATED_ALONE = {"mehds_vignette_4_aborted_unheard", "mehds_vignette_4_followi
 """Vehicles that stand already have done as they are told, before it can be noticed that one of them
 is silent; the ends are those of other stories (tests/e2e/test_field_missions.py)."""
 
-SHORT = ("mehds_vignette_4_aborted",)
-"""Those that are tried every time: ground, air, camera and detector in one."""
-
 
 def ends_of(story: Story) -> set[str]:
     """All end events to which stories of the same vignette come."""
@@ -160,14 +157,9 @@ def test_every_answers_file_of_the_vignettes_is_tried() -> None:
     assert files - SIMULATED_ALONE == {story.answers for story in STORIES}
 
 
+@pytest.mark.long
 @pytest.mark.timeout(WITHIN_S + 60)
-@pytest.mark.parametrize(
-    "story",
-    [
-        pytest.param(each, id=each.answers, marks=[] if each.answers in SHORT else pytest.mark.long)
-        for each in STORIES
-    ],
-)
+@pytest.mark.parametrize("story", [pytest.param(each, id=each.answers) for each in STORIES])
 async def test_the_vignette_comes_to_its_end_on_the_mixed_fleet(
     story: Story, tmp_path: Path, ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -71,6 +71,7 @@ async def test_a_route_is_driven_through_all_its_places(ugv1: Bench) -> None:
     await ugv1.until(lambda: near(ugv1.place, places[-1]))
 
 
+@pytest.mark.long
 async def test_a_route_that_is_repeated_begins_again_and_ends_when_it_is_asked_to(
     ugv1: Bench,
 ) -> None:
@@ -85,7 +86,7 @@ async def test_a_route_that_is_repeated_begins_again_and_ends_when_it_is_asked_t
 
 async def test_a_held_route_goes_on_with_the_places_that_remain(ugv1: Bench) -> None:
     start = ugv1.place
-    first, last = elsewhere(start, 4.0, 0.0), elsewhere(start, 4.0, 16.0)
+    first, last = elsewhere(start, 3.0, 0.0), elsewhere(start, 3.0, 11.0)
     goal = ugv1.begin("single_vehicle_routing", route=along(first, last), speed=4.0)
     await ugv1.until(lambda: ugv1.place[1] > start[1] + 3.0)
     ugv1.driver.hold()
@@ -102,6 +103,7 @@ async def test_a_held_route_goes_on_with_the_places_that_remain(ugv1: Bench) -> 
     assert lowest > held[1] - 0.5, "it must not go back to the place that it has passed"
 
 
+@pytest.mark.long
 async def test_waypoints_are_followed_if_the_fleet_says_so(domain: int, nav2: Peer) -> None:
     async with bench(domain, RouteAction.WAYPOINTS) as ugv1:
         start = ugv1.place
@@ -226,6 +228,7 @@ async def leads(ugv1: Bench, start: tuple[float, float], way_m: float) -> None:
         await asyncio.sleep(0.1)
 
 
+@pytest.mark.long
 async def test_follow_keeps_its_station_behind_a_vehicle_that_moves(ugv1: Bench) -> None:
     start = elsewhere(ugv1.place, 8.0, 0.0)
     lead_at(ugv1, *start)
@@ -245,7 +248,7 @@ async def test_follow_keeps_its_station_behind_a_vehicle_that_moves(ugv1: Bench)
 async def test_goto_a_vehicle_goes_where_it_has_gone(ugv1: Bench) -> None:
     start = elsewhere(ugv1.place, 10.0, 0.0)
     lead_at(ugv1, *start)
-    lead = asyncio.create_task(leads(ugv1, start, 20.0))
+    lead = asyncio.create_task(leads(ugv1, start, 8.0))
     try:
         goal = ugv1.begin("goto", target=VehiclePosition("lead"))
         assert await ugv1.state(goal) is BehaviorState.SUCCEEDED

@@ -85,7 +85,12 @@ async def test_a_goal_that_nav2_rejects_is_rejected(ugv1: Bench) -> None:
 
 
 @pytest.mark.parametrize(
-    ("error_code", "code"), [(208, "ROUTE_BLOCKED"), (107, "TIMEOUT"), (202, "FAILED")]
+    ("error_code", "code"),
+    [
+        (208, "ROUTE_BLOCKED"),
+        pytest.param(107, "TIMEOUT", marks=pytest.mark.long),
+        pytest.param(202, "FAILED", marks=pytest.mark.long),
+    ],
 )
 async def test_why_nav2_gave_up_is_told_with_a_code_of_missions(
     ugv1: Bench, error_code: int, code: str
@@ -176,6 +181,7 @@ async def test_a_foreign_goal_takes_over_a_vehicle_that_is_held(ugv1: Bench) -> 
     assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "TAKEN_OVER")
 
 
+@pytest.mark.long
 async def test_a_goal_that_nav2_refuses_to_somebody_else_disturbs_nothing(ugv1: Bench) -> None:
     stranger = await Stranger(ugv1).ready()
     there = ugv1.place[0] + 24.0, ugv1.place[1]
@@ -201,7 +207,7 @@ async def test_an_order_to_stop_stops_also_what_somebody_else_does(ugv1: Bench) 
 async def test_after_a_restart_the_vehicle_drives_on_and_its_end_is_told(
     domain: int, ugv1: Bench
 ) -> None:
-    places = [(ugv1.place[0] + 30.0, ugv1.place[1]), (ugv1.place[0] + 30.0, ugv1.place[1] + 20.0)]
+    places = [(ugv1.place[0] + 20.0, ugv1.place[1]), (ugv1.place[0] + 20.0, ugv1.place[1] + 12.0)]
     order = ugv1.order("single_vehicle_routing", route=along(*places))
     ugv1.driver.begin(order)
     await ugv1.moving(order.goal)
@@ -279,6 +285,7 @@ async def test_a_vehicle_that_was_lost_drives_on_until_it_is_told_something_else
     assert await ugv1.state(ugv1.begin("hold", duration=0.3)) is BehaviorState.SUCCEEDED
 
 
+@pytest.mark.long
 async def test_a_nav2_that_was_started_anew_knows_nothing_of_its_goal(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -298,6 +305,7 @@ async def test_a_nav2_that_was_started_anew_knows_nothing_of_its_goal(
                 assert await ugv1.state(again) is BehaviorState.SUCCEEDED
 
 
+@pytest.mark.long
 async def test_a_nav2_that_has_ended_lets_its_order_fail(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -19,7 +19,7 @@ SPEED = 2.0
 ROUTE = Route(((38.0, -77.0, None), (38.001, -77.0, None)))
 
 
-@pytest.fixture(params=list(Via))
+@pytest.fixture(params=[Via.TOPICS, pytest.param(Via.ACTION, marks=pytest.mark.long)])
 def via(request: pytest.FixtureRequest) -> Via:
     return Via(request.param)
 
@@ -47,6 +47,7 @@ async def test_a_start_before_the_node_is_there_is_done_once_it_is(
         assert (end.state, end.reason) == (CANCELLED, "the node on the vehicle was stopped")
 
 
+@pytest.mark.parametrize("via", list(Via))
 async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
     ros_domain: int, via: Via
 ) -> None:
@@ -65,6 +66,7 @@ async def test_a_node_that_is_killed_and_restarted_has_lost_the_behavior(
         await end_peer(again)
 
 
+@pytest.mark.long
 async def test_both_sides_are_restarted_and_nothing_is_known(ros_domain: int, via: Via) -> None:
     async with bench(ros_domain, "evsg1", via, SPEED) as one:
         peer = await start_peer(ros_domain)

@@ -103,7 +103,7 @@ async def console(domain: int) -> AsyncIterator[Console]:
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    with reserved_domain() as domain, Peer(NODE, domain, ["1", "evsg1"]):
+    with reserved_domain() as domain, Peer(NODE, domain, ["4", "evsg1"]):
         yield domain
 
 
@@ -114,9 +114,9 @@ async def one(domain: int) -> AsyncIterator[Console]:
 
 
 async def test_a_start_that_comes_again_is_done_once_and_answered(one: Console) -> None:
-    id_ = one.start("hold", parameters=[KeyValue(key="duration", value="2.0")])
+    id_ = one.start("hold", parameters=[KeyValue(key="duration", value="4.0")])
     await one.last_of(id_, S.RUNNING)
-    one.start("hold", id_, parameters=[KeyValue(key="duration", value="2.0")])
+    one.start("hold", id_, parameters=[KeyValue(key="duration", value="4.0")])
     await one.last_of(id_, S.SUCCEEDED)
     await one.later()
     begun = one.vehicle.mode
@@ -251,7 +251,7 @@ async def run_goal(one: Console, command: C) -> Any:
 
 
 async def test_a_goal_is_the_behavior_of_its_id_whoever_started_it(one: Console) -> None:
-    id_ = one.start("hold", parameters=[KeyValue(key="duration", value="2.0")])
+    id_ = one.start("hold", parameters=[KeyValue(key="duration", value="4.0")])
     await one.last_of(id_, S.RUNNING)
     await one.later()
     begun = one.vehicle.mode

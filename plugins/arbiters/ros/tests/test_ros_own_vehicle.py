@@ -217,7 +217,7 @@ async def test_a_busy_vehicle_takes_over_only_from_what_it_is_told_to(ros_domain
 
 async def test_a_vehicle_stands_while_it_is_held_and_then_goes_on(ros_domain: int) -> None:
     async with commanded(ros_domain) as sweeper:
-        sweeper.say(START, "b1", "goto", target=east(200))
+        sweeper.say(START, "b1", "goto", target=east(100))
         await sweeper.until(lambda: sweeper.speed_m_s > 1.0)
         sweeper.say(HOLD)
         await sweeper.until(lambda: sweeper.states[-1].held)
@@ -246,6 +246,7 @@ async def test_cancelled_it_has_come_to_a_stand(ros_domain: int) -> None:
         assert sweeper.speed_m_s == 0.0
 
 
+@pytest.mark.long
 async def test_a_vehicle_goes_on_at_another_speed(ros_domain: int) -> None:
     async with commanded(ros_domain) as sweeper:
         sweeper.say(START, "b1", "goto", target=east(500), speed=1.0)

@@ -125,7 +125,11 @@ def reasons(bench: ArbiterHarness) -> str:
 
 @pytest.mark.parametrize(
     ("kind", "settings"),
-    [("node", {}), ("base", {"driver": "base"}), ("nav2", {"driver": "nav2"})],
+    [
+        ("node", {}),
+        pytest.param("base", {"driver": "base"}, marks=pytest.mark.long),
+        pytest.param("nav2", {"driver": "nav2"}, marks=pytest.mark.long),
+    ],
 )
 async def test_a_vehicle_that_returns_is_told_to_stop_and_is_free_when_it_has(
     ros_domain: int, kind: str, settings: Mapping[str, Any]
@@ -153,13 +157,17 @@ async def test_a_vehicle_that_returns_is_told_to_stop_and_is_free_when_it_has(
 
 @pytest.mark.parametrize(
     ("kind", "settings", "topic"),
-    [("node", {}, "/ugv1/vehicle_status"), ("base", {"driver": "base"}, "/ugv1/odom")],
+    [
+        ("node", {}, "/ugv1/vehicle_status"),
+        pytest.param("base", {"driver": "base"}, "/ugv1/odom", marks=pytest.mark.long),
+    ],
 )
 async def test_two_vehicles_in_one_namespace_are_both_named_and_not_commanded(
     ros_domain: int, kind: str, settings: Mapping[str, Any], topic: str
 ) -> None:
     arguments = ["/ugv1", kind, "map"]
-    with Peer(PEER, ros_domain, arguments), Peer(PEER, ros_domain, arguments):
+    one, other = Peer(PEER, ros_domain, arguments), Peer(PEER, ros_domain, arguments)
+    with one, other:
         async with connected(ros_domain, **settings) as (bench, truth):
             await until(lambda: reasons(bench).count("/ugv1/vehicle (gid ") == 2)
             assert state(bench).ready is False  # type: ignore[union-attr]
@@ -173,6 +181,7 @@ async def test_two_vehicles_in_one_namespace_are_both_named_and_not_commanded(
             assert truth.begun() == 0
 
 
+@pytest.mark.long
 async def test_a_vehicle_that_appears_later_is_told_of_and_was_not_restarted(
     ros_domain: int,
 ) -> None:
@@ -198,13 +207,18 @@ async def test_a_vehicle_that_appears_later_is_told_of_and_was_not_restarted(
     ("settings", "frame", "says"),
     [
         ({}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
-        ({"driver": "base"}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
-        ({"driver": "base"}, "", "is in the frame '', declared is 'map'"),
-        ({"driver": "base"}, "ugv1/map", "is in the frame 'ugv1/map', declared is 'map'"),
-        (
-            {"driver": "base", "odom_frame": "odom"},
-            "map",
-            "declared is 'odom', and tf is not read: write 'odom_frame: map'",
+        *(
+            pytest.param({"driver": "base", **more}, frame, says, marks=pytest.mark.long)
+            for more, frame, says in (
+                ({}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
+                ({}, "", "is in the frame '', declared is 'map'"),
+                ({}, "ugv1/map", "is in the frame 'ugv1/map', declared is 'map'"),
+                (
+                    {"odom_frame": "odom"},
+                    "map",
+                    "declared is 'odom', and tf is not read: write 'odom_frame: map'",
+                ),
+            )
         ),
     ],
 )
@@ -237,7 +251,12 @@ async def reason_with_a_name(bench: Any) -> str:
     [
         ({}, "TwistStamped", "is subscribed to as geometry_msgs/msg/TwistStamped (/ugv1/vehicle"),
         ({"stamped": True}, "Twist", "write 'stamped: false' in its connection"),
-        ({}, "pose", "/ugv1/odom is of type geometry_msgs/msg/PoseStamped (/ugv1/vehicle"),
+        pytest.param(
+            {},
+            "pose",
+            "/ugv1/odom is of type geometry_msgs/msg/PoseStamped (/ugv1/vehicle",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 async def test_a_type_that_does_not_match_is_named_before_anything_moves(
@@ -250,8 +269,9 @@ async def test_a_type_that_does_not_match_is_named_before_anything_moves(
 
 
 async def test_what_is_awaited_where_is_said_of_a_vehicle_in_another_domain(
-    ros_domain: int, caplog: pytest.LogCaptureFixture
+    ros_domain: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("m2pem_plugin_ros.arbiter.FIRST_CONTACT_WITHIN_S", 0.5)
     async with connected(ros_domain):
         pass
     expected = (

@@ -13,8 +13,8 @@ from ros_sim_watch import COMMAND, Heard, Joystick, insist, switch, until
 from sensor_msgs.msg import BatteryState, NavSatFix, NavSatStatus
 from std_msgs.msg import UInt32
 
-FOR = "for 20 s"
-"""Four real seconds. On a busy computer it takes one of them until that is seen."""
+FOR = "for 15 s"
+"""Three real seconds. On a busy computer it takes one of them until that is seen."""
 
 SETTINGS = ["sim", "ros", "--driver", "base", "--ground", "2", "--speed", "5"]
 QUIET_S = 0.3
@@ -54,6 +54,7 @@ async def test_a_silent_vehicle_says_nothing_and_then_goes_on(
     await fix.next()
 
 
+@pytest.mark.long
 async def test_odometry_alone_may_stop(ros: RosRuntime, odometry: Heard) -> None:
     fix = Heard(ros, NavSatFix, "/ugv1/fix")
     await switch(ros, f"ugv1: stop odometry {FOR}")
@@ -62,6 +63,7 @@ async def test_odometry_alone_may_stop(ros: RosRuntime, odometry: Heard) -> None
     await odometry.next()
 
 
+@pytest.mark.long
 async def test_odometry_may_freeze_at_a_stamp(ros: RosRuntime, odometry: Heard) -> None:
     await switch(ros, f"ugv1: freeze odometry {FOR}")
     await until(lambda: len(odometry) > 2 and odometry.messages[-2] == odometry.messages[-1])
@@ -86,7 +88,7 @@ async def test_odometry_may_jump(ros: RosRuntime, odometry: Heard) -> None:
 async def test_wheels_that_are_stuck_do_not_obey(ros: RosRuntime, odometry: Heard) -> None:
     motions = Heard(ros, UInt32, "/ugv1/motions", qos.STATUS)
     before = (await until(lambda: motions.last)).data
-    await switch(ros, "ugv1: stuck for 30 s")
+    await switch(ros, f"ugv1: stuck {FOR}")
     async with Joystick(ros, "/ugv1/cmd_vel", 1.0):
         await until(lambda: ros.node.count_subscribers("/ugv1/cmd_vel"))
         seen = len(odometry)
@@ -97,6 +99,7 @@ async def test_wheels_that_are_stuck_do_not_obey(ros: RosRuntime, odometry: Hear
         await until(lambda: motions.last.data > before)
 
 
+@pytest.mark.long
 async def test_satellites_may_be_lost(ros: RosRuntime, odometry: Heard) -> None:
     fix = Heard(ros, NavSatFix, "/ugv1/fix")
     diagnostics = Heard(ros, DiagnosticArray, "/diagnostics", qos.EVENTS)

@@ -117,7 +117,7 @@ async def test_a_simulated_vehicle_does_what_it_is_commanded_and_counts_the_moti
 async def test_a_simulated_vehicle_refuses_with_the_reason_that_it_was_told(
     vehicle: Vehicle, ros: RosRuntime
 ) -> None:
-    await switch(ros, 'ugv1: refuse "too wet" for 30 s')
+    await switch(ros, 'ugv1: refuse "too wet" for 15 s')
     name = await vehicle.start("reverse", distance=1.0)
     refused = next(each for each in vehicle.statuses.messages if each.id == name)
     assert (refused.id, refused.state, refused.reason) == (name, BehaviorStatus.REJECTED, "too wet")
@@ -129,7 +129,7 @@ async def test_a_simulated_vehicle_refuses_with_the_reason_that_it_was_told(
 
 
 async def test_a_simulated_vehicle_may_miss_new_commands(vehicle: Vehicle, ros: RosRuntime) -> None:
-    await switch(ros, "ugv1: never accept for 20 s")
+    await switch(ros, "ugv1: never accept for 12 s")
     name = f"b{next(ids)}"
     state = vehicle.states.last
     vehicle.say(BehaviorCommand.START, name, "reverse", distance=1.0)
@@ -139,6 +139,7 @@ async def test_a_simulated_vehicle_may_miss_new_commands(vehicle: Vehicle, ros: 
     await vehicle.insist(said, BehaviorCommand.START, name, "reverse", distance=1.0)
 
 
+@pytest.mark.long
 async def test_a_simulated_vehicle_may_lie(vehicle: Vehicle, ros: RosRuntime) -> None:
     await switch(ros, "ugv1: lie for 30 s")
     await vehicle.statuses.next(lambda m: m.id.startswith("never-given-"))
@@ -149,6 +150,7 @@ async def test_a_simulated_vehicle_may_lie(vehicle: Vehicle, ros: RosRuntime) ->
     await vehicle.statuses.silence(QUIET_S)  # the next test is to find an honest vehicle
 
 
+@pytest.mark.long
 async def test_a_simulated_vehicle_may_flood(vehicle: Vehicle, ros: RosRuntime) -> None:
     before = len(vehicle.statuses)
     await switch(ros, "ugv1: flood 2000 for 15 s")
@@ -161,7 +163,7 @@ async def test_its_node_may_die_alone_and_forgets_what_it_did(
 ) -> None:
     name = await vehicle.start("teleop")
     await until(lambda: BehaviorStatus.RUNNING in vehicle.of(name))
-    await switch(ros, "ugv1: kill node for 30 s")
+    await switch(ros, "ugv1: kill node for 20 s")
     await until(lambda: ros.node.count_publishers("/ugv1/vehicle_status") == 0)
     assert ros.node.count_publishers("/ugv1/odom") == 1
     await vehicle.odometry.next(stands)
@@ -173,6 +175,7 @@ async def test_its_node_may_die_alone_and_forgets_what_it_did(
     await until(lambda: BehaviorStatus.SUCCEEDED in vehicle.of(again))
 
 
+@pytest.mark.long
 async def test_a_simulated_vehicle_stops_and_gives_up_when_its_odometry_is_no_number(
     vehicle: Vehicle, ros: RosRuntime
 ) -> None:
