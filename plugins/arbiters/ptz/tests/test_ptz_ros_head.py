@@ -6,10 +6,10 @@ import math
 import pytest
 from ptz_ros_world import AMPLE_S, make_driver, until, world
 
-COMMANDS = ["trajectory", "positions"]
+COMMANDS = ["trajectory", pytest.param("positions", marks=pytest.mark.long)]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ["trajectory", "positions"])
 async def test_a_ptz_head_points_clockwise_and_up_and_says_so(
     ros_domain, tmp_path, command
 ) -> None:
@@ -40,6 +40,7 @@ async def test_a_ptz_head_turns_no_faster_than_asked_and_the_last_order_counts(
         assert min(math.degrees(each["pan_joint"]) for each in it.history) > -80.0
 
 
+@pytest.mark.long
 async def test_orders_that_come_again_and_again_arrive_no_sooner(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path, command="positions") as it:
         await it.ready()
@@ -119,6 +120,7 @@ async def test_joints_that_fall_silent_are_not_heard(ros_domain, tmp_path) -> No
         await until(lambda: it.heard[-1] > loop.time() - 0.2)
 
 
+@pytest.mark.long
 async def test_a_fault_of_a_simulated_camera_ends_after_its_duration(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
@@ -128,6 +130,7 @@ async def test_a_fault_of_a_simulated_camera_ends_after_its_duration(ros_domain,
         await until(lambda: it.heard[-1] > loop.time() - 0.2)
 
 
+@pytest.mark.long
 async def test_words_that_are_no_fault_leave_a_simulated_camera_as_it_is(
     ros_domain, tmp_path
 ) -> None:
@@ -151,6 +154,7 @@ async def test_a_camera_that_is_not_there_says_what_is_missing(ros_domain, tmp_p
         assert not it.heard
 
 
+@pytest.mark.long
 async def test_joints_of_others_are_named(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path) as it:
         await it.ready()

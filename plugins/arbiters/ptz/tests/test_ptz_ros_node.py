@@ -13,10 +13,9 @@ from m2pem.api.clock import SystemClock
 from m2pem.testing import run_mission, scenarios
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
-VIAS = ("topics", "action")
 
-
-@pytest.mark.parametrize("via", VIAS)
+@pytest.mark.long
+@pytest.mark.parametrize("via", ["topics", "action"])
 async def test_pictures_come_back_to_the_mission(via: str, tmp_path: Path, ros_domain: int) -> None:
     async with world(ros_domain, tmp_path, via=via) as it:
         await it.bench.start("r1.b1", "take_picture", CAMERA, count=2, interval=0.1)
@@ -98,8 +97,11 @@ async def test_what_the_camera_itself_refuses_fails_with_its_reason(
         assert (await it.bench.ended("r1.b2", AMPLE_S)).state.terminal, "it goes on to serve"
 
 
-async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(ros_domain: int) -> None:
-    clock = SystemClock()
+async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("m2pem_plugin_ros.arbiter.FIRST_CONTACT_WITHIN_S", 0.5)
+    clock = SystemClock(10.0)
     arbiter = RosArbiter({CAMERA: connection(CAMERA, ros_domain)}, context(clock))
     async with ArbiterHarness(arbiter, clock) as bench:
 
@@ -114,8 +116,10 @@ async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(ros_doma
 
 
 def test_a_mission_gets_the_pictures_that_a_payload_with_a_node_took(
-    tmp_path: Path, ros_domain: int
+    tmp_path: Path, ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # The vehicle of the fleet is not there.
+    monkeypatch.setattr("m2pem_plugin_ros.arbiter.FIRST_CONTACT_WITHIN_S", 2.0)
     own = connection(CAMERA, ros_domain).settings
     fleet = scenarios.fleet(
         "ros", {"ugv1": {"namespace": "/ugv1", "domain_id": ros_domain}, CAMERA: own}

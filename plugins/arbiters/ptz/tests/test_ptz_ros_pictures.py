@@ -71,6 +71,7 @@ async def test_a_video_is_a_file_of_pictures(ros_domain, tmp_path) -> None:
         assert content.count(b"\xff\xd8\xff\xfe") == content.count(b"pan ") >= 2
 
 
+@pytest.mark.long
 async def test_two_videos_never_share_a_file(ros_domain, tmp_path) -> None:
     async with world(ros_domain, tmp_path) as it:
         await it.ready()
@@ -116,6 +117,7 @@ class Full(FileIO):
             raise OSError(28, "No space left on device")
 
 
+@pytest.mark.long
 async def test_a_disk_that_is_full_is_told_at_the_end(ros_domain, tmp_path, monkeypatch) -> None:
     async with world(ros_domain, tmp_path) as it:
         await it.ready()

@@ -43,7 +43,7 @@ def environment(tmp_path: Path) -> Iterator[dict[str, str]]:
 
 @pytest.fixture
 def served(environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    speed = "--speed 50"  # so that an operator on a busy computer sees what goes on
+    speed = "--speed 100"  # so that an operator on a busy computer sees what goes on
     words = f"serve --fleet {EXAMPLE / 'fleet.yaml'} --ocu mocu {speed} --journal memory:"
     process = subprocess.Popen(
         [sys.executable, "-m", "m2pem", *words.split()],

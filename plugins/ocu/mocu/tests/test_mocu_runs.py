@@ -136,6 +136,7 @@ async def test_either_a_url_or_bytes_are_given(world: World, client: Client, mis
     assert "not as both" in response["message"]
 
 
+@pytest.mark.long
 async def test_fifty_megabytes_are_refused_and_disturb_nobody(
     world: World, client: Client, clients: list[Client], tmp_path: Path
 ) -> None:

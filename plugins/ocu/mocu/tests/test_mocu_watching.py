@@ -191,6 +191,7 @@ async def test_a_flood_of_calls_starves_no_prompt(
     assert (await client.call("answer_prompt", **answer))["success"]
 
 
+@pytest.mark.long
 async def test_each_of_many_calls_at_once_is_answered(world: World, client: Client) -> None:
     answers = await client.responses(client.send("list_runs", times=1500), 1500)
     refused = [each["message"] for each in answers if not each["success"]]
