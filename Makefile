@@ -138,8 +138,12 @@ $(ROS)/installed: $(ROS)/created pyproject.toml constraints.txt $(PLUGINS:%=%/py
 	  $(ROS_PLUGINS:%=--editable '%[wheels]')
 	@touch $@
 
+# They wait, for DDS and for what moves, two thirds of their time: two workers for each processor have enough to do.
+# Neighbours stay together (worksteal), as the tests of a file share processes.
+ROS_WORKERS := 4
+
 test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
-	@$(ROS_PYTHON) -m pytest -n 2 -m "not long" $(ROS_TESTS)
+	@$(ROS_PYTHON) -m pytest -n $(ROS_WORKERS) --dist worksteal -m "not long" $(ROS_TESTS)
 	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
 
 demo: $(call packages_for,demo) ## run the paper's mission on simulated vehicles, in two ways

@@ -115,7 +115,7 @@ def _ros_command(journal: str, bound_ms: float | None) -> Program:
         Goal("cpu_percent", f"an executive with all that, ROS, {journal} journal, of a core", "%"),
     )
     command = ("ros_command", journal, "20", "500")
-    quick = ("ros_command", journal, "3", "10")
+    quick = ("ros_command", "sqlite", "3", "10")
     return Program("20 vehicles, 10 messages/s each", command, quick, goals, ros=True)
 
 
@@ -130,7 +130,7 @@ def _team_orders(journal: str) -> Program:
         )
     ]
     command = ("team_orders", journal, "5", "5", "100")
-    quick = ("team_orders", journal, "2", "2", "3")
+    quick = ("team_orders", "sqlite", "2", "2", "3")
     size = "5 ROS and 5 MAVLink members, 10 and 50 messages/s each"
     return Program(size, command, quick, tuple(goals), ros=True)
 
