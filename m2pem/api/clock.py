@@ -51,21 +51,28 @@ class SystemClock:
     """The wall clock at start plus steady time: it never goes back, and never jumps with NTP.
 
     `speed`: seconds of this clock in a real second. `start_us`: what it shows at first,
-    microseconds since the Unix epoch; None is now.
+    microseconds since the Unix epoch; None is now. `steady_ns`: returns the steady time in
+    nanoseconds; None is the computer's.
     """
 
-    def __init__(self, speed: float = 1.0, start_us: int | None = None) -> None:
+    def __init__(
+        self,
+        speed: float = 1.0,
+        start_us: int | None = None,
+        steady_ns: Callable[[], int] | None = None,
+    ) -> None:
         if not (speed > 0 and math.isfinite(speed)):
             raise ValueError(f"the speed of a clock is a positive number, not {speed}")
         self.speed = speed
         # Whole numbers: a float would lose microseconds in a process that runs for months.
         self._numerator, self._denominator = speed.as_integer_ratio()
-        self._started_ns = time.monotonic_ns()
+        self._steady_ns = steady_ns or time.monotonic_ns
+        self._started_ns = self._steady_ns()
         self._start_us = time.time_ns() // 1000 if start_us is None else start_us
 
     def now_us(self) -> int:
         """Microseconds since the Unix epoch; never goes back."""
-        elapsed_ns = time.monotonic_ns() - self._started_ns
+        elapsed_ns = self._steady_ns() - self._started_ns
         return self._start_us + elapsed_ns * self._numerator // (self._denominator * 1000)
 
     async def sleep(self, seconds: float) -> None:
@@ -78,8 +85,8 @@ class SystemClock:
         if remaining_us <= 0:
             await asyncio.sleep(0)
         while remaining_us > 0:
-            # The loop may wake us a clock tick early.
-            await asyncio.sleep(remaining_us / US_PER_S / self.speed)
+            # The loop may wake us a clock tick early, and a virtual one counts microseconds.
+            await asyncio.sleep(math.ceil(remaining_us / self.speed) / US_PER_S)
             remaining_us = time_us - self.now_us()
 
 
@@ -179,17 +186,22 @@ class _Moment(float):
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """An event loop whose time is virtual; see the module. Use `run_virtual`."""
+    """An event loop whose time is virtual; see the module. Use `run_virtual`.
+
+    `selector`: what it waits with, made for this loop; by default one that refuses I/O.
+    """
 
     _scheduled: list[asyncio.TimerHandle]  # asyncio's heap; its head is never a cancelled one here
 
-    def __init__(self) -> None:
+    def __init__(
+        self, selector: "Callable[[VirtualLoop], selectors.BaseSelector] | None" = None
+    ) -> None:
         self.elapsed_us = 0
         self.when_idle: Callable[[float | None], bool] = lambda _: False
         self._main: asyncio.Task[Any] | None = None
         self._threads_at_work = 0
         self._timer_numbers = itertools.count()
-        super().__init__(_JumpingSelector(self))
+        super().__init__((selector or _JumpingSelector)(self))
         # asyncio fires timers that are due within the clock's resolution. Half a microsecond never
         # fires one early, as all are due at whole ones; the default, a nanosecond, is lost when
         # added to a float of some months, and then the timer would never be due.

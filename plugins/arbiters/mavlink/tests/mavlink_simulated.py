@@ -13,8 +13,8 @@ from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 from m2pem.api import Clock, Connection, FleetBus, LocalFrame, ResourceId, offset
-from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
+from m2pem.testing.loopback import run_on_loopback
 
 HOME = (47.397742, 8.545594)
 HOME_ALTITUDE_M = 488.0
@@ -112,13 +112,12 @@ def fly(
 ) -> None:
     """Run `main` with an arbiter on simulated vehicles."""
 
-    async def run() -> None:
+    async def run(clock: Clock) -> None:
         async with Simulator(specs(*kinds), speed=speed, to=None) as simulator:
-            clock = SystemClock(speed)
             lent = context(clock)
             arbiter = MavlinkArbiter(connections(simulator, **more), lent)
             async with Bench(arbiter, clock) as bench:
                 bench.simulator, bench.bus = simulator, lent.bus
                 await main(bench)
 
-    asyncio.run(run())
+    run_on_loopback(run, speed)

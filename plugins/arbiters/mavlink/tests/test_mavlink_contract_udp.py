@@ -1,7 +1,6 @@
 """The contract of arbiters, against simulated autopilots over real UDP."""
 
 import asyncio
-import threading
 from typing import ClassVar
 
 import pytest
@@ -14,8 +13,8 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_simulated import at, connections, specs
 
 from m2pem.api import Point, ResourceId, Route
-from m2pem.api.clock import SystemClock
 from m2pem.testing import ArbiterCase, ArbiterContract
+from m2pem.testing.loopback import run_on_loopback
 
 A, B = ResourceId("v1"), ResourceId("v2")
 NUMBERS = {A: 1, B: 2}
@@ -23,38 +22,28 @@ SPEED = 20.0
 
 
 class _Simulated(ArbiterContract):
-    """The vehicles are simulated in a loop and thread of their own: they outlive the arbiters."""
+    """The vehicles are simulated in the same event loop, and outlive the arbiters."""
 
-    unsupported: ClassVar = {"virtual clock": "vehicles are told over real sockets"}
-    speed = SPEED
     kind = Kind.ROVER
     firmware = "ardupilot"
 
     @pytest.fixture
     def simulator(self):
-        simulator = Simulator(
-            specs(self.kind, self.kind, firmware=self.firmware), speed=SPEED, to=None
-        )
-        started, stop = threading.Event(), asyncio.Event()
-        loop = asyncio.new_event_loop()
+        return Simulator(specs(self.kind, self.kind, firmware=self.firmware), speed=SPEED, to=None)
 
-        async def main() -> None:
-            async with simulator:
-                await self.prepare(simulator)
-                started.set()
-                await stop.wait()
+    @pytest.fixture
+    def run(self, simulator):
+        def run(main) -> None:
+            async def on_vehicles(clock) -> None:
+                async with simulator:
+                    await self.prepare(simulator, clock)
+                    await main(clock)
 
-        thread = threading.Thread(
-            target=loop.run_until_complete, args=(main(),), name="asyncio_simulator"
-        )
-        thread.start()
-        assert started.wait(20)
-        yield simulator
-        loop.call_soon_threadsafe(stop.set)
-        thread.join()
-        loop.close()
+            run_on_loopback(on_vehicles, SPEED)
 
-    async def prepare(self, simulator) -> None:
+        return run
+
+    async def prepare(self, simulator, clock) -> None:
         """Have the vehicles ready to move."""
 
     @pytest.fixture
@@ -92,8 +81,8 @@ class _Simulated(ArbiterContract):
 class _Airborne(_Simulated):
     kind = Kind.COPTER
 
-    async def prepare(self, simulator) -> None:
-        await asyncio.gather(*(take_off(simulator[number], number) for number in (1, 2)))
+    async def prepare(self, simulator, clock) -> None:
+        await asyncio.gather(*(take_off(simulator[number], number, clock) for number in (1, 2)))
 
 
 class _OnARoute(_Simulated):
@@ -139,7 +128,6 @@ class _Winged(_Airborne):
 
     kind = Kind.PLANE
     unsupported: ClassVar = {
-        **_Simulated.unsupported,
         "hold": "a plane that is held circles: it never stands",
     }
 
@@ -205,9 +193,8 @@ def on_a_route() -> ArbiterCase:
     )
 
 
-async def take_off(truth, number: int) -> None:
+async def take_off(truth, number: int, clock) -> None:
     host, port = truth.address
-    clock = SystemClock(SPEED)
     link = await open_link(Address(number, 1), [f"udpout://{host}:{port}"], clock)
     vehicle = Vehicle(ResourceId("v"), "air", link, clock)
     vehicle.open()

@@ -18,7 +18,7 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import LinkState, ResourceId
-from m2pem.api.clock import SystemClock
+from m2pem.testing.loopback import loop_clock, on_loopback
 
 SPEED = 20.0
 AMPLE_S = 400.0
@@ -34,7 +34,7 @@ async def flying(
     spec = VehicleSpec(kind, firmware=firmware, estimator_s=6.0)
     async with Simulator([spec], speed=SPEED, to=None) as simulator:
         host, port = simulator[1].address
-        clock = SystemClock(SPEED)
+        clock = loop_clock(SPEED)
         link = await open_link(Address(1, 1), [f"udpout://{host}:{port}"], clock, OWN)
         domain = "air" if kind is Kind.COPTER else "ground"
         vehicle = Vehicle(ResourceId("uav1"), domain, link, clock)
@@ -47,6 +47,7 @@ async def flying(
             await link.close()
 
 
+@on_loopback
 async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> None:
     async with flying() as (truth, vehicle):
         assert vehicle.telemetry().ready is False
@@ -67,6 +68,7 @@ async def test_a_copter_waits_for_its_estimator_takes_off_goes_and_returns() -> 
         assert await vehicle.until(lambda: vehicle.state.landed is True, AMPLE_S)
 
 
+@on_loopback
 async def test_a_takeoff_that_was_stopped_on_the_ground_can_be_begun_again() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.driver.take_off(6.0)
@@ -79,6 +81,7 @@ async def test_a_takeoff_that_was_stopped_on_the_ground_can_be_begun_again() -> 
         )
 
 
+@on_loopback
 async def test_a_copter_stands_soon_after_a_stop() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.driver.take_off(10.0)
@@ -90,6 +93,7 @@ async def test_a_copter_stands_soon_after_a_stop() -> None:
         assert await vehicle.until(lambda: vehicle.state.speed_m_s < 0.2, AMPLE_S)
 
 
+@on_loopback
 async def test_velocities_move_it_while_they_are_repeated() -> None:
     async with flying() as (_, vehicle):
         await vehicle.driver.take_off(10.0)
@@ -101,6 +105,7 @@ async def test_velocities_move_it_while_they_are_repeated() -> None:
         assert await vehicle.until(lambda: vehicle.state.speed_m_s < 0.2, AMPLE_S)
 
 
+@on_loopback
 async def test_a_rover_is_armed_drives_holds_and_does_not_take_off() -> None:
     async with flying(Kind.ROVER) as (truth, vehicle):
         with pytest.raises(RefusedError, match="a rover does not take off"):
@@ -114,6 +119,7 @@ async def test_a_rover_is_armed_drives_holds_and_does_not_take_off() -> None:
         assert vehicle.state.landed is True
 
 
+@on_loopback
 async def test_another_ground_station_is_noticed() -> None:
     async with flying() as (truth, vehicle):
         watch = TakeoverMonitor(vehicle, OWN.system)
@@ -124,8 +130,8 @@ async def test_another_ground_station_is_noticed() -> None:
         assert watch.takeover(flying_modes) is None
         host, port = truth.address
         url = f"udpout://{host}:{port}"
-        link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
-        other = Vehicle(ResourceId("qgc"), "air", link, SystemClock(SPEED))
+        link = await open_link(Address(1, 1), [url], loop_clock(SPEED), Address(254, 190))
+        other = Vehicle(ResourceId("qgc"), "air", link, loop_clock(SPEED))
         other.open()
         assert await other.identified(AMPLE_S)
         await other.driver.set_mode(FlightMode.LAND)
@@ -148,6 +154,7 @@ TAKEOFF = MissionItem(22, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, altitude_m=10.0
 ROUTE = (TAKEOFF, waypoint(47.3979), waypoint(47.3981), waypoint(47.3983))
 
 
+@on_loopback
 async def test_a_mission_is_stored_read_and_flown_from_the_ground() -> None:
     async with flying() as (truth, vehicle):
         driver = vehicle.driver
@@ -168,6 +175,7 @@ async def test_a_mission_is_stored_read_and_flown_from_the_ground() -> None:
         assert await driver.downloaded() == ()
 
 
+@on_loopback
 async def test_a_rover_drives_a_mission() -> None:
     async with flying(Kind.ROVER) as (truth, vehicle):
         await vehicle.driver.upload(ROUTE[1:])
@@ -183,6 +191,7 @@ async def test_a_rover_drives_a_mission() -> None:
         ((TAKEOFF, *(waypoint(47.396 - n / 1000) for n in range(3))), "is not ours"),
     ],
 )
+@on_loopback
 async def test_another_mission_by_another_ground_station_is_noticed(
     replaced: tuple[MissionItem, ...], words: str
 ) -> None:
@@ -197,8 +206,8 @@ async def test_another_mission_by_another_ground_station_is_noticed(
         assert watch.takeover(mission_modes) is None
         host, port = truth.address
         url = f"udpout://{host}:{port}"
-        link = await open_link(Address(1, 1), [url], SystemClock(SPEED), Address(254, 190))
-        other = Vehicle(ResourceId("qgc"), "air", link, SystemClock(SPEED))
+        link = await open_link(Address(1, 1), [url], loop_clock(SPEED), Address(254, 190))
+        other = Vehicle(ResourceId("qgc"), "air", link, loop_clock(SPEED))
         other.open()
         assert await other.identified(AMPLE_S)
         await other.driver.upload(replaced)
@@ -211,6 +220,7 @@ async def test_another_mission_by_another_ground_station_is_noticed(
         await watch.close()
 
 
+@on_loopback
 async def test_failsafes_are_read_and_compared() -> None:
     async with flying() as (truth, vehicle):
         truth.autopilot.parameters["FS_GCS_ENABLE"] = 0.0
@@ -226,12 +236,14 @@ async def test_failsafes_are_read_and_compared() -> None:
         assert "FS_GCS_ENABLE" not in [each.parameter for each in found]
 
 
+@on_loopback
 async def test_a_refusal_says_why() -> None:
     async with flying() as (_, vehicle):
         with pytest.raises(RefusedError, match=r"COMPONENT_ARM_DISARM: failed \(.*Arm: .+\)"):
             await vehicle.driver.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
 
+@on_loopback
 async def test_a_cut_link_is_lost_and_found_again() -> None:
     async with flying() as (truth, vehicle):
         await vehicle.until(lambda: vehicle.state.home is not None, AMPLE_S)
