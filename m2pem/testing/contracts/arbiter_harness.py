@@ -156,6 +156,7 @@ START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
 MakeArbiter = Callable[[ArbiterContext], Arbiter]
 CutLink = Callable[[Arbiter, ResourceId], None]
 Effects = Callable[[Arbiter, ResourceId], int]
+IsArbiters = Callable[["asyncio.Task[Any]"], bool]
 Main = Callable[[Clock], Awaitable[None]]
 
 
@@ -226,6 +227,12 @@ class ArbiterFixtures(Contract):
         """A function that returns how many motions a vehicle has begun, by its own count, not the
         arbiter's; None: not supported."""
         return None
+
+    @pytest.fixture
+    def is_arbiters(self) -> IsArbiters:
+        """A function that tells tasks of the arbiter from those of a simulator in the same event
+        loop, which may go on for a moment when the arbiter is closed; by default all are its."""
+        return lambda _: True
 
     @pytest.fixture
     def run(self) -> Callable[[Main], None]:

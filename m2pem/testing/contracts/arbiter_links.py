@@ -14,6 +14,7 @@ from m2pem.testing.contracts.arbiter_harness import (
     ArbiterFixtures,
     ArbiterHarness,
     CutLink,
+    IsArbiters,
     Main,
     MakeArbiter,
     context,
@@ -345,7 +346,11 @@ class ArbiterLinks(ArbiterFixtures):
         with_harness(make_arbiter, run, main)
 
     def test_nothing_leaks_after_close(
-        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+        self,
+        make_arbiter: MakeArbiter,
+        case: ArbiterCase,
+        is_arbiters: IsArbiters,
+        run: Callable[[Main], None],
     ) -> None:
         """No task, thread or file is left behind."""
 
@@ -356,7 +361,7 @@ class ArbiterLinks(ArbiterFixtures):
                 await start(harness, "r1.b1", case.long, case.vehicle)
                 await harness.running("r1.b1")
             await asyncio.sleep(0)
-            leaked = asyncio.all_tasks() - before
+            leaked = {*filter(is_arbiters, asyncio.all_tasks() - before)}
             assert not leaked, f"tasks go on after close: {leaked}"
             assert _threads() <= threads, f"threads go on: {_threads() - threads}"
             for _ in range(SETTLING_STEPS):

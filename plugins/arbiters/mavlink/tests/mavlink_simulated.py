@@ -13,6 +13,7 @@ from m2pem_plugin_mavlink.simulator.simulator import SimulatedVehicle, Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 from m2pem.api import Clock, Connection, FleetBus, LocalFrame, ResourceId, offset
+from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 from m2pem.testing.loopback import run_on_loopback
 
@@ -120,4 +121,7 @@ def fly(
                 bench.simulator, bench.bus = simulator, lent.bus
                 await main(bench)
 
-    run_on_loopback(run, speed)
+    if more.get("driver") == "mavsdk":  # its threads wait for real time to pass
+        asyncio.run(run(SystemClock(speed)))
+    else:
+        run_on_loopback(run, speed)

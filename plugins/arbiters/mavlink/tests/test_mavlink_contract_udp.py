@@ -39,9 +39,12 @@ class _Simulated(ArbiterContract):
                     await self.prepare(simulator, clock)
                     await main(clock)
 
-            run_on_loopback(on_vehicles, SPEED)
+            self.play(on_vehicles)
 
         return run
+
+    def play(self, main) -> None:
+        run_on_loopback(main, SPEED)
 
     async def prepare(self, simulator, clock) -> None:
         """Have the vehicles ready to move."""

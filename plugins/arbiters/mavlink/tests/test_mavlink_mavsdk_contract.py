@@ -1,13 +1,24 @@
 """The contract of arbiters with `driver: mavsdk`, against simulated autopilots over real UDP."""
 
+import asyncio
+from typing import ClassVar
+
 import pytest
 import test_mavlink_contract_udp as over_udp
 from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from mavlink_mavsdk_world import native_threads, threads_fall_to
 from mavlink_simulated import connections
 
+from m2pem.api.clock import SystemClock
+
 
 class _Mavsdk:
+    unsupported: ClassVar = {"virtual clock": "threads of MAVSDK wait for real time to pass"}
+    speed = over_udp.SPEED
+
+    def play(self, main) -> None:
+        asyncio.run(main(SystemClock(over_udp.SPEED)))
+
     @pytest.fixture(autouse=True)
     def nothing_is_left_of_mavsdk(self, simulator):
         before = native_threads()

@@ -1,7 +1,6 @@
 """An ONVIF driver and a simulated camera, with real HTTP on 127.0.0.1 between them."""
 
 import asyncio
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -14,8 +13,8 @@ from m2pem_plugin_ptz.simulator.onvif.camera import Account, CameraSpec
 from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 
 from m2pem.api import Connection, ResourceId
-from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
+from m2pem.testing.loopback import loop_clock
 
 ACCOUNT = Account("operator", "s3cret: #1")
 RESOURCE = ResourceId("evsg2/ptz")
@@ -31,10 +30,9 @@ def write_credentials(folder: Path, password: str = ACCOUNT.password) -> Path:
 
 
 async def until(condition: Callable[[], object], within_s: float = 40.0) -> None:
-    deadline = time.monotonic() + within_s
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come about in time"
-        await asyncio.sleep(0.01)
+    async with asyncio.timeout(within_s):
+        while not condition():  # noqa: ASYNC110  # what is waited for has no event
+            await asyncio.sleep(0.01)
 
 
 class Bench:
@@ -48,7 +46,7 @@ class Bench:
             DriverSetup(
                 Connection(RESOURCE, "ground", settings),
                 Settings(DriverName.ONVIF, reach=reach, own=own_keys),
-                context(SystemClock()),
+                context(loop_clock()),
                 self._on_message,
             )
         )
@@ -71,7 +69,7 @@ class Bench:
 @asynccontextmanager
 async def camera(**options: object) -> AsyncIterator[OnvifServer]:
     spec = CameraSpec(**{"latency_s": ANSWERS_S, **options})  # type: ignore[arg-type]
-    async with OnvifServer(spec) as server:
+    async with OnvifServer(spec, monotonic=asyncio.get_running_loop().time) as server:
         yield server
 
 

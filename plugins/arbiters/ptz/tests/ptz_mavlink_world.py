@@ -21,6 +21,7 @@ from m2pem_plugin_ptz.settings import DriverName, Settings
 from m2pem.api import ArbiterContext, Connection, ResourceId, VehicleState
 from m2pem.api.clock import SystemClock
 from m2pem.telemetry.bus import Bus
+from m2pem.testing.loopback import loop_clock
 
 SPEED = 10.0
 AMPLE_S = 40.0
@@ -113,7 +114,7 @@ async def world(
     ) as simulator:
         real = simulator[1]
         host, port = real.address
-        clock = SystemClock(SPEED)
+        clock = loop_clock(SPEED)
         heard: list[float] = []
         connection = {"url": f"udpout://{host}:{port}", "system_id": 1, **(own or {})}
         setup = make_seat(connection, clock, lambda: heard.append(clock.now_us() / 1e6), **more)

@@ -8,9 +8,12 @@ from m2pem_plugin_mavlink.simulator.messages import Result
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from ptz_mavlink_world import until, world
 
+from m2pem.testing.loopback import on_loopback
+
 IMAGE_START, VIDEO_START, ZOOM = 2000, 2500, 531
 
 
+@on_loopback
 async def test_a_picture_is_what_the_camera_calls_it() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -22,6 +25,7 @@ async def test_a_picture_is_what_the_camera_calls_it() -> None:
         assert it.camera.pictures == 2
 
 
+@on_loopback
 async def test_a_camera_that_never_answers_is_asked_for_seldom_and_still_found() -> None:
     """An autopilot without a camera acknowledges the question, and answers nothing."""
     async with world() as it:
@@ -42,6 +46,7 @@ async def test_a_camera_that_never_answers_is_asked_for_seldom_and_still_found()
         assert often < 40, "each of five questions is asked a few times"
 
 
+@on_loopback
 async def test_pictures_that_are_asked_for_at_once_are_taken_one_after_another() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -49,6 +54,7 @@ async def test_pictures_that_are_asked_for_at_once_are_taken_one_after_another()
         assert [each.reference for each in taken] == ["/00000.jpg", "/00001.jpg", "/00002.jpg"]
 
 
+@on_loopback
 async def test_a_picture_whose_message_is_lost_is_asked_for() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -58,6 +64,7 @@ async def test_a_picture_whose_message_is_lost_is_asked_for() -> None:
         assert it.camera.pictures == 2
 
 
+@on_loopback
 async def test_a_command_whose_answer_is_lost_takes_one_picture() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -77,6 +84,7 @@ async def test_a_command_whose_answer_is_lost_takes_one_picture() -> None:
         assert it.camera.pictures == 1
 
 
+@on_loopback
 async def test_a_picture_that_could_not_be_taken_is_an_error() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -86,6 +94,7 @@ async def test_a_picture_that_could_not_be_taken_is_an_error() -> None:
         await it.driver.take_picture()
 
 
+@on_loopback
 async def test_a_picture_that_never_comes_is_an_error() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -94,6 +103,7 @@ async def test_a_picture_that_never_comes_is_an_error() -> None:
             await it.driver.take_picture()
 
 
+@on_loopback
 async def test_a_full_storage_is_an_error_that_says_so() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -106,6 +116,7 @@ async def test_a_full_storage_is_an_error_that_says_so() -> None:
         await it.driver.take_picture()
 
 
+@on_loopback
 async def test_a_camera_that_is_busy_is_waited_for() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -114,6 +125,7 @@ async def test_a_camera_that_is_busy_is_waited_for() -> None:
         assert (await it.driver.take_picture()).reference == "/00000.jpg"
 
 
+@on_loopback
 async def test_a_camera_that_falls_silent_is_an_error() -> None:
     async with world() as it:
         await it.ready("take_picture")
@@ -122,6 +134,7 @@ async def test_a_camera_that_falls_silent_is_an_error() -> None:
             await it.driver.take_picture()
 
 
+@on_loopback
 async def test_a_video_is_begun_and_ended() -> None:
     async with world() as it:
         await it.ready("record_video")
@@ -133,6 +146,7 @@ async def test_a_video_is_begun_and_ended() -> None:
         assert name.endswith("in camera 1/100")
 
 
+@on_loopback
 async def test_a_camera_that_does_not_record_says_why() -> None:
     async with world() as it:
         await it.ready("record_video")
@@ -141,6 +155,7 @@ async def test_a_camera_that_does_not_record_says_why() -> None:
             await it.driver.start_recording()
 
 
+@on_loopback
 async def test_a_camera_zooms_to_a_factor_and_says_so() -> None:
     async with world() as it:
         await it.ready()
@@ -152,6 +167,7 @@ async def test_a_camera_zooms_to_a_factor_and_says_so() -> None:
         await until(lambda: it.driver.ptz.zoom == pytest.approx(1.0))
 
 
+@on_loopback
 async def test_zoom_that_somebody_else_changes_is_seen() -> None:
     async with world() as it:
         await it.ready()
@@ -160,6 +176,7 @@ async def test_zoom_that_somebody_else_changes_is_seen() -> None:
         await until(lambda: it.driver.ptz.zoom == pytest.approx(3.0))
 
 
+@on_loopback
 async def test_halt_stops_a_zoom_on_its_way() -> None:
     async with world() as it:
         await it.ready()
@@ -182,6 +199,7 @@ async def test_halt_stops_a_zoom_on_its_way() -> None:
         assert it.camera.zoom == stood < 90.0
 
 
+@on_loopback
 async def test_a_vehicle_without_a_camera_says_who_did_not_answer() -> None:
     async with world(spec={"camera": False}) as it:
         await it.ready()

@@ -1,8 +1,6 @@
 """The contract of arbiters, on the gimbals of simulated autopilots, over real UDP."""
 
-import asyncio
 import math
-import threading
 from typing import ClassVar
 
 import pytest
@@ -13,6 +11,7 @@ from m2pem_plugin_ptz.arbiter import PtzArbiter
 
 from m2pem.api import Connection, GeoPosition, ResourceId, VehicleState
 from m2pem.testing import ArbiterCase, ArbiterContract
+from m2pem.testing.loopback import run_on_loopback
 
 A, B = ResourceId("v1/ptz"), ResourceId("v2/ptz")
 NUMBERS = {A: 1, B: 2}
@@ -42,13 +41,9 @@ class CountedMotions:
 
 
 class _Gimbals(ArbiterContract):
-    """The vehicles are simulated in a loop and thread of their own: they outlive the arbiters."""
+    """The vehicles are simulated in the same event loop, and outlive the arbiters."""
 
-    unsupported: ClassVar = {
-        "virtual clock": "cameras are told over real sockets",
-        "telemetry": "a camera that turns has a look, not a speed",
-    }
-    speed = SPEED
+    unsupported: ClassVar = {"telemetry": "a camera that turns has a look, not a speed"}
     kind = Kind.COPTER
     firmware = "ardupilot"
 
@@ -58,22 +53,18 @@ class _Gimbals(ArbiterContract):
         specs = [
             VehicleSpec(self.kind, system=number, **spec, estimator_s=6.0) for number in (1, 2)
         ]
-        simulator = Simulator(specs, speed=SPEED, to=None)
-        started, stop = threading.Event(), asyncio.Event()
-        loop = asyncio.new_event_loop()
+        return Simulator(specs, speed=SPEED, to=None)
 
-        async def main() -> None:
-            async with simulator:
-                started.set()
-                await stop.wait()
+    @pytest.fixture
+    def run(self, simulator):
+        def run(main) -> None:
+            async def on_vehicles(clock) -> None:
+                async with simulator:
+                    await main(clock)
 
-        thread = threading.Thread(target=loop.run_until_complete, args=(main(),), name="simulator")
-        thread.start()
-        assert started.wait(60)
-        yield simulator
-        loop.call_soon_threadsafe(stop.set)
-        thread.join()
-        loop.close()
+            run_on_loopback(on_vehicles, SPEED)
+
+        return run
 
     @pytest.fixture
     def motions(self, simulator):
@@ -140,6 +131,7 @@ class TestGimbalsOfCopters(_Gimbals):
     pass
 
 
+@pytest.mark.long
 class TestGimbalsOfRovers(_Gimbals):
     kind = Kind.ROVER
 

@@ -11,7 +11,7 @@ from m2pem_plugin_mavlink.simulator.messages import Result
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from ptz_mavlink_world import AMPLE_S, REACH, SPEED, until, world
 
-from m2pem.api.clock import SystemClock
+from m2pem.testing.loopback import loop_clock, on_loopback
 
 OURS = Controller(255, 191)
 THEIRS = Controller(77, 190)
@@ -22,6 +22,7 @@ PITCHYAW = 1000
     ("kind", "firmware"),
     [(Kind.COPTER, "ardupilot"), (Kind.ROVER, "ardupilot"), (Kind.COPTER, "px4")],
 )
+@on_loopback
 async def test_a_gimbal_points_from_the_bow_and_says_so(kind: Kind, firmware: str) -> None:
     async with world(kind, spec={"firmware": firmware}) as it:
         await it.ready()
@@ -32,6 +33,7 @@ async def test_a_gimbal_points_from_the_bow_and_says_so(kind: Kind, firmware: st
         assert it.gimbal.primary == OURS
 
 
+@on_loopback
 async def test_a_gimbal_reaches_no_farther_than_its_gimbal() -> None:
     async with world() as it:
         assert it.driver.reach == REACH
@@ -43,6 +45,7 @@ async def test_a_gimbal_reaches_no_farther_than_its_gimbal() -> None:
         assert it.driver.reach.zoom_max == REACH.zoom_max
 
 
+@on_loopback
 async def test_the_last_order_counts() -> None:
     async with world() as it:
         await it.ready()
@@ -54,6 +57,7 @@ async def test_the_last_order_counts() -> None:
         assert it.is_at(-30.0, -10.0)
 
 
+@on_loopback
 async def test_an_order_whose_message_is_lost_is_given_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -75,6 +79,7 @@ async def test_an_order_whose_message_is_lost_is_given_again(
         assert lost
 
 
+@on_loopback
 async def test_a_gimbal_turns_no_faster_than_asked() -> None:
     async with world() as it:
         await it.ready()
@@ -88,6 +93,7 @@ async def test_a_gimbal_turns_no_faster_than_asked() -> None:
         assert whole_s > 5.5
 
 
+@on_loopback
 async def test_orders_that_follow_each_other_keep_the_rate() -> None:
     async with world() as it:
         await it.ready()
@@ -99,6 +105,7 @@ async def test_orders_that_follow_each_other_keep_the_rate() -> None:
         assert it.clock.now_us() / 1e6 - began_s > 3.5
 
 
+@on_loopback
 async def test_halt_stops_it_on_its_way() -> None:
     async with world() as it:
         await it.ready()
@@ -111,6 +118,7 @@ async def test_halt_stops_it_on_its_way() -> None:
         assert it.truly_deg == pytest.approx(stood, abs=0.5)
 
 
+@on_loopback
 async def test_a_gimbal_that_knows_no_rates_is_halted_by_pointing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -133,6 +141,7 @@ async def test_a_gimbal_that_knows_no_rates_is_halted_by_pointing(
         assert (await it.stands())[0] < 140.0
 
 
+@on_loopback
 async def test_a_gimbal_from_the_bow_turns_with_its_vehicle() -> None:
     async with world() as it:
         await it.ready()
@@ -143,6 +152,7 @@ async def test_a_gimbal_from_the_bow_turns_with_its_vehicle() -> None:
         assert it.is_at(30.0, 0.0)
 
 
+@on_loopback
 async def test_a_gimbal_from_north_stays_when_its_vehicle_turns() -> None:
     async with world(own={"yaw": "north"}) as it:
         await it.ready()
@@ -154,6 +164,7 @@ async def test_a_gimbal_from_north_stays_when_its_vehicle_turns() -> None:
         await until(lambda: abs(math.degrees(it.driver.ptz.pan_rad) + 10.0) < 0.6)
 
 
+@on_loopback
 async def test_what_is_meant_from_the_deck_is_told_from_the_horizon() -> None:
     async with world(stabilized=False) as it:
         await it.ready()
@@ -163,6 +174,7 @@ async def test_what_is_meant_from_the_deck_is_told_from_the_horizon() -> None:
         await until(lambda: abs(it.driver.ptz.tilt_rad) < math.radians(0.6))
 
 
+@on_loopback
 async def test_another_station_in_control_is_not_fought() -> None:
     async with world() as it:
         await it.ready()
@@ -179,6 +191,7 @@ async def test_another_station_in_control_is_not_fought() -> None:
         assert it.driver.refusal("take_picture") == ""
 
 
+@on_loopback
 async def test_control_is_taken_again_when_the_other_station_has_released_it() -> None:
     async with world(spec={"firmware": "px4"}) as it:
         it.gimbal.primary = THEIRS
@@ -190,6 +203,7 @@ async def test_control_is_taken_again_when_the_other_station_has_released_it() -
         assert it.gimbal.primary == OURS
 
 
+@on_loopback
 async def test_a_gimbal_is_left_to_others_in_the_end() -> None:
     async with world() as it:
         await it.ready()
@@ -200,6 +214,7 @@ async def test_a_gimbal_is_left_to_others_in_the_end() -> None:
     assert math.degrees(gimbal.pointing.wanted_yaw_rad) == pytest.approx(30.0, abs=0.5)
 
 
+@on_loopback
 async def test_a_gimbal_is_connected_as_long_as_it_says_where_it_points() -> None:
     async with world() as it:
         await it.ready()
@@ -212,6 +227,7 @@ async def test_a_gimbal_is_connected_as_long_as_it_says_where_it_points() -> Non
         assert len(it.heard) == before
 
 
+@on_loopback
 async def test_after_a_restart_of_the_autopilot_it_is_heard_again() -> None:
     async with world() as it:
         await it.ready()
@@ -221,6 +237,7 @@ async def test_after_a_restart_of_the_autopilot_it_is_heard_again() -> None:
         await until(lambda: len(it.heard) > before + 5)
 
 
+@on_loopback
 async def test_a_vehicle_without_a_gimbal_says_who_did_not_answer() -> None:
     async with world(spec={"gimbal": False}) as it:
         await it.ready("take_picture")
@@ -230,12 +247,13 @@ async def test_a_vehicle_without_a_gimbal_says_who_did_not_answer() -> None:
         await until(lambda: it.heard)  # by its camera
 
 
+@on_loopback
 async def test_the_socket_is_that_of_the_vehicles_arbiter() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     url = f"udpin://127.0.0.1:{port}"
-    link = await open_link(Address(1, 1), [url], SystemClock(SPEED))
+    link = await open_link(Address(1, 1), [url], loop_clock(SPEED))
     try:
         async with world(to=("127.0.0.1", port), own={"url": url}) as it:
             await it.ready()
@@ -247,6 +265,7 @@ async def test_the_socket_is_that_of_the_vehicles_arbiter() -> None:
         await link.close()
 
 
+@on_loopback
 async def test_a_fixed_camera_looks_ahead() -> None:
     async with world(spec={"gimbal": False}, own={"gimbal": False}) as it:
         await it.ready("take_picture")
@@ -255,6 +274,7 @@ async def test_a_fixed_camera_looks_ahead() -> None:
         await it.driver.take_picture()
 
 
+@on_loopback
 async def test_a_manager_that_denies_is_told_of_once_for_each_order(caplog) -> None:
     async with world() as it:
         await it.ready()

@@ -11,8 +11,8 @@ from PIL import Image
 from ptz_fake_camera import at, rad, vehicle
 
 from m2pem.api import ArbiterContext, BehaviorState, Connection, Point, ResourceId
-from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
+from m2pem.testing.loopback import loop_clock, on_loopback
 
 PTZ = ResourceId("a/ptz")
 SPEED_M_S, TURN_RAD_S = 4.0, rad(6)
@@ -50,7 +50,7 @@ class Way:
 
 @asynccontextmanager
 async def bench(server, folder: Path, *, drives=False, **said):
-    clock = SystemClock()
+    clock = loop_clock()
     lent = context(clock)
     settings = {
         "driver": "onvif",
@@ -70,6 +70,7 @@ async def bench(server, folder: Path, *, drives=False, **said):
         driving.cancel()
 
 
+@on_loopback
 async def test_a_camera_stays_on_its_target_while_its_vehicle_drives_and_turns(tmp_path):
     round_about = camera(latency_s=0.1, endless=True)
     async with round_about as server, bench(server, tmp_path, drives=True) as (found, way):
@@ -94,6 +95,7 @@ def note_in(picture):
         return image.info["comment"].decode()
 
 
+@on_loopback
 async def test_pictures_and_a_video_come_into_the_missions_data(tmp_path):
     said = {"credentials": str(write_credentials(tmp_path))}
     async with camera(account=ACCOUNT) as server, bench(server, tmp_path, **said) as (found, _):
@@ -111,6 +113,7 @@ async def test_pictures_and_a_video_come_into_the_missions_data(tmp_path):
         assert len(server.camera.recorded) == 1
 
 
+@on_loopback
 async def test_a_wrong_password_and_a_missing_recorder_reject_with_whose_fault_it_is(tmp_path):
     path = write_credentials(tmp_path, "wrong")
     said = {"credentials": str(path)}

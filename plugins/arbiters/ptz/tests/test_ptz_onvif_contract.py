@@ -1,9 +1,8 @@
-"""The contract of arbiters, on simulated ONVIF cameras, over HTTP, with faster clocks."""
+"""The contract of arbiters, on simulated ONVIF cameras, over HTTP."""
 
 import asyncio
-import threading
-import time
 from collections.abc import Mapping
+from functools import partial
 from typing import ClassVar
 
 import pytest
@@ -15,70 +14,34 @@ from ptz_fake_camera import rad, vehicle
 
 from m2pem.api import Connection, ResourceId
 from m2pem.testing import ArbiterCase, ArbiterContract
+from m2pem.testing.loopback import run_on_loopback
 
 A, B = ResourceId("a/ptz"), ResourceId("b/ptz")
-SPEED = 3.0
-
-
-class _Cameras:
-    """Two cameras in a thread of their own: they outlive the event loop of a test."""
-
-    def __init__(self, spec: CameraSpec) -> None:
-        self.servers = {
-            each: OnvifServer(spec, monotonic=lambda: time.monotonic() * SPEED) for each in (A, B)
-        }
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._loop.run_forever)
-
-    def __enter__(self):
-        self._thread.start()
-        for server in self.servers.values():
-            self._do(server.__aenter__())
-        return self
-
-    def __exit__(self, *_):
-        for server in self.servers.values():
-            self._do(server.__aexit__(None, None, None))
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
-
-    def _do(self, coroutine):
-        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(40)
-
-    def silence(self, camera):
-        self._loop.call_soon_threadsafe(self.servers[camera].faults.silent, True)
-
-
-@pytest.fixture(scope="module")
-def descriptions():
-    """The library reads its service descriptions once; the clock should not run meanwhile."""
-    from onvif.client import ONVIFCamera
-
-    async def read():
-        for name in ("devicemgmt", "media", "ptz", "recording"):
-            async with OnvifServer(CameraSpec(latency_s=0.0)) as server:
-                found = ONVIFCamera("127.0.0.1", server.port, "", "", no_cache=True)
-                await found.update_xaddrs()
-                await found.create_onvif_service(name)
-                await found.close()
-
-    asyncio.run(read())
 
 
 class _Over(ArbiterContract):
     unsupported: ClassVar[Mapping[str, str]] = {
         "telemetry": "a camera that turns has a look, not a speed (test_ptz_arbiter)",
-        "virtual clock": "HTTP takes real time",
     }
-    speed = SPEED
     spec = CameraSpec(account=ACCOUNT, latency_s=0.01, rate_deg_s=60.0)
     reach: ClassVar[Mapping[str, object]] = {}
 
     @pytest.fixture
-    def cameras(self, descriptions):
-        with _Cameras(self.spec) as cameras:
-            yield cameras
+    def cameras(self):
+        """Filled by `run`: they outlive the arbiters."""
+        return {}
+
+    @pytest.fixture
+    def run(self, cameras):
+        async def with_cameras(main, clock) -> None:
+            now = asyncio.get_running_loop().time
+            async with (
+                OnvifServer(self.spec, monotonic=now) as cameras[A],
+                OnvifServer(self.spec, monotonic=now) as cameras[B],
+            ):
+                await main(clock)
+
+        return lambda main: run_on_loopback(partial(with_cameras, main))
 
     @pytest.fixture
     def make_arbiter(self, cameras, tmp_path):
@@ -93,9 +56,9 @@ class _Over(ArbiterContract):
         def make(context):
             for name in ("a", "b"):
                 context.bus.publish(vehicle(name, context.clock.now_us()))
-            ports = {each: server.port for each, server in cameras.servers.items()}
             connections = {
-                each: Connection(each, "ground", {**said, "port": ports[each]}) for each in ports
+                each: Connection(each, "ground", {**said, "port": camera.port})
+                for each, camera in cameras.items()
             }
             return PtzArbiter(connections, context)
 
@@ -103,11 +66,15 @@ class _Over(ArbiterContract):
 
     @pytest.fixture
     def cut_link(self, cameras):
-        return lambda _arbiter, camera: cameras.silence(camera)
+        return lambda _arbiter, camera: cameras[camera].faults.silent(True)
 
     @pytest.fixture
     def effects(self, cameras):
-        return lambda _arbiter, camera: cameras.servers[camera].camera.moves
+        return lambda _arbiter, camera: cameras[camera].camera.moves
+
+    @pytest.fixture
+    def is_arbiters(self):
+        return lambda task: not task.get_coro().__qualname__.startswith("RequestHandler.")
 
     @pytest.fixture
     def case(self):

@@ -10,9 +10,12 @@ from m2pem_plugin_ptz.gimbal import Reach
 from m2pem_plugin_ptz.simulator.onvif.camera import Account
 from onvif_bench import ACCOUNT, camera, driven, until
 
+from m2pem.testing.loopback import on_loopback
+
 rad = math.radians
 
 
+@on_loopback
 async def test_a_camera_points_zooms_and_says_where_it_looks(tmp_path):
     async with camera(account=ACCOUNT) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -29,6 +32,7 @@ async def test_a_camera_points_zooms_and_says_where_it_looks(tmp_path):
         assert bench.heard > heard
 
 
+@on_loopback
 async def test_the_last_wish_counts_and_calls_are_bounded(tmp_path):
     async with camera() as server, driven(server, tmp_path, calls=10) as bench:
         await bench.ready()
@@ -44,6 +48,7 @@ async def test_the_last_wish_counts_and_calls_are_bounded(tmp_path):
         assert sum(server.camera.calls.values()) <= 10 * seconds + 20
 
 
+@on_loopback
 async def test_a_halt_stops_at_once_even_while_a_call_is_under_way(tmp_path):
     async with camera(latency_s=0.3) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -60,6 +65,7 @@ async def test_a_halt_stops_at_once_even_while_a_call_is_under_way(tmp_path):
         assert server.camera.ptz[2] == zoom < 20.0
 
 
+@on_loopback
 async def test_what_is_wanted_after_a_halt_is_done(tmp_path):
     async with camera(latency_s=0.1) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -71,6 +77,7 @@ async def test_what_is_wanted_after_a_halt_is_done(tmp_path):
             await until(lambda: bench.looks_at(-0.2, -0.1))
 
 
+@on_loopback
 async def test_a_rate_is_kept(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -80,6 +87,7 @@ async def test_a_rate_is_kept(tmp_path):
         await until(lambda: bench.looks_at(0.3, 0.0))
 
 
+@on_loopback
 async def test_a_moving_target_is_followed_within_a_degree(tmp_path):
     async with camera(latency_s=0.2) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -100,6 +108,7 @@ async def test_a_moving_target_is_followed_within_a_degree(tmp_path):
         assert server.camera.calls["ContinuousMove"] > 5
 
 
+@on_loopback
 async def test_a_generic_camera_is_pointed_by_the_fleets_reach(tmp_path):
     reach = Reach((rad(-180), rad(180)), (rad(-90), rad(30)), zoom_max=20.0, rate_rad_s=rad(100))
     async with camera(degrees=False) as server, driven(server, tmp_path, reach) as bench:
@@ -111,6 +120,7 @@ async def test_a_generic_camera_is_pointed_by_the_fleets_reach(tmp_path):
         assert server.camera.ptz == pytest.approx((1.0, -1.0, 3.0), abs=0.01)
 
 
+@on_loopback
 async def test_an_inverted_camera_is_told_the_other_way(tmp_path):
     both = ["pan", "tilt"]
     async with camera(tilt_deg=(-30, 90)) as server, driven(server, tmp_path, invert=both) as bench:
@@ -120,6 +130,7 @@ async def test_an_inverted_camera_is_told_the_other_way(tmp_path):
         assert server.camera.ptz[:2] == pytest.approx((-0.5, 1.0), abs=0.01)
 
 
+@on_loopback
 async def test_a_camera_without_the_old_media_service_works(tmp_path):
     only_new = camera(account=ACCOUNT, media=False)
     async with only_new as server, driven(server, tmp_path, profile="main") as bench:
@@ -129,6 +140,7 @@ async def test_a_camera_without_the_old_media_service_works(tmp_path):
         assert (await bench.driver.take_picture()).suffix == ".jpg"
 
 
+@on_loopback
 async def test_video_is_recorded_by_the_camera_and_found_by_its_clock(tmp_path):
     late = camera(account=ACCOUNT, skew_s=-86400.0)
     async with late as server, driven(server, tmp_path) as bench:
@@ -144,6 +156,7 @@ async def test_video_is_recorded_by_the_camera_and_found_by_its_clock(tmp_path):
         assert abs(begun.timestamp() - server.camera.recorded[0].begin_s) < 60
 
 
+@on_loopback
 async def test_a_camera_whose_jobs_are_all_made_uses_an_idle_one(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -165,6 +178,7 @@ async def test_a_camera_whose_jobs_are_all_made_uses_an_idle_one(tmp_path):
         ({"turns": False}, "ptz_point_at", "does not report its direction"),
     ],
 )
+@on_loopback
 async def test_what_a_camera_cannot_do_is_refused_with_the_reason(tmp_path, options, behavior, why):
     async with camera(**options) as server, driven(server, tmp_path) as bench:
         await until(lambda: why in bench.driver.refusal(behavior))
@@ -172,6 +186,7 @@ async def test_what_a_camera_cannot_do_is_refused_with_the_reason(tmp_path, opti
             assert bench.driver.refusal("ptz_track") == ""
 
 
+@on_loopback
 async def test_a_camera_that_does_not_say_where_it_looks_is_refused(tmp_path):
     async with camera(positions=False) as server, driven(server, tmp_path) as bench:
         await until(lambda: "GetStatus" in bench.driver.refusal("ptz_point_at"))
@@ -179,12 +194,14 @@ async def test_a_camera_that_does_not_say_where_it_looks_is_refused(tmp_path):
         assert bench.heard > 0
 
 
+@on_loopback
 async def test_a_profile_that_is_not_there_is_refused_with_those_that_are(tmp_path):
     async with camera() as server, driven(server, tmp_path, profile="second") as bench:
         await until(lambda: "has no profile 'second'" in bench.driver.refusal("zoom"))
         assert "main (profile_1)" in bench.driver.refusal("zoom")
 
 
+@on_loopback
 async def test_the_environment_and_the_loggers_of_the_process_stay_as_they_are(
     tmp_path, monkeypatch
 ):

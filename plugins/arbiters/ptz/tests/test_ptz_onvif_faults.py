@@ -11,8 +11,10 @@ from m2pem_plugin_ptz.simulator.onvif.server import OnvifServer
 from onvif_bench import ACCOUNT, ANSWERS_S, camera, driven, until, write_credentials
 
 from m2pem.errors import PluginError
+from m2pem.testing.loopback import on_loopback
 
 
+@on_loopback
 async def test_a_camera_that_is_switched_on_later_is_found(tmp_path, caplog):
     async with camera() as server:
         port = server.port
@@ -29,6 +31,7 @@ async def test_a_camera_that_is_switched_on_later_is_found(tmp_path, caplog):
     assert len(set(said)) == len(said), "it is said once"
 
 
+@on_loopback
 async def test_a_camera_that_reboots_with_another_clock_is_taken_up_again(tmp_path):
     async with camera(account=ACCOUNT) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -44,6 +47,7 @@ async def test_a_camera_that_reboots_with_another_clock_is_taken_up_again(tmp_pa
         assert bench.driver.refusal("ptz_point_at") == ""
 
 
+@on_loopback
 async def test_a_clock_that_is_set_while_it_works_costs_no_more_than_a_moment(tmp_path):
     async with camera(account=ACCOUNT) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -54,6 +58,7 @@ async def test_a_clock_that_is_set_while_it_works_costs_no_more_than_a_moment(tm
         assert bench.driver.refusal("take_picture") == ""
 
 
+@on_loopback
 async def test_a_wrong_password_is_the_files_fault_and_tried_again_when_it_changes(
     tmp_path, caplog
 ):
@@ -70,12 +75,14 @@ async def test_a_wrong_password_is_the_files_fault_and_tried_again_when_it_chang
     assert ACCOUNT.password not in caplog.text
 
 
+@on_loopback
 async def test_a_camera_that_asks_for_a_password_gets_the_fleet_told_how_to_say_it(tmp_path):
     locked = camera(account=ACCOUNT)
     async with locked as server, driven(server, tmp_path, credentials=None) as bench:
         await until(lambda: "connection.credentials" in bench.driver.refusal("zoom"))
 
 
+@on_loopback
 async def test_a_password_that_others_may_read_does_not_leave_the_machine(tmp_path):
     path = write_credentials(tmp_path)
     path.chmod(0o644)
@@ -86,6 +93,7 @@ async def test_a_password_that_others_may_read_does_not_leave_the_machine(tmp_pa
         assert not server.camera.calls
 
 
+@on_loopback
 async def test_a_user_who_is_locked_out_on_the_way_is_said_so(tmp_path):
     async with camera(account=ACCOUNT) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -93,6 +101,7 @@ async def test_a_user_who_is_locked_out_on_the_way_is_said_so(tmp_path):
         await until(lambda: "refuses user 'operator'" in bench.driver.refusal("ptz_point_at"))
 
 
+@on_loopback
 async def test_a_fault_is_told_and_gone_when_the_camera_obeys_again(tmp_path, caplog):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -107,6 +116,7 @@ async def test_a_fault_is_told_and_gone_when_the_camera_obeys_again(tmp_path, ca
     assert caplog.text.count("the motor is too hot") == 1
 
 
+@on_loopback
 async def test_a_fault_of_what_was_wanted_before_does_not_count_after_a_halt(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -117,6 +127,7 @@ async def test_a_fault_of_what_was_wanted_before_does_not_count_after_a_halt(tmp
         assert bench.driver.refusal("ptz_point_at") == ""
 
 
+@on_loopback
 async def test_a_head_that_does_not_turn_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr(steering, "AGAIN_S", 0.3)
     async with camera() as server, driven(server, tmp_path) as bench:
@@ -129,6 +140,7 @@ async def test_a_head_that_does_not_turn_is_noticed(tmp_path, monkeypatch):
         assert bench.driver.refusal("ptz_point_at") == ""
 
 
+@on_loopback
 async def test_a_silent_camera_is_not_heard_and_then_heard_again(tmp_path):
     async with camera() as server, driven(server, tmp_path, timeout="0.3 s") as bench:
         await bench.ready()
@@ -141,6 +153,7 @@ async def test_a_silent_camera_is_not_heard_and_then_heard_again(tmp_path):
         assert bench.heard > heard
 
 
+@on_loopback
 async def test_a_slow_camera_is_still_pointed(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -149,6 +162,7 @@ async def test_a_slow_camera_is_still_pointed(tmp_path):
         await until(lambda: bench.looks_at(-0.8, 0.1))
 
 
+@on_loopback
 async def test_a_full_storage_is_an_error_of_the_recording(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -159,6 +173,7 @@ async def test_a_full_storage_is_an_error_of_the_recording(tmp_path):
             await bench.driver.stop_recording()
 
 
+@on_loopback
 async def test_a_recording_that_a_reboot_ended_does_not_stand_in_the_way_of_the_next(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -170,6 +185,7 @@ async def test_a_recording_that_a_reboot_ended_does_not_stand_in_the_way_of_the_
         assert server.camera.recording
 
 
+@on_loopback
 async def test_what_is_no_onvif_camera_is_said_so(tmp_path):
     async def web_page(reader, writer):
         await reader.read(100)
@@ -186,6 +202,7 @@ async def test_what_is_no_onvif_camera_is_said_so(tmp_path):
         server.port = kept
 
 
+@on_loopback
 async def test_nothing_is_left_after_close(tmp_path):
     before = asyncio.all_tasks()
     async with camera() as server:

@@ -15,10 +15,13 @@ from m2pem_plugin_ptz.simulator.onvif.server import draw
 from onvif_bench import ACCOUNT, camera, driven, until
 from PIL import Image
 
+from m2pem.testing.loopback import on_loopback
+
 VIEW = (math.radians(60), math.radians(34))
 
 
 @pytest.mark.parametrize("asks", list(Asks))
+@on_loopback
 async def test_a_picture_is_fetched_however_the_camera_asks_for_the_password(tmp_path, asks):
     async with camera(account=ACCOUNT, asks=asks) as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -32,6 +35,7 @@ async def test_a_picture_is_fetched_however_the_camera_asks_for_the_password(tmp
         assert server.camera.calls["snapshot"] == 2
 
 
+@on_loopback
 async def test_a_picture_shows_where_the_camera_looks(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -55,6 +59,7 @@ def test_the_horizon_is_where_it_belongs():
     assert below.getpixel(middle)[2] < below.getpixel(middle)[1], "ground"
 
 
+@on_loopback
 async def test_what_is_no_picture_is_an_error(tmp_path):
     async with camera() as server, driven(server, tmp_path) as bench:
         await bench.ready()
@@ -63,6 +68,7 @@ async def test_what_is_no_picture_is_an_error(tmp_path):
             await bench.driver.take_picture()
 
 
+@on_loopback
 async def test_a_picture_has_a_largest_size(tmp_path, monkeypatch):
     monkeypatch.setattr(media, "LARGEST", 100_000)
     async with camera() as server, driven(server, tmp_path) as bench:
@@ -72,6 +78,7 @@ async def test_a_picture_has_a_largest_size(tmp_path, monkeypatch):
             await bench.driver.take_picture()
 
 
+@on_loopback
 async def test_a_picture_that_does_not_come_is_not_waited_for_for_ever(tmp_path):
     async with camera() as server, driven(server, tmp_path, timeout="0.3 s") as bench:
         await bench.ready()
@@ -82,6 +89,7 @@ async def test_a_picture_that_does_not_come_is_not_waited_for_for_ever(tmp_path)
         assert refused.value.code == "LINK_LOST"
 
 
+@on_loopback
 async def test_a_wrong_password_for_pictures_is_said_so(tmp_path):
     async with camera(account=ACCOUNT) as server, driven(server, tmp_path) as bench:
         await bench.ready()

@@ -20,6 +20,8 @@ from zeep.proxy import AsyncServiceProxy
 from zeep.transports import AsyncTransport
 from zeep.wsse.username import UsernameToken
 
+from m2pem.testing.loopback import on_loopback
+
 WSDL = Path(onvif.__file__).parent / "wsdl"
 SERVICES = {
     "device": ("devicemgmt.wsdl", "http://www.onvif.org/ver10/device/wsdl", "DeviceBinding"),
@@ -57,6 +59,7 @@ def account(password=ACCOUNT.password, **options):
     return UsernameToken(ACCOUNT.user, password, use_digest=True, zulu_timestamp=True, **options)
 
 
+@on_loopback
 async def test_a_strict_client_understands_every_answer():
     async with camera(account=ACCOUNT) as server:
         async with client(server, "device", account()) as device:
@@ -88,6 +91,7 @@ async def test_a_strict_client_understands_every_answer():
 
 
 @pytest.mark.parametrize("degrees", [True, False])
+@on_loopback
 async def test_a_strict_client_turns_the_camera_and_sees_where_it_looks(degrees):
     async with camera(degrees=degrees) as server, client(server, "ptz") as ptz:
         node = (await ptz.GetNodes())[0]
@@ -105,6 +109,7 @@ async def test_a_strict_client_turns_the_camera_and_sees_where_it_looks(degrees)
         assert server.camera.ptz == pytest.approx((1.5708, -0.5236, 10.5), abs=1e-3)
 
 
+@on_loopback
 async def test_a_velocity_lasts_as_long_as_its_timeout_or_until_a_stop():
     async with camera() as server, client(server, "ptz") as ptz:
         half = {"PanTilt": {"x": 0.5, "y": 0.0}}
@@ -124,6 +129,7 @@ async def test_a_velocity_lasts_as_long_as_its_timeout_or_until_a_stop():
         ({"PanTilt": {"x": 0.0, "y": 0.0, "space": "urn:no"}}, "there is no space urn:no"),
     ],
 )
+@on_loopback
 async def test_what_cannot_be_is_a_fault_and_moves_nothing(place, text):
     async with camera() as server, client(server, "ptz") as ptz:
         with pytest.raises(zeep.exceptions.Fault, match=text):
@@ -143,6 +149,7 @@ async def test_what_cannot_be_is_a_fault_and_moves_nothing(place, text):
         (account(created=datetime(2020, 1, 1)), "the token was not made now"),
     ],
 )
+@on_loopback
 async def test_nobody_comes_in_without_a_fresh_digest_of_the_password(token, why):
     async with camera(account=ACCOUNT) as server, client(server, "media", token) as media:
         with pytest.raises(zeep.exceptions.Fault, match=why) as refused:
@@ -150,6 +157,7 @@ async def test_nobody_comes_in_without_a_fresh_digest_of_the_password(token, why
         assert [code.localname for code in refused.value.subcodes] == ["NotAuthorized"]
 
 
+@on_loopback
 async def test_a_nonce_is_taken_once():
     token = account(nonce="one of many")
     async with camera(account=ACCOUNT) as server, client(server, "media", token) as media:
@@ -158,6 +166,7 @@ async def test_a_nonce_is_taken_once():
             await media.GetProfiles()
 
 
+@on_loopback
 async def test_a_token_must_be_made_by_the_cameras_clock():
     async with camera(account=ACCOUNT, skew_s=-3600.0) as server:
         behind = datetime.now(UTC).replace(tzinfo=None) - timedelta(hours=1)
@@ -165,6 +174,7 @@ async def test_a_token_must_be_made_by_the_cameras_clock():
             assert await media.GetProfiles()
 
 
+@on_loopback
 async def test_what_is_no_soap_is_a_fault():
     async with camera() as server, aiohttp.ClientSession() as http:
         bomb = '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
@@ -176,6 +186,7 @@ async def test_what_is_no_soap_is_a_fault():
                 assert "WellFormed" in etree.tostring(fault, encoding="unicode")
 
 
+@on_loopback
 async def test_the_digest_is_the_one_of_the_specification():
     """Without any library: nonce, created and password, hashed with SHA-1."""
     nonce, created = os.urandom(16), datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
