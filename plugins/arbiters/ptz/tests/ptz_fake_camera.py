@@ -5,6 +5,7 @@ A `Gimbal` outlives the arbiter, as a camera outlives a restart. What it is told
 
 import asyncio
 import math
+from functools import lru_cache
 
 from m2pem_plugin_ptz.drivers.driver import CameraError
 from m2pem_plugin_ptz.gimbal import CapturedImage, PanTiltZoom, Reach
@@ -150,19 +151,17 @@ def vehicle(
     name, time_us, east=0.0, north=0.0, up=0.0, yaw=math.pi / 2, velocity=(0, 0, 0), **more
 ):
     """A vehicle that stands so far from the origin; looking north if nothing else is said."""
-    import pymap3d
-
-    place = pymap3d.enu2geodetic(east, north, up, *ORIGIN)
     return VehicleState(
         ResourceId(name),
         time_us,
-        GeoPosition(*(float(part) for part in place)),
+        GeoPosition(*at(east, north, up)),
         velocity_enu_m_s=tuple(map(float, velocity)),
         yaw_rad=yaw,
         **more,
     )
 
 
+@lru_cache(maxsize=64)  # most vehicles stand
 def at(east, north, up=0.0):
     """Latitude, longitude and altitude of a place so far from the origin."""
     import pymap3d
