@@ -1,5 +1,6 @@
 import asyncio
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -476,3 +477,27 @@ def test_a_plane_that_waits_in_rtl_for_its_ground_station_is_ready_when_it_has_a
             await waits
 
     virtual(main)
+
+
+def test_what_the_vehicles_of_a_fleet_are_waited_for_is_said_every_few_seconds(
+    virtual: Run,
+) -> None:
+    said: list[str] = []
+
+    async def main(clock: Clock) -> None:
+        link, vehicle = copter(clock)
+        async with Playing((link, vehicle)):
+            link.says["EKF_STATUS_REPORT"] = {"flags": WAITING_FLAGS}
+            await clock.sleep(2.0)
+            waits = asyncio.get_running_loop().create_task(ready([vehicle], said.append))
+            await clock.sleep(11.0)
+            await link.switch_off()
+            await clock.sleep(15.0)
+            link.says["EKF_STATUS_REPORT"] = {"flags": READY_FLAGS}
+            link.switch_on()
+            await waits
+
+    virtual(main)
+    assert len(said) == 5
+    assert re.fullmatch(r"waiting for uav1: EKF: no position yet, \d+ s", said[1])
+    assert re.fullmatch(r"waiting for uav1: silent for \d+ s", said[-1])

@@ -1,7 +1,6 @@
 """Waits until the vehicles of a fleet may be armed, on the ports that the executive will use."""
 
 import asyncio
-import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 
@@ -70,9 +69,10 @@ async def ready(vehicles: Sequence[Vehicle], report: Callable[[str], None]) -> N
     Raises:
         NotReadyError: they do not become ready in time.
     """
-    began_s = reported_s = time.monotonic()
+    loop = asyncio.get_running_loop()
+    began_s = reported_s = loop.time()
     while waiting := _waiting(vehicles):
-        now_s = time.monotonic()
+        now_s = loop.time()
         if now_s - began_s > READY_WITHIN_S:
             raise NotReadyError(f"not ready after {READY_WITHIN_S:.0f} s: {waiting}")
         if now_s - reported_s > REPORT_EVERY_S:
