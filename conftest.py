@@ -26,8 +26,17 @@ os.environ["M2PEM_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="m2pem-tests-")
 _PROGRAMS = ("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER", "M2PEM_ARDUPLANE", "M2PEM_PX4")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests of autopilots whose programs are not named."""
+    """Leave out the tests of autopilots whose programs are not named.
+
+    Of a class that says which of its tests are `quick`, the others are long.
+    """
+    for item in items:
+        if isinstance(item, pytest.Function):
+            name = item.name
+            if name not in getattr(item.cls, "quick", (name,)):
+                item.add_marker(pytest.mark.long)
     absent = [item for item in items if not _programs_of(item) <= os.environ.keys()]
     if absent:
         config.hook.pytest_deselected(items=absent)

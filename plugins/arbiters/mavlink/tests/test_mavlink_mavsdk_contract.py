@@ -31,7 +31,20 @@ class _Mavsdk:
 
 
 class TestMavsdkRovers(_Mavsdk, over_udp.TestSimulatedRovers):
-    pass
+    """`quick`: what MAVSDK could do in another way than our own link."""
+
+    quick: ClassVar = {
+        "test_a_behavior_that_preempts_takes_the_vehicle_over",
+        "test_a_cut_link_is_lost_within_the_declared_bound",
+        "test_a_second_start_has_one_physical_effect",
+        "test_accepted_comes_before_running_and_one_terminal_report_last",
+        "test_another_arbiter_finds_the_behavior_again",
+        "test_cancel_ends_a_behavior_within_the_declared_bound",
+        "test_hold_stops_the_vehicle_within_the_declared_bound",
+        "test_nothing_leaks_after_close",
+        "test_resume_goes_on_with_the_behavior",
+        "test_two_vehicles_do_not_mix",
+    }
 
 
 @pytest.mark.long
