@@ -44,6 +44,8 @@ class SimulatedWire:
         self.autopilot = Autopilot(spec, step_s=0.05)
         self.autopilot.meet("ground")
         self._parser = dialect.MAVLink(None)
+        self._said = dialect.MAVLink(None)
+        self._senders: dict[int, dialect.MAVLink] = {}
 
     def send(self, frame: bytes) -> None:
         """Hand it over."""
@@ -56,9 +58,15 @@ class SimulatedWire:
         self.autopilot.step(self.autopilot.now_s + self.STEP_S)
         for message, _, component in self.autopilot.take_outbox():
             if message is not None:
-                sender = dialect.MAVLink(None, self.autopilot.spec.system, component)
-                said += dialect.MAVLink(None).parse_buffer(message.pack(sender)) or ()
+                frame = message.pack(self._sender(component))
+                said += self._said.parse_buffer(frame) or ()
         return said
+
+    def _sender(self, component: int) -> dialect.MAVLink:
+        if component not in self._senders:
+            made = dialect.MAVLink(None, self.autopilot.spec.system, component)
+            self._senders[component] = made
+        return self._senders[component]
 
     def battery(self, left: float, volts: float, set_parameter: SetParameter) -> None:
         """The simulated battery's voltage falls with its charge."""

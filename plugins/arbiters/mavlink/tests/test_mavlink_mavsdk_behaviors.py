@@ -29,6 +29,7 @@ def test_a_copter_takes_off_flies_a_route_circles_and_returns():
     by_mavsdk(main, Kind.COPTER)
 
 
+@pytest.mark.long
 def test_a_copter_surveys_an_area_and_lands():
     async def main(bench):
         await bench.do("r1.b1", "takeoff", altitude=10.0)

@@ -79,6 +79,7 @@ async def test_a_rover_goes_where_it_is_told_and_holds(rover):
     assert north_m(rover) - stopped < 3.0
 
 
+@pytest.mark.long
 async def test_a_rover_drives_home(rover):
     await to_go(rover)
     await rover.action.goto_location(
@@ -90,6 +91,7 @@ async def test_a_rover_drives_home(rover):
     await really(lambda: abs(north_m(rover)) < 3.0)
 
 
+@pytest.mark.long
 async def test_offboard_drives_by_velocity(rover):
     await to_go(rover)
     await rover.offboard.set_velocity_ned(VelocityNedYaw(1.5, 0.0, 0.0, 0.0))

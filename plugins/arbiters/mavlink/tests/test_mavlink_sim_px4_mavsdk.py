@@ -141,6 +141,7 @@ async def test_a_simulated_px4_takes_off_goes_to_a_place_and_returns(copter: Flo
     assert copter.real.location[:2] == pytest.approx(ZURICH[:2], abs=1e-5)
 
 
+@pytest.mark.long
 async def test_a_simulated_px4_lands_where_it_is(copter: Flown) -> None:
     await copter.up(5.0)
     await copter.action.land()
@@ -149,6 +150,7 @@ async def test_a_simulated_px4_lands_where_it_is(copter: Flown) -> None:
     assert copter.real.up_m == pytest.approx(0, abs=0.1)
 
 
+@pytest.mark.long
 async def test_a_simulated_px4_orbits_and_holds(copter: Flown) -> None:
     await copter.up(10.0)
     place = (ZURICH.latitude_deg, ZURICH.longitude_deg, 500.0)
@@ -178,6 +180,7 @@ async def test_a_mission_is_flown_to_its_end(copter: Flown) -> None:
     assert copter.real.missions_begun == 1
 
 
+@pytest.mark.long
 async def test_offboard_flies_by_velocity_and_to_a_place(copter: Flown) -> None:
     await copter.up(10.0)
     with pytest.raises(OffboardError, match="NO_SETPOINT_SET"):
