@@ -61,7 +61,8 @@ def test_without_a_vehicle_that_is_heard_directions_still_work_but_places_do_not
     play(main, moves=None)
 
 
-driving = given(
+@settings(max_examples=8, deadline=None)
+@given(
     speed=st.floats(0, 8),
     turn_deg_s=st.floats(-30, 30),
     wave_deg=st.floats(0, 8),
@@ -69,22 +70,9 @@ driving = given(
     far=st.floats(40, 400),
     endless=st.booleans(),
 )
-
-
-@settings(max_examples=4)
-@driving
-def test_a_target_stays_within_a_degree_while_the_vehicle_drives_and_turns(**way):
-    stays_within_a_degree(**way)
-
-
-@pytest.mark.long
-@settings(max_examples=30)
-@driving
-def test_many_targets_stay_within_a_degree_while_the_vehicle_drives_and_turns(**way):
-    stays_within_a_degree(**way)
-
-
-def stays_within_a_degree(speed, turn_deg_s, wave_deg, bearing, far, endless):
+def test_a_target_stays_within_a_degree_while_the_vehicle_drives_and_turns(
+    speed, turn_deg_s, wave_deg, bearing, far, endless
+):
     """A steady turn with a swaying of six seconds upon it; states five times a second."""
     sway = math.tau / 6.0
 
