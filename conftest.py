@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import tempfile
 
 import pytest
@@ -18,6 +19,10 @@ settings.load_profile("repeatable")
 # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Tests start the same programs hundreds of times: these are compiled once, not at each start.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Executives that tests start are no concern of those that this user runs, nor of another worker's.
 os.environ["M2PEM_RUNTIME_DIR"] = tempfile.mkdtemp(prefix="m2pem-tests-")
