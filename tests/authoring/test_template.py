@@ -24,7 +24,10 @@ def render(template: Path, folder: Path, **answers: str) -> subprocess.Completed
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=() if kind == "arbiter" else pytest.mark.long) for kind in KINDS],
+)
 @pytest.mark.timeout(300)
 def test_a_plugin_of_the_template_is_installed_and_passes_its_tests(
     kind: str, author: Author

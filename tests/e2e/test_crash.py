@@ -117,7 +117,10 @@ def start(m2pem: CommandLine, fleet: Path, **environment: str) -> Program:
 
 @pytest.mark.parametrize(
     "count",
-    [1, 24, 62, *(pytest.param(count, marks=pytest.mark.long) for count in range(5, 80, 5))],
+    [
+        24,
+        *(pytest.param(count, marks=pytest.mark.long) for count in (1, *range(5, 80, 5), 62)),
+    ],
 )
 def test_a_run_killed_after_a_printed_record_is_resumed(
     m2pem: CommandLine, tmp_path: Path, count: int
@@ -136,7 +139,7 @@ def test_a_run_killed_after_a_printed_record_is_resumed(
     [
         {"DIE_AT": "BehaviorRequested DriveRoute"},
         {"DIE_IN": "single_vehicle_routing"},
-        {"DIE_IN": "reverse"},
+        pytest.param({"DIE_IN": "reverse"}, marks=pytest.mark.long),
         pytest.param({"DIE_AT": "BehaviorRequested DriveStop"}, marks=pytest.mark.long),
         pytest.param({"DIE_AT": "BehaviorRequested Reverse"}, marks=pytest.mark.long),
         pytest.param({"DIE_IN": "drive_stop"}, marks=pytest.mark.long),

@@ -40,7 +40,10 @@ SERVICE = {
 STEPS = (QUESTION, VEHICLE, TEAM, PAYLOAD, SERVICE)
 
 
-@pytest.mark.parametrize(("editor", "modeler"), [("camunda", "cloud"), ("bpmn-io", "platform")])
+@pytest.mark.parametrize(
+    ("editor", "modeler"),
+    [("camunda", "cloud"), pytest.param("bpmn-io", "platform", marks=pytest.mark.long)],
+)
 def test_a_mission_drawn_of_templates_is_checked_and_rehearsed(
     m2pem: CommandLine, tmp_path: Path, editor: str, modeler: str
 ) -> None:

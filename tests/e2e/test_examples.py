@@ -118,7 +118,25 @@ def install(command: Command, workspace: Path, site: Path) -> None:
     )
 
 
-@every_example
+def only_rehearsed(example: Path) -> bool:
+    """Whether its README shows no more than checks and rehearsals, which tests below do as well."""
+    return all(
+        command.text.startswith(("m2pem check ", "m2pem simulate ", "m2pem fleet "))
+        for command in commands(example)
+    )
+
+
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(
+            example,
+            marks=pytest.mark.long if only_rehearsed(example) and example != EXAMPLES[0] else (),
+            id=example.name,
+        )
+        for example in EXAMPLES
+    ],
+)
 def test_the_commands_do_what_the_readme_shows(example: Path, tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "workspace")
     shell = environment(tmp_path / "home") | NOT_INSTALLED

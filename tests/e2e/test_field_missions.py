@@ -199,6 +199,25 @@ NEVER_TAKEN = {"FlowTeleopEnded"}
 """A rehearsal answers the prompt beside the teleoperation at once, before that could end."""
 
 every_story = pytest.mark.parametrize("story", STORIES, ids=lambda story: story.answers)
+ALSO_SHORT = {
+    "mehds_vignette_1_swept",
+    "mehds_vignette_2_aborted_unheard",
+    "mehds_vignette_3_crossed",
+    "mehds_vignette_4_following_aborted_unheard",
+}
+"""One of each vignette, with both statuses: the others go the same way, and take long when run."""
+
+every_story_when_long = pytest.mark.parametrize(
+    "story",
+    [
+        pytest.param(
+            story,
+            marks=() if story.answers in ALSO_SHORT else pytest.mark.long,
+            id=story.answers,
+        )
+        for story in STORIES
+    ],
+)
 every_vignette = pytest.mark.parametrize("number", range(1, 5))
 
 

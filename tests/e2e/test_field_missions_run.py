@@ -5,14 +5,14 @@ import json
 from m2pem.mission.elements import EndEvent
 from tests.command_line import CommandLine
 
-from .test_field_missions import ANSWERS, FLEET, Story, every_story, mission
+from .test_field_missions import ANSWERS, FLEET, Story, every_story_when_long, mission
 
 SPEED = 100
 INNER = {"DETECTION", "ADVANCE"}
 """Called processes, whose end events are not ends of the vignette."""
 
 
-@every_story
+@every_story_when_long
 def test_the_vignette_is_run_to_its_end(m2pem: CommandLine, story: Story) -> None:
     status, out, _ = m2pem.run(
         "run", story.mission, "--fleet", FLEET, "--simulate", "--speed", str(SPEED),

@@ -3,8 +3,6 @@
 import asyncio
 from typing import Any
 
-import pytest
-
 from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.engine import records as r
 from m2pem.executive.executive import Executive
@@ -15,7 +13,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import load_answers
 from m2pem.rehearsal.scripted import ScriptedPlugins
 
-from .test_field_missions import ANSWERS, STORIES, Story, fleet, mission
+from .test_field_missions import ANSWERS, Story, every_story_when_long, fleet, mission
 
 START_US = 1_767_225_600_000_000
 INNER = {"DETECTION", "ADVANCE"}
@@ -33,7 +31,7 @@ class SeeingPlugins(PluginManager):
         self._seen.extend(records)
 
 
-@pytest.mark.parametrize("story", STORIES, ids=[story.answers for story in STORIES])
+@every_story_when_long
 def test_the_vignette_is_run_with_teams_made_of_single_vehicles(story: Story) -> None:
     seen: list[r.Record] = []
     answers = load_answers(ANSWERS / f"{story.answers}.yaml")

@@ -36,9 +36,11 @@ def test_pause_resume_and_stop_reach_the_vehicle_once_each(
     fleet, state = fleet_with_state(tmp_path)
     program = driving(m2pem, fleet)
     program.type("pause")
-    program.until_record("RunPaused", by="plain")
+    paused = program.until_record("RunPaused", by="plain")
     program.type("resume")
-    program.until_record("RunResumed", by="plain")
+    resumed = program.until_record("RunResumed", by="plain")
+    assert resumed["at_us"] > paused["at_us"]
+    assert resumed["t"] == paused["t"]  # mission time stands during a pause
     program.type("stop")
     program.until_record("RunEnded", outcome="stopped")
     ended = program.until_record("BehaviorEnded", state="CANCELLED")
@@ -46,18 +48,6 @@ def test_pause_resume_and_stop_reach_the_vehicle_once_each(
     assert program.rest()[0] == 130
     once = ["start", "hold", "resume", "cancel", "end"]
     assert effects(state) == Counter((kind, "evsg1") for kind in once)
-
-
-def test_mission_time_stands_during_a_pause(m2pem: CommandLine) -> None:
-    program = driving(m2pem)
-    program.type("pause")
-    paused = program.until_record("RunPaused")
-    program.type("resume")
-    resumed = program.until_record("RunResumed")
-    program.type("stop")
-    program.rest()
-    assert resumed["at_us"] > paused["at_us"]
-    assert resumed["t"] == paused["t"]
 
 
 def test_a_signal_is_sent_by_its_name_as_by_its_id(m2pem: CommandLine) -> None:

@@ -30,11 +30,15 @@ def test_a_fleet_without_the_vehicle(m2pem: CommandLine, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("wrong", "right", "said"),
     [
-        ('name="driver" vehicle="evsg1"', 'name="driver" payload="evsg1/ptz"', "evsg2/ptz"),
-        ('value="reverse"', 'value="revers"', "'reverse'"),
-        ('value="10 m"', 'value="10 kg"', "10 kg"),
+        pytest.param(
+            'name="driver" vehicle="evsg1"', 'name="driver" payload="evsg1/ptz"', "evsg2/ptz",
+            marks=pytest.mark.long, id="payload on another vehicle",
+        ),
+        pytest.param('value="reverse"', 'value="revers"', "'reverse'", id="unknown behavior"),
+        pytest.param(
+            'value="10 m"', 'value="10 kg"', "10 kg", marks=pytest.mark.long, id="mistyped unit"
+        ),
     ],
-    ids=["payload on another vehicle", "unknown behavior", "mistyped unit"],
 )  # fmt: skip
 def test_a_mission_that_asks_for_what_is_not_there(
     m2pem: CommandLine, tmp_path: Path, wrong: str, right: str, said: str

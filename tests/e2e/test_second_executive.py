@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.command_line import FLEET, MISSION, CommandLine, Program, fleet_with_state
 
 
@@ -39,12 +41,14 @@ def test_two_journals_on_one_state_file_share_its_vehicles(
     assert_refused(m2pem.run(*run), first)
 
 
+@pytest.mark.long
 def test_simulations_with_journals_of_their_own_run_side_by_side(m2pem: CommandLine) -> None:
     serving(m2pem, FLEET, "one.db")
     serving(m2pem, FLEET, "two.db")
     assert m2pem.run("check", MISSION, "--fleet", FLEET)[0] == 0
 
 
+@pytest.mark.long
 def test_a_killed_executive_keeps_no_vehicle(m2pem: CommandLine) -> None:
     run = ("run", MISSION, "--fleet", FLEET, "--ocu", "plain", "--journal", "journal.db")
     first = m2pem.start(*run)

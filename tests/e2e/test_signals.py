@@ -21,7 +21,9 @@ def driving(m2pem: CommandLine, fleet: Path, *words: str) -> Program:
     return program
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
+)
 def test_a_signal_stops_the_run_and_releases_its_vehicles(
     m2pem: CommandLine, tmp_path: Path, number: signal.Signals
 ) -> None:

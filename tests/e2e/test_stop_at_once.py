@@ -72,7 +72,7 @@ def effects(state: Path) -> list[str]:
     return [each.kind.value for each in recorded_effects(state)]
 
 
-@pytest.mark.parametrize("how", ["command", "all", "signal"])
+@pytest.mark.parametrize("how", ["command", pytest.param("all", marks=pytest.mark.long), "signal"])
 def test_a_vehicle_is_cancelled_while_the_disk_is_stalled(
     m2pem: CommandLine, tmp_path: Path, how: str
 ) -> None:
