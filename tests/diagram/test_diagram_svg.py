@@ -10,6 +10,7 @@ from m2pem.bpmn import parse_mission
 from m2pem.diagram import Overlays, draw
 from m2pem.diagram.style import FAINT, PATH, STUCK, WAITING, width_of, wrapped
 from m2pem.errors import MissionError
+from tests.each_case import every_file
 
 REPOSITORY = Path(__file__).parents[2]
 SVG = "{http://www.w3.org/2000/svg}"
@@ -124,9 +125,7 @@ def test_nothing_is_asked_of_any_host() -> None:
     assert "href" not in draw(fork())
 
 
-@pytest.mark.parametrize(
-    "path", [*DATA, *FOREIGN], ids=lambda path: f"{path.parent.name}-{path.stem}"
-)
+@every_file(DATA, FOREIGN)
 def test_files_of_all_sorts_are_drawn_with_all_that_their_diagrams_show(path: Path) -> None:
     try:
         parse_mission(path.read_bytes(), str(path))

@@ -15,6 +15,7 @@ from m2pem.bpmn.search_path import SearchPath
 from m2pem.editing.editable import editable
 from m2pem.errors import MissionError
 from m2pem.mission.mission import Mission
+from tests.each_case import every_file
 from tests.editing.same_model import model_of, new_names
 from tests.editor import BPMN, BPMNDI, has_symbol, read_with_moddle
 
@@ -26,10 +27,10 @@ FILES = sorted(
         *(REPOSITORY / "examples").glob("*/*.bpmn"),
         *(REPOSITORY / "docs").glob("**/*.bpmn"),
         *(REPOSITORY / "tests" / "data").glob("**/*.bpmn"),
-        *(Path(CORPORA).rglob("*.bpmn") if CORPORA else ()),
     ]
 )
-every_file = pytest.mark.parametrize("file", FILES, ids=lambda path: "-".join(path.parts[-3:]))
+FOREIGN = sorted(Path(CORPORA).rglob("*.bpmn")) if CORPORA else []
+for_every_file = every_file(FILES, FOREIGN)
 
 HEAD = (
     '<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" '
@@ -65,11 +66,14 @@ def loaded(path: Path, source: bytes) -> Mission:
 
 
 @cache
-def moddle() -> dict[Path, tuple[list[str], str]]:
-    """What an editor says to each file, and how it writes it."""
+def moddle(foreign: bool) -> dict[Path, tuple[list[str], str]]:
+    """What an editor says to each file of the repository or of others, and how it writes it."""
     found: dict[Path, tuple[list[str], str]] = {}
     with TemporaryDirectory() as folder:
-        made = {Path(folder, f"{number}.bpmn"): file for number, file in enumerate(FILES)}
+        made = {
+            Path(folder, f"{number}.bpmn"): file
+            for number, file in enumerate(FOREIGN if foreign else FILES)
+        }
         for copy, file in made.items():
             copy.write_bytes(editable(file.read_bytes()).source)
         read = read_with_moddle(made)
@@ -82,7 +86,7 @@ def moddle() -> dict[Path, tuple[list[str], str]]:
 # --- every mission there is ---------------------------------------------------------------------
 
 
-@every_file
+@for_every_file
 def test_the_model_stays_the_same(file: Path) -> None:
     source = file.read_bytes()
     try:
@@ -98,9 +102,9 @@ def test_the_model_stays_the_same(file: Path) -> None:
     assert model_of(after) == model_of(before, new_names(before, after))
 
 
-@every_file
+@for_every_file
 def test_what_an_editor_saves_is_the_same_model(file: Path) -> None:
-    warnings, saved = moddle()[file]
+    warnings, saved = moddle(file in FOREIGN)[file]
     assert warnings == []
     try:
         before = loaded(file, editable(file.read_bytes()).source)
@@ -109,9 +113,17 @@ def test_what_an_editor_saves_is_the_same_model(file: Path) -> None:
     assert model_of(loaded(file, saved.encode())) == model_of(before)
 
 
-@every_file
-@pytest.mark.parametrize("anew", [False, True], ids=["as drawn", "laid out"])
-def test_everything_is_drawn(file: Path, anew: bool) -> None:
+@for_every_file
+def test_everything_is_drawn(file: Path) -> None:
+    assert_everything_is_drawn(file, anew=False)
+
+
+@for_every_file
+def test_everything_is_drawn_where_all_is_laid_out(file: Path) -> None:
+    assert_everything_is_drawn(file, anew=True)
+
+
+def assert_everything_is_drawn(file: Path, *, anew: bool) -> None:
     source = file.read_bytes()
     result = editable(source, anew=anew)
     root = tree(result.source)
@@ -157,7 +169,7 @@ def test_the_same_file_gives_the_same_bytes() -> None:
         assert editable(source) == editable(source)
 
 
-@every_file
+@for_every_file
 def test_once_is_enough(file: Path) -> None:
     first = editable(file.read_bytes())
     assert editable(first.source).source == first.source

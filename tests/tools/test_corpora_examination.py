@@ -8,19 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.each_case import every_file
 from tools.corpora.examination import Outcome, examine
 from tools.corpora.models import models
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = [ROOT / "tests/data", ROOT / "missions"]
-if os.environ.get("M2PEM_CORPORA"):
-    FOLDERS.append(Path(os.environ["M2PEM_CORPORA"]))
-MODELS = [(folder, path) for folder in FOLDERS for path in models(folder)]
+OWN = [*models(ROOT / "tests/data"), *models(ROOT / "missions")]
+FOREIGN = models(Path(os.environ.get("M2PEM_CORPORA") or os.devnull))
 
 
-@pytest.mark.parametrize(
-    "path", [path for _, path in MODELS], ids=[str(path.relative_to(top)) for top, path in MODELS]
-)
+@every_file(OWN, FOREIGN)
 def test_a_model_loads_or_is_refused_with_findings_that_help(path: Path) -> None:
     found = examine(path)
     assert found.problems == ()
