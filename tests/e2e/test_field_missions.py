@@ -200,7 +200,7 @@ NEVER_TAKEN = {"FlowTeleopEnded"}
 
 every_story = pytest.mark.parametrize("story", STORIES, ids=lambda story: story.answers)
 ALSO_SHORT = {
-    "mehds_vignette_1_swept",
+    "mehds_vignette_1_aborted",
     "mehds_vignette_2_aborted_unheard",
     "mehds_vignette_3_crossed",
     "mehds_vignette_4_following_aborted_unheard",
