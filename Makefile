@@ -37,7 +37,7 @@ PIP_FAILED = { echo "pip could not install what is needed (its own message is ab
   Then the same make command again" >&2; exit 1; }
 
 .PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team
-.PHONY: check test test-long test-ros fuzz lint format docs pictures
+.PHONY: check page-test test test-long test-ros fuzz lint format docs pictures
 .PHONY: bench bench-quick conformance clean dist ros
 
 help: ## list the targets
@@ -186,10 +186,14 @@ UNITS := $(addprefix tests/,api bpmn control_socket deconfliction diagram editin
 check: lint ## check style, types, layers and the core's unit tests: two minutes
 	@$(BIN)/pytest -n 2 -m "not long" $(UNITS)
 
-test: lint bench-quick ## check all but the long tests
-	@cd $(UI) && npm run --silent test
+test: setup ## check all but the long tests
+	@$(MAKE) --silent --jobs 2 --output-sync=target lint bench-quick page-test
 	@$(BIN)/pytest -n $(WORKERS) -m "not long"
 	@$(MAKE) --silent test-ros
+
+# The unit tests of the page's own code.
+page-test: setup
+	@cd $(UI) && npm run --silent test
 
 test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800 --hypothesis-profile random
