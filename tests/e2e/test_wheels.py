@@ -73,7 +73,7 @@ def wheels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(page, clone / page.relative_to(REPOSITORY))
     made = clone / "dist"
     projects = [clone, *(clone / plugin.relative_to(REPOSITORY) for plugin in PLUGINS)]
-    run(sys.executable, "-c", BUILDING, made, *projects)
+    run(sys.executable, "-c", BUILDING, made, *projects, cwd=clone)
     return made
 
 

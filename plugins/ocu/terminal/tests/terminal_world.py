@@ -117,8 +117,12 @@ class Terminal:
                 await self.pilot.pause(0.01)
 
     async def until_shown(self, *texts: str) -> None:
+        def shown() -> bool:
+            screen = self.screen  # once for all texts: taking it is what costs most
+            return all(text in screen for text in texts)
+
         try:
-            await self.until(lambda: all(self.shows(text) for text in texts))
+            await self.until(shown)
         except TimeoutError:
             pytest.fail(f"not shown: {texts}\n{self.screen}")
 

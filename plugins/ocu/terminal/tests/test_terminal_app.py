@@ -1,5 +1,6 @@
 """What the other keys do, and what the screen shows of missions."""
 
+import pytest
 from m2pem_plugin_terminal.mission_pane import mission_tree
 from terminal_world import MISSION, World, scout
 
@@ -66,6 +67,7 @@ async def test_a_signal_is_chosen_by_its_name(world: World) -> None:
         assert not terminal.shows("Send a signal")
 
 
+@pytest.mark.long
 async def test_escape_sends_no_signal(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()

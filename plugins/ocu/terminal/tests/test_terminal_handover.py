@@ -1,5 +1,6 @@
 """Taking vehicles from the missions, and giving them back."""
 
+import pytest
 from m2pem_plugin_terminal.handover import choices, taken
 from terminal_world import World, fleet, scout
 
@@ -99,6 +100,7 @@ async def test_what_another_operator_has_is_refused_with_the_name(world: World) 
         assert await holder(world, "uav") == "bob@gcs2"
 
 
+@pytest.mark.long
 async def test_what_became_anothers_while_the_list_was_shown_is_left(world: World) -> None:
     async with world.terminal() as terminal:
         await world.control.take("scout", by="anna@gcs1")
@@ -114,6 +116,7 @@ async def test_what_became_anothers_while_the_list_was_shown_is_left(world: Worl
         assert await holder(world) == "bob@gcs2"
 
 
+@pytest.mark.long
 async def test_taking_what_another_took_meanwhile_is_refused(world: World) -> None:
     async with world.terminal() as terminal:
         await terminal.press("t")

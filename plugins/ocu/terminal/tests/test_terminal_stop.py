@@ -33,7 +33,14 @@ async def test_another_key_stops_every_mission(world: World) -> None:
         await terminal.until_shown("STOPPED")
 
 
-@pytest.mark.parametrize("keys", [["s"], ["t"], ["r"], ["question_mark"], ["q"], ["slash", "x"]])
+@pytest.mark.parametrize(
+    "keys",
+    [
+        ["s"],
+        *(pytest.param([key], marks=pytest.mark.long) for key in ("t", "r", "question_mark", "q")),
+        ["slash", "x"],
+    ],
+)
 async def test_stop_works_over_everything(world: World, keys: list[str]) -> None:
     async with world.terminal() as terminal:
         await world.start()

@@ -146,6 +146,7 @@ def test_stop_from_another_terminal_ends_the_command_with_130(tmux: Tmux) -> Non
     anna.until_shown("r1 stopped: by bob@gcs2", "status 130")
 
 
+@pytest.mark.long
 def test_scripts_pause_signal_and_stop(tmux: Tmux) -> None:
     anna = tmux.terminal("anna@gcs1", RUN)
     anna.until_shown("Question: USER SEND ROUTE")
