@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +12,7 @@ from mavlink_failsafes import FILE
 PAGE = """# Failsafes of a vehicle while a mission runs
 
 What real autopilots, which simulate themselves, and m2pem do when a failsafe of the vehicle acts
-in a mission. Each row was played with the real program, `m2pem run` and a second ground station
+in a mission. Each phase was played with the real program, `m2pem run` and a second ground station
 that brought the failsafe about; `tools/record_failsafes` does it again and writes this page. The
 rules are in [MAVLink vehicles](mavlink.md#when-the-link-is-lost-and-other-failsafes): m2pem
 interrupts no RTL and no LAND that it has not asked for, arms no vehicle that is not ready, and says
@@ -22,6 +23,24 @@ the fleet says `lost_after: 10 s`. No boundary event catches an error, so that a
 ends the mission; a mission of yours can catch the error and go on. When the mission is over, m2pem
 ends, and with it the heartbeats of the ground station: a vehicle that stays in the air then returns
 by its own ground station failsafe.
+
+In the tables, phases that went alike share a row.
+
+- *The vehicle*: its modes from the failsafe on, also after the mission, and where it ended ("away":
+  not at home).
+- *The mission*: how the behavior of the phase ended. "to RTL": the mode changed to RTL, which m2pem
+  did not command, and then what the vehicle said of it; with `TAKEN_OVER` another ground station or
+  a switch did it, else a failsafe of the vehicle. "does not move": it should, but has not for 60 s
+  (in RTL 120 s).
+- *Operators read*: what else they read during the mission, mostly what the vehicle says.
+
+Operators read these lines, too, whatever the failsafe is:
+
+- Before the takeoff: `uav1 waits until it is ready`, and what is missing.
+- When the link is lost: `uav1: LINK_LOST: its arbiter lost the link`; if the vehicle was armed, its
+  mode and height, that what it does now is not known, and what may be done.
+- When the mission ends and the vehicle is armed: `uav1 stays armed in RTL, 38 m above its home`,
+  and what may be done.
 
 Rovers say "Radio Failsafe" when it is the ground station that they have lost. m2pem commands
 heights above terrain only where a mission says `altitude_frame: terrain`, and serves no terrain
@@ -36,24 +55,28 @@ frame is not supported"). `MAV_CMD_INJECT_FAILURE` stops its motor 1, which PX4 
 `CA_FAILURE_MODE` is not 0.
 """
 
-SET = """
-The fleet says `failsafe: {vehicle.failsafe}`, the vehicle has {parameters}.
-"""
-
 HEAD = """
-| Phase | The vehicle | The mission | Operators read |
-|---|---|---|---|
+The fleet says `failsafe: {vehicle.failsafe}`, the vehicle has {parameters}.
+
+| Failsafe | Phase | The vehicle | The mission | Operators read |
+|---|---|---|---|---|
 """
 
 ROUTINE = re.compile(
-    r"^(Start|End|Task\d|r1 of \w+ started|Task\d: \w+ begins .*|r1 completed"
-    r"|Task\d: \w+ ends .*: succeeded|Task\d: error .*|r1 failed: .*"
-    r"|WARNING m2pem.arbiter: \w+: nothing happens when its battery is low.*"
-    r"|WARNING m2pem.arbiter: \w+: fleet says .*"
-    r"|WARNING m2pem.arbiter: \w+ is ready|.*waits until it is ready: EKF: .*"
-    r"|.*the vehicle has not reported its position yet)$"
+    r"Start|End|Task\d|r1 .*|Task\d: (.* begins|.* ends|error) .*|.* is ready|.*: LINK_LOST: .*"
+    r"|.*( waits until it is ready: | stays armed in | was armed in |an unknown module block).*"
+    r"|.*: (nothing happens|it only warns) when its battery is low.*|.*: fleet says .*"
+    r"|.*the vehicle has not reported its position yet|.*GCS Failsafe Off"
 )
-"""Lines of every mission; how it ends has a column of its own."""
+"""Lines of every mission, what the page says before the tables, and what is of no vehicle."""
+
+SHORTER = (
+    (r"(a failsafe of its own|another ground station or a switch) has taken over: ", ""),
+    (r"the mode changed from \S+ (to \w[^:,]*)(, which m2pem did not command)?", r"\1"),
+    (r"it should move, but has not moved for .*", "does not move"),
+    (r" [\d.]+V used \d+ mAh| at \d+%,| for [\d.]+ s(econds)?\b|, \d+ s\b| \(\d\)|AUTO\.", ""),
+)
+"""What the page says before the tables, and what differs from one run to the next."""
 
 
 def page() -> str:
@@ -65,40 +88,33 @@ def _page() -> Iterator[str]:
     yield PAGE
     kept = json.loads(FILE.read_text(encoding="utf-8"))
     for vehicle in VEHICLES.values():
-        if vehicle.name not in kept:
-            continue
         parameters = ", ".join(f"`{key}` {value:g}" for key, value in vehicle.parameters.items())
-        yield f"\n## {vehicle.title}\n{SET.format(vehicle=vehicle, parameters=parameters)}"
+        yield f"\n## {vehicle.title}\n{HEAD.format(vehicle=vehicle, parameters=parameters)}"
         for name, phases in kept[vehicle.name].items():
-            yield f"\n### {vehicle.title}: {name}\n{HEAD}"
+            rows = defaultdict(list)
             for phase in vehicle.phases_of(vehicle.failsafes[name]):
-                if phase in phases:
-                    seen = phases[phase]
-                    yield f"| {phase} | {_vehicle(seen)} | {_mission(seen)} | {_read(seen)} |\n"
+                rows[_cells(phases[phase])].append(phase)
+            first = f"**{name}**"
+            for cells, alike in rows.items():
+                yield f"| {first} | {', '.join(alike)} | {cells} |\n"
+                first = ""
 
 
-def _vehicle(seen: dict[str, Any]) -> str:
-    modes = ", ".join(seen["modes"]) or "changes no mode"
-    end = "stands, armed" if seen.get("stands") else "stays armed"
+def _cells(seen: dict[str, Any]) -> str:
+    modes = ", ".join(seen["modes"]) or "same mode"
+    end = "stands, armed" if seen.get("stands") else "armed"
     if seen["disarmed"]:
-        end = "disarmed at home" if seen["at home"] else "disarmed elsewhere"
-    texts = "".join(f"<br>*{text}*" for text in seen["texts"])
-    return f"{modes}; {end}{texts}"
+        end = "disarmed" if seen["at home"] else "disarmed away"
+    said = "\n".join(seen["said"])
+    error = re.search(r": error (\w+) \((.*)\), not caught", said)
+    mission = f"`{error[1]}` {_shorter(error[2])}" if error else "completed"
+    lines = (line.split(": ", 1)[1] for line in seen["said"] if not ROUTINE.fullmatch(line))
+    plain = (re.sub(r"^\w+( says)?: (BATTERY_LOW: )?", "", _shorter(line)) for line in lines)
+    read = [line for line in dict.fromkeys(plain) if line.casefold() not in mission.casefold()]
+    return f"{modes}; {end} | {mission} | {'; '.join(read) or '-'}"
 
 
-def _mission(seen: dict[str, Any]) -> str:
-    if seen["status"] is None:
-        return "waits"
-    for line in reversed(seen["said"]):
-        if match := re.search(r"ends (\w+): (failed|lost), (.*)$", line):
-            return f"`{match[1]}` {match[2]}: {match[3]}"
-    return "completed" if seen["status"] == 0 else "failed"
-
-
-def _read(seen: dict[str, Any]) -> str:
-    lines = (line for line in seen["said"] if not ROUTINE.match(line))
-    plain = (re.sub(r"^(WARNING m2pem\.\w+: |m2pem: r1: )", "", line) for line in lines)
-    plain = (
-        re.sub(r"\. Nothing commands it now: .*", "; what may be done", line) for line in plain
-    )
-    return "<br>".join(dict.fromkeys(line for line in plain if "ends" not in line)) or "-"
+def _shorter(text: str) -> str:
+    for pattern, words in SHORTER:
+        text = re.sub(pattern, words, text)
+    return text
