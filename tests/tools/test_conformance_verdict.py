@@ -34,10 +34,10 @@ def test_data_of_an_engine_that_has_none_are_not_compared() -> None:
     [
         (Played(EVERYTHING, "completed", {"n": 2}), "in the end n is 2, not 3"),
         (Played(EVERYTHING, "running", {"n": 3}), "does not complete"),
-        (Played(((*EVERYTHING[0], "end"),), "completed", {}), "`start` enters end besides"),
+        (Played(((*EVERYTHING[0], "end"),), "completed", {}), "`start` adds end"),
         (
             Played((EVERYTHING[0][:-1],), "failed", {}, "no word"),
-            "`start` does not enter end, fails (no word)",
+            "`start` lacks end, fails (no word)",
         ),
     ],
 )

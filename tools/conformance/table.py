@@ -1,7 +1,11 @@
-"""The table of conformance as Markdown, between two marks of a page."""
+"""The table of conformance as Markdown, between two marks of a page.
+
+Cases of an element that every engine treats alike share a row. m2pem has no column: a test sees to
+it that m2pem does as BPMN says in each case.
+"""
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -21,7 +25,9 @@ _CHAPTERS = {
     "13.2": "Processes (13.2)",
 }
 _KINDS = ("same", "differs", "refuses", "hangs", "crashes", "n.a.")
-_WORDS = {"same": "yes", "n.a.": "-"}
+_WORDS = {"same": "yes", "n.a.": "-", "differs": ""}
+_NOISE = re.compile(r"ValidationException: (NotImplementedError\(')?|: %r'| with id [0-9a-f-]{36}")
+"""Of the words of engines: what says nothing, and what differs from run to run."""
 
 Verdicts = Mapping[str, Sequence[Verdict]]
 """What each engine, by name and version, did in each of the cases."""
@@ -36,20 +42,20 @@ def render(cases: Sequence[Case], verdicts: Verdicts) -> str:
     return "\n".join(parts)
 
 
-def own_column(cases: Sequence[Case], own: Sequence[Verdict]) -> list[tuple[str, str, str]]:
-    """Element, variant and m2pem's cell of each row, as `read_own_column` finds them."""
-    return [
-        (_plain(case.element), _variant(case), _cell(verdict))
-        for case, verdict in zip(cases, own, strict=True)
-    ]
+def names(cases: Sequence[Case]) -> list[tuple[str, str]]:
+    """Element and variant of each case, as `read_names` finds them."""
+    return sorted((_plain(case.element), _plain(case.variant)) for case in cases)
 
 
-def read_own_column(page: str) -> list[tuple[str, str, str]]:
-    """The first three cells of the rows of the page's tables by chapter."""
+def read_names(page: str) -> list[tuple[str, str]]:
+    """Element and variant of each case in the page's tables by chapter."""
     tables = page.partition(_BEGIN)[2].partition(_END)[0].partition("### ")[2]
-    rows = [re.split(r"(?<!\\)\|", line)[1:4] for line in tables.splitlines() if line[:1] == "|"]
-    cells = [tuple(cell.strip() for cell in row) for row in rows]
-    return [(a, b, c) for a, b, c in cells if a not in ("element", "---")]
+    found, element = [], ""
+    for row in re.findall(r"^\| (?!element|---)(.*)", tables, re.M):
+        first, variants = row.split(" | ")[:2]
+        element = first.strip() or element
+        found += [(element, variant) for variant in variants.partition(r" \[")[0].split("; ")]
+    return sorted(found)
 
 
 def write(page: str, table: str) -> str:
@@ -73,25 +79,26 @@ def _summary(verdicts: Verdicts) -> str:
 
 
 def _chapter(rows: Sequence[int], cases: Sequence[Case], verdicts: Verdicts) -> str:
-    lines = [
-        f"| element | variant | {' | '.join(verdicts)} |",
-        "|---|---|" + "---|" * len(verdicts),
-    ]
+    others = [name for name in verdicts if name != "m2pem"]
+    alike: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for row in rows:
-        cells = " | ".join(_cell(found[row]) for found in verdicts.values())
-        lines.append(f"| {_plain(cases[row].element)} | {_variant(cases[row])} | {cells} |")
+        case = cases[row]
+        why = f" {_plain(f'[{case.extension}]')}" if case.extension else ""
+        cells = " | ".join([why, *(_cell(verdicts[name][row]) for name in others)])
+        alike[_plain(case.element)][cells].append(_plain(case.variant))
+    lines = [f"| element | variants | {' | '.join(others)} |", "|---|---|" + "---|" * len(others)]
+    for element, variants in alike.items():
+        first = element
+        for cells, those in variants.items():
+            lines.append(f"| {first} | {'; '.join(those)}{cells} |")
+            first = ""
     return "\n".join(lines) + "\n"
-
-
-def _variant(case: Case) -> str:
-    return _plain(f"{case.variant} [{case.extension}]" if case.extension else case.variant)
 
 
 def _cell(verdict: Verdict) -> str:
     word = _WORDS.get(verdict.kind, verdict.kind)
-    if verdict.kind == "n.a." and verdict.words:
-        return _plain(f"{word} ({verdict.words})")
-    return _plain(f"{word}: {verdict.words}" if verdict.words else word)
+    words = "" if verdict.kind == "n.a." else _NOISE.sub("", verdict.words)
+    return _plain(": ".join(part for part in (word, words) if part))
 
 
 def _plain(text: str) -> str:

@@ -109,9 +109,9 @@ def uncounted(file: Path) -> frozenset[str]:
 def _difference(when: str, expected: Counter[str], got: Counter[str], played: Played) -> str:
     parts = []
     if missing := list((expected - got).elements()):
-        parts.append(f"does not enter {' '.join(missing)}")
+        parts.append(f"lacks {' '.join(missing)}")
     if more := list((got - expected).elements()):
-        parts.append(f"enters {' '.join(more)} besides" if expected else f"enters {' '.join(more)}")
+        parts.append(f"adds {' '.join(more)}")
     if played.ended == "failed":
         parts.append(f"fails ({played.problem})")
     return f"`{when}` {', '.join(parts)}"
