@@ -30,16 +30,16 @@ This page is generated from the rules: `python -m m2pem.bpmn.pages rules`.
 _RULES_OF_BPMN = """
 ## BPMN's rules
 
-| number | rule | clause | level | what is wrong | what is right |
-|---|---|---|---|---|---|
+| rule | clause | level | wrong | right |
+|---|---|---|---|---|
 """
 _RULES_OF_M2PEM = """
 ## m2pem's own rules
 
 For questions that BPMN leaves open, and for m2pem's own elements of [mission files](missions.md).
 
-| number | rule | level | what is wrong | what is right |
-|---|---|---|---|---|
+| rule | level | wrong | right |
+|---|---|---|---|
 """
 
 
@@ -58,8 +58,8 @@ def _rule_rows(letter: str) -> Iterator[str]:
     for rule in RULES:
         if rule.code[0] == letter:
             clause = [rule.clause] if letter == "B" else []
-            cells = [rule.code, f"`{rule.slug}`", *clause, rule.severity.value]
-            cells += [rule.wrong, rule.right]
+            name = f"`{rule.slug} {rule.code}`"
+            cells = [name, *clause, rule.severity.value, rule.wrong, rule.right]
             yield f"| {' | '.join(cells)} |\n"
 
 
