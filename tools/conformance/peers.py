@@ -93,7 +93,7 @@ def _short(problem: str) -> str:
 
 def spiffworkflow(python: Path) -> Peer:
     """SpiffWorkflow, installed for that interpreter."""
-    script = REPOSITORY / "tests" / "conformance" / "play_spiffworkflow.py"
+    script = REPOSITORY / "tools" / "conformance" / "play_spiffworkflow.py"
     ask = "from importlib.metadata import version; print(version('SpiffWorkflow'))"
     found = subprocess.run([python, "-c", ask], capture_output=True, text=True, check=True)
     return Peer(
