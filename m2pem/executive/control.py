@@ -261,13 +261,15 @@ class Control:
     async def _explain_end(self, request: str, run: RunId) -> AsyncIterator[None]:
         """Say how and when a run has ended that refuses a request for that reason.
 
-        `request`: the method's name. A run that ended long ago is known to the journal alone.
+        `request`: the method's name. A run that ended long ago is known to the journal alone. An
+        end that the request itself has caused, and a journal that stalls has not written, is none.
         """
+        runner = self._supervisor.runners.get(run)
+        ended = runner is None or self._has_ended(run)
         try:
             yield
         except OperatorError as error:
-            runner = self._supervisor.runners.get(run)
-            if runner is not None and not self._has_ended(run):
+            if runner is not None and not ended and not runner.done.is_set():
                 raise
             lines = {each.run: each for each in await self._supervisor.journal.runs()}
             line = lines.get(run)

@@ -130,7 +130,7 @@ def test_two_terminals_and_a_script_steer_one_mission(tmux: Tmux) -> None:
     bob.until_shown("TERMINATED", "The executive has ended.")
     bob.press("q")
     bob.until_shown("status 0")
-    assert "no executive" in tmux.m2pem("stop r1").stdout
+    assert "there was nothing to stop" in tmux.m2pem("stop r1").stdout
 
 
 def test_stop_from_another_terminal_ends_the_command_with_130(tmux: Tmux) -> None:
