@@ -34,6 +34,7 @@ def test_the_page_installs_runs_and_tests_what_it_builds() -> None:
         assert wanted in typed
 
 
+@pytest.mark.long
 @pytest.mark.timeout(600)
 def test_an_author_with_the_page_and_pip_builds_runs_and_tests_the_plugin(author: Author) -> None:
     """The page's commands, in its order, print what it says. Ports are others, to be free."""

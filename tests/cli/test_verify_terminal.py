@@ -175,7 +175,7 @@ def test_ctrl_c_ends_the_search_of_requirements_before_it_begins(
     assert re.search(r"^undecided  asked .* \(not begun, after an int", results(tmp_path), re.M)
 
 
-@pytest.mark.parametrize("how", ["Ctrl-C", "SIGTERM"])
+@pytest.mark.parametrize("how", ["Ctrl-C", pytest.param("SIGTERM", marks=pytest.mark.long)])
 def test_what_ends_m2pem_ends_spin_and_what_it_saw_is_told(
     tmp_path: Path, mission: Path, how: str
 ) -> None:

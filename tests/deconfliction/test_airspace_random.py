@@ -119,7 +119,7 @@ def requests(task: tuple[str, dict[str, Any], Where], name: str) -> BehaviorRequ
     return request(task[0], name, **task[1])
 
 
-@settings(deadline=None, max_examples=600)
+@settings(deadline=None, max_examples=200)
 @given(tasks(), tasks(), st.booleans(), st.booleans())
 def test_two_that_may_both_go_meet_at_no_speed_whatever(
     first: tuple[str, dict[str, Any], Where],
