@@ -136,8 +136,8 @@ class TakeEffect:
 class RoleAssignment:
     """What a role of a mission runs on in a fleet.
 
-    `resource`: the vehicle, payload or team that the mission names. `resources`: those of the
-    fleet; empty: the fleet lacks it.
+    `resource`: the vehicle, payload or team that the mission names; "": what fills the role is
+    chosen when its task starts. `resources`: those of the fleet; empty: the fleet lacks it.
     """
 
     role: str
@@ -145,6 +145,8 @@ class RoleAssignment:
     resources: tuple[ResourceId, ...]
 
     def __str__(self) -> str:
+        if not self.resource:
+            return f"{self.role}: chosen when its task starts"
         if not self.resources:
             return f"{self.role}: {self.resource}, which the fleet lacks"
         team = "" if self.resources == (self.resource,) else f"{self.resource}: "
@@ -171,6 +173,35 @@ class StartPreview:
     def refused(self) -> bool:
         """Whether the mission cannot start."""
         return has_errors(self.findings)
+
+
+@dataclass(frozen=True, slots=True)
+class WaitingTask:
+    """A task that waits for vehicles or payloads that are not free (docs/allocation.md).
+
+    `allocation`: the id of its request. `task` is the task's label. Times are seconds: since it
+    asked, and until it gives up (None: it waits without a limit, or its run is about to answer).
+    `holders`: the behaviors, requests and operators who have what it could use, by resource.
+    """
+
+    run: RunId
+    allocation: str
+    element: str
+    task: str
+    behavior: str
+    waited_s: float
+    left_s: float | None
+    priority: int
+    reason: str
+    holders: Mapping[str, str]
+
+    def __str__(self) -> str:
+        limit = "without a limit" if self.left_s is None else f"for {self.left_s:.0f} s at most"
+        priority = f" with priority {self.priority}" if self.priority else ""
+        return (
+            f"{self.run}: {self.task} waits since {self.waited_s:.0f} s and {limit}{priority}: "
+            f"{self.reason}"
+        )
 
 
 LOGGED = "LOGGED"
@@ -313,7 +344,13 @@ class MissionControl(Protocol):
         ...
 
     async def holders(self) -> Mapping[ResourceId, str]:
-        """Who has each resource: an operator, a behavior ("r1.b3"), or "" when it is free."""
+        """Who has each resource: an operator, a behavior ("r1.b3"), a request for which it was just
+        chosen ("r1.a2"), or "" when it is free.
+        """
+        ...
+
+    async def waiting(self) -> Sequence[WaitingTask]:
+        """The tasks of all runs that wait for vehicles or payloads, in the order of service."""
         ...
 
     def subscribe(

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 from m2pem.api import records as r
+from m2pem.api.choices import choice_sentence
 from m2pem.api.control import StampedRecord
 from m2pem.api.run_view import RunView
 from m2pem.mission.catalogue import BehaviorState
@@ -188,7 +189,42 @@ def _scope_closed(view: RunView, record: r.ScopeClosed) -> _Sentence:
     return f"{view.label(record.element)}: scope {record.outcome.value}", Importance.DETAIL
 
 
-# --- behaviors, prompts, services -----------------------------------------------------------------
+# --- allocations, behaviors, prompts, services ----------------------------------------------------
+
+
+def _allocation_requested(view: RunView, record: r.AllocationRequested) -> _Sentence:
+    text = f"{view.label(record.element)}: asks for resources for {record.name}"
+    return text, Importance.DETAIL
+
+
+def _allocation_delayed(view: RunView, record: r.AllocationDelayed) -> _Sentence:
+    label = _asking(view, record.allocation)
+    if record.again:
+        return f"{label}: asks again, as {record.reason}", Importance.DETAIL
+    return f"{label}: {waiting(record.reason)}", Importance.NORMAL
+
+
+def waiting(reason: str) -> str:
+    """Say that a task waits for resources; `reason` "": why is not known yet."""
+    return f"waits for {reason}" if reason.startswith("role ") else f"waits{_after_colon(reason)}"
+
+
+def _resources_allocated(view: RunView, record: r.ResourcesAllocated) -> _Sentence:
+    text = f"{view.label(record.element)}: {choice_sentence(record, view.holder)}"
+    return text, Importance.NORMAL
+
+
+def _allocation_ended(view: RunView, record: r.AllocationEnded) -> _Sentence:
+    label = _asking(view, record.allocation)
+    if not record.code:
+        return f"{label}: no longer asks for resources", Importance.DETAIL
+    text = f"{label}: gets no resources, {record.code}{_in_brackets(record.reason)}"
+    return text, Importance.ATTENTION
+
+
+def _asking(view: RunView, id_: str) -> str:
+    allocation = view.allocation(id_)
+    return view.label(allocation.element) if allocation is not None else id_
 
 
 def _behavior_requested(view: RunView, record: r.BehaviorRequested) -> _Sentence:
@@ -342,6 +378,10 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.FlowTaken: _flow_taken,
     r.ScopeOpened: _scope_opened,
     r.ScopeClosed: _scope_closed,
+    r.AllocationRequested: _allocation_requested,
+    r.AllocationDelayed: _allocation_delayed,
+    r.ResourcesAllocated: _resources_allocated,
+    r.AllocationEnded: _allocation_ended,
     r.BehaviorRequested: _behavior_requested,
     r.BehaviorProgressed: _behavior_progressed,
     r.BehaviorCancelRequested: _behavior_cancel_requested,
@@ -383,6 +423,10 @@ _KINDS: dict[type, Kind] = {
         ),
         Kind.OPERATORS: (r.OperatorTookControl, r.OperatorGaveControlBack, r.GeometryReceived),
         Kind.BEHAVIORS: (
+            r.AllocationRequested,
+            r.AllocationDelayed,
+            r.ResourcesAllocated,
+            r.AllocationEnded,
             r.BehaviorRequested,
             r.BehaviorProgressed,
             r.BehaviorCancelRequested,

@@ -26,6 +26,7 @@ from m2pem.api.control import (
     StampedRecord,
     StartPreview,
     TakeEffect,
+    WaitingTask,
 )
 from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
@@ -215,6 +216,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("holders", Nothing, dict[ResourceId, str]),
         Operation("missions", Nothing, list[str], alone=True),
         Operation("preview_start", Check, StartPreview, alone=True),
+        Operation("waiting", Nothing, list[WaitingTask]),
         Operation("runs", Nothing, list[RunSummary]),
         Operation("prompts", Nothing, list[OpenPrompt]),
         Operation("records", Page, list[StampedRecord]),

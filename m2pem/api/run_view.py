@@ -34,7 +34,8 @@ Place: TypeAlias = tuple[str, str]
 class ElementState(msgspec.Struct):
     """An element: the tokens on it now and so far, and the mission time of its last change.
 
-    `failed`: the last token that left it had failed. `asking`: a prompt of it is open.
+    `failed`: the last token that left it had failed. `asking`: a prompt of it is open. `waiting`:
+    a task of it waits for vehicles or payloads that are not free.
     """
 
     active: int = 0
@@ -42,6 +43,7 @@ class ElementState(msgspec.Struct):
     last: float = 0.0
     failed: bool = False
     asking: bool = False
+    waiting: bool = False
 
 
 @dataclass(slots=True)
@@ -59,6 +61,25 @@ class Behavior:
     token: int
     since_s: float
     state: str = ""
+
+
+@dataclass(slots=True)
+class Allocation:
+    """A task that asks for vehicles or payloads to be chosen for its roles (docs/allocation.md).
+
+    `name`: its behavior. `since_s`: mission time at which it asked. `reason`: why it waits, ""
+    before that is known. `holders`: the behaviors, requests and operators who have what it could
+    use, by resource.
+    """
+
+    id: str
+    name: str
+    process: str
+    element: str
+    token: int
+    since_s: float
+    reason: str = ""
+    holders: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +123,7 @@ class Token:
     since_us: int
     instance: int | None = None
     is_around: bool = False
-    work: dict[str, Behavior | Service] = field(default_factory=dict)
+    work: dict[str, Behavior | Service | Allocation] = field(default_factory=dict)
     prompts: set[str] = field(default_factory=set)
     waits: dict[int, Wait] = field(default_factory=dict)
 
@@ -128,7 +149,8 @@ class Scope:
 
 @dataclass(frozen=True, slots=True)
 class ActiveElement:
-    """An element with tokens on it, and the behaviors that they wait for.
+    """An element with tokens on it, the behaviors that they wait for, and the `allocations`: the
+    requests for vehicles and payloads that they wait for.
 
     `since_us`: when the first of them came, microseconds since the Unix epoch.
     """
@@ -137,6 +159,7 @@ class ActiveElement:
     tokens: int
     since_us: int
     behaviors: tuple[Behavior, ...]
+    allocations: tuple[Allocation, ...] = ()
 
 
 @dataclass(slots=True)
@@ -185,6 +208,7 @@ class RunView:
         self.completed: set[str] = set()
         """Elements that a token has completed at least once."""
         self.behaviors: dict[str, Behavior] = {}
+        self.allocations: dict[str, Allocation] = {}
         self.services: dict[str, Service] = {}
         self.prompts: dict[str, r.PromptOpened] = {}
         self.waits: dict[int, Wait] = {}
@@ -192,6 +216,7 @@ class RunView:
         """Operators who have taken a resource, by resource, as far as the run's records say."""
         self.changes: Changes | None = None
         self._ended_behaviors: dict[str, Behavior] = {}
+        self._ended_allocations: dict[str, Allocation] = {}
         self._closed_prompts: dict[str, r.PromptOpened] = {}
         self._past_waits: dict[int, Wait] = {}
         self._paused_us = 0
@@ -240,6 +265,18 @@ class RunView:
     def behavior(self, id_: str) -> Behavior | None:
         """Return a behavior that goes on, or that was among the last to end."""
         return self.behaviors.get(id_) or self._ended_behaviors.get(id_)
+
+    def allocation(self, id_: str) -> Allocation | None:
+        """Return a request for resources that goes on, or that was among the last to end."""
+        return self.allocations.get(id_) or self._ended_allocations.get(id_)
+
+    def holder(self, id_: str) -> str:
+        """Return words for who holds a resource: a behavior or request of this run by its name."""
+        if (behavior := self.behavior(id_)) is not None:
+            return f"{behavior.name} of {self.label(behavior.element)} ({id_})"
+        if (allocation := self.allocation(id_)) is not None:
+            return f"{self.label(allocation.element)} ({id_})"
+        return id_
 
     def prompt(self, id_: str) -> r.PromptOpened | None:
         """Return a prompt that is open, or that was among the last to be closed."""
@@ -319,11 +356,13 @@ class RunView:
         for prompt in list(self.prompts):
             self._close_prompt(prompt)
         for place, state in self.elements.items():
-            if state.active or state.asking:
+            if state.active or state.asking or state.waiting:
                 state.active = 0
                 state.asking = False
+                state.waiting = False
                 self._touch(place, state)
         self.tokens.clear()
+        self.allocations.clear()
         self.waits.clear()
 
     def _take(self, record: r.OperatorTookControl) -> None:
@@ -406,6 +445,44 @@ class RunView:
             del self.waits[id_]
 
     # --- what tokens wait for -------------------------------------------------------------------
+
+    def _request_allocation(self, record: r.AllocationRequested) -> None:
+        allocation = self.allocations[record.allocation] = Allocation(
+            record.allocation,
+            record.name,
+            record.process,
+            record.element,
+            record.token,
+            self.t_s,
+        )
+        if token := self.tokens.get(record.token):
+            token.work[record.allocation] = allocation
+
+    def _delay_allocation(self, record: r.AllocationDelayed) -> None:
+        if allocation := self.allocations.get(record.allocation):
+            allocation.reason = record.reason
+            allocation.holders = record.holders
+            self._note_waiting(allocation)
+
+    def _end_allocation(self, record: r.ResourcesAllocated | r.AllocationEnded) -> None:
+        allocation = self.allocations.pop(record.allocation, None)
+        if allocation is None:
+            return
+        _keep(self._ended_allocations, record.allocation, allocation)
+        if token := self.tokens.get(allocation.token):
+            token.work.pop(record.allocation, None)
+        self._note_waiting(allocation)
+
+    def _note_waiting(self, allocation: Allocation) -> None:
+        place = (allocation.process, allocation.element)
+        state = self._element(place)
+        waiting = any(
+            each.reason and (each.process, each.element) == place
+            for each in self.allocations.values()
+        )
+        if state.waiting != waiting:
+            state.waiting = waiting
+            self._touch(place, state)
 
     def _request_behavior(self, record: r.BehaviorRequested) -> None:
         behavior = self.behaviors[record.behavior] = Behavior(
@@ -517,6 +594,9 @@ def _active(element: str, tokens: list[Token]) -> ActiveElement:
         tuple(
             work for token in tokens for work in token.work.values() if isinstance(work, Behavior)
         ),
+        tuple(
+            work for token in tokens for work in token.work.values() if isinstance(work, Allocation)
+        ),
     )
 
 
@@ -533,6 +613,10 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.ScopeInterrupted: RunView._interrupt_scope,
     r.TokenEntered: RunView._enter,
     r.TokenLeft: RunView._leave,
+    r.AllocationRequested: RunView._request_allocation,
+    r.AllocationDelayed: RunView._delay_allocation,
+    r.ResourcesAllocated: RunView._end_allocation,
+    r.AllocationEnded: RunView._end_allocation,
     r.BehaviorRequested: RunView._request_behavior,
     r.BehaviorProgressed: RunView._progress_behavior,
     r.BehaviorUnsettled: RunView._unsettle_behavior,

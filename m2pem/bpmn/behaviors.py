@@ -1,10 +1,12 @@
 """Behaviors and services as XML: the paper's Figure 3 (docs/missions.md)."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 from lxml import etree
 
 from m2pem.bpmn.context import ReadingContext
+from m2pem.bpmn.needs import NEED_ATTRIBUTES, NeedReader
 from m2pem.bpmn.rules.attributes import BAD_VALUE
 from m2pem.bpmn.rules.behaviors import (
     BEHAVIOR_NAME,
@@ -14,9 +16,9 @@ from m2pem.bpmn.rules.behaviors import (
     DUPLICATE_ROLE,
     MISPLACED,
     PARAMETER_NAME,
-    REQUIRES_RESERVED,
     ROLE_ALLOCATION,
     ROLE_NAME,
+    ROLE_NEED,
     ROLE_NOT_LITERAL,
     SERVICE_CLASS,
 )
@@ -24,7 +26,7 @@ from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.xml import BPMN, M2PEM, local
 from m2pem.mission.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
 
-_ROLE_ATTRIBUTES = frozenset({"name", "optional", "requires", *RoleKind})
+_LITERAL_ATTRIBUTES = frozenset({"name", "optional", *RoleKind})
 
 
 class BehaviorReader:
@@ -89,7 +91,9 @@ class BehaviorReader:
             )
         if kind not in list(BehaviorType) or not name:
             return None
-        return Behavior(BehaviorType(kind), name, line, tuple(parameters), tuple(roles))
+        # What is needed is of the behavior's own type; a team is made of the vehicles chosen.
+        filled = [role if role.resource else replace(role, kind=RoleKind(kind)) for role in roles]
+        return Behavior(BehaviorType(kind), name, line, tuple(parameters), tuple(filled))
 
     def _head_property(self, element: etree._Element, head: dict[str, str]) -> None:
         name = _attribute(element, "name") or ""
@@ -122,6 +126,14 @@ class BehaviorReader:
                 roles += self._resources(child)
         self.refuse_repeated(parameters, DUPLICATE_PROPERTY)
         self.refuse_repeated(roles, DUPLICATE_ROLE)
+        for role in roles:
+            if role.need is not None:
+                self._error(
+                    role.line,
+                    ROLE_NEED,
+                    f"role '{role.name}' of a service says what it needs, or waits",
+                    "only behaviors choose resources as they start: name the payload or vehicle",
+                )
         name = (_attribute(element, "class") or "").strip()
         line = self._line(element)
         if not name:
@@ -173,7 +185,7 @@ class BehaviorReader:
         name = (_attribute(element, "name") or "").strip()
         if not name:
             self._error(line, ROLE_NAME, "a role has no name", 'write <role name="driver" .../>')
-        texts = {key: _attribute(element, key) for key in sorted(_ROLE_ATTRIBUTES)}
+        texts = {key: _attribute(element, key) for key in sorted(_LITERAL_ATTRIBUTES)}
         for key, text in texts.items():
             if text is not None and ("${" in text or "#{" in text):
                 self._error(
@@ -183,28 +195,34 @@ class BehaviorReader:
                     "write the vehicle, payload or team itself",
                 )
                 return []
-        if texts["requires"] is not None:
+        needs = {key: text for key in NEED_ATTRIBUTES if (text := _attribute(element, key))}
+        named = [(kind, texts[kind] or "") for kind in RoleKind if texts[kind] is not None]
+        by_need = "requires" in needs or "same" in needs
+        if by_need and named:
             self._error(
                 line,
-                REQUIRES_RESERVED,
-                f"role '{name}' asks for a dynamic allocation (requires=), which m2pem reserves "
-                "but does not offer yet",
-                'name the resource: vehicle="...", payload="vehicle/payload" or team="..."',
+                ROLE_ALLOCATION,
+                f"role '{name}' names a {named[0][0]} and says what it needs, too",
+                "keep the name, or what is needed of it",
             )
             return []
-        named = [(kind, texts[kind] or "") for kind in RoleKind if texts[kind] is not None]
-        if len(named) != 1 or not named[0][1].strip():
+        if not by_need and (len(named) != 1 or not named[0][1].strip()):
             what = " and ".join(kind for kind, _ in named) if len(named) > 1 else "no resource"
             self._error(
                 line,
                 ROLE_ALLOCATION,
                 f"role '{name}' names {what}",
-                "name exactly one vehicle, payload or team",
+                "name exactly one vehicle, payload or team, or say with requires= what it needs",
             )
             return []
-        kind, resource = named[0]
+        kind, resource = named[0] if named else (RoleKind.VEHICLE, "")
+        need = None
+        if needs:
+            need = NeedReader(self._context, self._task, line, name, by_need=by_need).read(needs)
+            if need is None:
+                return []
         optional = self._optional(line, name, texts["optional"])
-        return [Role(name, kind, resource.strip(), line, optional)] if name else []
+        return [Role(name, kind, resource.strip(), line, optional, need)] if name else []
 
     def _optional(self, line: int, role: str, text: str | None) -> bool:
         if text not in (None, "true", "false", "1", "0"):

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from m2pem.bpmn.rules.data import UNWRITTEN_NAME
 from m2pem.findings import Finding
-from m2pem.mission.behavior import Assignment, Behavior, Parameter
+from m2pem.mission.behavior import Assignment, Behavior, Parameter, Role
 from m2pem.mission.behavior import Mapping as DataMapping
+from m2pem.mission.candidate_facts import is_fact
 from m2pem.mission.elements import (
     Activity,
     AdHocSubProcess,
@@ -25,18 +26,28 @@ from m2pem.mission.elements import (
     UserTask,
 )
 from m2pem.mission.events import ConditionalEventDefinition, TimerEventDefinition
-from m2pem.mission.expression import Expression
+from m2pem.mission.expression import Expression, parse
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest_or
 
 
 class Read(NamedTuple):
-    """An expression that is evaluated over a process's data, and its element."""
+    """An expression that is evaluated over a process's data, and its element.
+
+    `of_role`: it is of a role, and reads the facts of candidates as well.
+    """
 
     expression: Expression
     element: str
     line: int
+    of_role: bool = False
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of the data store that it reads."""
+        names = self.expression.names
+        return frozenset(each for each in names if not is_fact(each)) if self.of_role else names
 
 
 @dataclass(slots=True)
@@ -108,9 +119,10 @@ def unwritten(
 def _findings(mission: Mission, process: Process, store: _Store) -> Iterator[Finding]:
     said: set[tuple[str, str]] = set()
     for read in store.reads:
-        if read.expression.names <= store.written:
+        names = read.names
+        if names <= store.written:
             continue
-        for name in sorted(name for name in read.expression.names if not store.has(name)):
+        for name in sorted(name for name in names if not store.has(name)):
             if (read.element, name) in said:
                 continue
             said.add((read.element, name))
@@ -147,6 +159,7 @@ def _reads(node: FlowNode) -> Iterator[Read]:
             yield Read(flow.condition, flow.id, flow.line)
     if isinstance(node, ScriptTask | ServiceTask | SendTask) and node.behavior is not None:
         yield from _parameters(node, node.behavior.parameters)
+        yield from _needs(node, node.behavior.roles)
     if isinstance(node, ScriptTask) and node.script is not None:
         for statement in node.script.statements:
             if isinstance(statement, Assignment):
@@ -187,6 +200,18 @@ def _parameters(node: FlowNode, parameters: Iterable[Parameter]) -> Iterator[Rea
             yield Read(parameter.value, node.id, parameter.line)
 
 
+def _needs(node: FlowNode, roles: Iterable[Role]) -> Iterator[Read]:
+    for role in roles:
+        if role.need is None:
+            continue
+        for expression in role.need.expressions:
+            yield Read(expression, node.id, role.line, of_role=True)
+        if role.need.same:
+            yield Read(parse(role.need.same), node.id, role.line)
+        if role.need.wait_limit is not None:
+            yield Read(role.need.wait_limit, node.id, role.line)
+
+
 def written_by(node: FlowNode) -> set[str]:
     """The names that a node itself writes, without those of its service or behavior."""
     written = {mapping.target for mapping in _data_mappings(node)}
@@ -206,7 +231,10 @@ def written_by(node: FlowNode) -> set[str]:
         written.update(flow.local_id for flow in node.incoming)
     elif isinstance(node, CallActivity):
         written.update(mapping.target for mapping in node.mappings.outputs)
-    return written
+    behavior = getattr(node, "behavior", None)
+    if isinstance(behavior, Behavior):
+        written.update(role.need.store for role in behavior.roles if role.need is not None)
+    return written - {""}
 
 
 def _note_mappings(call: CallActivity, caller: _Store, called: _Store) -> None:

@@ -7,7 +7,8 @@ with `m2pem:` means an element of m2pem's:
     m2pem:behavior = goto           <m2pem:behavior type="vehicle" name="goto">
     m2pem:type = vehicle
     m2pem:property:speed = 2 m/s      <m2pem:properties><m2pem:property name="speed" value="2 m/s"/>
-    m2pem:vehicle:mover = ugv1        <m2pem:resources><m2pem:role name="mover" vehicle="ugv1"/>
+    m2pem:vehicle:mover = ugv1        <m2pem:resources><m2pem:role name="mover" vehicle="ugv1"
+    m2pem:wait:mover = PT10M                                            wait="PT10M"/>
 
 The elements take the properties' place in the tree before it is read, so that readers and rules
 know only m2pem's elements.
@@ -18,6 +19,7 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from m2pem.bpmn.file_findings import FileFindings
+from m2pem.bpmn.needs import NEED_ATTRIBUTES
 from m2pem.bpmn.rules.behaviors import DUPLICATE_PROPERTY
 from m2pem.bpmn.rules.extensions import UNKNOWN_EXTENSION
 from m2pem.bpmn.xml import BPMN, CAMUNDA, M2PEM, ZEEBE, Document
@@ -34,7 +36,7 @@ TIMEOUT = f"{PREFIX}timeout"
 
 _SETTINGS = (STORE, OPERATORS, TIMEOUT)
 _SINGLE = frozenset({BEHAVIOR, TYPE, PROMPT, *_SETTINGS})
-_ROLES = frozenset(RoleKind)
+_ROLES = frozenset({*RoleKind, *NEED_ATTRIBUTES})
 _NAMED = frozenset({"property", "decision", *_ROLES})
 _CONTAINERS = (CAMUNDA + "properties", ZEEBE + "properties")
 _EXTENSIONS = BPMN + "extensionElements"
@@ -94,8 +96,9 @@ class _Replacement:
                 f"add the property '{BEHAVIOR}' with a name of the catalogue",
             )
         else:
-            for item in self._of(("property", *_ROLES)):
-                self._item(self.outer, *item)
+            for item in self._of(("property",)):
+                self._property(self.outer, *item)
+            self._roles(self.outer)
         self._prompt()
 
     def _sort(self, element: etree._Element) -> bool:
@@ -118,7 +121,8 @@ class _Replacement:
             return True
         if what in _NAMED:
             right = f"write for example '{property_name(what, _EXAMPLES[what])}'"
-            self._error(element, f"the property '{whole}' does not say which {what}", right)
+            which = "role" if what in NEED_ATTRIBUTES else what
+            self._error(element, f"the property '{whole}' does not say which {which}", right)
         else:
             forms = [*sorted(_SINGLE), *(f"{PREFIX}{each}:" for each in sorted(_NAMED))]
             right = f"{PREFIX}{what}{colon}"
@@ -130,11 +134,12 @@ class _Replacement:
         behavior = self._add(self.outer, "behavior", origin, name=_value(origin))
         if TYPE in self.single:
             behavior.set("type", _value(self.single[TYPE]))
-        for wrapper, kinds in (("properties", ("property",)), ("resources", tuple(_ROLES))):
-            if items := self._of(kinds):
-                inside = self._add(behavior, wrapper, origin)
-                for item in items:
-                    self._item(inside, *item)
+        if properties := self._of(("property",)):
+            inside = self._add(behavior, "properties", origin)
+            for item in properties:
+                self._property(inside, *item)
+        if self._of(tuple(_ROLES)):
+            self._roles(self._add(behavior, "resources", origin))
 
     def _prompt(self) -> None:
         decisions = self._of(("decision",))
@@ -155,11 +160,20 @@ class _Replacement:
     def _of(self, kinds: tuple[str, ...]) -> list[tuple[str, str, etree._Element]]:
         return [each for each in self.named if each[0] in kinds]
 
-    def _item(self, outer: etree._Element, what: str, name: str, origin: etree._Element) -> None:
-        if what in _ROLES:
-            self._add(outer, "role", origin, name=name, **{what: _value(origin)})
-        else:
-            self._add(outer, "property", origin, name=name, value=_value(origin))
+    def _property(self, outer: etree._Element, _: str, name: str, origin: etree._Element) -> None:
+        self._add(outer, "property", origin, name=name, value=_value(origin))
+
+    def _roles(self, outer: etree._Element) -> None:
+        """Add a role of each name: its properties are attributes of one element.
+
+        What is given twice makes two elements, which the reader of roles reports.
+        """
+        roles: dict[str, etree._Element] = {}
+        for what, name, origin in self._of(tuple(_ROLES)):
+            role = roles.get(name)
+            if role is None or what in role.attrib:
+                role = roles[name] = self._add(outer, "role", origin, name=name)
+            role.set(what, _value(origin))
 
     def _add(
         self, outer: etree._Element, tag: str, origin: etree._Element, /, **attributes: str
@@ -182,6 +196,7 @@ _EXAMPLES = {
     "vehicle": "mover",
     "payload": "camera",
     "team": "team",
+    **dict.fromkeys(NEED_ATTRIBUTES, "mover"),
 }
 
 

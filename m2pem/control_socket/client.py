@@ -59,9 +59,7 @@ def ask_all(journal: Path, method: str, **params: Any) -> list[Any]:
     Raises:
         OperatorError: some refused or did not answer, each named; or there is none.
     """
-    paths = list(live_sockets(journal))
-    if not paths:
-        raise _not_driven(journal)
+    paths = executives(journal)
     answers: list[Any] = []
     problems: list[str] = []
     with ThreadPoolExecutor(len(paths)) as pool:
@@ -77,15 +75,25 @@ def ask_all(journal: Path, method: str, **params: Any) -> list[Any]:
     return answers
 
 
+def executives(journal: Path) -> list[Path]:
+    """The sockets of all executives on the journal.
+
+    Raises:
+        NotDrivenError: there is none.
+    """
+    paths = list(live_sockets(journal))
+    if not paths:
+        raise _not_driven(journal)
+    return paths
+
+
 def find_executive(journal: Path, run: str | None) -> Path:
     """The socket of the executive that drives `run`; of the only one on the journal if None.
 
     Raises:
         OperatorError: there is none, or (without a run) more than one.
     """
-    paths = list(live_sockets(journal))
-    if not paths:
-        raise _not_driven(journal)
+    paths = executives(journal)
     if run is None:
         if len(paths) > 1:
             raise OperatorError(
@@ -111,9 +119,7 @@ def choose_executive(journal: Path, name: str | None) -> Path:
     Raises:
         OperatorError: there is none; or several, which are listed.
     """
-    paths = list(live_sockets(journal))
-    if not paths:
-        raise _not_driven(journal)
+    paths = executives(journal)
     if name is None and len(paths) == 1:
         return paths[0]
     fleets = {path: fleet_name(path) for path in paths}

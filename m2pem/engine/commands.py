@@ -12,6 +12,22 @@ from m2pem.mission.values import Value
 
 
 @dataclass(frozen=True, slots=True)
+class AllocateResources:
+    """Choose resources for the roles of a task; answer with `ResourcesChosen` or
+    `ResourcesNotFree`. `again`: what was chosen before had been taken meanwhile."""
+
+    allocation: str
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawAllocation:
+    """The task needs its resources no longer: what was chosen for it is free."""
+
+    allocation: str
+
+
+@dataclass(frozen=True, slots=True)
 class StartBehavior:
     """Start a behavior on the arbiters of its resources; idempotent on `behavior`."""
 
@@ -88,6 +104,8 @@ class CancelService:
 
 
 Command: TypeAlias = Union[
+    AllocateResources,
+    WithdrawAllocation,
     StartBehavior,
     CancelBehavior,
     HoldResource,

@@ -13,6 +13,7 @@ from m2pem.engine import records as r
 from m2pem.engine.arming import arm_entered, next_timer
 from m2pem.engine.data import flatten
 from m2pem.engine.elements.activities import complete
+from m2pem.engine.elements.allocations import resources_chosen, resources_not_free
 from m2pem.engine.elements.behaviors import (
     behavior_missing,
     behavior_reported,
@@ -138,6 +139,10 @@ def _give_up(x: Steps, item: i.GiveUp) -> None:
         for behavior in state.behaviors.values()
         if behavior.phase is not BehaviorPhase.CANCELLING
     ]
+    awaited += [
+        f"{request.token.node.id} (resources: {request.reason or 'not chosen yet'})"
+        for request in state.allocations.values()
+    ]
     awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
     awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
     awaited += [f"{wait.node.id} ({wait.trigger.value})" for wait in state.waits.values()]
@@ -258,6 +263,8 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.GiveUp: _give_up,
     i.BehaviorReported: behavior_reported,
     i.BehaviorMissing: behavior_missing,
+    i.ResourcesChosen: resources_chosen,
+    i.ResourcesNotFree: resources_not_free,
     i.PromptAnswer: _answer,
     i.ServiceCompleted: _service_completed,
     i.ServiceFailed: _service_failed,

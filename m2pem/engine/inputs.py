@@ -103,6 +103,27 @@ class BehaviorMissing(_Input, frozen=True):
     reason: str = ""
 
 
+class ResourcesChosen(_Input, frozen=True):
+    """The allocator has chosen resources for the roles of a request, and holds them for it.
+
+    `considered`: as in record `ResourcesAllocated`.
+    """
+
+    allocation: str
+    roles: dict[str, tuple[str, ...]]
+    considered: dict[str, Value]
+
+
+class ResourcesNotFree(_Input, frozen=True):
+    """What a request needs is not free. `code`: the error that its task throws; "": it waits.
+    `holders`: who has what could fill its roles, by resource."""
+
+    allocation: str
+    reason: str
+    holders: dict[str, str] = msgspec.field(default_factory=dict)
+    code: str = ""
+
+
 class PromptAnswer(_Input, frozen=True):
     """An operator's decision; the first one wins."""
 
@@ -190,6 +211,8 @@ Input: TypeAlias = Union[
     GiveUp,
     BehaviorReported,
     BehaviorMissing,
+    ResourcesChosen,
+    ResourcesNotFree,
     PromptAnswer,
     ServiceCompleted,
     ServiceFailed,

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from m2pem.engine import records as r
 from m2pem.engine.commands import (
+    AllocateResources,
     CancelBehavior,
     CancelService,
     ClosePrompt,
@@ -13,6 +14,7 @@ from m2pem.engine.commands import (
     ResumeResource,
     RunService,
     StartBehavior,
+    WithdrawAllocation,
 )
 from m2pem.engine.records import Record
 from m2pem.engine.state import Behavior, BehaviorPhase, Prompt, RunState, RunStatus, Service
@@ -20,6 +22,9 @@ from m2pem.mission.behavior import Decision
 
 _WITH_COMMANDS = frozenset(
     {
+        r.AllocationRequested,
+        r.AllocationDelayed,
+        r.AllocationEnded,
         r.BehaviorRequested,
         r.BehaviorRestarted,
         r.BehaviorCancelRequested,
@@ -48,6 +53,8 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
         if type(record) not in _WITH_COMMANDS:
             continue
         match record:
+            case r.AllocationRequested() | r.AllocationDelayed() | r.AllocationEnded():
+                commands.extend(_allocation(state, record))
             case r.BehaviorRequested() | r.BehaviorRestarted():
                 behavior = state.behaviors.get(record.behavior)
                 if behavior is not None and behavior.phase is not BehaviorPhase.CANCELLING:
@@ -95,6 +102,19 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
     return commands
 
 
+def _allocation(
+    state: RunState, record: r.AllocationRequested | r.AllocationDelayed | r.AllocationEnded
+) -> list[Command]:
+    match record:
+        case r.AllocationEnded():
+            return [WithdrawAllocation(record.allocation)]
+        case r.AllocationDelayed(again=False):
+            return []
+    if record.allocation not in state.allocations:
+        return []
+    return [AllocateResources(record.allocation, isinstance(record, r.AllocationDelayed))]
+
+
 def outstanding(state: RunState) -> list[Command]:
     """Return the commands of all that should be active now, for an executive that claims the run.
 
@@ -109,6 +129,7 @@ def outstanding(state: RunState) -> list[Command]:
             commands.extend(_hold(behavior))
         else:
             commands.append(_start(state, behavior))
+    commands.extend(AllocateResources(allocation) for allocation in state.allocations)
     commands.extend(_open(prompt) for prompt in state.prompts.values())
     commands.extend(_run(service) for service in state.services.values())
     if state.status is RunStatus.PAUSED:

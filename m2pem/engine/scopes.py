@@ -39,9 +39,12 @@ def error_path(token: Token) -> ErrorPath:
 def stop_activity(
     x: Execution, token: Token, outcome: TokenOutcome, failed: ErrorPath = ()
 ) -> None:
-    """End the work of the activity that a token is on: its behavior, prompt, service or scope."""
+    """End the work of the activity that a token is on: its behavior, the request for its resources,
+    its prompt, service or scope."""
     if token.behavior:
         x.emit(r.BehaviorCancelRequested(token.behavior))
+    if token.allocation:
+        x.emit(r.AllocationEnded(token.allocation))
     if token.prompt:
         x.emit(r.PromptWithdrawn(token.prompt))
     if token.service:

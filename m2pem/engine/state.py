@@ -146,7 +146,7 @@ class Join:
 class Token:
     """A token on a flow node. `flow`: how it came. A move makes a new object with the same id.
 
-    At most one of `behavior`, `service` and `inner` is set: the work of its activity.
+    At most one of `behavior`, `allocation`, `service` and `inner` is set: the work of its activity.
     `instance`: which instance of a loop or multi-instance activity it is, from 0; None: none.
     `own`: data of the activity itself (item variable, data inputs and outputs); None: nothing.
     """
@@ -157,6 +157,7 @@ class Token:
     flow: SequenceFlow | None
     waits: "dict[int, Wait] | None" = None
     behavior: str = ""
+    allocation: str = ""
     prompt: str = ""
     service: str = ""
     inner: Scope | None = None
@@ -236,6 +237,22 @@ class Behavior:
 
 
 @dataclass(slots=True, eq=False)
+class AllocationRequest:
+    """A task that waits for resources to be chosen. Fields as in record `AllocationRequested`.
+
+    `reason`, `holders`: why they are not free, as far as it was said.
+    """
+
+    id: str
+    token: Token
+    parameters: dict[str, Value]
+    deadline: int
+    at_us: int
+    reason: str = ""
+    holders: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
 class Prompt:
     """An open prompt. `behavior`: the behavior that it asks about after a restart."""
 
@@ -287,6 +304,7 @@ class RunState:
     last_wait: int = 0
     last_completion: int = 0
     last_compensation: int = 0
+    last_allocation: int = 0
     last_behavior: int = 0
     last_prompt: int = 0
     last_service: int = 0
@@ -295,9 +313,12 @@ class RunState:
     root: Scope | None = None
     scopes: dict[int, Scope] = field(default_factory=dict)
     tokens: dict[int, Token] = field(default_factory=dict)
+    allocations: dict[str, AllocationRequest] = field(default_factory=dict)
     behaviors: dict[str, Behavior] = field(default_factory=dict)
     held: dict[str, list[str]] = field(default_factory=dict)
     """Behaviors that hold a resource: at most one that is not being cancelled."""
+    commanded: dict[str, None] = field(default_factory=dict)
+    """Every resource that a behavior of the run has had."""
     taken: dict[str, str] = field(default_factory=dict)
     """Resources that operators have taken, and who has each."""
     prompts: dict[str, Prompt] = field(default_factory=dict)

@@ -169,7 +169,12 @@ class Steps(Execution):
         state = self.state
         if state.status is not RunStatus.RUNNING:
             return
-        if state.prompts or state.services or len(state.waits) > len(state.conditions):
+        if (
+            state.allocations
+            or state.prompts
+            or state.services
+            or len(state.waits) > len(state.conditions)
+        ):
             return
         if state.conditions and state.shared.keys and self._another_process_can_begin():
             return  # it may write to a data store what a condition reads

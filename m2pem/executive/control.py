@@ -28,6 +28,7 @@ from m2pem.api.control import (
     StampedRecord,
     StartPreview,
     TakeEffect,
+    WaitingTask,
 )
 from m2pem.api.health import HealthCheck
 from m2pem.api.telemetry import Telemetry
@@ -45,6 +46,7 @@ from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
+from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import Fleet
@@ -246,6 +248,11 @@ class Control:
     async def holders(self) -> Mapping[ResourceId, str]:
         """Who has each resource."""
         return self._supervisor.handover.holders()
+
+    async def waiting(self) -> Sequence[WaitingTask]:
+        """The tasks of all runs that wait for vehicles or payloads."""
+        supervisor = self._supervisor
+        return waiting_tasks(supervisor.runners.values(), supervisor.clock.now_us())
 
     async def _ask(self, request: str, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know.

@@ -107,7 +107,7 @@ class Handover:
             self._availability.restore(resource)
 
     def holders(self) -> dict[ResourceId, str]:
-        """Return who has each resource: an operator, a behavior, or "" for a free one."""
+        """Return who has each resource: an operator, a behavior, a request; "" if it is free."""
         return {
             resource: self.taken.get(resource) or self._availability.holder(resource) or ""
             for resource in self._known

@@ -53,6 +53,18 @@ OnRecords = Callable[[RunId, Sequence[r.Record]], None]
 """Is called with the records of a run when they are committed, before their commands go out."""
 
 
+class ResourceAllocator(Protocol):
+    """Chooses resources for tasks: `m2pem.executive.allocator.Allocator`."""
+
+    def ask(self, runner: "Runner", allocation: str, *, again: bool) -> None:
+        """Choose resources for a request; the run gets the answer as an input."""
+        ...
+
+    def withdraw(self, allocation: str) -> None:
+        """Forget a request."""
+        ...
+
+
 class RunLimit(Protocol):
     """A bound beyond which every run is given up. Missions that command real vehicles have none."""
 
@@ -73,6 +85,7 @@ class RunContext:
     journal: Journal
     clock: Clock
     dispatcher: Dispatcher
+    allocator: ResourceAllocator
     services: Services
     events: ControlEvents
     observe: OnRecords
@@ -367,6 +380,10 @@ class Runner:
     def _dispatch(self, command: c.Command, *, early_done: bool = False) -> None:
         context = self._context
         match command:
+            case c.AllocateResources():
+                context.allocator.ask(self, command.allocation, again=command.again)
+            case c.WithdrawAllocation():
+                context.allocator.withdraw(command.allocation)
             case c.StartBehavior():
                 self._start(command)
             case c.CancelBehavior():

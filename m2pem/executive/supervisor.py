@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from m2pem.allocation.assignment import load_solver
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock
@@ -22,6 +23,7 @@ from m2pem.engine.records import Record, RunEnded
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError
+from m2pem.executive.allocator import Allocator
 from m2pem.executive.armed_vehicles import describe_armed_vehicles
 from m2pem.executive.behavior_lifecycle import (
     AirspaceView,
@@ -129,6 +131,16 @@ class Supervisor:
             self._post_report,
             self._separation,
         )
+        self.allocator = Allocator(
+            arbiters,
+            self.availability,
+            bus.latest,
+            clock,
+            self._geometry,
+            self.runners,
+            events.publish,
+        )
+        self.availability.on_change = self.allocator.resources_changed
         self.emergency = EmergencyCommands(self.dispatcher, events, self._marks)
         self.handover = Handover(arbiters, self.availability)
         self.losses = JournalLossPrompts(
@@ -166,6 +178,7 @@ class Supervisor:
 
     async def end_calls(self) -> None:
         """Let go of lost resources, services and calls of arbiters, once every run has ended."""
+        self.allocator.close()
         await self._lost_resources.close()
         await self._services.close()
         await self.dispatcher.close()
@@ -199,6 +212,8 @@ class Supervisor:
             handed_over=self.handed_over,
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
+        if loaded.chooses_resources:
+            load_solver()
         return loaded.process(process).id, findings
 
     def _load(
@@ -298,6 +313,8 @@ class Supervisor:
                 log.warning(
                     "%s goes on as it was begun, but would not begin now: %s", number, finding
                 )
+        if mission.chooses_resources:
+            await asyncio.to_thread(load_solver)
         run = MissionRun(mission, self.fleet, number, self.settings.steps_at_once)
         last_us = await replay(self.journal, run, self.settings.on_records)
         runner = self._runner(run, epoch)
@@ -317,6 +334,7 @@ class Supervisor:
             self.journal,
             self.clock,
             self.dispatcher,
+            self.allocator,
             self._services,
             self.events,
             self._observe,
@@ -331,6 +349,7 @@ class Supervisor:
 
     async def _drive_and_release(self, runner: Runner) -> None:
         await runner.drive()
+        self.allocator.let_go(runner.id)
         await self.journal.release(runner.id)
         del self._tasks[runner.id]
         every, taken = self.fleet.vehicles.values(), self.handover.taken
@@ -352,6 +371,7 @@ class Supervisor:
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.losses.on_records(run, records)
+        self.allocator.on_records(run, records)
         if self.settings.on_records is not None:
             self.settings.on_records(run, records)
         if self._observers is not None:
@@ -380,6 +400,7 @@ class Supervisor:
             self._lost_resources.on_telemetry(state)
             state = self._lost_resources.annotated(state)
         self._bus.publish(state)
+        self.allocator.on_telemetry()
         if self._separation is not None:
             self._separation.on_telemetry(state)
 

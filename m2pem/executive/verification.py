@@ -69,7 +69,12 @@ def search_request(
     wrong = findings_for(mission, arbiters, plugins, tuple(data), process)
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
     writes = plugins.service_writes()
-    options = Options(data=data, service_writes=writes, timers_in_order=timers_in_order)
+    options = Options(
+        data=data,
+        service_writes=writes,
+        timers_in_order=timers_in_order,
+        catalogue=arbiters.offered if arbiters is not None else None,
+    )
     fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     requirements = collect(Names(mission, fleet, writes, data), spec)
     return SearchRequest(mission, fleet, process, data, options, requirements)

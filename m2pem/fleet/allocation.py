@@ -1,6 +1,6 @@
 """Which resources fill the roles of a task, and which of them are free (paper, section 4.2)."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from m2pem.errors import M2pemError
@@ -56,9 +56,15 @@ def resources_of(role: Role, fleet: Fleet) -> tuple[ResourceId, ...]:
 
 
 def resources_of_mission(mission: Mission, fleet: Fleet) -> tuple[ResourceId, ...]:
-    """Return every resource that roles of a mission name, each once, in the order of its tasks."""
+    """Return every resource that roles of a mission name, each once, in the order of its tasks.
+
+    Those that a task waits for are left out: it starts whoever has them.
+    """
     found = dict.fromkeys(
-        resource for role in roles_of_mission(mission) for resource in resources_of(role, fleet)
+        resource
+        for role in roles_of_mission(mission)
+        if role.need is None
+        for resource in resources_of(role, fleet)
     )
     return tuple(found)
 
@@ -82,6 +88,9 @@ MANNED = "manned"
 class Availability:
     """The one ledger of an executive, across all its runs. Behavior ids are unique in it.
 
+    Requests for resources (`m2pem.executive.allocator`) hold what was chosen for them by their own
+    id. `on_change`: is called when a resource may be free, or is not available any more.
+
     A behavior that took a resource over from one which is being cancelled may end first: the
     resource is then held by the one before again.
     """
@@ -90,6 +99,7 @@ class Availability:
         self._resources = frozenset({*fleet.vehicles, *fleet.payloads})
         self._unavailable = {v.id: MANNED for v in fleet.vehicles.values() if v.manned}
         self._holders: dict[ResourceId, list[str]] = {}  # the last one holds it
+        self.on_change: Callable[[], None] = lambda: None
 
     def withdraw(self, resource: ResourceId, reason: str) -> None:
         """No behavior gets the resource until `restore`. Its holder, if any, keeps holding it.
@@ -100,10 +110,12 @@ class Availability:
         if resource not in self._resources:
             raise KeyError(resource)
         self._unavailable[resource] = reason
+        self.on_change()
 
     def restore(self, resource: ResourceId) -> None:
         """Behaviors may get the resource again; a manned vehicle, too, once it is handed over."""
         self._unavailable.pop(resource, None)
+        self.on_change()
 
     def reason(self, resource: ResourceId) -> str:
         """Why a resource is unavailable, or "" when it is not."""
@@ -159,3 +171,10 @@ class Availability:
                 holders.remove(behavior)
             if not holders:
                 del self._holders[resource]
+        self.on_change()
+
+    def hand_on(self, request: str, behavior: str) -> None:
+        """Give what is held for a request to the behavior that was requested for it."""
+        for holders in self._holders.values():
+            if request in holders:
+                holders[holders.index(request)] = behavior

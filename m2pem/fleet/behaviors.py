@@ -19,6 +19,9 @@ ALTITUDE_FRAME = ParameterSpec(
 )
 """Accepted by every behavior that takes an altitude or a position."""
 
+ENDING_PARAMETERS = frozenset({"duration", "timeout", "turns"})
+"""Parameters with which a behavior that would go on until it is interrupted ends by itself."""
+
 _SLOWEST_M_S = 0.01
 _SHORTEST_M = 0.1
 _RIGHT_ANGLE = math.pi / 2

@@ -1,14 +1,16 @@
 """The static check: whether a mission fits a fleet, before anything moves (paper, section 4.2)."""
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import Catalogue, ResourceGraph
+from m2pem.fleet.need_check import check_needs
 from m2pem.fleet.parameters import ParameterProblem, examine
+from m2pem.fleet.task_findings import TaskFindings
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
 from m2pem.mission.elements import (
@@ -42,33 +44,6 @@ def lacking(team_behavior: str, offered: Collection[str]) -> tuple[str, ...]:
     """
     needs = TEAM_NEEDS.get(team_behavior, ())
     return tuple(name for name in needs if name not in offered)
-
-
-@dataclass(frozen=True, slots=True)
-class TaskFindings:
-    """Collects the findings of one task; each says the task, its line, and the role if any."""
-
-    file: str
-    task: Activity
-    found: list[Finding] = field(default_factory=list)
-
-    def add(
-        self,
-        rule: str,
-        message: str,
-        remedy: str = "",
-        *,
-        line: int,
-        role: str = "",
-        severity: Severity = Severity.ERROR,
-    ) -> None:
-        """Note a finding at `line` of the mission, once."""
-        where = f"{self.task.id} (line {self.task.line})" + (f", role '{role}'" if role else "")
-        finding = Finding(
-            severity, self.file, line, self.task.id, rule, f"{where}: {message}", remedy
-        )
-        if finding not in self.found:
-            self.found.append(finding)
 
 
 def place(fleet: Fleet, resource: str) -> str:
@@ -108,11 +83,6 @@ def check_roles(roles: Sequence[Role], fleet: Fleet, findings: TaskFindings) -> 
 
 
 def _check_role(role: Role, fleet: Fleet, findings: TaskFindings) -> bool:
-    if role.requires:
-        message = "'requires' (dynamic allocation) is reserved and not understood yet"
-        remedy = "name a vehicle, payload or team"
-        findings.add("reserved", message, remedy, line=role.line, role=role.name)
-        return False
     if resources_of(role, fleet):
         return True
     kinds = [
@@ -290,10 +260,18 @@ class _Check:
         return findings.found
 
     def _behavior(self, behavior: Behavior, findings: TaskFindings) -> None:
-        filled = check_roles(behavior.roles, self.fleet, findings)
+        named = [role for role in behavior.roles if role.resource]
+        filled = check_roles(named, self.fleet, findings)
         matching = [role for role in filled if role.kind.value == behavior.type.value]
-        self._check_role_kinds(behavior, filled, findings)
+        possible = check_needs(behavior, self.fleet, self.graph, findings)
+        if len(named) == len(behavior.roles):
+            self._check_role_kinds(behavior, filled, findings)
         takers: list[_Taker] = []
+        for role_name, resources in possible.items():
+            for resource in resources:
+                spec = self.graph.spec(resource, behavior.name, behavior.type)
+                if spec is not None and all(spec != taker.spec for taker in takers):
+                    takers.append(_Taker(spec, role_name, f"{place(self.fleet, resource)}: "))
         for role in matching:
             for resource in resources_of(role, self.fleet):
                 self._check_manned(behavior, role, resource, findings)

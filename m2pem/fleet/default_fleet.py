@@ -5,6 +5,7 @@ mission always gives the same fleet.
 """
 
 import math
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -13,9 +14,11 @@ from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import SIMULATED, Domain, Fleet, Payload, Team, Vehicle
 from m2pem.geo.local_frame import offset
 from m2pem.geo.positions import is_local
-from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
+from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
 from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.tree import Compare, Comparison, In, Literal, Name, walk
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.mission.mission import Mission
 
@@ -36,8 +39,9 @@ def fleet_for(mission: Mission) -> Fleet:
     """A fleet of simulated vehicles, payloads, teams and geometries that fits a mission.
 
     A vehicle flies if one of its behaviors only makes sense in the air, or takes an altitude; it
-    drives otherwise. A team has members of its own (`section_1`, ...). A name that the mission
-    reads from its data while it runs cannot be known here.
+    drives otherwise. A team has members of its own (`section_1`, ...). A role by need gets vehicles
+    of its own for each task, with the domain, tags and payloads that its condition names. A name
+    that the mission reads from its data while it runs cannot be known here.
     """
     draft = _Draft()
     tasks = list(_tasks(mission))
@@ -67,11 +71,14 @@ def _tasks(mission: Mission) -> Iterator[Behavior | ServiceCall]:
 class _Draft:
     domains: dict[str, Domain] = field(default_factory=dict)
     payloads: dict[str, bool] = field(default_factory=dict)  # id -> whether it is a detector
+    tags: dict[str, list[str]] = field(default_factory=dict)
+    needed: Counter[str] = field(default_factory=Counter)  # vehicles made for roles of a name
     teams: dict[str, tuple[str, ...]] = field(default_factory=dict)
     geometries: dict[str, Geometry] = field(default_factory=dict)
 
     def add_role(self, role: Role, task: Behavior | ServiceCall) -> None:
-        if role.requires or not role.resource:
+        if role.need is not None and not role.resource:
+            self._add_needed(role, role.need, task)
             return
         if role.kind is RoleKind.PAYLOAD:
             vehicle, _, payload = role.resource.partition("/")
@@ -85,9 +92,32 @@ class _Draft:
             names = tuple(f"{role.resource}_{number}" for number in range(1, TEAM_SIZE + 1))
             self.teams[role.resource] = names
         for name in names:
-            if isinstance(task, Behavior) and _flies(task):
+            if _is_flown(task):
                 self.domains[name] = Domain.AIR
             self.domains.setdefault(name, Domain.GROUND)
+
+    def _add_needed(self, role: Role, need: Need, task: Behavior | ServiceCall) -> None:
+        """Add vehicles for a role by need, as far as its condition says literally what they are.
+
+        A role that means an earlier one's resources needs none of its own.
+        """
+        if need.same and need.condition is None:
+            return
+        wanted = _literals(need.condition)
+        domain = next(iter(wanted["vehicle.domain"]), "air" if _is_flown(task) else "ground")
+        first = self.needed[role.name] + 1
+        self.needed[role.name] += need.most
+        names = wanted["vehicle.name"] or [
+            f"{role.name}_{number}" for number in range(first, first + need.most)
+        ]
+        for name in names:
+            self.domains[name] = Domain(domain) if domain in list(Domain) else Domain.GROUND
+            self.tags.setdefault(name, []).extend(wanted["vehicle.tags"])
+            payloads = wanted["vehicle.payloads"] or wanted["payload.name"]
+            if role.kind is RoleKind.PAYLOAD and not payloads:
+                payloads = [role.name]
+            for payload in payloads:
+                self.payloads.setdefault(f"{name}/{payload}", False)
 
     def add_any_detector(self) -> None:
         if not any(self.payloads.values()):
@@ -148,12 +178,31 @@ class _Draft:
                 SIMULATED,
                 {"home": [latitude_deg, longitude_deg]},
                 payloads=tuple(p.id for p in payloads.values() if p.vehicle == vehicle),
+                tags=tuple(self.tags.get(name, ())),
             )
         teams = {
             name: Team(name, tuple(map(ResourceId, members)), ResourceId(members[0]))
             for name, members in self.teams.items()
         }
         return Fleet("sim", "sim", vehicles, payloads, teams, self.geometries, ORIGIN)
+
+
+def _literals(condition: Expression | None) -> dict[str, list[str]]:
+    """Return the texts that a condition compares facts with, by the name of the fact."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for node, _ in walk(condition.tree) if condition is not None else ():
+        match node:
+            case (
+                Compare(Comparison.EQUAL, Name(name), Literal(str(text)))
+                | Compare(Comparison.EQUAL, Literal(str(text)), Name(name))
+                | In(Literal(str(text)), Name(name))
+            ):
+                found[name].append(text)
+    return found
+
+
+def _is_flown(task: Behavior | ServiceCall) -> bool:
+    return isinstance(task, Behavior) and _flies(task)
 
 
 def _flies(behavior: Behavior) -> bool:

@@ -43,6 +43,7 @@ class Payload:
     settings: Mapping[str, Any]
     behaviors: tuple[str, ...] | None = None
     detector: bool = False
+    tags: tuple[str, ...] = ()
     line: int = 0
 
 
@@ -63,6 +64,7 @@ class Vehicle:
     failsafe: str = ""
     cruise_speed_m_s: float | None = None
     endurance_s: float | None = None
+    tags: tuple[str, ...] = ()
     line: int = 0
 
 
@@ -86,6 +88,8 @@ class Fleet:
     aircraft that are nearer than `horizontal_separation_m`; None: they are not kept apart.
     `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
     `handed_over`: names of geometries that missions may use and operators hand over.
+    `battery_cost_s`, `switching_cost_s`: travel time that an empty battery, and a vehicle which is
+    new to a run, count as when vehicles are chosen for roles.
     """
 
     name: str
@@ -102,6 +106,8 @@ class Fleet:
     horizontal_separation_m: float = 20.0
     time_separation_s: float | None = None
     handed_over: tuple[str, ...] = ()
+    battery_cost_s: float = 60.0
+    switching_cost_s: float = 10.0
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from m2pem.errors import FleetError
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
-from m2pem.fleet.fleet_schema import DeconflictionModel, FleetModel, VehicleModel
+from m2pem.fleet.fleet_schema import AllocationModel, DeconflictionModel, FleetModel, VehicleModel
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
 from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.geo.local_frame import Origin
@@ -151,6 +151,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
             failsafe=vehicle.failsafe or "",
             cruise_speed_m_s=vehicle.cruise_speed,
             endurance_s=vehicle.endurance,
+            tags=tuple(vehicle.tags),
             line=source.line(("vehicles", name)),
         )
     teams = {
@@ -164,6 +165,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         for name, team in model.teams.items()
     }
     apart = model.deconfliction
+    costs = model.allocation or AllocationModel()
     return Fleet(
         name=model.name or Path(source.file).stem,
         file=source.file,
@@ -179,6 +181,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         horizontal_separation_m=(apart or DeconflictionModel()).horizontal,
         time_separation_s=apart.time if apart else None,
         handed_over=tuple(model.handed_over),
+        battery_cost_s=costs.battery,
+        switching_cost_s=costs.switching,
     )
 
 
@@ -192,6 +196,7 @@ def _payloads(source: YamlSource, vehicle: str, model: VehicleModel) -> Iterator
             settings=settings,
             behaviors=_names(payload.behaviors),
             detector=payload.detector,
+            tags=tuple(payload.tags),
             line=source.line(("vehicles", vehicle, "payloads", name)),
         )
 

@@ -12,23 +12,23 @@ from pydantic.json_schema import WithJsonSchema
 from m2pem.units import UNITS, Dimension, quantity
 
 
-def _reader(dimension: Dimension) -> Callable[[object], float]:
+def _reader(dimension: Dimension, *, zero: bool = False) -> Callable[[object], float]:
     def read(value: object) -> float:
         result = quantity(value, dimension)
-        if result <= 0.0:
-            raise ValueError(f"{value!r} is not above 0")
+        if result < 0.0 or (result == 0.0 and not zero):
+            raise ValueError(f"{value!r} is {'less than 0' if zero else 'not above 0'}")
         return result
 
     return read
 
 
-def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
+def _quantity_schema(dimension: Dimension, bound: str = "exclusiveMinimum") -> dict[str, Any]:
     units = "|".join(UNITS[dimension])
     number = r"[0-9]+(\.[0-9]*)?([eE][+-]?[0-9]+)?"
     si = next(iter(UNITS[dimension]))
     return {
         "anyOf": [
-            {"type": "number", "exclusiveMinimum": 0},
+            {"type": "number", bound: 0},
             {"type": "string", "pattern": rf"^\s*\+?{number}\s*({units})?\s*$"},
         ],
         "description": f"A {dimension.value}, for example '5 {si}'; a bare number is in {si}.",
@@ -40,6 +40,13 @@ Duration = Annotated[
     BeforeValidator(_reader(Dimension.DURATION)),
     WithJsonSchema(_quantity_schema(Dimension.DURATION)),
 ]
+DurationOrZero = Annotated[
+    float,
+    BeforeValidator(_reader(Dimension.DURATION, zero=True)),
+    WithJsonSchema(_quantity_schema(Dimension.DURATION, "minimum")),
+]
+"""A duration, or 0."""
+
 Distance = Annotated[
     float,
     BeforeValidator(_reader(Dimension.DISTANCE)),
@@ -86,6 +93,7 @@ class PayloadModel(_Model):
     detector: Annotated[
         bool, Field(description="Its detections complete the service Detector.")
     ] = False
+    tags: Annotated[list[Text], Field(description="Words by which roles ask for it.")] = []
 
 
 class VehicleModel(_Model):
@@ -119,6 +127,7 @@ class VehicleModel(_Model):
         Annotated[Duration, Field(gt=0)] | None,
         Field(description="How long it can go at that speed, with a full battery."),
     ] = None
+    tags: Annotated[list[Text], Field(description="Words by which roles ask for it.")] = []
 
 
 class TeamModel(_Model):
@@ -147,6 +156,19 @@ class DeconflictionModel(_Model):
             "routes may not cross at one height.",
         ),
     ] = None
+
+
+class AllocationModel(_Model):
+    """What counts beside the travel time when vehicles are chosen for roles by need."""
+
+    battery: Annotated[
+        DurationOrZero,
+        Field(description="Travel time that an empty battery counts as; a full one: 0."),
+    ] = 60.0
+    switching: Annotated[
+        DurationOrZero,
+        Field(description="Travel time that a vehicle which is new to the run counts as."),
+    ] = 10.0
 
 
 class FleetModel(_Model):
@@ -184,6 +206,7 @@ class FleetModel(_Model):
         Name | None, Field(description="Name of the area that no vehicle may leave.")
     ] = None
     deconfliction: DeconflictionModel | None = None
+    allocation: AllocationModel | None = None
 
 
 def fleet_schema() -> dict[str, Any]:

@@ -23,11 +23,39 @@ class RoleKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Role:
-    """One role of a behavior with its static allocation.
+class Need:
+    """What a role asks of the resources that fill it; they are chosen when its task starts.
 
-    `resource` is the id in the fleet: a vehicle ("evsg1"), a payload ("evsg2/ptz") or a team.
-    `requires` is the text of a dynamic allocation (reserved; a finding refuses it).
+    `condition`: read for each candidate, over its facts and the data store; None: every candidate
+    that offers the behavior may fill the role. `least`, `most`: how many fill it. `preference`: how
+    many seconds of travel time a candidate is worth. `same`: the name of data with the resources of
+    an earlier role. `store`: the name under which the chosen resources are stored. `waits`: whether
+    the task waits until they are free, for `wait_limit` (an ISO 8601 duration) or without a limit.
+    `priority`: of what waits, the highest comes first.
+    """
+
+    condition: Expression | None = None
+    least: int = 1
+    most: int = 1
+    preference: Expression | None = None
+    same: str = ""
+    store: str = ""
+    waits: bool = False
+    wait_limit: Expression | None = None
+    priority: int = 0
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        """The expressions that are read for each candidate."""
+        return tuple(each for each in (self.condition, self.preference) if each is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """One role of a behavior and what fills it.
+
+    `resource` is the id in the fleet: a vehicle ("evsg1"), a payload ("evsg2/ptz") or a team; ""
+    for a role by need. `need` None: the resource is allocated at once or not at all.
     """
 
     name: str
@@ -35,7 +63,7 @@ class Role:
     resource: str
     line: int
     optional: bool = False
-    requires: str = ""
+    need: Need | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +88,11 @@ class Behavior:
     line: int
     parameters: tuple[Parameter, ...] = ()
     roles: tuple[Role, ...] = ()
+
+    @property
+    def allocated_at_start(self) -> bool:
+        """Whether a role is filled, or waited for, when the task starts."""
+        return any(role.need is not None for role in self.roles)
 
 
 @dataclass(frozen=True, slots=True)

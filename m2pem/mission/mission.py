@@ -108,3 +108,9 @@ class Mission:
     def activities(self) -> Iterator[Activity]:
         """Every activity, in the order of the XML."""
         return (node for node in self.nodes if isinstance(node, Activity))
+
+    @property
+    def chooses_resources(self) -> bool:
+        """Whether a behavior gets its resources only when its task starts (docs/allocation.md)."""
+        behaviors = (getattr(task, "behavior", None) for task in self.activities())
+        return any(each is not None and each.allocated_at_start for each in behaviors)

@@ -70,6 +70,7 @@ class _Chart:
         self._per_s = (RIGHT - LEFT) / (line.end_s or 1.0)
         self._rows = [
             *([_Row("prompts", line.prompts)] if line.prompts else []),
+            *([_Row("waiting", line.waits)] if line.waits else []),
             *([_Row("services", line.services)] if line.services else []),
             *_resources(line, fleet),
         ]

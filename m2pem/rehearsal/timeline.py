@@ -47,7 +47,8 @@ class Mark:
 
 @dataclass(slots=True)
 class Timeline:
-    """`resources`: spans of each resource that was commanded, in order of their start."""
+    """`resources`: spans of each resource that was commanded, in order of their start. `waits`:
+    tasks that waited for resources."""
 
     process: str = ""
     started_us: int = 0
@@ -56,6 +57,7 @@ class Timeline:
     outcome: str = ""
     detail: str = ""
     prompts: list[Span] = field(default_factory=list)
+    waits: list[Span] = field(default_factory=list)
     services: list[Span] = field(default_factory=list)
     resources: dict[str, list[Span]] = field(default_factory=dict)
     marks: list[Mark] = field(default_factory=list)
@@ -80,6 +82,7 @@ class _Reader:
     def __init__(self) -> None:
         self.line = Timeline()
         self._open: dict[str, Span] = {}
+        self._asked: dict[str, tuple[float, r.AllocationRequested]] = {}
 
     def take(self, t_s: float, record: r.Record) -> None:
         line = self.line
@@ -90,6 +93,10 @@ class _Reader:
             case r.RunEnded():
                 line.outcome, line.detail = record.outcome.value, record.detail
                 line.ended_s = t_s
+            case r.AllocationRequested() | r.AllocationDelayed():
+                self._ask(t_s, record)
+            case r.ResourcesAllocated() | r.AllocationEnded():
+                self._end_asking(t_s, record)
             case r.BehaviorRequested():
                 span = self._begin(t_s, record.behavior, record.name, record.element)
                 for resource in record.resources:
@@ -129,6 +136,25 @@ class _Reader:
         """Let bars without an end last to the end of the records."""
         for span in self._open.values():
             span.end_s = self.line.end_s
+
+    def _ask(self, t_s: float, record: r.AllocationRequested | r.AllocationDelayed) -> None:
+        if isinstance(record, r.AllocationRequested):
+            self._asked[record.allocation] = (t_s, record)
+        elif record.allocation not in self._open:
+            since_s, asked = self._asked[record.allocation]
+            span = self._begin(since_s, record.allocation, asked.name, asked.element)
+            self.line.waits.append(span)
+
+    def _end_asking(self, t_s: float, record: r.ResourcesAllocated | r.AllocationEnded) -> None:
+        del self._asked[record.allocation]
+        if record.allocation not in self._open:
+            return  # it did not wait
+        if isinstance(record, r.ResourcesAllocated):
+            given = ", ".join(each for resources in record.roles.values() for each in resources)
+            self._end(t_s, record.allocation, Outcome.SUCCEEDED, given)
+        else:
+            outcome = Outcome.FAILED if record.code else Outcome.INTERRUPTED
+            self._end(t_s, record.allocation, outcome, record.code)
 
     def _begin(self, t_s: float, key: str, what: str, element: str) -> Span:
         span = self._open[key] = Span(t_s, t_s, what, element)

@@ -16,6 +16,9 @@ REQUESTED = r.BehaviorRequested(
 )
 ASKED = r.PromptOpened(1, "VIGNETTE1", "UserSendRoute", 1, "p1", "Well?", ())
 
+WANTED = r.AllocationRequested(*ON_ROUTE, "r1.a1", "goto", "vehicle", {}, 0, 0)
+HELD = "role 'scout': uav1 is held by r2.b1"
+
 
 def sentence(*records: r.Record) -> str:
     """The sentence about the last of these."""
@@ -50,6 +53,25 @@ def sentence(*records: r.Record) -> str:
             ],
             "DRIVE ROUTE: timer occurred",
         ),
+        ([WANTED], "DRIVE ROUTE: asks for resources for goto"),
+        (
+            [WANTED, r.AllocationDelayed("r1.a1", HELD, {"uav1": "r2.b1"})],
+            "DRIVE ROUTE: waits for role 'scout': uav1 is held by r2.b1",
+        ),
+        (
+            [WANTED, r.AllocationDelayed("r1.a1", "what is free is kept", {})],
+            "DRIVE ROUTE: waits: what is free is kept",
+        ),
+        (
+            [WANTED, r.AllocationDelayed("r1.a1", "uav1 is with ann", {}, again=True)],
+            "DRIVE ROUTE: asks again, as uav1 is with ann",
+        ),
+        (
+            [WANTED, r.AllocationEnded("r1.a1", "RESOURCE_UNAVAILABLE", HELD)],
+            f"DRIVE ROUTE: gets no resources, RESOURCE_UNAVAILABLE ({HELD})",
+        ),
+        ([WANTED, r.AllocationEnded("r1.a1")], "DRIVE ROUTE: no longer asks for resources"),
+        ([r.AllocationEnded("r1.a1")], "r1.a1: no longer asks for resources"),
         ([r.RunYielded(())], "RunYielded"),
         ([r.TokensGathered(*ON_ROUTE)], "TokensGathered: DRIVE ROUTE"),
     ],

@@ -109,6 +109,35 @@ def test_behaviors_are_known_from_request_to_end() -> None:
     assert view.behavior("r1.b1") is not None, "describe needs its name"
 
 
+def asks_for_resources(allocation: str, token: int = 1) -> r.AllocationRequested:
+    return r.AllocationRequested(token, P, "A", 1, allocation, "goto", "vehicle", {}, 0, 0)
+
+
+def test_an_element_waits_while_a_task_of_it_has_no_resources() -> None:
+    view = folded(enter(1, "A"), enter(2, "A"), asks_for_resources("a1"))
+    assert not view.elements[P, "A"].waiting  # nothing says yet that they are not free
+    apply(view, [r.AllocationDelayed("a1", "uav1 is held by r2.b1", {"uav1": "r2.b1"})])
+    assert view.elements[P, "A"].waiting
+    ((waiting,),) = [each.allocations for each in view.active()]
+    assert (waiting.name, waiting.since_s, waiting.holders) == ("goto", 3.0, {"uav1": "r2.b1"})
+    apply(view, [asks_for_resources("a2", 2), r.AllocationDelayed("a2", "nothing is free", {})])
+    given = r.ResourcesAllocated(1, P, "A", 1, "a1", {"scout": ("uav1",)}, {})
+    apply(view, [given])
+    assert view.elements[P, "A"].waiting
+    apply(view, [r.AllocationEnded("a2", "RESOURCE_UNAVAILABLE")])
+    assert not view.elements[P, "A"].waiting
+    assert not view.allocations
+    assert view.holder("a2") == "A (a2)"
+
+
+def test_when_a_run_has_ended_nothing_waits() -> None:
+    delayed = r.AllocationDelayed("a1", "nothing is free", {})
+    view = folded(enter(1, "A"), asks_for_resources("a1"), delayed)
+    apply(view, [r.RunEnded(r.RunOutcome.STOPPED, "")])
+    assert not view.elements[P, "A"].waiting
+    assert not view.allocations
+
+
 def test_the_status_of_a_run_follows_its_records() -> None:
     view = folded(r.RunStarted(process=P, started_us=1_000_000))
     assert view.summary.started_us == 1_000_000

@@ -157,7 +157,16 @@ ROLES = {
     "empty resource": ('<role name="d" vehicle=""/>', "role-allocation"),
     "two resources": ('<role name="d" vehicle="v" team="t"/>', "role-allocation"),
     "expression": ('<role name="d" vehicle="${v}"/>', "role-not-literal"),
-    "dynamic": ('<role name="d" requires="domain:air"/>', "requires-reserved"),
+    "need and name": ('<role name="d" vehicle="v" requires="true"/>', "role-allocation"),
+    "need that is no expression": ('<role name="d" requires="domain:air"/>', "bad-expression"),
+    "need of a named one": ('<role name="d" vehicle="v" store="x"/>', "role-need"),
+    "count of none": ('<role name="d" requires="true" count="0"/>', "role-need"),
+    "count of a million": ('<role name="d" requires="true" count="1000000"/>', "role-need"),
+    "count backwards": ('<role name="d" requires="true" count="3..1"/>', "role-need"),
+    "wait without a unit": ('<role name="d" requires="true" wait="10"/>', "role-need"),
+    "priority in words": ('<role name="d" requires="true" priority="high"/>', "role-need"),
+    "data without a name": ('<role name="d" requires="true" store="a b"/>', "role-need"),
+    "need of what was chosen, no name": ('<role name="d" same="a+b"/>', "role-need"),
     "optional that is no truth": ('<role name="d" vehicle="v" optional="y"/>', "bad-value"),
     "unknown attribute": ('<role name="d" vehicle="v" robot="r"/>', "unknown-extension"),
     "twice": (
@@ -224,3 +233,32 @@ def test_statements_of_a_script_are_read(form: str) -> None:
         4,
     )
     assert throw == ThrowError("NO_FUEL", 5)
+
+
+def test_what_a_role_needs_is_read() -> None:
+    text = """<behavior type="team" name="area_survey"><resources>
+        <role name="crew" requires="vehicle.domain == 'air'" count="1..3" prefer="10"
+              store="crew" wait="PT5M" priority="2"/>
+        <role name="again" same="crew" wait="unlimited"/>
+        <role name="lead" vehicle="uav1" wait="PT1M"/></resources></behavior>"""
+    behavior = load(as_child(text)).elements["T"].behavior  # type: ignore[attr-defined]
+    crew, again, lead = behavior.roles
+    assert (crew.kind, crew.resource) == (RoleKind.TEAM, "")
+    need = crew.need
+    assert (need.condition.text, need.least, need.most) == ("vehicle.domain == 'air'", 1, 3)
+    assert (need.preference.text, need.store, need.priority) == ("10", "crew", 2)
+    assert need.waits
+    assert need.wait_limit.text == "PT5M"
+    assert (again.need.same, again.need.waits, again.need.wait_limit) == ("crew", True, None)
+    assert (lead.kind, lead.resource, lead.need.waits) == (RoleKind.VEHICLE, "uav1", True)
+
+
+def test_a_service_names_its_resources() -> None:
+    service = '<m2pem:service class="Detector"><m2pem:role name="s" requires="true"/>'
+    found = summary(
+        around(
+            f'<serviceTask id="T"><extensionElements>{service}</m2pem:service>'
+            "</extensionElements></serviceTask>"
+        )
+    )
+    assert [rule for rule, *_ in found] == ["role-need"]

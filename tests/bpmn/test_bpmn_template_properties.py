@@ -56,6 +56,28 @@ def test_a_behavior_is_read(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+def test_what_a_role_needs_is_read(engine: str) -> None:
+    needs = {
+        "m2pem:requires:mover": "vehicle.battery > 0.4",
+        "m2pem:wait:mover": "PT10M",
+        "m2pem:vehicle:leader": "ugv1",
+        "m2pem:wait:leader": "unlimited",
+    }
+    of = {"m2pem:behavior": "follow", "m2pem:type": "vehicle", **needs}
+    mission = load(task("scriptTask", engine, of))
+    (found,) = [node for node in mission.nodes if isinstance(node, ScriptTask)]
+    assert mission.warnings == ()
+    assert found.behavior is not None
+    mover, leader = found.behavior.roles
+    assert mover.need is not None
+    assert mover.need.condition is not None
+    assert (mover.name, mover.need.condition.text) == ("mover", "vehicle.battery > 0.4")
+    assert mover.need.wait_limit is not None
+    assert leader.need is not None
+    assert (leader.resource, leader.need.waits, leader.need.wait_limit) == ("ugv1", True, None)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_prompt_is_read(engine: str) -> None:
     mission = load(task("userTask", engine, QUESTION))
     (found,) = [node for node in mission.nodes if isinstance(node, UserTask)]
@@ -106,6 +128,10 @@ def test_a_value_may_be_an_expression_of_feel() -> None:
         (
             {"m2pem:vehicle": "ugv1"},
             ("unknown-extension", 5, "write for example 'm2pem:vehicle:mover'"),
+        ),
+        (
+            {"m2pem:requires": "true"},
+            ("unknown-extension", 5, "write for example 'm2pem:requires:mover'"),
         ),
         (
             {"m2pem:type": "vehicle"},

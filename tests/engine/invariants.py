@@ -15,6 +15,7 @@ def check_state(state: RunState) -> None:
         assert not state.tokens
         assert not state.scopes
         assert not state.waits
+        assert not state.allocations
         assert not state.prompts
         assert not state.services
         assert not state.yielded
@@ -42,7 +43,7 @@ def _check_tokens(state: RunState) -> None:
         assert token.scope.tokens[token.id] is token
         assert token.node.container is token.scope.container
         assert token.inner is None or state.scopes[token.inner.id] is token.inner
-        busy = [token.behavior, token.service, token.inner]
+        busy = [token.behavior, token.allocation, token.service, token.inner]
         assert sum(bool(each) for each in busy) <= 1
 
 
@@ -141,6 +142,10 @@ def _check_work(state: RunState) -> None:
     for token in state.tokens.values():
         if token.behavior:
             assert state.behaviors[token.behavior].phase is not BehaviorPhase.CANCELLING
+    for request in state.allocations.values():
+        assert state.tokens[request.token.id] is request.token
+        assert request.token.allocation == request.id
+        assert not request.deadline or request.deadline in state.waits
     for prompt in state.prompts.values():
         assert state.tokens[prompt.token.id] is prompt.token
         assert prompt.token.prompt == prompt.id

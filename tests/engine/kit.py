@@ -215,6 +215,7 @@ class Play:
         state = self.run.state
         return bool(
             len(state.waits) > len(state.conditions)
+            or state.allocations
             or state.prompts
             or state.services
             or any(token.behavior for token in state.tokens.values())

@@ -19,7 +19,8 @@
   attributes; what follows `until` is the completion condition. Both come last in a task, and before
   its elements in a subprocess.
 * A script task's text is `do BEHAVIOR ROLES PARAMETERS` (roles: `uav1`, `evsg1/ptz`, `team:alpha`,
-  with `?` optional), or statements separated by `;`.
+  with `?` optional), or statements separated by `;`. A role `need:ATTRIBUTE=VALUE;...` says what it
+  needs; with `count=` it is of a team behavior, and with `vehicle=` it names what it waits for.
 * A service task's is `call SERVICE ROLES PARAMETERS`, a user task's `ask DECISIONS`, a call
   activity's `in a as b, out c as d`.
 * `A undo B`, on a line of its own, attaches a compensation event (`A_undo`) to A that leads to B.
@@ -202,7 +203,7 @@ def _script(text: str) -> str:
         return "<script>" + text.replace(";", "\n") + "</script>"
     _, name, *words = text.split()
     kind = "vehicle"
-    if any(word.startswith("team:") for word in words):
+    if any(word.startswith("team:") or "count=" in word for word in words):
         kind = "team"
     elif any("/" in word and "=" not in word for word in words):
         kind = "payload"
@@ -226,6 +227,9 @@ def _words(words: list[str], tag: str, role_tag: str) -> tuple[str, str]:
     properties, roles = "", ""
     for number, word in enumerate(words, 1):
         key, equals, value = word.partition("=")
+        if word.startswith("need:"):
+            roles += _need(word.removeprefix("need:"), role_tag, number)
+            continue
         if equals:
             properties += f"<m2pem:{tag} name={quoteattr(key)} value={quoteattr(value)}/>"
             continue
@@ -236,6 +240,13 @@ def _words(words: list[str], tag: str, role_tag: str) -> tuple[str, str]:
             kind, resource = "team", resource.removeprefix("team:")
         roles += f'<m2pem:{role_tag} name="role{number}" {kind}="{resource}"{optional}/>'
     return properties, roles
+
+
+def _need(word: str, role_tag: str, number: int) -> str:
+    optional = ' optional="true"' if word.endswith("?") else ""
+    parts = [part.partition("=") for part in word.removesuffix("?").split(";")]
+    attributes = "".join(f" {key}={quoteattr(value)}" for key, _, value in parts)
+    return f'<m2pem:{role_tag} name="role{number}"{attributes}{optional}/>'
 
 
 def _prompt(text: str) -> str:

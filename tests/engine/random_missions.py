@@ -45,6 +45,7 @@ class _Draft:
     budget: int
     processes: list[str] = field(default_factory=list)
     number: int = 100
+    roles: Sequence[str] = ROLES
 
     def name(self, prefix: str) -> str:
         self.number += 1
@@ -66,7 +67,7 @@ class _Draft:
         tag, text = self.one_of(_LEAVES if inside else _LEAVES[:-1]).split(" ", 1)
         text = text.format(
             set=self.one_of(ASSIGNMENTS),
-            roles=self.one_of(ROLES),
+            roles=self.one_of(self.roles),
             event=self.one_of(EVENTS[:4]),
             thrown=self.one_of(THROWN),
             code=self.one_of(CODES),
@@ -229,9 +230,12 @@ _LEAVES = (
 )
 
 
-def structured(dice: Random) -> str:
-    """A mission of nested blocks, with perhaps a second process that a signal or message starts."""
-    draft = _Draft(dice, dice.randint(1, 30))
+def structured(dice: Random, roles: Sequence[str] = ROLES) -> str:
+    """A mission of nested blocks, with perhaps a second process that a signal or message starts.
+
+    `roles`: of its behaviors; each takes one of these texts.
+    """
+    draft = _Draft(dice, dice.randint(1, 30), roles=roles)
     main = "\n".join(draft.container(0, inside=False))
     other = ""
     if draft.chance(30):
@@ -263,9 +267,9 @@ _NODES = (
 )
 
 
-def graph(dice: Random) -> str:
-    """Nodes joined at random, all of which some start event can reach."""
-    draft = _Draft(dice, 0)
+def graph(dice: Random, roles: Sequence[str] = ROLES) -> str:
+    """Nodes joined at random, all of which some start event can reach. `roles`: as above."""
+    draft = _Draft(dice, 0, roles=roles)
     inside = _graph(draft, dice.randint(1, 12), 0)
     return f'<process id="MAIN" isExecutable="true">\n{inside}\n</process>'
 
@@ -326,7 +330,7 @@ def _element(draft: _Draft, tag: str, text: str, name: str, depth: int) -> str:
         return f'<{tag} id="{name}" messageRef="{text}">{draft.loop()}</{tag}>'
     text = text.format(
         set=draft.one_of(ASSIGNMENTS),
-        roles=draft.one_of(ROLES),
+        roles=draft.one_of(draft.roles),
         event=draft.one_of(EVENTS[:4]),
         thrown=draft.one_of(THROWN),
         code=draft.one_of(CODES),

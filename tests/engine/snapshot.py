@@ -4,6 +4,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from m2pem.engine.state import (
+    AllocationRequest,
     Behavior,
     Compensation,
     CompletedActivity,
@@ -21,7 +22,17 @@ from m2pem.engine.state import (
 from m2pem.mission.elements import Element
 from m2pem.mission.mission import Mission
 
-_OBJECTS = (Scope, Token, Wait, Behavior, Prompt, Service, CompletedActivity, Compensation)
+_OBJECTS = (
+    Scope,
+    Token,
+    Wait,
+    AllocationRequest,
+    Behavior,
+    Prompt,
+    Service,
+    CompletedActivity,
+    Compensation,
+)
 
 
 def snapshot(state: RunState) -> dict[str, Any]:
@@ -30,7 +41,7 @@ def snapshot(state: RunState) -> dict[str, Any]:
     held: list[object] = [state.root] if state.root is not None else []
     for kept in (state.scopes, state.tokens, state.waits, state.behaviors):
         held.extend(kept.values())
-    for also in (state.prompts, state.services):
+    for also in (state.allocations, state.prompts, state.services):
         held.extend(also.values())
     for each in held:
         if isinstance(each, Scope):  # grows while it is walked

@@ -8,9 +8,10 @@ import pytest
 
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.behaviors import SHARED
-from m2pem.fleet.check import TaskFindings, check_mission, check_roles, place
+from m2pem.fleet.check import check_mission, check_roles, place
 from m2pem.fleet.fleet import Fleet, simulated_fleet
-from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
+from m2pem.fleet.task_findings import TaskFindings
+from m2pem.mission.behavior import Behavior, BehaviorType, Role, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 
 from .fleets import PATROL, everything, patrol
@@ -351,12 +352,6 @@ def test_roles_that_the_fleet_fills_give_no_finding(fleet: Fleet) -> None:
             "wrong-kind",
             "evsg3/ptz ({file}:13) is a payload, not a vehicle",
             'write payload="evsg3/ptz"',
-        ),
-        (
-            Role("driver", RoleKind.VEHICLE, "", 15, requires="domain:air"),
-            "reserved",
-            "'requires' (dynamic allocation) is reserved and not understood yet",
-            "name a vehicle, payload or team",
         ),
     ],
 )

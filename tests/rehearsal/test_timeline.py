@@ -42,6 +42,27 @@ def test_a_behavior_lasts_from_its_request_to_its_end_on_each_resource(
     assert line.resources == {"a": [span], "b/ptz": [span]}
 
 
+def asked(allocation: str) -> r.AllocationRequested:
+    return r.AllocationRequested(*TASK, allocation, "goto", "vehicle", {}, 0, 0)
+
+
+def test_a_task_that_waits_for_resources_has_a_span_from_when_it_asked() -> None:
+    line = timeline(
+        (1.0, asked("r1.a1")),
+        (1.0, asked("r1.a2")),
+        (1.0, asked("r1.a3")),
+        (1.5, r.AllocationDelayed("r1.a2", "uav1 is held by r2.b1", {"uav1": "r2.b1"})),
+        (2.0, r.AllocationDelayed("r1.a3", "nothing is free", {})),
+        (2.0, r.ResourcesAllocated(*TASK, "r1.a1", {"scout": ("uav2",)}, {})),
+        (4.0, r.ResourcesAllocated(*TASK, "r1.a2", {"scout": ("uav1",)}, {})),
+        (5.0, r.AllocationEnded("r1.a3", "RESOURCE_UNAVAILABLE")),
+    )
+    assert line.waits == [
+        Span(1.0, 4.0, "goto", "Drive", Outcome.SUCCEEDED, "uav1"),
+        Span(1.0, 5.0, "goto", "Drive", Outcome.FAILED, "RESOURCE_UNAVAILABLE"),
+    ]
+
+
 def test_prompts_and_services_are_spans_too() -> None:
     line = timeline(
         (0.0, r.PromptOpened(1, "P", "Ask", 1, "p1", "Go?", ())),

@@ -50,13 +50,13 @@ ROLE_NOT_LITERAL = Rule(
     "a role is an expression",
     "name the vehicle, payload or team itself",
 )
-REQUIRES_RESERVED = Rule(
+ROLE_NEED = Rule(
     210,
-    "requires-reserved",
+    "role-need",
     "missions.md",
     E,
-    "requires= is not yet for missions to use",
-    "name the vehicle itself",
+    "what a role needs makes no sense",
+    "the message names the attribute and what it may be",
 )
 TWO_BEHAVIORS = Rule(
     211,

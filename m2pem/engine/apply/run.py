@@ -14,6 +14,7 @@ def run_started(state: RunState, record: r.RunStarted) -> None:
 
 def run_claimed(state: RunState, record: r.RunClaimed) -> None:
     state.epoch = record.epoch
+    state.last_allocation += record.lost
     state.last_behavior += record.lost
     state.last_prompt += record.lost
     state.last_service += record.lost

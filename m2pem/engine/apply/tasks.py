@@ -1,13 +1,38 @@
-"""What records about behaviors, prompts and services do to the state."""
+"""What records about allocations, behaviors, prompts and services do to the state."""
 
 from m2pem.engine import records as r
+from m2pem.engine.apply.events import end_wait
 from m2pem.engine.state import (
+    AllocationRequest,
     Behavior,
     BehaviorPhase,
     Prompt,
     RunState,
     Service,
 )
+
+
+def allocation_requested(state: RunState, record: r.AllocationRequested) -> None:
+    token = state.tokens[record.token]
+    state.last_allocation += 1
+    state.allocations[record.allocation] = AllocationRequest(
+        record.allocation, token, record.parameters, record.deadline, record.at_us
+    )
+    token.allocation = record.allocation
+
+
+def allocation_delayed(state: RunState, record: r.AllocationDelayed) -> None:
+    request = state.allocations[record.allocation]
+    request.reason = record.reason
+    request.holders = record.holders
+
+
+def allocation_ended(state: RunState, record: r.ResourcesAllocated | r.AllocationEnded) -> None:
+    request = state.allocations.pop(record.allocation)
+    request.token.allocation = ""
+    wait = state.waits.get(request.deadline)
+    if wait is not None:
+        end_wait(state, wait)
 
 
 def behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
@@ -27,6 +52,7 @@ def behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
     )
     for resource in record.resources:
         state.held.setdefault(resource, []).append(record.behavior)
+        state.commanded[resource] = None
     state.tokens[record.token].behavior = record.behavior
 
 

@@ -6,6 +6,7 @@
 from dataclasses import replace
 
 from m2pem.engine.elements import activities, events, gateways, subprocesses, tasks
+from m2pem.engine.elements.behaviors import time_is_up
 from m2pem.engine.execution import ElementHandler, Execution, Hook
 from m2pem.mission import elements as e
 from m2pem.mission.elements import FlowNode
@@ -28,10 +29,10 @@ HANDLERS: dict[type[FlowNode], ElementHandler] = {
     e.UserTask: replace(
         _activity(tasks.user_task), trigger=tasks.prompt_timed_out, answer=tasks.answer_user_task
     ),
-    e.ScriptTask: _activity(tasks.script_task),
-    e.ServiceTask: _activity(tasks.service_task),
-    e.BusinessRuleTask: _activity(tasks.service_task),
-    e.SendTask: _activity(tasks.send_task),
+    e.ScriptTask: replace(_activity(tasks.script_task), trigger=time_is_up),
+    e.ServiceTask: replace(_activity(tasks.service_task), trigger=time_is_up),
+    e.BusinessRuleTask: replace(_activity(tasks.service_task), trigger=time_is_up),
+    e.SendTask: replace(_activity(tasks.send_task), trigger=time_is_up),
     e.ReceiveTask: _activity(tasks.receive_task),
     e.SubProcess: _activity(subprocesses.subprocess),
     e.Transaction: _activity(subprocesses.subprocess),

@@ -14,6 +14,13 @@ from m2pem.engine import records as r
 from m2pem.engine.arming import await_event
 from m2pem.engine.data import reader
 from m2pem.engine.elements.activities import complete
+from m2pem.engine.elements.allocations import (
+    UNAVAILABLE,
+    allocation_timed_out,
+    emit_behavior,
+    refusal_of,
+    request_allocation,
+)
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.engine.scopes import end_run
@@ -40,50 +47,34 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
     A resource that another behavior holds, and that is not being cancelled, is
     RESOURCE_UNAVAILABLE.
     """
-    node = token.node
     parameters = _evaluate(x, token, behavior)
     if parameters is None:
         return
     if not behavior.roles and behavior.name == "hold":
         _hold_for(x, token, parameters.get("duration"))
         return
+    if behavior.allocated_at_start:
+        request_allocation(x, token, behavior, parameters)
+        return
     try:
         allocation = allocate(behavior, x.fleet)
     except AllocationError as error:
-        throw_error(x, token, "RESOURCE_UNAVAILABLE", str(error))
+        throw_error(x, token, UNAVAILABLE, str(error))
         return
     if not allocation.resources:
-        reason = f"no resource is allocated to {behavior.name}"
-        throw_error(x, token, "RESOURCE_UNAVAILABLE", reason)
-        return
-    preempts: dict[str, None] = {}
-    for resource in allocation.resources:
-        if resource in x.state.taken:
-            reason = f"{resource} is with {x.state.taken[resource]}"
-            throw_error(x, token, "RESOURCE_UNAVAILABLE", reason)
-            return
-        for holder in x.state.held.get(resource, ()):
-            held_by = x.state.behaviors[holder]
-            if held_by.phase is not BehaviorPhase.CANCELLING:
-                reason = f"{resource} is held by {held_by.name} of {held_by.element} ({holder})"
-                throw_error(x, token, "RESOURCE_UNAVAILABLE", reason)
-                return
-            preempts[holder] = None
-    x.emit(
-        r.BehaviorRequested(
-            token.id,
-            x.process_of(node),
-            node.id,
-            token.scope.id,
-            f"{x.state.run}.b{x.state.last_behavior + 1}",
-            behavior.name,
-            behavior.type.value,
-            tuple(allocation.resources),
-            {role: tuple(ids) for role, ids in allocation.roles.items()},
-            parameters,
-            tuple(preempts),
-        )
-    )
+        throw_error(x, token, UNAVAILABLE, f"no resource is allocated to {behavior.name}")
+    elif refusal := refusal_of(x, allocation.resources):
+        throw_error(x, token, UNAVAILABLE, refusal)
+    else:
+        emit_behavior(x, token, behavior, allocation.resources, allocation.roles, parameters)
+
+
+def time_is_up(x: Execution, token: Token) -> None:
+    """End the wait of a task for its resources, or a `hold` without a role."""
+    if token.allocation:
+        allocation_timed_out(x, token)
+    else:
+        complete(x, token)
 
 
 def _evaluate(x: Execution, token: Token, behavior: BehaviorOfTask) -> dict[str, Value] | None:

@@ -44,6 +44,9 @@ from m2pem.engine.records.run import (
     RunYielded,
 )
 from m2pem.engine.records.tasks import (
+    AllocationDelayed,
+    AllocationEnded,
+    AllocationRequested,
     BehaviorCancelRequested,
     BehaviorContinued,
     BehaviorEnded,
@@ -54,6 +57,7 @@ from m2pem.engine.records.tasks import (
     PromptAnswered,
     PromptOpened,
     PromptWithdrawn,
+    ResourcesAllocated,
     ServiceEnded,
     ServiceRequested,
     ServiceWithdrawn,
@@ -75,6 +79,9 @@ from m2pem.engine.records.tokens import (
 
 __all__ = [
     "ActivitiesChosen",
+    "AllocationDelayed",
+    "AllocationEnded",
+    "AllocationRequested",
     "BehaviorCancelRequested",
     "BehaviorContinued",
     "BehaviorEnded",
@@ -107,6 +114,7 @@ __all__ = [
     "PromptOpened",
     "PromptWithdrawn",
     "Record",
+    "ResourcesAllocated",
     "RunClaimed",
     "RunEnded",
     "RunOutcome",
@@ -156,6 +164,10 @@ Record: TypeAlias = Union[
     FlowTaken,
     GatewayActivated,
     GatewayReset,
+    AllocationRequested,
+    AllocationDelayed,
+    ResourcesAllocated,
+    AllocationEnded,
     BehaviorRequested,
     BehaviorProgressed,
     BehaviorCancelRequested,

@@ -1,15 +1,69 @@
-"""Records about the work of tasks: behaviors, prompts and services."""
+"""Records about the work of tasks: allocations, behaviors, prompts and services."""
 
 from m2pem.engine.records.base import BaseRecord
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.values import Value
 
 
+class AllocationRequested(BaseRecord, frozen=True):
+    """A task asks for resources that are to be chosen now; its behavior follows.
+
+    `allocation`: the id of the request. `parameters`: those of the behavior. `deadline`: the wait
+    (`EventAwaited`) that ends it; 0: the task does not wait, or waits without a limit. `at_us`:
+    when it asked, in microseconds since the Unix epoch.
+    """
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    allocation: str
+    name: str
+    type: str
+    parameters: dict[str, Value]
+    deadline: int
+    at_us: int
+
+
+class AllocationDelayed(BaseRecord, frozen=True):
+    """The resources of a request are not free. `reason`: for people. `holders`: the behaviors and
+    operators who have what could fill its roles, by resource. `again`: what was chosen had been
+    taken meanwhile, so that the request is made again."""
+
+    allocation: str
+    reason: str
+    holders: dict[str, str]
+    again: bool = False
+
+
+class ResourcesAllocated(BaseRecord, frozen=True):
+    """Resources were chosen for the roles of a task. `considered`: the candidates of each role, and
+    what each would have cost (docs/allocation.md)."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    allocation: str
+    roles: dict[str, tuple[str, ...]]
+    considered: dict[str, Value]
+
+
+class AllocationEnded(BaseRecord, frozen=True):
+    """A request ended without resources. `code`: the error that its task throws; "": the task was
+    interrupted."""
+
+    allocation: str
+    code: str = ""
+    reason: str = ""
+
+
 class BehaviorRequested(BaseRecord, frozen=True):
     """The arbiters of `resources` must start a behavior.
 
     `roles` maps each role of the mission to the resources allocated to it. `preempts` are
-    behaviors that are being cancelled and still hold one of the resources.
+    behaviors that are being cancelled and still hold one of the resources. `allocation`: the
+    request by which they were chosen, if any.
     """
 
     token: int
@@ -23,6 +77,7 @@ class BehaviorRequested(BaseRecord, frozen=True):
     roles: dict[str, tuple[str, ...]]
     parameters: dict[str, Value]
     preempts: tuple[str, ...] = ()
+    allocation: str = ""
 
 
 class BehaviorProgressed(BaseRecord, frozen=True):

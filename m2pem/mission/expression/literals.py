@@ -1,5 +1,6 @@
 """How numbers and texts are written, in expressions and in messages about them."""
 
+import json
 import math
 import re
 
@@ -64,6 +65,22 @@ def show_scalar(value: bool | int | float | str) -> str:
         whole = value.is_integer() and abs(value) < _WHOLE_LIMIT
         return str(int(value)) if whole else repr(value)
     return str(value)
+
+
+def shown(value: Value) -> str:
+    """Return a value as it would be written in an expression, for reasons that people read.
+
+    Doubles have six significant digits.
+    """
+    return shorten(json.dumps(_rounded(value), ensure_ascii=False))
+
+
+def _rounded(value: Value) -> Value:
+    if isinstance(value, float) and math.isfinite(value):
+        return float(f"{value:.6g}")
+    if isinstance(value, list):
+        return [_rounded(each) for each in value]
+    return value
 
 
 def describe(value: Value) -> str:

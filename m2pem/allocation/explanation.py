@@ -1,0 +1,124 @@
+"""Says why resources were chosen, for record `ResourcesAllocated`, and why a task has none."""
+
+from collections.abc import Mapping, Sequence
+
+from m2pem.allocation.needs import ConsideredRole, Occupancy
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
+
+MAX_LISTED = 20
+"""Candidates of a role that a record lists; it counts the others."""
+
+DIGITS = 3
+"""Decimal digits of seconds, metres and charges in a record."""
+
+
+def what_was_considered(
+    roles: Sequence[ConsideredRole],
+    chosen: Mapping[str, Sequence[ResourceId]],
+    together_with: Sequence[str],
+) -> dict[str, Value]:
+    """Return what a choice saw, as a value for the journal.
+
+    `roles`: of the task, each with all its candidates. `chosen`: by role. `together_with`: the
+    other requests that were decided at the same moment.
+    """
+    return {
+        "roles": {
+            each.role.name: _role(each, chosen.get(each.role.name, ()))
+            for each in roles
+            if each.role.need is not None
+        },
+        "together_with": list(together_with),
+    }
+
+
+def _role(considered: ConsideredRole, chosen: Sequence[ResourceId]) -> Value:
+    ranked = sorted(considered.resources, key=lambda each: _rank(considered, each, chosen))
+    return {
+        "chosen": list(chosen),
+        "candidates": [_candidate(considered, each) for each in ranked[:MAX_LISTED]],
+        "not_listed": max(0, len(ranked) - MAX_LISTED),
+    }
+
+
+def _rank(
+    considered: ConsideredRole, resource: ResourceId, chosen: Sequence[ResourceId]
+) -> tuple[int, float]:
+    """The chosen ones first, then what was free by its cost, what was held, what was excluded."""
+    if resource in chosen:
+        return 0, 0.0
+    if resource in considered.excluded:
+        return 4, 0.0
+    occupancy = considered.occupied.get(resource)
+    if occupancy is not None and occupancy.withdrawn:
+        return 3, 0.0
+    return (1 if occupancy is None else 2), considered.total_s(resource)
+
+
+def _candidate(considered: ConsideredRole, resource: ResourceId) -> Value:
+    found: dict[str, Value] = {"resource": resource}
+    if resource in considered.excluded:
+        found["excluded"] = considered.excluded[resource]
+        return found
+    occupancy = considered.occupied.get(resource)
+    if occupancy is not None and occupancy.withdrawn:
+        found["excluded"] = f"it is unavailable: {occupancy.withdrawn}"
+    elif occupancy is not None:
+        found["held_by"] = occupancy.holder
+    cost = considered.costs.of(resource)
+    return found | {
+        "cost_s": round(considered.total_s(resource), DIGITS),
+        "travel_s": _rounded(cost.travel_s),
+        "distance_m": _rounded(cost.distance_m),
+        "battery": _rounded(cost.battery),
+        "battery_s": round(cost.battery_s, DIGITS),
+        "switching_s": round(cost.switching_s, DIGITS),
+        "preference_s": round(cost.preference_s, DIGITS),
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, DIGITS)
+
+
+def reason(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, str]) -> str:
+    """Say why a task has no resources now, role by role.
+
+    `given`: resources that were given to other requests at the same moment, and to which.
+    """
+    said = [_why(each, given) for each in roles]
+    missing = [text for text in said if text]
+    return "; ".join(missing or ["what is free is kept for tasks that asked before"])
+
+
+def _why(considered: ConsideredRole, given: Mapping[ResourceId, str]) -> str:
+    options = considered.options
+    free = [each for each in options.costs_s if each not in given]
+    if len(free) >= options.least:
+        return ""
+    name = considered.role.name
+    if not considered.resources:
+        return f"role '{name}': the fleet has nothing that could fill it"
+    # What may be free soon says more than what is excluded.
+    ranked = sorted(considered.resources, key=lambda each: each in considered.excluded)
+    said = [f"{each} {_state(considered, each, given)}" for each in ranked[:MAX_NAMED]]
+    count = f"{len(free)} of {options.least} free: " if options.least > 1 else ""
+    others = len(ranked) - len(said)
+    more = f" and {others} others" if others else ""
+    return f"role '{name}': {count}{', '.join(said)}{more}"
+
+
+MAX_NAMED = 6
+"""Candidates that a reason names; it counts the others."""
+
+
+def _state(
+    considered: ConsideredRole, resource: ResourceId, given: Mapping[ResourceId, str]
+) -> str:
+    if resource in considered.excluded:
+        return f"is excluded ({considered.excluded[resource]})"
+    occupancy = considered.occupied.get(resource, Occupancy(given.get(resource, "")))
+    if occupancy.withdrawn:
+        return f"is unavailable ({occupancy.withdrawn})"
+    return f"is held by {occupancy.holder}" if occupancy.holder else "is free"

@@ -1,0 +1,386 @@
+"""The allocator: chooses resources for the tasks of all runs that ask, together.
+
+Requests that arrive in one turn of the event loop, and those that wait, are decided at one moment.
+What is chosen is held for its request until the run has journaled the choice and requests the
+behavior. While a request waits, the allocator looks again when a resource is released, lost or
+received again, and at most every half second when telemetry arrives.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from m2pem.allocation.assignment import Request, assign
+from m2pem.allocation.candidates import Candidates, LatestState, Place
+from m2pem.allocation.circles import Waiting, circles
+from m2pem.allocation.explanation import reason, what_was_considered
+from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
+from m2pem.api.clock import Clock
+from m2pem.api.control import Alert, RunId
+from m2pem.engine import records as r
+from m2pem.engine.data import reader
+from m2pem.engine.elements.allocations import UNAVAILABLE, behavior_of
+from m2pem.engine.inputs import ResourcesChosen, ResourcesNotFree
+from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus
+from m2pem.errors import ExpressionError
+from m2pem.executive.dispatcher import Geometries
+from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.runner import Runner
+from m2pem.fleet.allocation import Availability, resources_of
+from m2pem.fleet.behaviors import ENDING_PARAMETERS
+from m2pem.fleet.parameters import ParameterError, resolve
+from m2pem.mission.behavior import Behavior, BehaviorType
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+
+LOOK_AGAIN_US = 500_000
+"""Telemetry makes the allocator look again at what waits after that time, in microseconds."""
+
+
+@dataclass(slots=True)
+class _Asked:
+    """A request that has no behavior yet. `chosen`: its resources are held for it. `told`: what its
+    run was told that it lacks, without the values of telemetry, which change all the time."""
+
+    runner: Runner
+    chosen: bool = False
+    told: object = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Considered:
+    """A request with all that may fill its roles."""
+
+    asked: _Asked
+    request: AllocationRequest
+    roles: tuple[ConsideredRole, ...]
+
+    @property
+    def priority(self) -> int:
+        """The greatest priority of its roles."""
+        return max(each.role.need.priority for each in self.roles if each.role.need is not None)
+
+    @property
+    def waits(self) -> bool:
+        """Whether its task waits until resources are free."""
+        return any(each.role.need is not None and each.role.need.waits for each in self.roles)
+
+
+class Allocator:
+    """Chooses resources for the requests of all runs of an executive.
+
+    `latest`: the newest telemetry of a resource. `runners`: the runs that are driven here.
+    `publish`: takes warnings for operators.
+    """
+
+    def __init__(
+        self,
+        arbiters: FleetArbiters,
+        availability: Availability,
+        latest: LatestState,
+        clock: Clock,
+        geometries: Geometries,
+        runners: Mapping[RunId, Runner],
+        publish: Callable[[Alert], None],
+    ) -> None:
+        self._arbiters = arbiters
+        self._availability = availability
+        self._latest = latest
+        self._clock = clock
+        self._geometries = geometries
+        self._runners = runners
+        self._publish = publish
+        self._asked: dict[str, _Asked] = {}
+        self._scheduled = False
+        self._later: asyncio.Task[None] | None = None
+        self._looked_us = 0
+        self._circles: set[frozenset[str]] = set()
+        fleet = arbiters.fleet
+        self._order = {each: place for place, each in enumerate((*fleet.vehicles, *fleet.payloads))}
+
+    # --- what runs ask ----------------------------------------------------------------------------
+
+    def ask(self, runner: Runner, allocation: str, *, again: bool) -> None:
+        """Choose resources for a request; the run gets the answer as an input.
+
+        `again`: what was chosen for it had been taken meanwhile.
+        """
+        asked = self._asked.setdefault(allocation, _Asked(runner))
+        if again and asked.chosen:
+            asked.chosen = False
+            self._availability.release(allocation)
+        self._decide_soon()
+
+    def withdraw(self, allocation: str) -> None:
+        """Forget a request: its task needs no resources any more."""
+        if self._asked.pop(allocation, None) is not None:
+            self._availability.release(allocation)
+
+    def on_records(self, run: RunId, records: Sequence[r.Record]) -> None:
+        """Hand what is held for a request to the behavior that was requested for it."""
+        for record in records:
+            if isinstance(record, r.BehaviorRequested) and record.allocation:
+                if self._asked.pop(record.allocation, None) is not None:
+                    self._availability.hand_on(record.allocation, record.behavior)
+            elif isinstance(record, r.RunResumed):
+                self._decide_soon()
+
+    def let_go(self, run: RunId) -> None:
+        """Forget the requests of a run that is not driven here any more."""
+        for allocation, asked in list(self._asked.items()):
+            if asked.runner.id == run:
+                self.withdraw(allocation)
+
+    # --- what changes -----------------------------------------------------------------------------
+
+    def resources_changed(self) -> None:
+        """Look again at what waits: a resource is free, or is not available any more."""
+        if any(not each.chosen for each in self._asked.values()):
+            self._decide_soon()
+
+    def on_telemetry(self) -> None:
+        """Look again at what waits, `LOOK_AGAIN_US` after the last time."""
+        if self._later is None and any(not each.chosen for each in self._asked.values()):
+            self._later = asyncio.create_task(self._look_later())
+
+    async def _look_later(self) -> None:
+        await self._clock.sleep_until(self._looked_us + LOOK_AGAIN_US)
+        self._later = None
+        self.resources_changed()
+
+    def close(self) -> None:
+        """Look no more."""
+        if self._later is not None:
+            self._later.cancel()
+
+    # --- deciding ---------------------------------------------------------------------------------
+
+    def _decide_soon(self) -> None:
+        if not self._scheduled:
+            self._scheduled = True
+            asyncio.get_running_loop().call_soon(self._decide)
+
+    def _decide(self) -> None:
+        self._scheduled = False
+        self._looked_us = self._clock.now_us()
+        waiting = self._consider()
+        waiting.sort(key=lambda each: (-each.priority, each.request.at_us, each.request.id))
+        requests = [
+            Request(each.request.id, tuple(role.options for role in each.roles)) for each in waiting
+        ]
+        chosen = assign(requests, self._order)
+        served = [each.request.id for each in waiting if each.request.id in chosen]
+        given = {
+            resource: request
+            for request, roles in chosen.items()
+            for ids in roles.values()
+            for resource in ids
+        }
+        for each in waiting:
+            number = each.request.id
+            if number in chosen:
+                self._give(each, chosen[number], [other for other in served if other != number])
+            else:
+                self._refuse(each, given)
+        self._tell_of_circles([each for each in waiting if each.request.id not in chosen])
+
+    def _consider(self) -> list[_Considered]:
+        found: list[_Considered] = []
+        snapshot = Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
+        evaluator, occupied = RoleEvaluator(snapshot), self._occupied()
+        for allocation, asked in self._asked.items():
+            state = asked.runner.run.state
+            request = state.allocations.get(allocation)
+            if asked.chosen or request is None or state.status is not RunStatus.RUNNING:
+                continue
+            try:
+                roles = self._roles(evaluator, asked.runner, request, occupied)
+            except ExpressionError as error:
+                asked.runner.post(ResourcesNotFree(allocation, str(error), code="EXPRESSION"))
+                continue
+            found.append(_Considered(asked, request, roles))
+        return found
+
+    def _roles(
+        self,
+        evaluator: RoleEvaluator,
+        runner: Runner,
+        request: AllocationRequest,
+        occupied: Mapping[ResourceId, Occupancy],
+    ) -> tuple[ConsideredRole, ...]:
+        behavior, state = behavior_of(request), runner.run.state
+        ending = {
+            each.id for each in state.behaviors.values() if each.phase is BehaviorPhase.CANCELLING
+        }
+        if ending:  # the run may preempt what it has cancelled itself
+            occupied = {
+                each: found for each, found in occupied.items() if found.holder not in ending
+            }
+        task = Task(
+            behavior,
+            self._place(evaluator.candidates, runner.id, behavior, request),
+            reader(request.token),
+            state.commanded,
+            occupied,
+        )
+        return tuple(evaluator.role(role, task) for role in behavior.roles)
+
+    def _occupied(self) -> dict[ResourceId, Occupancy]:
+        """Return what is not free, and why; also what behaviors have been given that wait for
+        their turn in the dispatcher."""
+        requested = {
+            resource: holders[-1]
+            for runner in self._runners.values()
+            for resource, holders in runner.run.state.held.items()
+        }
+        found: dict[ResourceId, Occupancy] = {}
+        for resource in self._order:
+            if withdrawn := self._availability.reason(resource):
+                found[resource] = Occupancy(withdrawn=withdrawn)
+            elif holder := self._availability.holder(resource) or requested.get(resource):
+                found[resource] = Occupancy(holder)
+        return found
+
+    def _place(
+        self, candidates: Candidates, run: RunId, behavior: Behavior, request: AllocationRequest
+    ) -> Place:
+        """Return where the task begins; anywhere, if its parameters make no sense: its behavior is
+        refused later, with the reason."""
+        spec = self._spec(behavior)
+        if spec is None:
+            return Place()
+        fleet = self._arbiters.fleet
+        try:
+            parameters = resolve(
+                spec,
+                request.parameters,
+                lambda name: self._geometries(run, name),
+                fleet.vehicles,
+                fleet.origin,
+            )
+        except ParameterError:
+            return Place()
+        return candidates.place_of(parameters)
+
+    def _spec(self, behavior: Behavior) -> BehaviorSpec | None:
+        """Return how the behavior is taken by the first resource that offers it."""
+        graph = self._arbiters.graph
+        found = (graph.spec(each, behavior.name, behavior.type) for each in self._order)
+        return next((spec for spec in found if spec is not None), None)
+
+    def _give(
+        self,
+        each: _Considered,
+        chosen: Mapping[str, tuple[ResourceId, ...]],
+        together_with: Sequence[str],
+    ) -> None:
+        fleet = self._arbiters.fleet
+        roles = {
+            role.role.name: resources_of(role.role, fleet)
+            if role.role.resource
+            else chosen[role.role.name]
+            for role in each.roles
+            if role.role.name in chosen
+        }
+        resources = [resource for ids in roles.values() for resource in ids]
+        each.asked.chosen = True
+        self._availability.adopt(resources, each.request.id)
+        each.asked.runner.post(
+            ResourcesChosen(
+                each.request.id, dict(roles), what_was_considered(each.roles, roles, together_with)
+            )
+        )
+
+    def _refuse(self, each: _Considered, given: Mapping[ResourceId, str]) -> None:
+        holders = {
+            str(resource): holder
+            for role in each.roles
+            for resource in (*role.options.busy, *role.options.costs_s)
+            if (holder := _holder(role, resource) or given.get(resource, ""))
+        }
+        why = reason(each.roles, given)
+        lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])
+        if each.waits and each.asked.told == lacks:
+            return
+        each.asked.told = lacks
+        code = "" if each.waits else UNAVAILABLE
+        each.asked.runner.post(ResourcesNotFree(each.request.id, why, holders, code))
+
+    # --- circles of waiting -----------------------------------------------------------------------
+
+    def _tell_of_circles(self, waiting: Sequence[_Considered]) -> None:
+        """Warn operators of runs that wait for each other, once for each circle."""
+        runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
+        idle = {run for run, runner in runners.items() if self._is_idle(runner)}
+        asked = [
+            Waiting(
+                each.request.id,
+                each.asked.runner.id,
+                tuple(self._needed(role) for role in each.roles),
+            )
+            for each in waiting
+            if each.asked.runner.id in idle
+        ]
+        found = circles(asked)
+        for circle in found:
+            if circle not in self._circles:
+                text = _circle_text([each for each in waiting if each.asked.runner.id in circle])
+                for run in sorted(circle):
+                    self._publish(Alert(run, "WAITING_CIRCLE", text))
+        self._circles = set(found)
+
+    def _needed(self, role: ConsideredRole) -> tuple[int, tuple[str | None, ...]]:
+        """Return how many resources a role lacks, and the runs that hold one until they go on."""
+        lacking = max(0, role.options.least - len(role.options.costs_s))
+        holders: list[str | None] = []
+        for resource in role.resources:
+            if resource in role.excluded or resource not in role.occupied:
+                continue
+            holder = role.occupied[resource].holder
+            holders.append(holder.partition(".")[0] if self._goes_on(holder) else None)
+        return lacking, tuple(holders)
+
+    def _goes_on(self, behavior: str) -> bool:
+        """Whether a behavior ends only when its run ends it."""
+        runner = self._runners.get(behavior.partition(".")[0])
+        known = runner.run.state.behaviors.get(behavior) if runner is not None else None
+        if known is None or known.phase is not BehaviorPhase.ACTIVE:
+            return False
+        if not ENDING_PARAMETERS.isdisjoint(known.parameters):
+            return False
+        kind = BehaviorType(known.type)
+        spec = self._arbiters.graph.spec(known.resources[0], known.name, kind)
+        return spec is not None and not spec.ends
+
+    def _is_idle(self, runner: Runner) -> bool:
+        """Whether a run can go on only by getting what it asked for."""
+        state = runner.run.state
+        limits = {request.deadline for request in state.allocations.values()}
+        if limits != {0} or state.prompts or state.services or state.waits:
+            return False
+        return all(self._goes_on(behavior) for behavior in state.behaviors)
+
+
+def _circle_text(waiting: Sequence[_Considered]) -> str:
+    said = [
+        f"{each.asked.runner.id} waits at {each.request.token.node.label} for "
+        + ", ".join(
+            f"{resource} ({role.occupied[resource].holder})"
+            for role in each.roles
+            for resource in role.options.busy
+        )
+        for each in waiting
+    ]
+    runs = [each.asked.runner.id for each in waiting]
+    return (
+        f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
+        f"{runs[-1]}`), or take what it has and give it back"
+    )
+
+
+def _withdrawn(role: ConsideredRole) -> frozenset[ResourceId]:
+    return frozenset(each for each, found in role.occupied.items() if found.withdrawn)
+
+
+def _holder(role: ConsideredRole, resource: ResourceId) -> str:
+    occupancy = role.occupied.get(resource)
+    return occupancy.holder if occupancy is not None else ""

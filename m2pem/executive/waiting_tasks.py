@@ -1,0 +1,49 @@
+"""Which tasks of all runs wait for vehicles and payloads, in the order in which they are served."""
+
+from collections.abc import Iterable
+
+from m2pem.api.control import WaitingTask
+from m2pem.engine.elements.allocations import behavior_of
+from m2pem.engine.state import AllocationRequest, RunState
+from m2pem.executive.runner import Runner
+from m2pem.units import US_PER_S
+
+
+def waiting_tasks(runners: Iterable[Runner], now_us: int) -> list[WaitingTask]:
+    """Return the tasks that wait: the greatest priority first, then what asked first.
+
+    `now_us`: microseconds since the Unix epoch by the executive's clock.
+    """
+    requests = [
+        (runner.run.state, request)
+        for runner in runners
+        for request in runner.run.state.allocations.values()
+        if request.reason
+    ]
+    requests.sort(key=lambda found: (-_priority(found[1]), found[1].at_us, found[1].id))
+    return [_task(state, request, now_us) for state, request in requests]
+
+
+def _priority(request: AllocationRequest) -> int:
+    """Return the greatest priority of the roles that are chosen or waited for."""
+    needs = (role.need for role in behavior_of(request).roles)
+    return max(need.priority for need in needs if need is not None)
+
+
+def _task(state: RunState, request: AllocationRequest, now_us: int) -> WaitingTask:
+    node = request.token.node
+    wait = state.waits.get(request.deadline)
+    due_us = None if wait is None else wait.due_us
+    left_us = None if due_us is None else max(0, due_us - state.mission_time_us(now_us))
+    return WaitingTask(
+        state.run,
+        request.id,
+        node.id,
+        node.label,
+        behavior_of(request).name,
+        max(0, now_us - request.at_us) / US_PER_S,
+        None if left_us is None else left_us / US_PER_S,
+        _priority(request),
+        request.reason,
+        request.holders,
+    )

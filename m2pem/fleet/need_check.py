@@ -1,0 +1,161 @@
+"""The static check of roles by need: whether the fleet can fill them (docs/allocation.md)."""
+
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+
+import rustworkx
+
+from m2pem.errors import ExpressionError
+from m2pem.fleet.allocation import resources_of
+from m2pem.fleet.facts import Fit, fits
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.graph import ResourceGraph
+from m2pem.fleet.task_findings import TaskFindings
+from m2pem.mission.behavior import Behavior, BehaviorType, Role
+from m2pem.mission.candidate_facts import CANDIDATE_FACTS, is_fact
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.expression.tree import In, Literal, Name, walk
+from m2pem.suggestions import did_you_mean
+
+NAMED = 6
+"""Candidates that a finding names; it counts the others."""
+
+SOLVER = "scipy"
+"""The package that chooses; it is an extra of m2pem, as missions without such roles need it not."""
+
+
+def check_needs(
+    behavior: Behavior, fleet: Fleet, graph: ResourceGraph, findings: TaskFindings
+) -> dict[str, tuple[ResourceId, ...]]:
+    """Check the roles of a behavior that are filled when it starts.
+
+    Returns what may fill each role by need that is right, by the role's name.
+    """
+    by_need = [role for role in behavior.roles if role.need is not None]
+    if by_need and find_spec(SOLVER) is None:
+        findings.add(
+            "no-solver",
+            "choosing resources needs the package scipy, which is not installed",
+            "pip install 'm2pem[allocation]'",
+            line=behavior.line,
+        )
+    possible: dict[str, tuple[ResourceId, ...]] = {}
+    for role in by_need:
+        if role.resource:
+            continue
+        _check_facts(role, findings)
+        _check_count(behavior, role, findings)
+        try:
+            found = fits(fleet, graph, behavior, role)
+        except ExpressionError as error:
+            findings.add("bad-need", f"requires: {error}", line=role.line, role=role.name)
+            continue
+        able = tuple(fit.resource for fit in found if not fit.excluded)
+        least = role.need.least if role.need is not None and not role.optional else 0
+        if len(able) < least:
+            _cannot_fill(role, fleet, found, able, least, findings)
+        else:
+            possible[role.name] = able
+    _check_together(behavior, fleet, possible, findings)
+    return possible
+
+
+def _check_facts(role: Role, findings: TaskFindings) -> None:
+    assert role.need is not None
+    for expression in role.need.expressions:
+        for name in sorted(expression.names):
+            if is_fact(name) and name not in CANDIDATE_FACTS:
+                findings.add(
+                    "unknown-fact",
+                    f"'{name}' is no fact of a candidate",
+                    did_you_mean(name, CANDIDATE_FACTS)
+                    or f"there are: {', '.join(CANDIDATE_FACTS)}",
+                    line=role.line,
+                    role=role.name,
+                )
+
+
+def _check_count(behavior: Behavior, role: Role, findings: TaskFindings) -> None:
+    assert role.need is not None
+    if role.need.most > 1 and behavior.type is not BehaviorType.TEAM:
+        findings.add(
+            "role-count",
+            f"the {behavior.type.value} behavior {behavior.name} has one {behavior.type.value} in "
+            f"each role, not {role.need.most}",
+            'make it a team behavior (type="team"), or delete count=',
+            line=role.line,
+            role=role.name,
+        )
+
+
+def _cannot_fill(
+    role: Role,
+    fleet: Fleet,
+    found: Sequence[Fit],
+    able: Sequence[ResourceId],
+    least: int,
+    findings: TaskFindings,
+) -> None:
+    out = [f"{fit.resource}: {fit.excluded}" for fit in found if fit.excluded]
+    more = f"; and {len(out) - NAMED} others" if len(out) > NAMED else ""
+    has = f"{len(able)} of {fleet.file} can" if able else f"nothing in {fleet.file} can"
+    wanted = f"{least} are needed, and {has} fill it" if least > 1 else f"{has} fill it"
+    findings.add(
+        "unfillable",
+        f"{wanted}: {'; '.join(out[:NAMED]) or 'the fleet has none'}{more}",
+        _unknown_tag(role, fleet) or "ask for less, or give the fleet what is asked for",
+        line=role.line,
+        role=role.name,
+    )
+
+
+def _unknown_tag(role: Role, fleet: Fleet) -> str:
+    """Return a hint if a role asks for a tag that nothing in the fleet has."""
+    assert role.need is not None
+    tags = {tag for each in fleet.vehicles.values() for tag in each.tags}
+    tags |= {tag for each in fleet.payloads.values() for tag in each.tags}
+    if role.need.condition is None:
+        return ""
+    for node, _ in walk(role.need.condition.tree):
+        match node:
+            case In(item=Literal(value=str(wanted)), container=Name(name=name)):
+                if name.endswith(".tags") and wanted not in tags:
+                    hint = did_you_mean(wanted, tags)
+                    return f"nothing in the fleet has the tag '{wanted}'. {hint}".rstrip()
+    return ""
+
+
+def _check_together(
+    behavior: Behavior,
+    fleet: Fleet,
+    possible: Mapping[str, tuple[ResourceId, ...]],
+    findings: TaskFindings,
+) -> None:
+    """Check that all roles of one task can be filled at once, each resource in one of them."""
+    places: list[tuple[Role, Sequence[ResourceId]]] = []
+    for role in behavior.roles:
+        if role.name in possible and role.need is not None and not role.optional:
+            places += [(role, possible[role.name])] * role.need.least
+        elif role.resource:
+            places += [(role, (each,)) for each in resources_of(role, fleet)]
+    if len(places) < 2 or not possible:
+        return
+    graph: rustworkx.PyGraph = rustworkx.PyGraph()
+    graph.add_nodes_from(range(len(places)))
+    nodes: dict[ResourceId, int] = {}
+    for place, (_, resources) in enumerate(places):
+        for resource in resources:
+            if resource not in nodes:
+                nodes[resource] = graph.add_node(resource)
+            graph.add_edge(place, nodes[resource], 1)
+    filled = len(rustworkx.max_weight_matching(graph, max_cardinality=True))
+    if filled < len(places):
+        roles = ", ".join(dict.fromkeys(f"'{role.name}'" for role, _ in places))
+        what = ", ".join(dict.fromkeys(each for _, resources in places for each in resources))
+        findings.add(
+            "roles-compete",
+            f"the roles {roles} need {len(places)} resources at once, and only {filled} can be "
+            f"given to them: they compete for {what}",
+            "ask for less, or give the fleet more of them",
+            line=behavior.line,
+        )
