@@ -19,16 +19,18 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import definition_of
 from m2pem.engine.data import reader
+from m2pem.engine.elements.allocations import UNAVAILABLE
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
 from m2pem.engine.steps import Steps
 from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.expression import Expression
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import ReadValue, Value
-from m2pem.verify.net.petri_net import Trigger
+from m2pem.verify.net import choices
+from m2pem.verify.net.petri_net import Action, Trigger
 from m2pem.verify.translate.domains import constants, representatives
 
 _SECOND_US = 1_000_000
@@ -103,6 +105,8 @@ class ConformanceRun:
             self._now_us += _SECOND_US
             self._bring_about(Trigger(trigger), step)
         for action in step["actions"]:
+            if action["action"] == Action.ALLOCATED:
+                self._allocate(action["element"], action["detail"])
             if action["action"] == "taken":
                 self._expected[action["element"]] += 1
         return self.steps[before:]
@@ -143,6 +147,31 @@ class ConformanceRun:
                 self._time_is_up(element)
             case Trigger.CONDITION:
                 self._come_true(element, step["data"])
+
+    def _allocate(self, element: str, detail: str) -> None:
+        """Answer the request of a task for resources as the allocator does in the step."""
+        asked = self.run.state.allocations.values()
+        request = next((each for each in asked if each.token.node.id == element), None)
+        if request is None:
+            raise NotPlayableError(f"{element} asks for no resources in the engine now")
+        if not detail:
+            self._give(i.ResourcesNotFree(request.id, "too few are free", {}, UNAVAILABLE))
+            return
+        chosen: dict[str, tuple[str, ...]] = {}
+        given: set[str] = set()
+        for role, places in choices.read(detail).items():
+            for alike in places:
+                free = next((r for r in alike if r not in given and self._is_free(r)), None)
+                if free is None:
+                    raise NotPlayableError(f"{' and '.join(alike)} are not free in the engine now")
+                given.add(free)
+                chosen[role] = (*chosen.get(role, ()), free)
+        self._give(i.ResourcesChosen(request.id, chosen, {}))
+
+    def _is_free(self, resource: str) -> bool:
+        state = self.run.state
+        holders = [state.behaviors[each] for each in state.held.get(ResourceId(resource), ())]
+        return all(each.phase is BehaviorPhase.CANCELLING for each in holders)
 
     def _end_work(self, element: str, code: str, writes: Mapping[str, Any]) -> None:
         token = self._token(element, "behavior", "service", "prompt")

@@ -10,6 +10,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.mission import Mission
 from m2pem.verify.net.petri_net import PetriNet
+from tests.verify.allocator import Allocator
 from tests.verify.conformance import START_US
 from tests.verify.trace_mapping import Follower, look_of_run
 
@@ -68,23 +69,42 @@ def branches(
 class Walk:
     """A run of the engine in which numbers choose what happens, followed by the net."""
 
-    def __init__(self, mission: Mission, fleet: Fleet, net: PetriNet, seed: int) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        fleet: Fleet,
+        net: PetriNet,
+        seed: int,
+        allocator: Allocator | None = None,
+    ) -> None:
+        """`allocator`: answers the requests of tasks for resources."""
         self.run = MissionRun(mission, fleet, "r1")
         self.follower = Follower(net)
         self.process = net.process
         self.now_us = START_US
         self.dice = Random(seed)
         self.given: list[i.Input] = []
+        self.allocator = allocator
 
     def give(self, item: i.Input) -> bool:
         """Whether the net can do what the engine has done."""
+        self._receive(item)
+        for _ in range(50):
+            if self.allocator is None or self.run.wants_continue:
+                break
+            answer = self.allocator.answer(self.run)
+            if answer is None:
+                break
+            self._receive(answer)
+        return self.run.wants_continue or self.follower.step(self.run.state)
+
+    def _receive(self, item: i.Input) -> None:
         self.given.append(item)
         self.run.receive(item, self.now_us)
         for _ in range(50):
             if not self.run.wants_continue:
                 break
             self.run.receive(i.Continue(), self.now_us)
-        return self.run.wants_continue or self.follower.step(self.run.state)
 
     def go(self, length: int = 25) -> str:
         """Where the net could not follow; "" if they always could."""

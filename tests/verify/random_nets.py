@@ -16,6 +16,7 @@ from m2pem.verify.net.petri_net import (
 )
 
 _KINDS = (Kind.INTERNAL, Kind.INTERNAL, Kind.JOIN, Kind.EXTERNAL, Kind.EXTERNAL)
+_ACTIONS = [each for each in Action if each is not Action.ALLOCATED]
 _ENDS = 3
 
 
@@ -64,7 +65,7 @@ def _transition(
         number,
         f"r{number}",
         dice.choice(_KINDS),
-        (Step(f"e{consumed[0]}", dice.choice(list(Action))),),
+        (Step(f"e{consumed[0]}", dice.choice(_ACTIONS)),),
         consume=tuple((p, 1) for p in consumed),
         read=tuple(some(1, 0.2)),
         inhibit=tuple(p for p in some(2, 0.2) if p not in consumed),

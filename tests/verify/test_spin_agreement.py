@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from m2pem.bpmn import read_mission
 from m2pem.fleet.default_fleet import fleet_for
+from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import check
 from m2pem.verify.ltl import Formula, propositions
@@ -22,6 +23,7 @@ from m2pem.verify.net.encoding import Marking
 from m2pem.verify.net.petri_net import Flag, PetriNet
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties import ALL
+from m2pem.verify.properties.commands import watch_interruptions
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.requirements import Names, parse_spec
 from m2pem.verify.requirements.check import check_requirement, conditions
@@ -39,6 +41,7 @@ from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
 from tests.verify import formulas
 from tests.verify.missions import approval, pair
+from tests.verify.random_needs import OPEN, branches_with_needs, fleet_of, net_of
 from tests.verify.random_nets import random_net
 from tests.verify.test_properties import (
     JOIN_FED_BY_ONE,
@@ -115,8 +118,11 @@ def test_broken_missions_have_one_answer(text: str) -> None:
     assert one_answer(notation(text)) is Verdict.VIOLATED
 
 
-def one_answer(mission: Mission) -> Verdict:
-    ours, spins = check(mission), check_with_spin(mission)
+def one_answer(
+    mission: Mission, fleet: Fleet | None = None, options: Options | None = None
+) -> Verdict:
+    ours = check(mission, fleet, options=options)
+    spins = check_with_spin(mission, fleet, options=options)
     assert spins.states == ours.states
     assert spins.engine == "spin"
     assert len(spins.results) == len(ALL)
@@ -151,6 +157,20 @@ def seeds(odd: tuple[int, ...]) -> list[object]:
 def _random_mission(seed: int) -> PetriNet:
     text = (structured if seed % 2 else graph)(Random(seed))
     return (simplify if seed % 3 else lambda net: net)(translate(notation(text)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_missions_with_roles_by_need_have_the_same_states(seed: int) -> None:
+    mission = notation(branches_with_needs(Random(seed)))
+    net = simplify(net_of(mission)) if seed % 3 else net_of(mission)
+    watched = watch_interruptions(net, fleet_of(mission).vehicles)
+    same(watched[0] if watched is not None and seed % 2 else net)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_missions_with_roles_by_need_have_one_answer(seed: int) -> None:
+    mission = notation(branches_with_needs(Random(seed)))
+    one_answer(mission, fleet_of(mission), OPEN)
 
 
 @pytest.mark.parametrize("seed", seeds(ODD_MISSIONS))

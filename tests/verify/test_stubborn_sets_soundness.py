@@ -19,6 +19,7 @@ from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
 from tests.verify.answers import FEW, NO_FEWER, atoms_of, both, formula_of
 from tests.verify.random_mission_nets import random_mission_net
+from tests.verify.random_needs import branches_with_needs, net_of
 from tests.verify.random_nets import random_net
 
 Make = Callable[[Random], PetriNet]
@@ -50,6 +51,10 @@ def transitions(dice: Random) -> PetriNet:
 
 def missions(dice: Random) -> PetriNet:
     return translate(notation(dice.choice([structured, graph])(dice)))
+
+
+def needs(dice: Random) -> PetriNet:
+    return net_of(notation(branches_with_needs(dice)))
 
 
 def seen(found: Exploration) -> tuple[object, ...]:
@@ -109,7 +114,14 @@ def places(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.usefixtures("places")
 @pytest.mark.parametrize(
     ("make", "models"),
-    [(nets, 30), (sound_nets, 25), (failing_nets, 25), (transitions, 25), (missions, 10)],
+    [
+        (nets, 30),
+        (sound_nets, 25),
+        (failing_nets, 25),
+        (transitions, 25),
+        (missions, 10),
+        (needs, 10),
+    ],
 )
 def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int) -> None:
     count: Counter[str] = Counter()
@@ -136,7 +148,7 @@ def test_nor_of_odd_models(make: Make, seed: int) -> None:
 @pytest.mark.long
 @pytest.mark.timeout(3_600)
 @pytest.mark.usefixtures("places")
-@pytest.mark.parametrize("make", [nets, sound_nets, failing_nets, transitions, missions])
+@pytest.mark.parametrize("make", [nets, sound_nets, failing_nets, transitions, missions, needs])
 def test_nor_of_very_many_models(make: Make) -> None:
     count: Counter[str] = Counter()
     assert not [each for seed in seeds_for(LONG_S) for each in compare(make, seed, count)]

@@ -38,6 +38,7 @@ class CompiledTransition:
     plain: bool = True
     any_of: list[int] = field(default_factory=list)
     at_least: list[tuple[int, int, int]] = field(default_factory=list)
+    at_most: list[tuple[int, int, int]] = field(default_factory=list)
     takes: list[tuple[int, int]] = field(default_factory=list)
     moves: list[tuple[int, int, int, bool]] = field(default_factory=list)
     gives: list[tuple[int, int, int, int]] = field(default_factory=list)
@@ -59,6 +60,7 @@ class Encoding:
         at = 0
         for place in net.places:
             width = self.wider.get(place.index, SEVERAL_BITS if place.several else 1)
+            width = max(width, len(place.free).bit_length())
             self.offset.append(at)
             self.width.append(width)
             self.mask.append(((1 << width) - 1) << at)
@@ -121,6 +123,8 @@ class Encoding:
             c.test |= self.mask[place]
             if place in taken or place in transition.read:  # which it never can
                 c.at_least.append((self.mask[place], self.offset[place], 1 << self.width[place]))
+        for place, count in transition.at_most:
+            c.at_most.append((self.mask[place], self.offset[place], count))
         for variable, values in transition.guard:
             mask = self._values_mask(variable, values)
             if len(values) == 1:
@@ -151,11 +155,11 @@ class Encoding:
             c.erase |= all_of
             c.put |= 1 << (self.value_bit[variable] + value)
         c.clear |= c.erase
-        c.plain = not (c.any_of or c.at_least or c.takes or c.moves or c.gives)
+        c.plain = not (c.any_of or c.at_least or c.at_most or c.takes or c.moves or c.gives)
         c.reads = c.test
         for mask in c.any_of:
             c.reads |= mask
-        for mask, _, _ in c.at_least:
+        for mask, _, _ in (*c.at_least, *c.at_most):
             c.reads |= mask
         c.changes = c.clear | c.put
         for place, _ in c.takes:
@@ -178,6 +182,9 @@ class Encoding:
             return True
         for mask in c.any_of:
             if not state & mask:
+                return False
+        for mask, offset, count in c.at_most:
+            if (state & mask) >> offset > count:
                 return False
         return all((state & mask) >> offset >= count for mask, offset, count in c.at_least)
 

@@ -2,7 +2,8 @@
 
 A marking says how many tokens each place has, and which value each variable has. A transition is
 enabled when each place of `consume` has that many tokens, each of `read` has one, none of `inhibit`
-has any, and each variable of `guard` has one of the values named. Firing, in this order:
+has any, each of `at_most` has no more than that many, and each variable of `guard` has one of the
+values named. Firing, in this order:
 
 1. the tokens of `consume` are removed;
 2. for each pair of `moves`, a token on the first place goes to the second, and for each pair of
@@ -18,7 +19,8 @@ internal one is; `Kind.EXTERNAL` ones when neither is. Transitions of one kind f
 An *outcome* is what is decided when a transition fires: by something outside, or by a choice that
 the mission leaves open. Fairness is about outcomes: one that is possible again and again happens
 again and again. Transitions of one outcome are the same answer, report or timer in different
-states: never are two of them enabled. A join only waits, and decides nothing.
+states: never are two of them enabled. A join only waits, and decides nothing. A choice of
+resources, which waits as joins do, decides.
 
 Both the built-in search and the PROMELA that is written for Spin are made from this alone.
 """
@@ -36,7 +38,8 @@ class Kind(StrEnum):
     INTERNAL = "internal"
     """A step that the executive does by itself."""
     JOIN = "join"
-    """An inclusive or complex join completes. It waits until nothing else can move."""
+    """An inclusive or complex join completes, or resources are chosen for a task. That waits until
+    nothing else can move."""
     EXTERNAL = "outside"
     """An answer, report, timer, signal or message. It comes when the executive has nothing to do.
     """
@@ -124,6 +127,14 @@ class Place:
     behavior: str = ""
     once: bool = False
     """A token that does not fit is lost; that is a finding, unless `several` are meant."""
+    free: tuple[str, ...] = ()
+    """A pool of interchangeable resources: each token says that one of them is free. It never has
+    more tokens than resources."""
+    returns: tuple[int, ...] = ()
+    """Pools that a resource is given back to when the place loses its token: each transition that
+    resets the place copies its token there."""
+    holder: int | None = None
+    """Of a place with `returns`: the active place of the task that holds the resources."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +168,14 @@ class Action(StrEnum):
     TRIGGERED = "triggered"
     THROWN = "thrown"
     """An event throws, or an activity's error propagates."""
+    ALLOCATED = "allocated"
+    """A task gets the resources of `detail` (`m2pem.verify.net.choices`); "": it gets none, because
+    too few are free."""
 
+
+UNASKED = "unasked"
+"""Detail of the success of a behavior that goes on until it is interrupted: nothing may count on
+it."""
 
 BEGINS = "begins"
 """Detail of the step in which an activity begins its work, after its boundary events are armed."""
@@ -206,6 +224,7 @@ class Transition:
     """Its scope must be empty: all of the scope's places are in `inhibit`."""
     due_us: int | None = None
     """Of a timer whose duration the mission states: microseconds after it is armed."""
+    at_most: tuple[tuple[int, int], ...] = ()
 
     outcomes: tuple[int, ...] = ()
     """The outcomes that it stands for (see the module)."""
@@ -271,7 +290,7 @@ def with_outcomes(transitions: Sequence[Transition]) -> list[Transition]:
     count = 0
     made: list[Transition] = []
     for transition in transitions:
-        if transition.kind is Kind.JOIN:
+        if only_waits(transition):
             made.append(transition)
             continue
         others = alike.setdefault(_decided(transition), [])
@@ -282,6 +301,12 @@ def with_outcomes(transitions: Sequence[Transition]) -> list[Transition]:
         others.append((transition, outcome))
         made.append(replace(transition, outcomes=(outcome,)))
     return made
+
+
+def only_waits(transition: Transition) -> bool:
+    """Whether a transition is a join, which decides nothing."""
+    allocates = any(step.action is Action.ALLOCATED for step in transition.steps)
+    return transition.kind is Kind.JOIN and not allocates
 
 
 def _decided(transition: Transition) -> _Decided:
@@ -311,4 +336,4 @@ def outcomes_of(net: PetriNet) -> Mapping[int, tuple[int, ...]]:
     """The outcomes of each transition: several, where it was fused from several transitions."""
     if any(transition.outcomes for transition in net.transitions):
         return {transition.index: transition.outcomes for transition in net.transitions}
-    return {r.index: () if r.kind is Kind.JOIN else (r.index,) for r in net.transitions}
+    return {r.index: () if only_waits(r) else (r.index,) for r in net.transitions}

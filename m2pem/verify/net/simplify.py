@@ -58,7 +58,7 @@ def simplify(
 def _trim(transition: Transition, concurrency: Concurrency) -> Transition:
     """Remove arcs from places that never have a token when the transition fires."""
     needed = [place for place, _ in transition.consume] + list(transition.read)
-    if not needed or not (transition.inhibit or transition.reset):
+    if not needed or not (transition.inhibit or transition.reset or transition.copies):
         return transition
 
     possible = -1
@@ -66,13 +66,17 @@ def _trim(transition: Transition, concurrency: Concurrency) -> Transition:
         possible &= concurrency.rows[place] | 1 << place
     targets = {t for _, t in (*transition.moves, *transition.copies)}
     inhibit = tuple(p for p in transition.inhibit if possible >> p & 1)
+    moved = {target for _, target in transition.moves}
+    copies = tuple(
+        (one, other) for one, other in transition.copies if possible >> one & 1 or one in moved
+    )
     absent = set(transition.inhibit) - targets
     reset = tuple(
         p for p in transition.reset if p not in absent and (possible >> p & 1 or p in targets)
     )
     if len(reset) > len(transition.reset) * _WORTH_TRIMMING:
         reset = transition.reset
-    return replace(transition, inhibit=inhibit, reset=reset)
+    return replace(transition, inhibit=inhibit, reset=reset, copies=copies)
 
 
 def renumbered(net: PetriNet, transitions: list[Transition]) -> PetriNet:
@@ -97,6 +101,7 @@ def renumbered(net: PetriNet, transitions: list[Transition]) -> PetriNet:
             produce=tuple((number[p], c) for p, c in transition.produce),
             read=tuple(number[p] for p in transition.read),
             inhibit=tuple(number[p] for p in transition.inhibit if p in number),
+            at_most=tuple((number[p], c) for p, c in transition.at_most if p in number),
             reset=reset_places(transition.reset),
             moves=tuple((number[a], number[b]) for a, b in transition.moves),
             copies=tuple((number[a], number[b]) for a, b in transition.copies),
@@ -105,7 +110,15 @@ def renumbered(net: PetriNet, transitions: list[Transition]) -> PetriNet:
     )
     return replace(
         net,
-        places=tuple(replace(place, index=n) for n, place in enumerate(order)),
+        places=tuple(
+            replace(
+                place,
+                index=n,
+                returns=tuple(number[p] for p in place.returns if p in number),
+                holder=None if place.holder is None else number.get(place.holder),
+            )
+            for n, place in enumerate(order)
+        ),
         transitions=made,
         initial=tuple((number[p], c) for p, c in net.initial),
         completed=number[net.completed],
@@ -209,6 +222,7 @@ def _passes(transition: Transition, place: int, watched: set[int]) -> bool:
         and not (
             transition.read
             or transition.inhibit
+            or transition.at_most
             or transition.reset
             or transition.moves
             or transition.copies

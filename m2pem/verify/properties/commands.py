@@ -1,8 +1,8 @@
 """Properties of commands: are vehicles and payloads commanded as they should be?
 
-`watch_interruptions` extends the net by a place for each vehicle. It gets a token when a behavior
-that holds the vehicle is ended by something else than its own report, and loses it when another
-behavior begins on that vehicle.
+`watch_interruptions` extends the net by a place for each vehicle, or for each pool of vehicles. It
+gets a token when a behavior that holds the vehicle is ended by something else than its own report,
+and loses it when another behavior begins on that vehicle.
 """
 
 from collections.abc import Collection
@@ -134,7 +134,8 @@ def _interruption(
             held = [
                 watched.net.places[p].element
                 for p, t in each.copies
-                if t in places and watched.net.places[p].resources
+                if t in places
+                and (watched.net.places[p].resources or watched.net.places[p].returns)
             ]
             held += [
                 watched.net.places[p].element
@@ -150,43 +151,124 @@ def watch_interruptions(
 ) -> tuple[PetriNet, dict[int, str]] | None:
     """Return the extended net, and by place the vehicle; None: no vehicle can be interrupted.
 
-    Payloads are not considered: a camera that no behavior commands does no harm.
+    A vehicle of a pool that is interrupted goes to the pool's own such place, from which tasks may
+    take it as well. Payloads are not considered: a camera that no behavior commands does no harm.
     """
+    pools = {p.index: p.free for p in net.places if p.free and set(p.free) <= set(vehicles)}
     held = {
         p.index: mine
         for p in net.places
-        if (mine := tuple(each for each in p.resources if each in vehicles))
+        if not p.returns and (mine := tuple(each for each in p.resources if each in vehicles))
     }
-    if not any(_interrupts(net, transition, held) for transition in net.transitions):
+    given = {p.index for p in net.places if set(p.returns) & pools.keys()}
+    if not any(_interrupts(net, each, {*held, *given}) for each in net.transitions):
         return None
     resources = sorted({r for each in held.values() for r in each})
     first = len(net.places)
     number = {resource: first + n for n, resource in enumerate(resources)}
     places = [Place(number[r], f"{r}~interrupted", net.process, 0, Role.CONTROL) for r in resources]
-    transitions = [_noting(net, transition, held, number) for transition in net.transitions]
+    stopped = {pool: first + len(places) + n for n, pool in enumerate(pools)}
+    places += [
+        replace(net.places[pool], index=n, name=f"{net.places[pool].name}~interrupted")
+        for pool, n in stopped.items()
+    ]
+    transitions = [
+        each
+        for transition in net.transitions
+        for each in _taking(
+            _stopping(net, _noting(net, transition, held, number), stopped), stopped
+        )
+    ]
     watched = replace(
-        net, places=(*net.places, *places), transitions=tuple(transitions), single=None
+        net,
+        places=(*net.places, *places),
+        transitions=tuple(replace(each, index=n) for n, each in enumerate(transitions)),
+        single=None,
     )
-    return watched, {n: resource for resource, n in number.items()}
+    names = {n: _one_of(pools[pool]) for pool, n in stopped.items()}
+    return watched, {**{n: resource for resource, n in number.items()}, **names}
+
+
+def _one_of(pool: tuple[str, ...]) -> str:
+    return pool[0] if len(pool) == 1 else f"one of {', '.join(pool)}"
 
 
 def _interrupts(
-    net: PetriNet, transition: Transition, held: dict[int, tuple[str, ...]]
+    net: PetriNet, transition: Transition, held: Collection[int]
 ) -> list[tuple[int, bool]]:
     """Holding places that a transition takes the token off; and whether it always does."""
     if any(p in net.ends for p, _ in transition.produce):
         return []
-    lost = [(p, False) for p in transition.reset if p in held]
-    if transition.trigger not in (Trigger.SUCCEEDS, Trigger.FAILS):
-        lost += [(p, True) for p, _ in transition.consume if p in held]
+    consumed = {p for p, _ in transition.consume}
+    reports = transition.trigger in (Trigger.SUCCEEDS, Trigger.FAILS)
+    lost = [
+        (p, False)
+        for p in transition.reset
+        if p in held and not (reports and net.places[p].holder in consumed)
+    ]
+    if not reports:
+        lost += [(p, True) for p in consumed if p in held]
     lost += [(s, False) for s, _ in transition.moves if s in held]
     return lost
+
+
+def _stopping(net: PetriNet, transition: Transition, stopped: dict[int, int]) -> Transition:
+    """Give back what a transition interrupts to the places of interrupted vehicles."""
+    given_back = {p for p, pool in transition.copies if pool in stopped}
+    interrupted = {p for p, _ in _interrupts(net, transition, given_back)}
+    if not interrupted:
+        return transition
+    copies = tuple(
+        (p, stopped[pool] if p in interrupted and pool in stopped else pool)
+        for p, pool in transition.copies
+    )
+    return replace(transition, copies=copies)
+
+
+def _taking(transition: Transition, stopped: dict[int, int]) -> list[Transition]:
+    """Return the transitions in place of one that takes vehicles from pools, or tests them.
+
+    The vehicles of a pool that are free are those that were interrupted and the others.
+    """
+    consume, at_most = dict(transition.consume), dict(transition.at_most)
+    tested = {pool: most for pool, most in at_most.items() if pool in stopped}
+    found = [(consume, at_most)]
+    for pool, count in transition.consume:
+        if pool in stopped:
+            found = [
+                (_shared(taken, pool, stopped[pool], part), limits)
+                for taken, limits in found
+                for part in range(count + 1)
+            ]
+    for pool, most in tested.items():
+        found = [
+            (taken, {**limits, pool: most - part, stopped[pool]: part})
+            for taken, limits in found
+            for part in range(most + 1)
+        ]
+    empty = [stopped[pool] for pool in transition.inhibit if pool in stopped]
+    if len(found) == 1 and not empty:
+        return [transition]
+    return [
+        replace(
+            transition,
+            consume=tuple(sorted(taken.items())),
+            at_most=tuple(sorted(limits.items())),
+            inhibit=(*transition.inhibit, *empty),
+        )
+        for taken, limits in found
+    ]
+
+
+def _shared(consume: dict[int, int], place: int, other: int, part: int) -> dict[int, int]:
+    """Take a part of what is consumed from another place."""
+    return {p: n for p, n in {**consume, place: consume[place] - part, other: part}.items() if n}
 
 
 def _noting(
     net: PetriNet, transition: Transition, held: dict[int, tuple[str, ...]], number: dict[str, int]
 ) -> Transition:
-    lost = _interrupts(net, transition, held)
+    lost = _interrupts(net, transition, held.keys())
     begun = {r for p, _ in transition.produce for r in held.get(p, ())}
     reset, produce = set(transition.reset), dict(transition.produce)
     copies = list(transition.copies)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from m2pem.mission import elements as e
 from m2pem.mission.events import CompensateEventDefinition
-from m2pem.verify.net.petri_net import Exactness, Flag, Role, Trigger
+from m2pem.verify.net.petri_net import UNASKED, Action, Exactness, Flag, Kind, Role, Trigger
 from m2pem.verify.properties.results import Result, SearchedMission, Violation
 from m2pem.verify.search.fairness import FairCycles
 
@@ -82,10 +82,11 @@ def _stuck(searched: SearchedMission) -> list[Violation]:
     ]
 
 
-def _reaching(searched: SearchedMission, goals: list[int]) -> bytearray:
+def _reaching(searched: SearchedMission, goals: list[int], *, asked: bool) -> bytearray:
     """The states from which some of the goals can be reached, if no work fails uncaught.
 
-    A failure of a vehicle that ends the run is no way out.
+    A failure of a vehicle that ends the run is no way out; nor is, if only what is `asked` for
+    counts, the success of a behavior that goes on until it is interrupted.
     """
     found = searched.found
     assert found.edge_start is not None
@@ -95,7 +96,8 @@ def _reaching(searched: SearchedMission, goals: list[int]) -> bytearray:
     before: list[list[int]] = [[] for _ in range(count)]
     for state in range(count):
         for at in range(found.edge_start[state], found.edge_start[state + 1]):
-            if not _fails(searched, found.edge_transition[at]):
+            each = found.edge_transition[at]
+            if not _fails(searched, each) and not (asked and _unasked(searched, each)):
                 before[found.edge_state[at]].append(state)
     marked = bytearray(count)
     waiting = list(goals)
@@ -111,6 +113,11 @@ def _reaching(searched: SearchedMission, goals: list[int]) -> bytearray:
 
 def _fails(searched: SearchedMission, transition: int) -> bool:
     return searched.net.transitions[transition].flag is Flag.UNCAUGHT_FAILURE
+
+
+def _unasked(searched: SearchedMission, transition: int) -> bool:
+    each = searched.net.transitions[transition]
+    return each.trigger is Trigger.SUCCEEDS and each.detail == UNASKED
 
 
 def _begins(searched: SearchedMission, transition: int) -> bool:
@@ -137,8 +144,26 @@ def _lost(searched: SearchedMission, *, ends_only: bool) -> list[int]:
             done,
         )
         goals += range(last, len(found.states))
-    marked = _reaching(searched, goals)
+    marked = _reaching(searched, goals, asked=ends_only)
     return [state for state in range(len(found.states)) if not marked[state]]
+
+
+def _shown(searched: SearchedMission, lost: Sequence[int]) -> int:
+    """Return the first of some states in which a task waits for resources; else the first one."""
+    net, found = searched.net, searched.found
+    asking = {
+        place
+        for each in net.transitions
+        if any(step.action is Action.ALLOCATED for step in each.steps)
+        for place, _ in each.consume
+        if not net.places[place].free and net.places[place].role is Role.CONTROL
+    }
+    for state in lost if asking else ():
+        if asking & found.marking(state).tokens.keys() and all(
+            net.transitions[each].kind is Kind.EXTERNAL for each, _ in found.successors(state)
+        ):
+            return state
+    return lost[0]
 
 
 def can_complete(searched: SearchedMission) -> Result:
@@ -146,8 +171,9 @@ def can_complete(searched: SearchedMission) -> Result:
     violations: list[Violation] = []
     lost = _lost(searched, ends_only=True)
     if lost:
-        stuck = searched.where(lost[0])
-        run = tuple(searched.found.run_to(lost[0]))
+        state = _shown(searched, lost)
+        stuck = searched.where(state)
+        run = tuple(searched.found.run_to(state))
         last = searched.net.transitions[run[-1]].element if run else ""
         message = f"from {searched.labels(stuck)} on, the end cannot be reached any more"
         if last:
@@ -172,7 +198,7 @@ def completes_if_fair(searched: SearchedMission) -> Result:
     if not found.reduced:
         violations = _stuck(searched)[:1] or _fair_cycle(searched, rounds)
     if not violations and (lost := _lost(searched, ends_only=True)):
-        violations = [_never_ends(searched, lost[0])]
+        violations = [_never_ends(searched, _shown(searched, lost))]
     elif not violations and found.reduced and found.complete and rounds.any:
         note = IN_EACH_STATE
     return searched.result("completes-if-fair", FAIR, violations, note=note)
@@ -200,7 +226,7 @@ def _never_ends(searched: SearchedMission, lost: int) -> Violation:
     stuck = next((s for s in found.terminals if not searched.ended(s)), None)
     if stuck is not None:
         return _stuck(searched)[0]
-    into, cycle = _into_cycle(searched, lost)
+    into, cycle = _into_cycle(searched, lost, asked=True)
     where = _elements(searched, cycle) or searched.where(lost)
     how = "and can reach no end any more" if cycle else "or fails"
     return Violation(
@@ -236,14 +262,20 @@ def no_livelock(searched: SearchedMission) -> Result:
     return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
 
 
-def _into_cycle(searched: SearchedMission, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Transitions that lead from a state to a cycle, and those of the cycle."""
+def _into_cycle(
+    searched: SearchedMission, start: int, *, asked: bool = False
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Transitions that lead from a state to a cycle, and those of the cycle. `asked`: as above."""
     seen: dict[int, int] = {}
     transitions: list[int] = []
     state = start
     while state not in seen:
         seen[state] = len(transitions)
-        steps = (each for each in searched.found.successors(state) if not _fails(searched, each[0]))
+        steps = (
+            each
+            for each in searched.found.successors(state)
+            if not _fails(searched, each[0]) and not (asked and _unasked(searched, each[0]))
+        )
         transition, state = next(steps, (-1, -1))
         if transition < 0:
             return tuple(transitions), ()

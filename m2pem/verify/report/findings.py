@@ -19,9 +19,11 @@ from m2pem.verify.report.run_steps import (
     encoding_of,
     tokens_of,
 )
-from m2pem.verify.report.stuck import why_stuck
+from m2pem.verify.report.stuck import waits_for_resources, why_stuck
 
 DEADLOCK = "no-deadlock"
+ENDS = frozenset({"can-complete", "completes-if-fair"})
+"""Properties that a task violates which waits for ever for what others keep."""
 FOLLOWING = frozenset({"no-dead-element", "can-complete", "completes-if-fair"})
 """Properties whose violations often follow from those of others."""
 
@@ -170,8 +172,12 @@ def _describe(
     loop, state = describe_run(net, element_names, found.cycle, begin=len(run_steps), at=state)
     tokens = tokens_of(encoding_of(net), state)
     deadlock = answer.property == DEADLOCK and not answer.required
-    stuck = why_stuck(element_names, run_steps, tokens) if deadlock else []
+    waiting = waits_for_resources(net, element_names, encoding_of(net).marking(state))
+    stuck = why_stuck(element_names, run_steps, tokens, waiting) if deadlock else []
     missing = tuple(flow for each in stuck for flow in each.missing)
     if stuck:
         found = replace(found, message="; ".join(each.text for each in stuck))
+    elif answer.property in ENDS and not answer.required:
+        waits = [f"{element_names.with_id(each)} {what}" for each, what in waiting.items()]
+        found = replace(found, message="; ".join([found.message, *waits]))
     return DescribedViolation(answer, found, run_steps, loop, tokens, missing)

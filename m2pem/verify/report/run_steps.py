@@ -9,6 +9,7 @@ from m2pem.mission.behavior import Behavior
 from m2pem.mission.events import RootElement
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
+from m2pem.verify.net import choices
 from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import (
     BEGINS,
@@ -364,6 +365,10 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
             commands = element_names.behavior(first.element)
             commanded = any(step.detail == COMMANDS for step in actions)
             return f"{name}: {commands}" if commands and commanded else f"{name} begins"
+        case Action.ALLOCATED if first.detail:
+            return f"{name} is given {choices.in_words(choices.read(first.detail))}"
+        case Action.ALLOCATED:
+            return f"{name} gets nothing: too few of what could fill its roles are free"
         case Action.INTERRUPTED:
             return ""
         case Action.THROWN:

@@ -1,10 +1,11 @@
 """Deadlocks explained: what each token waits for, and what in the run made that impossible."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from m2pem.mission import elements as e
-from m2pem.verify.net.petri_net import Action
+from m2pem.verify.net.encoding import Marking
+from m2pem.verify.net.petri_net import Action, PetriNet
 from m2pem.verify.report.run_steps import ElementNames, RunStep, Token
 
 
@@ -18,11 +19,15 @@ class WaitingTokens:
 
 
 def why_stuck(
-    element_names: ElementNames, run_steps: Sequence[RunStep], tokens: Sequence[Token]
+    element_names: ElementNames,
+    run_steps: Sequence[RunStep],
+    tokens: Sequence[Token],
+    waiting: Mapping[str, str] | None = None,
 ) -> list[WaitingTokens]:
     """What the remaining tokens wait for, one sentence for each element.
 
-    An activity that waits for its inside is left out when the inside is described.
+    An activity that waits for its inside is left out when the inside is described. `waiting`: what
+    tasks wait for that have no resources (`waits_for_resources`).
     """
     joins: dict[str, list[str]] = {}
     found: list[WaitingTokens] = []
@@ -37,8 +42,47 @@ def why_stuck(
     around |= {owner for t in tokens if not t.flow for owner in _around(element_names, t.element)}
     for token in tokens:
         if not token.flow and token.element not in around:
-            found.append(WaitingTokens(token.element, _waits(element_names, token.element)))
+            said = _waits(element_names, token.element)
+            if waiting is not None and token.element in waiting:
+                said = f"{element_names.with_id(token.element)} {waiting[token.element]}"
+            found.append(WaitingTokens(token.element, said))
     return found
+
+
+def waits_for_resources(
+    net: PetriNet, element_names: ElementNames, marking: Marking
+) -> dict[str, str]:
+    """Say of each task that asks for resources what it waits for, and what has that."""
+    asked: dict[str, dict[str, None]] = {}
+    asking: set[str] = set()
+    for transition in net.transitions:
+        first = transition.steps[0] if transition.steps else None
+        if first is None or first.action is not Action.ALLOCATED or not first.detail:
+            continue
+        wanted = asked.setdefault(first.element, {})
+        for place, _ in transition.consume:
+            wanted.update(dict.fromkeys(net.places[place].free))
+            if not net.places[place].free and place in marking.tokens:
+                asking.add(first.element)
+    holders = {
+        resource: place.element
+        for place in net.places
+        if place.index in marking.tokens
+        for pool in place.returns
+        for resource in place.resources or net.places[pool].free
+    }
+    found: dict[str, str] = {}
+    for element in asking:
+        held = {r: holders[r] for r in asked[element] if r in holders}
+        who = ", ".join(f"{r} is held by {element_names.name(by)}" for r, by in held.items())
+        found[element] = (
+            f"waits for {_any_of(list(asked[element]))}, {who or 'which it cannot get'}"
+        )
+    return found
+
+
+def _any_of(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _around(element_names: ElementNames, element: str) -> set[str]:

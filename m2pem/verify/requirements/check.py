@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from m2pem.fleet.allocation import spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.expression import Expression
 from m2pem.mission.mission import Mission
 from m2pem.verify.ltl import propositions
-from m2pem.verify.ltl.formula import Data, needs_steps
+from m2pem.verify.ltl.formula import Commanded, Data, needs_steps
 from m2pem.verify.ltl.model_check import Result, Run, Stopped, Verdict, check
 from m2pem.verify.net.petri_net import PetriNet, Transition
 from m2pem.verify.net.simplify import simplify
@@ -51,6 +52,20 @@ def conditions(requirements: Sequence[Requirement]) -> tuple[Expression, ...]:
     )
 
 
+def distinguished(requirements: Sequence[Requirement], fleet: Fleet) -> frozenset[str]:
+    """The vehicles and payloads that requirements are about: they are in no pool with others
+    (`Options.distinguished`).
+    """
+    commanded = {
+        each.resource
+        for requirement in requirements
+        for each in propositions(requirement.formula)
+        if isinstance(each, Commanded)
+    }
+    teams = [fleet.teams[name] for name in commanded if name in fleet.teams]
+    return frozenset(commanded).union(*(spelled_out(team) for team in teams))
+
+
 def net_for(
     mission: Mission,
     fleet: Fleet,
@@ -68,7 +83,11 @@ def net_for(
         KeyError: the mission has no such process.
         TooLargeError: its net is larger than `size_limit` allows.
     """
-    options = replace(options or Options(), conditions=conditions(requirements))
+    options = replace(
+        options or Options(),
+        conditions=conditions(requirements),
+        distinguished=distinguished(requirements, fleet),
+    )
     net = translate(mission, fleet, process=process, options=options, size_limit=size_limit)
     if any(each.fair or needs_steps(each.formula) for each in requirements):
         return net

@@ -10,9 +10,10 @@ from m2pem.fleet.allocation import resources_of, spelled_out
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission import elements as e
-from m2pem.mission.behavior import Assignment, Behavior, Parameter
+from m2pem.mission.behavior import Assignment, Behavior, Need, Parameter
+from m2pem.mission.candidate_facts import is_fact
 from m2pem.mission.elements import FlowNode, UserTask
-from m2pem.mission.expression import Expression
+from m2pem.mission.expression import Expression, parse
 from m2pem.mission.loops import MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest
@@ -63,6 +64,9 @@ def written_by(node: e.FlowNode, services: Mapping[str, Sequence[str]]) -> Itera
     behavior = getattr(node, "behavior", None)
     if behavior is not None and (behavior.name, behavior.type) in SHARED:
         yield from SHARED[behavior.name, behavior.type].writes
+    for role in behavior.roles if behavior is not None else ():
+        if role.need is not None and role.need.store:
+            yield role.need.store
     if isinstance(node, e.Activity) and isinstance(node.loop, MultiInstance):
         yield node.loop.output_collection
 
@@ -73,6 +77,9 @@ def read_by(node: e.FlowNode) -> Iterator[Expression]:
     behavior = getattr(node, "behavior", None)
     if behavior is not None:
         parameters = behavior.parameters
+        for role in behavior.roles:
+            if role.need is not None:
+                yield from _read_by_need(role.need)
     elif isinstance(node, e.ServiceTask) and node.call is not None:
         parameters = node.call.properties
     yield from (each.value for each in parameters if isinstance(each.value, Expression))
@@ -87,6 +94,15 @@ def read_by(node: e.FlowNode) -> Iterator[Expression]:
     elif isinstance(loop, MultiInstance):
         conditions = (loop.cardinality, loop.collection, loop.completion)
     yield from (each for each in conditions if each is not None)
+
+
+def _read_by_need(need: Need) -> Iterator[Expression]:
+    if need.same:
+        yield parse(need.same)
+    if need.wait_limit is not None:
+        yield need.wait_limit
+    for expression in need.expressions:
+        yield from (parse(name) for name in sorted(expression.names) if not is_fact(name))
 
 
 _WHERE = ("area", "route", "target")

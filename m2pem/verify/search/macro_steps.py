@@ -31,13 +31,15 @@ class Feed:
     """An internal transition or join that a macro step alone does not cause, but may with others.
 
     It waits for bits that are `missing` or `present`, which the macro step does not change; or, if
-    there are none, for some of a field of bits each of `fields`.
+    there are none, for some of a field of bits each of `fields`, or, if there are none of these
+    either, for less in a field of `filled`.
     """
 
     transition: int
     missing: int
     present: int
     fields: tuple[int, ...] = ()
+    filled: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)
@@ -86,6 +88,8 @@ class MacroSteps:
         wants, barred = c.need, c.test & ~c.need
         for mask in (*c.any_of, *(mask for mask, _, _ in c.at_least)):
             wants |= mask
+        for mask, _, _ in c.at_most:
+            barred |= mask
         for low in bits_of(wants):
             self._wanting[low] = self._wanting.get(low, 0) | 1 << number
         for low in bits_of(barred):
@@ -167,8 +171,9 @@ class MacroSteps:
                 continue
             fields = [mask for mask in c.any_of if not now & mask]
             fields += [mask for mask, offset, n in c.at_least if (now & mask) >> offset < n]
-            if fields:
-                macro_step.feeds.append(Feed(number, 0, 0, tuple(fields)))
+            filled = [mask for mask, offset, n in c.at_most if (now & mask) >> offset > n]
+            if fields or filled:
+                macro_step.feeds.append(Feed(number, 0, 0, tuple(fields), tuple(filled)))
 
 
 def _goes_round(following: dict[int, list[int]]) -> bool:

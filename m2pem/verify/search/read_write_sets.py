@@ -46,6 +46,8 @@ class ReadWriteSets:
             forbids |= mask
         for mask, _, _ in c.at_least:
             needs |= mask
+        for mask, _, _ in c.at_most:
+            forbids |= mask
         clears, sets = c.clear, c.put
         for place, _ in c.takes:
             clears |= encoding.mask[place]

@@ -120,16 +120,17 @@ def safe_places(net: PetriNet) -> frozenset[int]:
     """Places that the structure proves to have one token at most, or to get tokens from one
     transition.
     """
+    counted = frozenset(place.index for place in net.places if place.free)  # by their own laws
     if net.single is not None:
-        return net.single
+        return net.single | counted
     if is_small(net):
-        return Concurrency(net).single
+        return Concurrency(net).single | counted
     producers: dict[int, int] = {}
     for transition in net.transitions:
         made = {place for place, _ in transition.produce}
         for place in made | {target for _, target in (*transition.moves, *transition.copies)}:
             producers[place] = producers.get(place, 0) + 1
-    return frozenset(p.index for p in net.places if producers.get(p.index, 0) <= 1)
+    return counted | {p.index for p in net.places if producers.get(p.index, 0) <= 1}
 
 
 class _Chooser:
@@ -248,7 +249,11 @@ class _Chooser:
                     best = found
                     if not best & (best - 1):
                         return best
-        return best if best >= 0 else read_write.setting_any(feed.fields[0])
+        if best >= 0:
+            return best
+        if feed.fields:
+            return read_write.setting_any(feed.fields[0])
+        return read_write.clearing_any(feed.filled[0])
 
     def _enabling(
         self, number: int, state: int, closed: int, own: tuple[int, int], candidates: int
@@ -282,6 +287,9 @@ class _Chooser:
         for mask, offset, count in c.at_least:
             if (state & mask) >> offset < count:
                 return self.read_write.setting_any(mask)
+        for mask, offset, count in c.at_most:
+            if (state & mask) >> offset > count:
+                return self.read_write.clearing_any(mask)
         return 0
 
     # --- what a step disturbs -------------------------------------------------------------------

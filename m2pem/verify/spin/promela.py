@@ -53,7 +53,7 @@ _SHARED_CLEARS = 4
 """Transitions that reset the same places share a macro from so many places on."""
 _HEADINGS = {
     Kind.INTERNAL: "what the executive does by itself",
-    Kind.JOIN: "joins that wait until nothing else can move",
+    Kind.JOIN: "joins and choices of resources that wait until nothing else can move",
     Kind.EXTERNAL: "what comes from outside",
 }
 
@@ -160,6 +160,8 @@ class Writer:
             said = f"{place.element}, {place.role.value}"
             if place.resources:
                 said += f": {place.behavior} holds {', '.join(place.resources)}"
+            if place.free:
+                said += f": free of {', '.join(place.free)}"
             first = f" = {begin[place.index]}" if place.index in begin else ""
             self._out.add(f"{kind} {name}{first}; {comment(said)}")
         for variable, name in zip(self.net.variables, self.variables, strict=True):
@@ -242,6 +244,7 @@ class Writer:
         ]
         tests += [places[p] for p in transition.read if p not in consumed]
         tests += [f"!{places[p]}" for p in transition.inhibit]
+        tests += [f"{places[p]} <= {n}" for p, n in transition.at_most if n < self.most[p]]
         for variable, allowed in transition.guard:
             count = len(self.net.variables[variable].values)
             if len(allowed) < count:

@@ -5,25 +5,45 @@ from dataclasses import replace
 from m2pem.engine.execution import Waits, waits_when_entered
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior
+from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.expression import literal
 from m2pem.units import Dimension, UnitError, quantity
-from m2pem.verify.net.petri_net import BEGINS, Action, Exactness, Flag, Kind, Role, Step, Trigger
+from m2pem.verify.net.petri_net import (
+    BEGINS,
+    UNASKED,
+    Action,
+    Exactness,
+    Flag,
+    Kind,
+    Role,
+    Step,
+    Trigger,
+)
 from m2pem.verify.translate import subprocesses
+from m2pem.verify.translate.allocations import (
+    asking_place,
+    choose_resources,
+    take_named_resources,
+)
 from m2pem.verify.translate.catching import boundaries, caught_before_work
 from m2pem.verify.translate.compensation import note_completion
 from m2pem.verify.translate.context import (
     ActivityInstance,
+    Contender,
     TranslationContext,
     behavior_of,
     held_by,
     register_catcher,
     resources,
+    takes_from_pools,
 )
 from m2pem.verify.translate.loops import looped
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
+from m2pem.verify.translate.pools import goes_on
 from m2pem.verify.translate.sequence_flows import leave
 from m2pem.verify.translate.throwing import (
     catchable,
+    failing,
     interrupting_places,
     message_effects,
     split_by_places,
@@ -153,13 +173,6 @@ def _at_once(instance: ActivityInstance) -> list[Effect]:
     return product([stop], instance.done())
 
 
-def failing(
-    context: TranslationContext, instance: ActivityInstance, code: str, flag: Flag
-) -> list[Effect]:
-    """An activity fails. Its token is removed already."""
-    return throw_error(context, instance.outer, instance.node, instance, code, flag)
-
-
 def _behavior(
     context: TranslationContext, instance: ActivityInstance, behavior: Behavior
 ) -> list[Effect]:
@@ -173,39 +186,44 @@ def _behavior(
         ]
         runs(context, instance.active, after_us, (instance.active,), made)
         return [instance.begin()]
+    if instance.node in context.candidates:
+        _outside_work(context, instance, asking_place(context, instance))
+        return choose_resources(context, instance, behavior)
     held = resources(context, behavior)
     if not held:
         return failing(context, instance, "RESOURCE_UNAVAILABLE", Flag.UNCAUGHT)
+    if takes_from_pools(context, instance.node, behavior):
+        _outside_work(context, instance, asking_place(context, instance))
+        return take_named_resources(context, instance, behavior, held)
     _outside_work(context, instance)
     wants = net.place(
         instance.node, instance.outer, Role.ENTERING, f":wants{instance.inside.index}"
     )
-    context.contended.append((instance, wants, held))
+    asks = Effect(consume=(wants,))
+    begins = instance.begin()
+    context.contended.append(Contender(instance, held, asks, replace(begins, consume=asks.consume)))
     return [Effect(produce=(wants,))]
 
 
 def translate_contention(context: TranslationContext) -> None:
     """A behavior begins when no other behavior holds its resources; else it fails at once."""
     net = context.net
-    for instance, wants, held in context.contended:
-        holders = {n: r for r in held for n in net.holders.get(r, ())}
-        begins = Effect(
+    for contender in context.contended:
+        instance = contender.instance
+        holders = {n: r for r in contender.resources for n in net.holders.get(r, ())}
+        free = Effect(
             steps=(Step(instance.node.id, Action.ENTERED, "commands"),),
-            consume=(wants,),
             inhibit=frozenset(holders),
-        ).then(instance.begin())
-        assert begins is not None
-        net.transition(begins)
+        )
+        context.transitions(product([free], [contender.begins]))
         for holder, resource in holders.items():
             refused = Effect(
-                consume=(wants,),
                 read=frozenset({holder}),
                 flag=Flag.CONFLICT,
                 flagged=resource,
             )
             fails = failing(context, instance, "RESOURCE_UNAVAILABLE", Flag.CONFLICT)
-            for effect in product([refused], fails):
-                net.transition(effect)
+            context.transitions(product(product([contender.asks], [refused]), fails))
 
 
 def _hold_us(behavior: Behavior) -> int | None:
@@ -222,15 +240,22 @@ def _ended(instance: ActivityInstance, effect: Effect) -> Effect:
     return effect.with_step(instance.node.id, Action.COMPLETED)
 
 
-def _outside_work(context: TranslationContext, instance: ActivityInstance) -> list[Effect]:
-    """A behavior or service call: it succeeds or fails when its report comes."""
+def _outside_work(
+    context: TranslationContext, instance: ActivityInstance, asks: int | None = None
+) -> list[Effect]:
+    """A behavior or service call: it succeeds or fails when its report comes.
+
+    `asks`: a place that has a token while the behavior has not begun.
+    """
     net = context.net
-    well = [_ended(instance, instance.leave())]
-    badly = Effect(consume=(instance.active,))
+    begun = Effect(inhibit=frozenset() if asks is None else frozenset({asks}))
+    well = product([_ended(instance, instance.leave())], [begun])
+    badly = replace(begun, consume=(instance.active,))
     for key in context.data.written_anyhow(instance.node):
         well = context.data.write(well, key, None, instance.outer, instance.node)
+    unasked = UNASKED if asks is not None and _goes_on(context, instance) else ""
     for effect in product(well, instance.done()):
-        net.transition(effect, Kind.EXTERNAL, Trigger.SUCCEEDS)
+        net.transition(effect, Kind.EXTERNAL, Trigger.SUCCEEDS, unasked)
     if context.options.failures:
         codes = dict.fromkeys((*catchable(context, instance.outer, instance), "FAILED"))
         for code in codes:
@@ -239,6 +264,16 @@ def _outside_work(context: TranslationContext, instance: ActivityInstance) -> li
                 if both is not None:
                     net.transition(both, Kind.EXTERNAL, Trigger.FAILS, code)
     return [instance.begin()]
+
+
+def _goes_on(context: TranslationContext, instance: ActivityInstance) -> bool:
+    """Whether a behavior that takes resources from pools keeps them until it is interrupted."""
+    behavior = behavior_of(instance.node)
+    assert behavior is not None
+    roles = context.candidates.get(instance.node, ())
+    chosen = [each for role in roles for each in role.resources]
+    named = map(ResourceId, resources(context, behavior) or ()) if not roles else ()
+    return goes_on(behavior, [*chosen, *named], context.options.catalogue)
 
 
 def _user_task(

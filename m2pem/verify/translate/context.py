@@ -21,6 +21,7 @@ from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate.data import Data, Truth
 from m2pem.verify.translate.net_builder import Effect, NetBuilder, ScopeDraft
 from m2pem.verify.translate.options import Options
+from m2pem.verify.translate.pools import Pool, candidates_of, pools_of, stored_values
 
 
 @dataclass(slots=True, eq=False)
@@ -81,6 +82,31 @@ class CompensationEffects:
     over: Effect
 
 
+@dataclass(frozen=True, slots=True)
+class Contender:
+    """A behavior that begins if all its resources are free, and fails at once if one is not.
+
+    `asks`: the effect that removes its token from where it asks for them. `begins`: of its begin.
+    """
+
+    instance: ActivityInstance
+    resources: tuple[str, ...]
+    asks: Effect
+    begins: Effect
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """A place that has a token while a task asks for resources of `pools`. `urgent`: it gets one of
+    them as soon as one is free, as far as its priority allows.
+    """
+
+    place: int
+    priority: int
+    pools: frozenset[Pool]
+    urgent: bool
+
+
 class TranslationContext:
     """A translation in progress.
 
@@ -102,7 +128,11 @@ class TranslationContext:
         self.fleet = fleet
         self.options = options
         self.net = NetBuilder(size_limit)
-        self.data = Data(mission, options, size_limit)
+        self.candidates = candidates_of(mission, fleet, options.catalogue)
+        self.data = Data(mission, options, size_limit, stored_values(self.candidates))
+        self.pool_of = pools_of(
+            mission, fleet, self.candidates, self.data.domains.of, options.distinguished
+        )
         self.world = self.net.scope(process, None)
         self.world.path = ()
         self.world.frame = ()
@@ -117,7 +147,8 @@ class TranslationContext:
         self.messages: dict[str, list[Catcher]] = {}
         self.begins: dict[tuple[str, str], list[list[Effect]]] = {}
         self.later: list[Callable[[], None]] = []
-        self.contended: list[tuple[ActivityInstance, int, tuple[str, ...]]] = []
+        self.contended: list[Contender] = []
+        self.asking: list[Asking] = []
         self.choices: list[tuple[Effect, e.FlowNode, ScopeDraft]] = []
         self.compensated_by: dict[e.Activity, CompensatedBy | None] = {}
         self.notes_scopes: dict[int, ScopeDraft] = {}
@@ -126,6 +157,23 @@ class TranslationContext:
         self.root = self.everything
         self.repeated = _repeated_nodes(mission)
         self.again = _ends_reached_again(mission)
+
+    def pool_place(self, pool: Pool) -> int:
+        """Return the place with a token for each resource of a pool that is free."""
+        number = self.net.place(
+            self.process,
+            self.everything,
+            Role.CONTROL,
+            f":free {'|'.join(pool)}",
+            several=len(pool) > 1,
+        )
+        self.net.places[number] = replace(self.net.places[number], free=pool)
+        return number
+
+    def free_resources(self) -> tuple[int, ...]:
+        """Return the pools, each as often as it has resources: all are free at first."""
+        pools = dict.fromkeys(self.pool_of.values())
+        return tuple(self.pool_place(pool) for pool in pools for _ in pool)
 
     def end_run(self, place: int) -> Effect:
         """End the run, and all in it."""
@@ -245,11 +293,23 @@ def held_by(context: TranslationContext, node: e.Activity) -> tuple[tuple[str, .
     """Return (resources that a token on an activity holds, the behavior's name). The whole of a
     loop holds nothing.
     """
+    return ((), "") if node.loop is not None else held_by_instance(context, node)
+
+
+def held_by_instance(context: TranslationContext, node: e.Activity) -> tuple[tuple[str, ...], str]:
+    """The same, of an instance of a loop too. What comes from pools is held by places beside it."""
     behavior = behavior_of(node)
-    if behavior is None or node.loop is not None:
+    if behavior is None or takes_from_pools(context, node, behavior):
         return (), ""
     held = resources(context, behavior)
     return held or (), behavior.name if held else ""
+
+
+def takes_from_pools(context: TranslationContext, node: e.Activity, behavior: Behavior) -> bool:
+    """Whether a task chooses its resources, or needs one that another task may choose."""
+    if node in context.candidates:
+        return True
+    return any(each in context.pool_of for each in resources(context, behavior) or ())
 
 
 def behavior_of(node: e.Activity) -> Behavior | None:

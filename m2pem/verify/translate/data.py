@@ -1,7 +1,7 @@
 """Data in the net: a variable for each followed name of each process instance."""
 
 import itertools
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
 from m2pem.errors import ExpressionError
@@ -9,8 +9,9 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior
 from m2pem.mission.events import ConditionalEventDefinition
-from m2pem.mission.expression import Expression
+from m2pem.mission.expression import Dialect, Expression, parse
 from m2pem.mission.expression.expression import literal
+from m2pem.mission.expression.tree import ListOf, Literal
 from m2pem.mission.loops import INSTANCE_COUNTS, LOOP_COUNTER, MultiInstance, StandardLoop
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
@@ -32,9 +33,15 @@ class Data:
     """The followed names of a mission, and what reads and writes them."""
 
     def __init__(
-        self, mission: Mission, options: Options, size_limit: SizeLimit | None = None
+        self,
+        mission: Mission,
+        options: Options,
+        size_limit: SizeLimit | None = None,
+        stored: Mapping[e.FlowNode, Mapping[str, list[Value] | None]] | None = None,
     ) -> None:
+        """`stored`: by task and name, the resources that it may store there."""
         self._mission = mission
+        self._stored = stored or {}
         self._size_limit = size_limit or SizeLimit()
         self._options = options
         self._hidden: dict[e.FlowNode, frozenset[str]] = {}
@@ -156,6 +163,18 @@ class Data:
     def is_blurred(self, key: str) -> bool:
         """Whether a name is followed, but with values that represent many."""
         return key in self.domains.of and not self.domains.of[key].closed
+
+    def values_of(
+        self, key: str, scope: ScopeDraft, node: e.FlowNode
+    ) -> tuple[int, Sequence[tuple[Value, bool]]] | None:
+        """Return the variable of a name as a node sees it, and its values, each with whether it
+        represents only itself; None: the name is not followed.
+        """
+        if not self._follows(key, self.hidden(node)):
+            return None
+        domain = self.domains.of[key]
+        variable = self.variable(key, scope.frame)
+        return variable, list(zip(domain.values, domain.exact, strict=True))
 
     # --- writing --------------------------------------------------------------------------------
 
@@ -308,6 +327,10 @@ class Data:
                 found.append(node.loop.condition)
             if isinstance(node, e.AdHocSubProcess):
                 found.append(node.completion)
+            behavior: Behavior | None = getattr(node, "behavior", None)
+            for role in behavior.roles if behavior is not None else ():
+                if role.need is not None and role.need.same:
+                    found.append(parse(role.need.same))
             for condition in found:
                 if condition is not None:
                     yield condition, hidden
@@ -331,6 +354,10 @@ class Data:
             yield Write(loop.output_collection, None)
         for key in self.written_anyhow(node):
             yield Write(key, None)
+        for key, values in self._stored.get(node, {}).items():
+            yield from (Write(key, constant(value)) for value in values or ())
+            if values is None:
+                yield Write(key, None)
         match node:
             case e.ScriptTask(script=script) if script is not None:
                 for statement in script.statements:
@@ -354,6 +381,14 @@ class Data:
         if isinstance(node, e.ServiceTask) and node.call is not None:
             return tuple(self._options.service_writes.get(node.call.service, ()))
         return ()
+
+
+def constant(value: Value) -> Expression:
+    """Return the expression that is always the name of a resource, or a list of names."""
+    if isinstance(value, list):
+        items = ListOf(tuple(Literal(str(each)) for each in value))
+        return Expression(repr(value), Dialect.BARE, items)
+    return literal(str(value))
 
 
 def _flat(data: object, prefix: str = "") -> Iterator[tuple[str, Value]]:

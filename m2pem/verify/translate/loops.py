@@ -13,8 +13,7 @@ from m2pem.verify.translate.compensation import (
 from m2pem.verify.translate.context import (
     ActivityInstance,
     TranslationContext,
-    behavior_of,
-    resources,
+    held_by_instance,
 )
 from m2pem.verify.translate.data import ERROR, Truth
 from m2pem.verify.translate.net_builder import Effect, product
@@ -60,16 +59,15 @@ def _instance(
 ) -> ActivityInstance:
     """Translate one instance: its token is in the scope of the whole activity."""
     node, net = whole.node, context.net
-    behavior = behavior_of(node)
-    held = resources(context, behavior) if behavior is not None else None
+    held, behavior = held_by_instance(context, node)
     suffix = f"[{number}]"
     active = net.place(
         node,
         whole.inside,
         Role.ACTIVE,
         suffix,
-        resources=held or (),
-        behavior=behavior.name if behavior is not None and held else "",
+        resources=held,
+        behavior=behavior,
     )
     inside = net.scope(node, whole.inside, step=f"{node.id}{suffix}")
     instance = ActivityInstance(node, whole.inside, inside, active, lambda: [], boundary=False)

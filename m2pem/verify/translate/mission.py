@@ -69,7 +69,7 @@ def translate(
     for other in others:
         _instances(context, other)
     first = begin(context, root, context.root)
-    initial = (context.running, *first.produce)
+    initial = (context.running, *context.free_resources(), *first.produce)
     for late in context.later:
         late()
     translate_contention(context)

@@ -60,6 +60,7 @@ class Effect:
     assign: dict[int, int] = field(default_factory=dict)
     flag: Flag | None = None
     flagged: str = ""
+    at_most: tuple[tuple[int, int], ...] = ()
 
     def then(self, other: "Effect") -> "Effect | None":
         """Return both effects together, this one first; None if they exclude each other."""
@@ -91,6 +92,7 @@ class Effect:
             {**self.assign, **other.assign},
             self.flag or other.flag,
             self.flagged or other.flagged,
+            self.at_most + other.at_most,
         )
 
     def with_step(self, element: str, action: Action, detail: str = "") -> "Effect":
@@ -161,6 +163,8 @@ class NetBuilder:
         self.timed: dict[int, list[Timed]] = {}
         self.at_once: set[int] = set()
         """Entry places of elements that wait as soon as they are entered (`enter_at_once`)."""
+        self.holding: list[int] = []
+        """Places whose resources come from pools."""
         self._at: dict[tuple[object, int, str], int] = {}
 
     # --- parts ----------------------------------------------------------------------------------
@@ -200,6 +204,8 @@ class NetBuilder:
         several: bool = False,
         resources: tuple[str, ...] = (),
         behavior: str = "",
+        returns: tuple[int, ...] = (),
+        holder: int | None = None,
     ) -> int:
         """Return the place of an element in a scope; it is created at the first call."""
         key = (element, scope.index, f"{role}{suffix}")
@@ -219,9 +225,13 @@ class NetBuilder:
                 several or scope.several,
                 resources,
                 behavior,
+                returns=returns,
+                holder=holder,
             )
         )
         scope.places.append(number)
+        if returns:
+            self.holding.append(number)
         for resource in resources:
             self.holders.setdefault(resource, []).append(number)
         return number
@@ -327,7 +337,7 @@ class NetBuilder:
             tuple(sorted(inhibit)),
             tuple(sorted(effect.guard.items())),
             effect.moves,
-            effect.copies,
+            effect.copies + self._given_back(reset),
             reset,
             tuple(sorted(Counter(effect.produce).items())),
             tuple(sorted(effect.assign.items())),
@@ -337,6 +347,20 @@ class NetBuilder:
             effect.flagged,
             bool(effect.empty_scopes),
             draft.due_us,
+            tuple(sorted(dict(sorted(effect.at_most, reverse=True)).items())),
+        )
+
+    def _given_back(self, reset: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
+        """Return the copies with which a transition that resets places gives resources back."""
+        if not self.holding:
+            return ()
+        emptied = set(reset)
+        return tuple(
+            (held, pool)
+            for held in self.holding
+            if held in emptied
+            for pool in self.places[held].returns
+            if pool not in emptied  # at the end of the run, all places are
         )
 
 
@@ -386,7 +410,7 @@ def _entry(net: NetBuilder, place: int) -> TransitionDraft | None:
     if len(takes) != 1 or takes[0].kind is not Kind.INTERNAL:
         return None
     effect = takes[0].effect
-    asks = effect.read or effect.inhibit or effect.empty_scopes or effect.guard
+    asks = effect.read or effect.inhibit or effect.empty_scopes or effect.guard or effect.at_most
     does_more = effect.moves or effect.copies or effect.reset_scopes or effect.flag is not None
     return None if effect.consume != (place,) or asks or does_more else takes[0]
 
@@ -403,21 +427,12 @@ def _joined(
         if not entry.reset.isdisjoint(rest) or not entry.assign.keys().isdisjoint(effect.assign):
             needed.add(place)
             continue
-        effect = Effect(
-            effect.steps + entry.steps,
-            effect.consume,
-            effect.read,
-            effect.inhibit,
-            effect.empty_scopes,
-            effect.moves,
-            effect.copies,
-            effect.reset | entry.reset,
-            effect.reset_scopes,
-            (*rest, *entry.produce),
-            effect.guard,
-            {**effect.assign, **entry.assign},
-            effect.flag,
-            effect.flagged,
+        effect = replace(
+            effect,
+            steps=effect.steps + entry.steps,
+            reset=effect.reset | entry.reset,
+            produce=(*rest, *entry.produce),
+            assign={**effect.assign, **entry.assign},
         )
         waiting += [each for each in entry.produce if each in entries]
     return effect

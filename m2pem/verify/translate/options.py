@@ -1,8 +1,9 @@
 """What a translation assumes about the world around a mission."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from m2pem.fleet.graph import Catalogue
 from m2pem.mission.expression import Expression
 from m2pem.mission.values import Value
 
@@ -17,7 +18,9 @@ class Options:
     `instances`: how many parallel instances of an activity, and of a process that triggers start,
     are modelled when the mission does not state their number. `calls`: how often a process may be
     called within itself. `failures`: behaviors and services may fail. `timers_in_order`: of timers
-    that begin to run together, the one that is due first fires first.
+    that begin to run together, the one that is due first fires first. `catalogue`: what each
+    resource offers; None: all that the mission asks for. `distinguished`: resources that
+    requirements are about.
     """
 
     data: Mapping[str, Value] = field(default_factory=dict)
@@ -29,5 +32,7 @@ class Options:
     timers_in_order: bool = False
     conditions: Sequence[Expression] = ()
     """Conditions of requirements on the data of the process that the run begins with."""
+    catalogue: Catalogue | None = None
+    distinguished: Collection[str] = ()
     most_instances: int = 8
     """Most instances of a number that the mission states; above, `instances` are checked."""

@@ -71,6 +71,13 @@ def throw_error(
     return _go_up(context, scope, thrower, instance, code, thrown, uncaught, error_code, first=True)
 
 
+def failing(
+    context: TranslationContext, instance: ActivityInstance, code: str, flag: Flag
+) -> list[Effect]:
+    """An activity fails. Its token is removed already."""
+    return throw_error(context, instance.outer, instance.node, instance, code, flag)
+
+
 def throw_escalation(
     context: TranslationContext, scope: ScopeDraft, thrower: e.FlowNode, code: str
 ) -> list[tuple[Effect, bool]]:

@@ -1,0 +1,468 @@
+"""Tasks whose resources come from pools: they are chosen, or waited for, when the task starts.
+
+The token of such a task is on its activity as soon as it is entered, so that its boundary events
+can end it while it waits. Until it has its resources, a token on its place *asks* prevents its work
+from ending. A choice takes a token from the pools, and puts one on a place *holds*; whatever resets
+that place gives it back (`NetBuilder.finish`). Both places are in the activity's own scope.
+
+The allocator decides when the engine has nothing left to do; so choices, and refusals, wait until
+nothing else can move, as joins do. Which of the resources that may fill a role the executive takes
+depends on telemetry: each is a transition.
+"""
+
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from m2pem.engine.elements.allocations import UNAVAILABLE
+from m2pem.fleet.facts import vehicle_of
+from m2pem.fleet.fleet import Fleet
+from m2pem.mission.behavior import Behavior
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
+from m2pem.verify.net import choices
+from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step, Trigger
+from m2pem.verify.translate.context import (
+    ActivityInstance,
+    Asking,
+    Contender,
+    TranslationContext,
+)
+from m2pem.verify.translate.data import boxes, constant
+from m2pem.verify.translate.net_builder import Effect, product
+from m2pem.verify.translate.pools import Pool, RoleCandidates
+from m2pem.verify.translate.throwing import failing
+from m2pem.verify.translate.timers import due_us, runs, written
+
+Amounts = Mapping[Pool, int]
+"""How many resources of each pool."""
+
+
+def asking_place(context: TranslationContext, instance: ActivityInstance) -> int:
+    """Return the place of a token while a task asks for its resources."""
+    return context.net.place(instance.node, instance.inside, Role.CONTROL, ":asks")
+
+
+# --- tasks that name their resources --------------------------------------------------------------
+
+
+def take_named_resources(
+    context: TranslationContext,
+    instance: ActivityInstance,
+    behavior: Behavior,
+    resources: Sequence[str],
+) -> list[Effect]:
+    """Translate a task that names its resources, of which another task may choose some."""
+    asks = asking_place(context, instance)
+    named = tuple(map(ResourceId, resources))
+    pools = _pools(context, named)
+    begins = Effect(
+        consume=(asks, *(context.pool_place(pool) for pool in pools)),
+        produce=(_holds_named(context, instance, behavior, named),),
+    )
+    refused = Effect(consume=(asks, instance.active))
+    context.contended.append(Contender(instance, named, refused, begins))
+    begun = instance.begin().then(Effect(produce=(asks,)))
+    assert begun is not None
+    return [begun]
+
+
+def _pools(context: TranslationContext, resources: Iterable[ResourceId]) -> tuple[Pool, ...]:
+    pools = (context.pool_of.get(each) for each in resources)
+    return tuple(dict.fromkeys(pool for pool in pools if pool is not None))
+
+
+def _holds_named(
+    context: TranslationContext,
+    instance: ActivityInstance,
+    behavior: Behavior,
+    named: Sequence[ResourceId],
+) -> int:
+    return context.net.place(
+        instance.node,
+        instance.inside,
+        Role.CONTROL,
+        f":holds {'+'.join(named)}",
+        resources=tuple(named),
+        behavior=behavior.name,
+        returns=tuple(context.pool_place(pool) for pool in _pools(context, named)),
+        holder=instance.active,
+    )
+
+
+# --- tasks whose resources are chosen -------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Filled:
+    """A role, how many of which pool fill it, and what could."""
+
+    role: RoleCandidates
+    amounts: Amounts
+    offered: Sequence[Pool]
+
+    @property
+    def count(self) -> int:
+        return sum(self.amounts.values())
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """A choice for all roles of a task."""
+
+    filled: tuple[_Filled, ...]
+
+    @property
+    def total(self) -> Counter[Pool]:
+        total: Counter[Pool] = Counter()
+        for each in self.filled:
+            total.update(each.amounts)
+        return total
+
+    @property
+    def possible(self) -> bool:
+        """Whether the pools have so many."""
+        return all(count <= len(pool) for pool, count in self.total.items())
+
+
+def choose_resources(
+    context: TranslationContext, instance: ActivityInstance, behavior: Behavior
+) -> list[Effect]:
+    """Translate a task that asks for resources: what it may be given, and how it ends without."""
+    roles = context.candidates[instance.node]
+    asks = asking_place(context, instance)
+    waits = any(each.role.need is not None and each.role.need.waits for each in roles)
+    _note_approximations(context, instance, roles, waits=waits)
+    cases = list(_cases(context, instance, roles))
+    certain = len(cases) == 1 and not instance.inside.several
+    context.asking.append(_asking(context, asks, roles, certain=certain))
+    if waits:
+        _wait_limit(context, instance, roles)
+
+    def translate_later() -> None:
+        for guard, offered in cases:
+            when = Effect(guard=guard)
+            for choice in _choices(context, instance, roles, offered, fewest=False):
+                given = _given(context, instance, behavior, choice)
+                context.transitions(product([when], given), Kind.JOIN)
+            if not waits:
+                fewest = _choices(context, instance, roles, offered, fewest=True)
+                for limits in _refusals([each.total for each in fewest]):
+                    refused = product([when], [_refused(context, instance, limits)])
+                    fails = failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT)
+                    context.transitions(product(refused, fails), Kind.JOIN)
+
+    context.later.append(translate_later)
+    begun = instance.begin().then(Effect(produce=(asks,)))
+    assert begun is not None
+    return [begun]
+
+
+def _asking(
+    context: TranslationContext, asks: int, roles: Sequence[RoleCandidates], *, certain: bool
+) -> Asking:
+    """Return who asks. Only of a task that needs one resource, whatever telemetry and data are, it
+    is known that it gets one as soon as one is free.
+    """
+    urgent = certain and len(roles) == 1 and _least(roles[0]) == 1 and not roles[0].unknown
+    pools = _pools(context, (resource for each in roles for resource in each.resources))
+    return Asking(asks, _priority(roles), frozenset(pools), urgent)
+
+
+def _priority(roles: Sequence[RoleCandidates]) -> int:
+    return max((each.role.need.priority for each in roles if each.role.need is not None), default=0)
+
+
+def _served_before(
+    context: TranslationContext, roles: Sequence[RoleCandidates], wanted: Iterable[Pool]
+) -> frozenset[int]:
+    """The places of tasks of a greater priority that ask for some of the same."""
+    pools, priority = {*wanted}, _priority(roles)
+    return frozenset(
+        each.place
+        for each in context.asking
+        if each.urgent and each.priority > priority and each.pools & pools
+    )
+
+
+def _note_approximations(
+    context: TranslationContext,
+    instance: ActivityInstance,
+    roles: Sequence[RoleCandidates],
+    *,
+    waits: bool,
+) -> None:
+    def bounded(what: str) -> None:
+        context.net.approximate(instance.node, Exactness.BOUNDED, what)
+
+    for each in roles:
+        if each.unknown:
+            names = ", ".join(sorted(each.unknown))
+            bounded(f"role '{each.role.name}': what depends on {names} is taken to hold")
+        same = each.role.need.same if each.role.need is not None else ""
+        if same and context.data.values_of(same, instance.outer, instance.node) is None:
+            bounded(f"role '{each.role.name}': '{same}' is not followed, so it may be any resource")
+    wanted = sum(_least(each) for each in roles)
+    others = [other for other in context.candidates if other is not instance.node]
+    if waits and wanted > 1 and others:
+        bounded("that it keeps what is free, while it waits for the rest, is not followed")
+    if instance.inside.several:
+        bounded("of several tokens on it, one has resources at a time")
+
+
+def _least(each: RoleCandidates) -> int:
+    if each.named:
+        return max(1, len(each.resources)) if not each.role.optional else len(each.resources)
+    need = each.role.need
+    return 0 if each.role.optional or need is None else need.least
+
+
+# --- what a task may be given ---------------------------------------------------------------------
+
+
+def _cases(
+    context: TranslationContext, instance: ActivityInstance, roles: Sequence[RoleCandidates]
+) -> Iterator[tuple[dict[int, frozenset[int]], tuple[tuple[ResourceId, ...], ...]]]:
+    """Yield, by the values of data that roles read with `same`, what may fill each role."""
+    followed = {}
+    for each in roles:
+        name = each.role.need.same if each.role.need is not None else ""
+        known = context.data.values_of(name, instance.outer, instance.node) if name else None
+        if known is not None:
+            followed[name] = known
+    ranges = [range(len(values)) for _, values in followed.values()]
+    alike: dict[tuple[tuple[ResourceId, ...], ...], list[tuple[int, ...]]] = {}
+    for combination in itertools.product(*ranges):
+        context.net.size_limit.count_case(instance.node.id)
+        values = {
+            name: known[number]
+            for (name, (_, known)), number in zip(followed.items(), combination, strict=True)
+        }
+        offered = tuple(_same(context.fleet, each, values) for each in roles)
+        alike.setdefault(offered, []).append(combination)
+    variables = [variable for variable, _ in followed.values()]
+    for offered, combinations in alike.items():
+        for box in boxes(combinations, [len(each) for each in ranges]):
+            yield dict(zip(variables, box, strict=True)), offered
+
+
+def _same(
+    fleet: Fleet, each: RoleCandidates, values: Mapping[str, tuple[Value, bool]]
+) -> tuple[ResourceId, ...]:
+    """What may fill a role beside the values of data, of which each is exact or stands for many."""
+    name = each.role.need.same if each.role.need is not None else ""
+    value, exact = values.get(name, (None, False))
+    if not exact:
+        return each.resources
+    chosen = value if isinstance(value, list) else [value]
+    return tuple(r for r in each.resources if r in chosen or vehicle_of(fleet, r).id in chosen)
+
+
+def _choices(
+    context: TranslationContext,
+    instance: ActivityInstance,
+    roles: Sequence[RoleCandidates],
+    offered: Sequence[tuple[ResourceId, ...]],
+    *,
+    fewest: bool,
+) -> Iterator[_Choice]:
+    """Yield all choices for the roles of a task. `fewest`: with no more resources than it needs."""
+    ways = [
+        list(_fillings(context, role, resources, fewest=fewest))
+        for role, resources in zip(roles, offered, strict=True)
+    ]
+    for filled in itertools.product(*ways):
+        context.net.size_limit.count_case(instance.node.id)
+        choice = _Choice(filled)
+        if choice.possible:
+            yield choice
+
+
+def _fillings(
+    context: TranslationContext,
+    each: RoleCandidates,
+    resources: Sequence[ResourceId],
+    *,
+    fewest: bool,
+) -> Iterator[_Filled]:
+    least = _least(each)
+    pools = _pools(context, resources)
+    if each.named:
+        if len(resources) == least:
+            yield _Filled(each, dict.fromkeys(pools, 1), pools)
+        return
+    need = each.role.need
+    most = least if fewest or need is None else need.most
+    for count in range(least, min(most, sum(map(len, pools))) + 1):
+        for amounts in _spread(pools, count):
+            yield _Filled(each, amounts, pools)
+
+
+def _spread(pools: Sequence[Pool], count: int) -> Iterator[dict[Pool, int]]:
+    """Yield every way to take a number of resources from pools."""
+    if not pools:
+        if not count:
+            yield {}
+        return
+    first, *others = pools
+    for taken in range(min(count, len(first)), -1, -1):
+        for rest in _spread(others, count - taken):
+            yield {first: taken, **rest} if taken else rest
+
+
+def _given(
+    context: TranslationContext, instance: ActivityInstance, behavior: Behavior, choice: _Choice
+) -> list[Effect]:
+    """A task is given resources, and begins its behavior."""
+    total = choice.total
+    asks = asking_place(context, instance)
+    places = {pool: context.pool_place(pool) for pool in total}
+    named = [r for each in choice.filled if each.role.named for r in each.role.resources]
+    chosen: Counter[Pool] = Counter()
+    for each in choice.filled:
+        if not each.role.named:
+            chosen.update(each.amounts)
+    holds = [
+        context.net.place(
+            instance.node,
+            instance.inside,
+            Role.CONTROL,
+            f":holds {number + 1} of {'|'.join(pool)}",
+            resources=pool if len(pool) == 1 else (),
+            behavior=behavior.name,
+            returns=(places[pool],),
+            holder=instance.active,
+        )
+        for pool, count in chosen.items()
+        for number in range(count)
+    ]
+    if named:
+        holds.append(_holds_named(context, instance, behavior, named))
+    detail = choices.written(
+        {
+            each.role.role.name: [
+                list(pool) for pool, count in each.amounts.items() for _ in range(count)
+            ]
+            for each in choice.filled
+            if each.count
+        }
+    )
+    begins = Effect(
+        steps=(Step(instance.node.id, Action.ALLOCATED, detail),),
+        consume=(asks, *(places[pool] for pool, count in total.items() for _ in range(count))),
+        inhibit=_served_before(context, context.candidates[instance.node], total)
+        | frozenset(holds if instance.inside.several else ()),
+        produce=tuple(holds),
+    )
+    effects = product([begins], _no_more(context, asks, choice))
+    for each in choice.filled:
+        need = each.role.role.need
+        if need is not None and need.store and each.count:
+            value = _stored_value(context, each, one=need.most == 1)
+            source = None if value is None else constant(value)
+            effects = context.data.write(effects, need.store, source, instance.outer, instance.node)
+    return effects
+
+
+def _no_more(context: TranslationContext, asks: int, choice: _Choice) -> list[Effect]:
+    """Return when a choice may leave a role with fewer than it can have: no more are free, or
+    another task asks for them at the same time.
+    """
+    total = choice.total
+    wanting: dict[Pool, None] = {}
+    for each in choice.filled:
+        need = each.role.role.need
+        if not each.role.named and need is not None and each.count < need.most:
+            wanting.update(dict.fromkeys(each.offered))
+    if not wanting:
+        return [Effect()]
+    rest = Effect(at_most=tuple((context.pool_place(pool), total[pool]) for pool in wanting))
+    others = [
+        each.place for each in context.asking if each.place != asks and each.pools & wanting.keys()
+    ]
+    return [rest, *(Effect(read=frozenset({place})) for place in others)]
+
+
+def _stored_value(context: TranslationContext, each: _Filled, *, one: bool) -> Value | None:
+    """What a role stores; None: which of a pool is not known."""
+    if any(len(pool) > 1 for pool in each.amounts):
+        return None
+    chosen = {pool[0] for pool in each.amounts}
+    ordered: list[Value] = [r for r in each.role.resources if r in chosen]
+    return ordered[0] if one else ordered
+
+
+# --- without resources ----------------------------------------------------------------------------
+
+
+def _refusals(fewest: Sequence[Counter[Pool]]) -> list[dict[Pool, int]]:
+    """Return how many of which pools are free at most when no choice is possible, for each way.
+
+    `fewest`: what those choices take that take no more than the task needs.
+    """
+    found: list[dict[Pool, int]] = [{}]
+    for total in fewest:
+        extended = []
+        for limits in found:
+            if any(limits.get(pool, count) < count for pool, count in total.items()):
+                extended.append(limits)
+                continue
+            extended += [{**limits, pool: count - 1} for pool, count in total.items()]
+        found = [
+            each
+            for number, each in enumerate(extended)
+            if not any(
+                _covers(other, each) and (other != each or at < number)
+                for at, other in enumerate(extended)
+                if at != number
+            )
+        ]
+    return found
+
+
+def _covers(one: Mapping[Pool, int], other: Mapping[Pool, int]) -> bool:
+    """Whether limits hold wherever others do."""
+    return all(pool in other and other[pool] <= count for pool, count in one.items())
+
+
+def _refused(
+    context: TranslationContext, instance: ActivityInstance, limits: Mapping[Pool, int]
+) -> Effect:
+    asks = asking_place(context, instance)
+    places = {context.pool_place(pool): count for pool, count in limits.items()}
+    return Effect(
+        steps=(Step(instance.node.id, Action.ALLOCATED),),
+        consume=(asks, instance.active),
+        inhibit=frozenset(place for place, count in places.items() if not count),
+        at_most=tuple((place, count) for place, count in places.items() if count),
+    )
+
+
+def _wait_limit(
+    context: TranslationContext, instance: ActivityInstance, roles: Sequence[RoleCandidates]
+) -> None:
+    """A task has waited for its resources as long as it may."""
+    limits = [
+        each.role.need.wait_limit
+        for each in roles
+        if each.role.need is not None and each.role.need.wait_limit is not None
+    ]
+    if not limits:
+        return
+    asks = asking_place(context, instance)
+    late = Effect(consume=(instance.active,), read=frozenset({asks}))
+    due = [due_us(each) for each in limits]
+    fixed = [written(each) for each in limits]
+    made = [
+        context.net.transition(effect, Kind.EXTERNAL, Trigger.TIMER, due_us=_first(due))
+        for effect in product(
+            [late], failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT_FAILURE)
+        )
+    ]
+    runs(context, instance.active, _first(fixed), (asks,), made)
+
+
+def _first(times: Sequence[int | None]) -> int | None:
+    known = [each for each in times if each is not None]
+    return min(known) if len(known) == len(times) else None
