@@ -1,6 +1,8 @@
 """`m2pem fleet`: who is there and can do what."""
 
 import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -9,26 +11,39 @@ from m2pem.cli.completers import file_or
 from m2pem.cli.options import as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
+    from m2pem.api.control import WaitingTask
     from m2pem.executive.fleet_connections import FleetArbiters
 
 
 @click.command(epilog=example("m2pem fleet fleet_configs/vignette1.yaml"))
 @click.argument("fleet_file", metavar="FLEET", required=False, shell_complete=file_or())
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of fleet files instead.")
+@click.option(
+    "--running",
+    is_flag=True,
+    help="Ask the executives that serve the journal: who holds what, and which tasks wait.",
+)
 @journal_option
 @format_option
-def fleet(fleet_file: str | None, schema: bool, journal: str | None, output: str) -> None:
+def fleet(
+    fleet_file: str | None, schema: bool, running: bool, journal: str | None, output: str
+) -> None:
     """Show a fleet: who is there and can do what.
 
     Also the interrupted runs of the journal that have vehicles of the fleet.
     """
+    if running:
+        if fleet_file is not None or schema:
+            raise click.UsageError("--running asks an executive, which has a fleet: name none")
+        _show_running(journal, output)
+        return
     if schema:
         from m2pem.fleet.fleet_schema import fleet_schema
 
         click.echo(as_json(fleet_schema()))
         return
     if fleet_file is None:
-        raise click.UsageError("name a fleet file, or say --schema")
+        raise click.UsageError("name a fleet file, or say --schema or --running")
     from m2pem.scripting.sources import DEFAULT_FLEET, arbiters_of
 
     if fleet_file == DEFAULT_FLEET:
@@ -127,3 +142,61 @@ def _as_text(arbiters: "FleetArbiters") -> str:
     behaviors = [(name, ", ".join(who)) for name, who in sorted(offered.items())]
     parts.append(table(("BEHAVIOR", "OFFERED BY"), behaviors))
     return "\n\n".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Holding:
+    """What an executive says of its fleet. `holders`: by resource, "" if it is free."""
+
+    executive: str
+    fleet: str
+    holders: Mapping[str, str]
+    waiting: "Sequence[WaitingTask]"
+
+    def as_text(self) -> str:
+        """Return it as text."""
+        from m2pem.cli.table import table
+
+        held = [(name, holder or "free") for name, holder in self.holders.items()]
+        parts = [
+            f"executive {self.executive} with fleet {self.fleet}",
+            table(("RESOURCE", "HELD BY"), held),
+        ]
+        if self.waiting:
+            rows = [
+                (
+                    each.run,
+                    each.task,
+                    f"{each.waited_s:.0f} s",
+                    "-" if each.left_s is None else f"{each.left_s:.0f} s",
+                    str(each.priority),
+                    each.reason,
+                )
+                for each in self.waiting
+            ]
+            header = ("RUN", "TASK THAT WAITS", "WAITED", "LEFT", "PRIORITY", "FOR")
+            parts.append(table(header, rows))
+        return "\n\n".join(parts)
+
+
+def _show_running(journal: str | None, output: str) -> None:
+    """Print who holds what in the executives that serve a journal, and which tasks wait."""
+    import msgspec
+
+    from m2pem.api.control import WaitingTask
+    from m2pem.cli.run_control import journal_file
+    from m2pem.control_socket.client import ask, executives, fleet_name
+
+    found = [
+        Holding(
+            socket.stem,
+            fleet_name(socket),
+            ask(socket, "holders"),
+            msgspec.convert(ask(socket, "waiting"), list[WaitingTask]),
+        )
+        for socket in executives(journal_file(journal))
+    ]
+    if output == "json":
+        click.echo(as_json({"executives": found}))
+    else:
+        click.echo("\n\n".join(each.as_text() for each in found))

@@ -33,6 +33,7 @@ COMMANDS = {
     "runs": "List the runs of a journal.",
     "journal": "Show the state of a journal, back it up, or make its file smaller.",
     "replay": "Print the records of a run, and its state.",
+    "explain": "Explain which vehicles a task got, and why.",
     "resume": "Take up a run that was interrupted.",
     "answer": "Answer a prompt of a run that is running on this host.",
     "signal": "Send a signal to a run that is running on this host.",

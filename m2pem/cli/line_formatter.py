@@ -7,7 +7,8 @@ import click
 from m2pem.api import records as r
 from m2pem.api.control import RunId, RunStatus, RunSummary, StampedRecord
 from m2pem.api.description import Description, Importance, Kind, describe
-from m2pem.api.run_view import Behavior, RunView
+from m2pem.api.run_view import Allocation, Behavior, RunView
+from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.state import RunState
 from m2pem.mission.elements import Activity, Event
 from m2pem.mission.mission import Mission
@@ -21,6 +22,8 @@ SHOWN = frozenset(
         r.RunEnded,
         r.TokenEntered,
         r.TokenLeft,
+        r.AllocationDelayed,
+        r.ResourcesAllocated,
         r.BehaviorRequested,
         r.BehaviorEnded,
         r.BehaviorUnsettled,
@@ -44,6 +47,10 @@ SHOWN = frozenset(
 
 NAMING = frozenset(
     (
+        r.AllocationRequested,
+        r.AllocationDelayed,
+        r.ResourcesAllocated,
+        r.AllocationEnded,
         r.BehaviorRequested,
         r.BehaviorEnded,
         r.PromptOpened,
@@ -88,8 +95,18 @@ class LineFormatter:
         self._views: dict[RunId, RunView] = {}
 
     def restore(self, state: RunState) -> None:
-        """Add the behaviors of a run that was begun before."""
+        """Add the behaviors and requests for resources of a run that was begun before."""
         view = self._view(state.run)
+        for request in state.allocations.values():
+            token = request.token
+            view.allocations[request.id] = Allocation(
+                request.id,
+                behavior_of(request).name,
+                token.scope.container.process.id,
+                token.node.id,
+                token.id,
+                0.0,
+            )
         for each in state.behaviors.values():
             view.behaviors[each.id] = Behavior(
                 each.id, each.name, each.resources, each.process, each.element, each.token, 0.0

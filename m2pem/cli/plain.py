@@ -42,7 +42,7 @@ HELP = """\
   start! FILE        the same, even if other runs or operators have its vehicles
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
   handback evsg1     give it back
-  who                print the holder of each vehicle and payload
+  who                print the holder of each vehicle and payload, and which tasks wait
   runs               list the runs and their states
   quit               leave; missions go on without an operator here
 With several runs, say which: stop r2."""
@@ -300,6 +300,8 @@ class PlainOcu:
     async def _who(self, _: list[str]) -> None:
         for resource, holder in (await self._control.holders()).items():
             self._say(f"{resource}: {holder or 'free'}")
+        for task in await self._control.waiting():
+            self._say(str(task))
 
     async def _runs(self, _: list[str]) -> None:
         for run in await self._control.runs():

@@ -1,9 +1,10 @@
-"""The status of a run by its journal: tokens, behaviors, prompts, data."""
+"""The status of a run by its journal: tokens, behaviors, tasks that wait, prompts, data."""
 
 from typing import Any
 
 import msgspec
 
+from m2pem.api.description import waiting
 from m2pem.cli.table import table
 from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
@@ -71,6 +72,15 @@ class RunStatusView:
                 }
                 for behavior in state.behaviors.values()
             ],
+            "waiting": [
+                {
+                    "allocation": request.id,
+                    "element": request.token.node.id,
+                    "reason": request.reason,
+                    "holders": request.holders,
+                }
+                for request in state.allocations.values()
+            ],
             "prompts": [
                 {"prompt": prompt.id, "element": prompt.token.node.id, "text": prompt.text}
                 for prompt in state.prompts.values()
@@ -95,6 +105,11 @@ class RunStatusView:
                 for each in state.behaviors.values()
             ]
             parts.append(table(("BEHAVIOR", "OF", "STATE"), rows))
+        if state.allocations:
+            waits = [
+                (each.token.node.label, waiting(each.reason)) for each in state.allocations.values()
+            ]
+            parts.append(table(("TASK", "WAITS"), waits))
         if self._data:
             written = [
                 (key, msgspec.json.encode(value).decode())

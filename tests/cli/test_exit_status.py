@@ -18,6 +18,7 @@ OF_JOURNALS = (
     ("runs", "--export", "r1"),
     ("runs", "--delete", "r1"),
     ("replay", "r1"),
+    ("explain", "r1", "DriveRoute"),
     ("resume", "r1"),
     ("fleet", FLEET),
     ("run", MISSION, "--fleet", FLEET, "--ocu", "none"),
@@ -32,6 +33,7 @@ OF_EXECUTIVES = (
     ("stop", "--all"),
     ("start", MISSION),
     ("attach",),
+    ("fleet", "--running"),
 )
 
 
@@ -91,6 +93,8 @@ def test_without_an_executive_each_request_ends_with_1(
     "words",
     [
         ("replay", "r9"),
+        ("explain", "r9", "DriveRoute"),
+        ("explain", "r9"),
         ("resume", "r9"),
         ("runs", "r9"),
         ("runs", "--export", "r9"),
@@ -99,6 +103,7 @@ def test_without_an_executive_each_request_ends_with_1(
         ("stop",),
         ("fleet",),
         ("fleet", "missing.yaml"),
+        ("fleet", FLEET, "--running"),
         ("serve", "--fleet", "sim"),
         ("serve", "--fleet", "missing.yaml"),
         ("serve", "--fleet", FLEET, "--ocu", "nothing"),

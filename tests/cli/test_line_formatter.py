@@ -35,6 +35,15 @@ def formatted(*records: Record, run: str = "r1") -> str | None:
         (r.RunEnded(RunOutcome.FAILED, "stuck"), "r1 failed: stuck"),
         (r.TokenEntered(*ON_ROUTE), "DRIVE ROUTE"),
         (r.TokenLeft(*ON_ROUTE, TokenOutcome.INTERRUPTED), "DRIVE ROUTE: interrupted"),
+        (
+            r.AllocationRequested(*ON_ROUTE, "r1.a1", "goto", "vehicle", {}, 0, 0),
+            None,
+        ),
+        (r.AllocationEnded("r1.a1"), None),
+        (
+            r.ResourcesAllocated(*ON_ROUTE, "r1.a1", {"scout": ("evsg1",)}, {"roles": {}}),
+            "DRIVE ROUTE: evsg1 for scout",
+        ),
         (REQUESTED, "DRIVE ROUTE: evsg1 begins single_vehicle_routing"),
         (
             r.PromptAnswered(1, "VIGNETTE1", "UserSendRoute", 1, "p1", "abort", "ann"),

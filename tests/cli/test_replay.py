@@ -50,6 +50,7 @@ def test_the_state_alone(invoke: Invoke, journal: Path, printed: str) -> None:
         "detail": "terminated by mission ended",
         "tokens": [],
         "behaviors": [],
+        "waiting": [],
         "prompts": [],
         "data": {"mission.speed": 2.5, "user.decision": "abort"},
     }

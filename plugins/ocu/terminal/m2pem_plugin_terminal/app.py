@@ -289,11 +289,10 @@ class TerminalApp(Display):
         question = f"Start {name} all the same?" if preview.busy else f"Start {name}?"
         await self._confirm("Start", question, preview_text(preview), start)
 
-    def _task_label(self, behavior: str) -> str:
-        found = self._behavior(behavior)
-        if found is None:
-            return behavior
-        return self.follower.views[behavior.rpartition(".")[0]].label(found.element)
+    def _task_label(self, holder: str) -> str:
+        view = self.follower.views.get(holder.rpartition(".")[0])
+        found = view and (view.behaviors.get(holder) or view.allocations.get(holder))
+        return view.label(found.element) if view and found else holder
 
     async def action_runs(self) -> None:
         """Choose the run to show."""

@@ -18,13 +18,13 @@ TITLE = "Take, or give back"
 TEXT = "Take a resource that is free or in a mission, or give one of yours back."
 RETURNED = "Missions may command it again from then on: it may move."
 REMARK_CELLS = 34
-BEHAVIOR = re.compile(r"r\d+\.b\d+")
-"""The id of a behavior: `MissionControl.holders` has one, or the name of an operator."""
+OF_MISSIONS = re.compile(r"r\d+\.[ab]\d+")
+"""The id of a behavior or request: `MissionControl.holders` has one, or the name of an operator."""
 
 
 def with_operator(holder: str) -> bool:
-    """Return whether a holder is an operator, not a behavior."""
-    return bool(holder) and BEHAVIOR.fullmatch(holder) is None
+    """Return whether a holder is an operator, not a behavior or request."""
+    return bool(holder) and OF_MISSIONS.fullmatch(holder) is None
 
 
 def taken(holders: Mapping["ResourceId", str]) -> dict[str, str]:
@@ -37,7 +37,7 @@ def choices(
 ) -> list[Choice]:
     """Return the choices: vehicles, each with its payloads, and who controls them.
 
-    `by` is the operator here; `task` gives the label of a behavior's task by the behavior's id.
+    `by` is the operator here; `task` gives the label of a task by its behavior or request.
     """
     return [
         Choice(resource, resource, shortened(_who(holders[resource], by, task), REMARK_CELLS))

@@ -23,6 +23,8 @@ LOGGED = frozenset(
         r.OperatorTookControl,
         r.OperatorGaveControlBack,
         r.GeometryReceived,
+        r.AllocationDelayed,
+        r.ResourcesAllocated,
         r.BehaviorRequested,
         r.BehaviorUnsettled,
         r.BehaviorEnded,

@@ -8,8 +8,9 @@ from rich.cells import cell_len
 from rich.text import Text
 
 from m2pem.api import RunView
+from m2pem.api.description import printable, waiting
 from m2pem.api.records import TokenOutcome, Trigger
-from m2pem.api.run_view import Behavior, FinishedToken, Token
+from m2pem.api.run_view import Allocation, Behavior, FinishedToken, Token
 from m2pem_plugin_terminal.formatting import clock_time, shortened
 
 SHOWN_WHEN_DONE = frozenset(
@@ -136,7 +137,8 @@ def _done_line(view: RunView, done: Done, now: float, width: int) -> Text:
 def _active_lines(view: RunView, active: Token, time_s: float, width: int) -> list[Text]:
     """Return the name of an element and its activity, on one line or two."""
     inside = any(scope.token == active.id for scope in view.scopes.values())
-    kind = "asking" if active.prompts else "doing" if active.work or inside else "waiting"
+    works = any(not isinstance(each, Allocation) for each in active.work.values())
+    kind = "asking" if active.prompts else "doing" if works or inside else "waiting"
     symbol, colour = SYMBOLS[kind]
     label = shortened(view.label(active.element), width - 2)
     first = Text.assemble((symbol, colour), " ", (label, "#e3e8ee"))
@@ -156,6 +158,8 @@ def _details(view: RunView, active: Token, time_s: float) -> list[str]:
         if isinstance(work, Behavior):
             unsettled = " (unsettled)" if work.state == "unsettled" else ""
             details.append(f"{', '.join(work.resources)} {work.name}{unsettled}".strip())
+        elif isinstance(work, Allocation):
+            details.append(printable(waiting(work.reason)))
         else:
             details.append(work.name)
     if active.prompts:

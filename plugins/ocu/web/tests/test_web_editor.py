@@ -87,6 +87,26 @@ async def test_a_problem_is_marked_and_leads_to_its_element(desk: Desk) -> None:
     await expect(page.locator(SAVED)).to_have_text("Saved")
 
 
+async def test_a_role_says_what_it_needs(desk: Desk) -> None:
+    page = await desk.edit()
+    await page.click("[data-element-id=Reverse]")
+    await page.get_by_label("Who", exact=False).first.select_option("Chosen when the task starts")
+    await page.get_by_label("What it must be or have").fill("vehicle.domain == 'ground'")
+    await page.get_by_text("More about the choice").click()
+    await page.get_by_label("Wait for at most").fill("PT10M")
+    await page.get_by_label("Wait for at most").blur()
+    await Drawing(page).save()
+    mission = load_mission(desk.executive.missions / "vignette1.bpmn")
+    reverse = mission.elements["Reverse"]
+    assert isinstance(reverse, ScriptTask)
+    assert reverse.behavior is not None
+    (role,) = reverse.behavior.roles
+    assert role.need is not None
+    assert role.need.condition is not None
+    assert (role.resource, role.need.condition.text) == ("", "vehicle.domain == 'ground'")
+    assert (role.need.waits, str(role.need.wait_limit)) == (True, "PT10M")
+
+
 async def test_signals_are_made_by_name_and_shared(desk: Desk) -> None:
     page = await desk.edit()
     await page.click("[data-element-id=SignalStop]")

@@ -50,6 +50,7 @@ QUERIES = {
     "mission_time_s": "/api/runs/{run}",
     "prompts": "/api/prompts",
     "holders": "/api/resources",
+    "waiting": "/api/resources",
     "fleet": "/api/fleet",
     "catalogue": "/api/behaviors",
 }
@@ -74,6 +75,7 @@ def control() -> Mock:
     control = Mock(spec=MissionControl)
     for name in COMMANDS:
         setattr(control, name, AsyncMock(spec=getattr(MissionControl, name), return_value=[]))
+    control.waiting = AsyncMock(return_value=[])
     control.holders = AsyncMock(return_value={SENT["resource"]: ""})
     control.runs = AsyncMock(return_value=[RunSummary("r1", "M", "P", RunStatus.RUNNING, 0)])
     return control

@@ -154,7 +154,8 @@ async def test_a_vehicle_is_taken_and_given_back(world: MakeWorld) -> None:
         otto = await here.browser("otto")
         path = f"/api/resources/{VEHICLE}"
         assert (await otto.http.post(f"{path}/take")).status_code == 204
-        assert (await otto.http.get("/api/resources")).json() == {"holders": {VEHICLE: "otto"}}
+        found = (await otto.http.get("/api/resources")).json()
+        assert found == {"holders": {VEHICLE: "otto"}, "waiting": []}
         again = await otto.http.post(f"{path}/take")
         assert (again.status_code, again.json()["detail"]) == (409, f"{VEHICLE} is with otto")
         assert (await otto.http.post(f"{path}/give-back")).status_code == 204

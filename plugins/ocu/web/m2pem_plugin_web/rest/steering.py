@@ -127,10 +127,27 @@ def prompt_router(control: MissionControl, hub: Hub) -> APIRouter:
     return routes
 
 
+class WaitingTaskModel(BaseModel):
+    """A task that waits for vehicles or payloads: `MissionControl.waiting`. Times in seconds."""
+
+    run: str
+    allocation: str
+    element: str
+    task: str
+    behavior: str
+    waited_s: float
+    left_s: float | None
+    priority: int
+    reason: str
+    holders: dict[str, str]
+
+
 class HoldersModel(BaseModel):
-    """Who has each resource: an operator, a behavior ("r1.b3"), or "" when it is free."""
+    """Who has each resource: an operator, a behavior ("r1.b3"), a request ("r1.a2"), or "" when it
+    is free. `waiting`: the tasks that wait for some, in the order in which they are served."""
 
     holders: dict[str, str]
+    waiting: list[WaitingTaskModel]
 
 
 def resource_router(control: MissionControl) -> APIRouter:
@@ -143,9 +160,15 @@ def resource_router(control: MissionControl) -> APIRouter:
 
     @routes.get("")
     async def holders(_: Viewer) -> HoldersModel:
-        """Who has what."""
+        """Who has what, and which tasks wait."""
         found = await control.holders()
-        return HoldersModel(holders={str(each): who for each, who in found.items()})
+        return HoldersModel(
+            holders={str(each): who for each, who in found.items()},
+            waiting=[
+                WaitingTaskModel.model_validate(each, from_attributes=True)
+                for each in await control.waiting()
+            ],
+        )
 
     @routes.post("/{resource:path}/take", status_code=204)
     async def take(person: Operator, resource: str) -> None:

@@ -162,6 +162,7 @@ export const strings = {
       none: "No block is called that.",
       hint: "Drag a block to its place. With the keyboard, Enter puts it behind what is selected.",
       nobody: "who?",
+      byNeed: "by need",
       askTitle: "Ask the operator",
       askDoc: "A question, with answers to choose from",
       continueLabel: "Continue",
@@ -255,6 +256,27 @@ export const strings = {
       unfit: "{id} cannot do this.",
       unknown: "{id} is not in this fleet.",
       kinds: { vehicle: "Vehicles", payload: "Payloads", team: "Teams" },
+      byNeed: "Chosen when the task starts",
+      needs: {
+        further: "More about the choice",
+        waiting: "Waiting for it",
+        requires: {
+          label: "What it must be or have",
+          hint: "For example vehicle.domain == 'air' and vehicle.battery > 0.4; true: any that can do it.",
+        },
+        same: { label: "The same as", hint: "The name under which an earlier task stored its choice." },
+        count: { label: "How many", hint: "2, or 1..3 for as many as are free, up to 3. Else one." },
+        prefer: {
+          label: "Preferred by",
+          hint: "How many seconds of travel time it is worth: 'fast' in vehicle.tags ? 60 : 0",
+        },
+        store: { label: "Store the choice as", hint: "Later tasks read it: ${surveyor}." },
+        wait: {
+          label: "Wait for at most",
+          hint: "For example PT10M, or unlimited. Else the task does not wait.",
+        },
+        priority: { label: "Priority", hint: "The greatest number is served first. Else 0." },
+      },
     },
     service: {
       class: "Service",
@@ -598,6 +620,7 @@ export const strings = {
     watch: "Watch the rehearsal (in a new tab)",
     timeline: "Who did what when",
     questions: "Questions",
+    waits: "Waiting for vehicles",
     services: "Services",
     bar: "{label}: {from} to {to}",
     start: "Start",
@@ -779,6 +802,7 @@ export const strings = {
         done: "done",
         failed: "failed",
         asking: "awaits an operator",
+        waiting: "waits for a vehicle",
       },
     },
     outline: {
@@ -929,6 +953,7 @@ export const strings = {
     timeline: {
       label: "Time line",
       prompts: "Questions",
+      waits: "Waiting for vehicles",
       services: "Services",
       zoomIn: "Zoom in",
       zoomOut: "Zoom out",

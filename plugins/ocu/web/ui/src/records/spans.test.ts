@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { PROMPTS, SERVICES, Spans } from "./spans";
+import type { RunRecord } from "../shared/types";
+import { PROMPTS, SERVICES, Spans, WAITS } from "./spans";
 import { RECORDS } from "./testing";
 
 function after(seq: number): Spans {
@@ -23,6 +24,24 @@ describe("spans", () => {
     expect(prompt).toMatchObject({ row: PROMPTS, to: 4, end: "succeeded", reason: "y (anna)" });
     expect(behavior).toMatchObject({ row: "v1", from: 4, to: 9, end: "failed", reason: "BLOCKED" });
     expect(service).toMatchObject({ row: SERVICES, from: 4, to: 9, end: "cancelled" });
+  });
+
+  it("has a bar for a task that waits, from when it asked", () => {
+    const at = { process: "P", element: "Drive" };
+    const spans = new Spans();
+    const facts: [number, string, object][] = [
+      [1, "AllocationRequested", { ...at, allocation: "r1.a1", name: "goto" }],
+      [1, "AllocationRequested", { ...at, allocation: "r1.a2", name: "goto" }],
+      [2, "ResourcesAllocated", { ...at, allocation: "r1.a1", roles: { scout: ["v1"] } }],
+      [3, "AllocationDelayed", { allocation: "r1.a2", reason: "v1 is held", holders: {} }],
+      [9, "ResourcesAllocated", { ...at, allocation: "r1.a2", roles: { scout: ["v2"] } }],
+    ];
+    facts.forEach(([t, record, fields], index) =>
+      spans.add({ run: "r1", seq: index + 1, t, record, ...fields } as RunRecord),
+    );
+    expect(spans.all).toMatchObject([
+      { row: WAITS, from: 1, to: 9, end: "succeeded", label: "goto", reason: "v2" },
+    ]);
   });
 
   it("takes over what is commanded where records are missing", () => {

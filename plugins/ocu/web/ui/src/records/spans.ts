@@ -1,7 +1,7 @@
 // Who did what when: bars of a time line, made of records.
 import type { Command, RunRecord } from "../shared/types";
 
-export type SpanKind = "behavior" | "prompt" | "service";
+export type SpanKind = "behavior" | "prompt" | "wait" | "service";
 
 /** How it ended: "" while it goes on, "unknown" where its end was not seen. */
 export type SpanEnd = "" | "succeeded" | "failed" | "cancelled" | "unknown";
@@ -20,6 +20,7 @@ export interface Span {
 }
 
 export const PROMPTS = "prompts";
+export const WAITS = "waits";
 export const SERVICES = "services";
 
 const ENDS: Record<string, SpanEnd> = {
@@ -33,6 +34,7 @@ const ENDS: Record<string, SpanEnd> = {
 export class Spans {
   readonly all: Span[] = [];
   private readonly open = new Map<string, Span[]>();
+  private readonly asked = new Map<string, RunRecord>();
   private seq = 0;
 
   get rows(): string[] {
@@ -46,6 +48,22 @@ export class Spans {
       case "BehaviorRequested": {
         const resources = (record.resources as string[] | undefined) ?? [];
         this.begin(record, "behavior", text(record, "behavior"), text(record, "name"), resources);
+        break;
+      }
+      case "AllocationRequested":
+        this.asked.set(text(record, "allocation"), record);
+        break;
+      case "AllocationDelayed":
+        this.wait(text(record, "allocation"));
+        break;
+      case "ResourcesAllocated": {
+        const roles = (record.roles as Record<string, string[]> | undefined) ?? {};
+        this.endWait(record, "succeeded", Object.values(roles).flat().join(", "));
+        break;
+      }
+      case "AllocationEnded": {
+        const code = text(record, "code");
+        this.endWait(record, code ? "failed" : "cancelled", code);
         break;
       }
       case "PromptOpened":
@@ -95,6 +113,19 @@ export class Spans {
       const [kind, id] = [key.slice(0, key.indexOf(":")), key.slice(key.indexOf(":") + 1)];
       if (kind === "behavior" && !(id in commands)) this.finish(key, t, "unknown", "");
     }
+  }
+
+  /** A task waits from when it asked for resources. */
+  private wait(allocation: string): void {
+    const record = this.asked.get(allocation);
+    if (!record || this.open.has(`wait:${allocation}`)) return;
+    this.begin(record, "wait", allocation, text(record, "name"), [WAITS]);
+  }
+
+  private endWait(record: RunRecord, end: SpanEnd, reason: string): void {
+    const allocation = text(record, "allocation");
+    this.asked.delete(allocation);
+    this.finish(`wait:${allocation}`, record.t, end, reason);
   }
 
   private begin(

@@ -26,6 +26,7 @@ const state = (fields: Partial<ElementState>): ElementState => ({
   last: 0,
   failed: false,
   asking: false,
+  waiting: false,
   ...fields,
 });
 

@@ -197,6 +197,8 @@ export interface ElementState {
   last: number;
   failed: boolean;
   asking: boolean;
+  /** A task of it waits for vehicles or payloads that are not free. */
+  waiting: boolean;
 }
 
 export interface Command {

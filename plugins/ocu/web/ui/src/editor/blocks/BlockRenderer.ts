@@ -2,7 +2,7 @@
 import type BpmnRenderer from "bpmn-js/lib/draw/BpmnRenderer";
 import BaseRenderer from "diagram-js/lib/draw/BaseRenderer";
 import { strings } from "../../strings";
-import { behaviorOf, serviceOf, type BehaviorUse, type Role } from "../moddle/behavior";
+import { behaviorOf, isByNeed, serviceOf, type BehaviorUse, type Role } from "../moddle/behavior";
 import { isA, type ModdleElement } from "../moddle/moddle";
 import type { Catalogue } from "../session/catalogue";
 import type { Element, EventBus } from "../session/services";
@@ -86,9 +86,10 @@ function whoOf(
   roles: readonly Role[],
   isNeeded: boolean,
 ): { who: string | undefined; missing: boolean } {
-  const named = roles.filter((role) => role.resource !== "");
-  if (named.length > 0) {
-    return { who: named.map((role) => role.resource).join(", "), missing: false };
+  const filled = roles.filter((role) => role.resource !== "" || isByNeed(role));
+  if (filled.length > 0) {
+    const { byNeed } = strings.editor.blocks;
+    return { who: filled.map((role) => role.resource || byNeed).join(", "), missing: false };
   }
   return isNeeded && roles.some((role) => !role.optional)
     ? { who: strings.editor.blocks.nobody, missing: true }

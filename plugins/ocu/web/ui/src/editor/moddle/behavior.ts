@@ -11,13 +11,27 @@ export type ResourceKind = "vehicle" | "payload" | "team";
 
 export const RESOURCE_KINDS: readonly ResourceKind[] = ["vehicle", "payload", "team"];
 
-/** A role; `resource` is "" while nothing is chosen. */
+/** What says what a role needs, and how long its task waits (docs/allocation.md). */
+export const NEEDS = ["requires", "same", "count", "prefer", "store", "wait", "priority"] as const;
+
+/** Those that a role which names its resource may have, too. */
+export const WAITS: readonly NeedName[] = ["wait", "priority"];
+
+export type NeedName = (typeof NEEDS)[number];
+
+export type Need = Partial<Record<NeedName, string>>;
+
+/** A role; `resource` is "" while nothing is chosen, and if it is filled by what it needs. */
 export interface Role {
   name: string;
   kind: ResourceKind;
   resource: string;
   optional: boolean;
+  need?: Need;
 }
+
+/** Whether vehicles or payloads are chosen for a role when its task starts. */
+export const isByNeed = ({ need }: Role): boolean => Boolean(need?.requires ?? need?.same);
 
 export interface Commanded {
   parameters: ParameterValue[];
@@ -159,11 +173,15 @@ function readParameter(element: ModdleElement): ParameterValue {
 function readRole(element: ModdleElement, type: string): Role {
   const named = RESOURCE_KINDS.find((kind) => text(element, kind) !== "");
   const otherwise = RESOURCE_KINDS.find((kind) => kind === type) ?? "vehicle";
+  const needs = NEEDS.filter((name) => text(element, name) !== "");
   return {
     name: text(element, "name"),
     kind: named ?? otherwise,
     resource: named ? text(element, named) : "",
     optional: ["true", "1"].includes(text(element, "optional")),
+    ...(needs.length && {
+      need: Object.fromEntries(needs.map((name) => [name, text(element, name)])),
+    }),
   };
 }
 
@@ -217,6 +235,7 @@ function writeRole(factory: Factory, role: Role, before?: ModdleElement): Moddle
       name: role.name,
       [role.kind]: role.resource || undefined,
       optional: role.optional ? "true" : undefined,
+      ...role.need,
     },
     before,
   );

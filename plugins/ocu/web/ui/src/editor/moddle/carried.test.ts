@@ -1,6 +1,6 @@
 import { BpmnModdle } from "bpmn-moddle";
 import { describe, expect, it } from "vitest";
-import { behaviorOf, serviceOf, setBehavior, setService } from "./behavior";
+import { behaviorOf, isByNeed, serviceOf, setBehavior, setService } from "./behavior";
 import { m2pemDescriptor } from "./descriptor";
 import type { Change } from "./extensions";
 import { mappingsOf, setMappings } from "./mappings";
@@ -64,6 +64,30 @@ describe("behaviors", () => {
     expect(xml).toContain('<m2pem:property id="p1" name="speed" value="2"');
     expect(xml).toContain('tool:note="n"');
     expect(xml).toContain("camunda:properties");
+  });
+
+  it("keeps and writes what a role needs", async () => {
+    const role = `<m2pem:role name="surveyor" requires="vehicle.battery &gt; 0.4" count="1..3"
+      store="s" wait="PT10M"/>`;
+    const { definitions, element } = await read(
+      task(`<m2pem:behavior type="vehicle" name="goto"><m2pem:resources>${role}</m2pem:resources>
+        </m2pem:behavior>`),
+    );
+    const use = behaviorOf(element)!;
+    const [read_] = use.roles;
+    expect(read_).toMatchObject({ kind: "vehicle", resource: "" });
+    expect(isByNeed(read_!)).toBe(true);
+    const need = { ...read_!.need, count: "2", priority: "1" };
+    apply(setBehavior(factory, element, { ...use, roles: [{ ...read_!, need }] }));
+    expect(await written(definitions)).toContain(
+      '<m2pem:role name="surveyor" requires="vehicle.battery &#62; 0.4" count="2" store="s"' +
+        ' wait="PT10M" priority="1" />',
+    );
+    const named = { ...read_!, resource: "uav1", need: { wait: "PT1M" } };
+    apply(setBehavior(factory, element, { ...use, roles: [named] }));
+    expect(await written(definitions)).toContain(
+      '<m2pem:role name="surveyor" vehicle="uav1" wait="PT1M" />',
+    );
   });
 
   it("leaves no empty extension elements behind", async () => {

@@ -1,5 +1,7 @@
 // What m2pem adds to BPMN, as bpmn-moddle reads and writes it (docs/missions.md). Whatever is not
 // said here is kept as it stands in the file. vocabulary.test.ts holds the names to m2pem's own.
+import { NEEDS } from "./behavior";
+
 const attribute = (name: string) => ({ name, type: "String", isAttr: true });
 const children = (name: string, type: string) => ({ name, type, isMany: true });
 const text = { name: "body", type: "String", isBody: true };
@@ -36,7 +38,7 @@ export const m2pemDescriptor = {
     {
       name: "Role",
       superClass: ["Element"],
-      properties: ["name", "vehicle", "payload", "team", "optional", "requires"].map(attribute),
+      properties: ["name", "vehicle", "payload", "team", "optional", ...NEEDS].map(attribute),
     },
     {
       name: "Service",

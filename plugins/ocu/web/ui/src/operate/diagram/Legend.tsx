@@ -8,7 +8,7 @@ export function Legend() {
   const colours = palette.value;
   return (
     <ul class="legend" aria-label={text.legend}>
-      {(["active", "done", "asking", "failed"] as const).map((look) => {
+      {(["active", "done", "asking", "waiting", "failed"] as const).map((look) => {
         const { fill, ring, dash } = colours[look];
         const line = ring
           ? `2px ${dash.length > 0 ? "dashed" : "solid"} ${ring}`

@@ -1,6 +1,7 @@
 // Numbers at the corners of elements: how often a token came, how many are there now; and a sign
-// for what failed or asks. Renewed a few times a second: people read no faster.
+// for what failed, asks or waits. Renewed a few times a second: people read no faster.
 import type { ElementState } from "../../shared/types";
+import { lookOf, SIGNS } from "./colours";
 import type { Outline } from "./painter";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -58,8 +59,7 @@ export class Badges {
       this.write(`${key}\nhits`, gfx, outline, "hits", state.hits > 1 ? short(state.hits) : "");
       const tokens = state.active > 1 ? `● ${short(state.active)}` : "";
       this.write(`${key}\ntokens`, gfx, outline, "tokens", tokens);
-      const sign = state.asking ? "?" : state.failed && state.active === 0 ? "✕" : "";
-      this.write(`${key}\nsign`, gfx, outline, "sign", sign);
+      this.write(`${key}\nsign`, gfx, outline, "sign", SIGNS[lookOf(state)]);
     }
     this.waiting.clear();
   }

@@ -4,7 +4,7 @@ import { computed, signal } from "@preact/signals";
 import { remember, remembered } from "../../shared/memory";
 import type { ElementState } from "../../shared/types";
 
-export type Look = "active" | "asking" | "failed" | "done" | "idle";
+export type Look = "active" | "asking" | "waiting" | "failed" | "done" | "idle";
 
 export interface Colour {
   fill: [red: number, green: number, blue: number];
@@ -29,6 +29,7 @@ export const PALETTES: Record<PaletteName, Palette> = {
   green: {
     active: solid([61, 224, 88], "#0a7a26"),
     asking: { ...solid([255, 184, 46], "#8a4b00"), dash: [8, 4] },
+    waiting: { ...solid([168, 203, 240], "#1d4f8a"), dash: [3, 3] },
     failed: solid([247, 138, 134], "#a3121a", 4),
     done: solid([218, 222, 225], "", 0),
   },
@@ -36,6 +37,7 @@ export const PALETTES: Record<PaletteName, Palette> = {
   colourBlind: {
     active: solid([105, 190, 240], "#00496b"),
     asking: { ...solid([240, 228, 66], "#5a5200"), dash: [8, 4] },
+    waiting: { ...solid([224, 170, 200], "#6b2a50"), dash: [3, 3] },
     failed: solid([240, 146, 87], "#7a2d00", 5),
     done: solid([218, 222, 225], "", 0),
   },
@@ -63,9 +65,20 @@ export function chooseFade(seconds: number): void {
 
 export function lookOf(state: ElementState): Look {
   if (state.asking) return "asking";
+  if (state.waiting) return "waiting";
   if (state.active > 0) return "active";
   if (state.failed) return "failed";
   return state.hits > 0 ? "done" : "idle";
 }
+
+/** What tells a state without its colour. */
+export const SIGNS: Record<Look, string> = {
+  asking: "?",
+  waiting: "…",
+  failed: "✕",
+  active: "",
+  done: "",
+  idle: "",
+};
 
 export const css = ([red, green, blue]: Colour["fill"]): string => `rgb(${red} ${green} ${blue})`;

@@ -34,7 +34,7 @@ const MIDDLE = "auto" as unknown as Point;
 /** Small diagrams are not blown up more. */
 const LARGEST = 1.2;
 
-const LOOKS: Look[] = ["active", "asking", "failed", "done"];
+const LOOKS: Look[] = ["active", "asking", "waiting", "failed", "done"];
 
 export class Drawing {
   private readonly figures = new Map<string, Figure>();

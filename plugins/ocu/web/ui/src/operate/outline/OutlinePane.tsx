@@ -4,7 +4,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { fill, strings } from "../../strings";
 import type { ElementState } from "../../shared/types";
-import { lookOf, type Look } from "../diagram/colours";
+import { lookOf, SIGNS, type Look } from "../diagram/colours";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import type { MissionNode } from "../mission/missionModel";
@@ -143,7 +143,7 @@ function Item({ row, state, selected, reached, onKeyDown, onClick, onTurn }: Ite
       </span>
       {!isProcess && (
         <i class="dot" aria-hidden="true">
-          {{ asking: "?", failed: "✕", active: "", done: "", idle: "" }[look]}
+          {SIGNS[look]}
         </i>
       )}
       <span class="name">{node.label}</span>

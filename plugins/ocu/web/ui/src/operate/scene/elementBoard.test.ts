@@ -8,6 +8,7 @@ const state = (fields: Partial<ElementState> = {}): ElementState => ({
   last: 0,
   failed: false,
   asking: false,
+  waiting: false,
   ...fields,
 });
 

@@ -23,7 +23,14 @@ const SLOW_MS = 200;
 /** Long lists are renewed less often, as each renewal takes longer. */
 const EACH_MS = 2;
 
-const IDLE: ElementState = { active: 0, hits: 0, last: 0, failed: false, asking: false };
+const IDLE: ElementState = {
+  active: 0,
+  hits: 0,
+  last: 0,
+  failed: false,
+  asking: false,
+  waiting: false,
+};
 
 export class ElementBoard {
   private readonly states = new Map<string, Seen>();

@@ -1,7 +1,7 @@
 // Who did what when: a row for each vehicle and payload, questions and services above.
 import { useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { PROMPTS, SERVICES, type Span } from "../../records/spans";
+import { PROMPTS, SERVICES, WAITS, type Span } from "../../records/spans";
 import { clock } from "../../shared/format";
 import { strings } from "../../strings";
 import type { Fleet } from "../../shared/types";
@@ -195,7 +195,7 @@ function rowsOf(spans: readonly Span[], fleet: Fleet): Row[] {
     ...fleet.payloads.filter(({ vehicle }) => vehicle === id).map((payload) => payload.id),
   ]);
   const vehicles = new Set(fleet.vehicles.map(({ id }) => id));
-  const order = [...new Set([PROMPTS, SERVICES, ...resources, ...inRow.keys()])];
+  const order = [...new Set([PROMPTS, WAITS, SERVICES, ...resources, ...inRow.keys()])];
   let top = 0;
   return order
     .filter((id) => inRow.has(id) || vehicles.has(id))
@@ -210,5 +210,6 @@ function rowsOf(spans: readonly Span[], fleet: Fleet): Row[] {
 
 function titleOf(id: string): string {
   if (id === PROMPTS) return text.prompts;
+  if (id === WAITS) return text.waits;
   return id === SERVICES ? text.services : id;
 }

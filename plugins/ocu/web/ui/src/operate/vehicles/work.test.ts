@@ -21,7 +21,7 @@ describe("work", () => {
   });
 
   it("tells operators from behaviors", () => {
-    expect(["anna@gcs1", "r1.b3", "", "r12.b144"].map(isOperator)).toEqual([
+    expect(["anna@gcs1", "r1.b3", "", "r12.a144"].map(isOperator)).toEqual([
       true,
       false,
       false,
@@ -30,7 +30,7 @@ describe("work", () => {
   });
 
   it("knows the run that drives a vehicle, whichever page it is shown on", () => {
-    expect(["r12.b144", "anna@gcs1", ""].map(runOf)).toEqual(["r12", "", ""]);
+    expect(["r12.b144", "r2.a1", "anna@gcs1", ""].map(runOf)).toEqual(["r12", "r2", "", ""]);
   });
 
   it("says who else has a vehicle", () => {

@@ -17,12 +17,12 @@ export function workOf(resource: string, commands: Record<string, Command>): Wor
     .sort((one, other) => one.command.since - other.command.since);
 }
 
-/** Holders are operators, behaviors ("r1.b3"), or "" for none. */
+/** Holders are operators, behaviors ("r1.b3"), requests ("r1.a2"), or "" for none. */
 export const isOperator = (holder: string): boolean =>
-  holder !== "" && !/^r\d+\.b\d+$/.test(holder);
+  holder !== "" && !/^r\d+\.[ab]\d+$/.test(holder);
 
-/** The run whose behavior holds a resource; "": none does. */
-export const runOf = (holder: string): string => /^(r\d+)\.b\d+$/.exec(holder)?.[1] ?? "";
+/** The run whose behavior or request holds a resource; "": none does. */
+export const runOf = (holder: string): string => /^(r\d+)\.[ab]\d+$/.exec(holder)?.[1] ?? "";
 
 /** Which other run or operator has a resource, in words; "": none has. */
 export function heldElsewhere(holder: string, run: string): string {

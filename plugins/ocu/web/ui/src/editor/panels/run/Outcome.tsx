@@ -1,7 +1,7 @@
 // What a rehearsal came to: how it ended, who did what when, and where to watch it.
 import { fill, strings } from "../../../strings";
 import type { RunSummary } from "../../../shared/types";
-import { PROMPTS, SERVICES, type Span } from "../../../records/spans";
+import { PROMPTS, SERVICES, WAITS, type Span } from "../../../records/spans";
 import type { EditorContext } from "../panel";
 
 const words = strings.run;
@@ -50,8 +50,12 @@ function Bars({
 }) {
   const rows = [...new Set(spans.map(({ row }) => row))];
   const last = Math.max(end, ...spans.map(({ from, to }) => to ?? from), 0.001);
-  const title = (row: string) =>
-    row === PROMPTS ? words.questions : row === SERVICES ? words.services : row;
+  const titles: Record<string, string> = {
+    [PROMPTS]: words.questions,
+    [WAITS]: words.waits,
+    [SERVICES]: words.services,
+  };
+  const title = (row: string) => titles[row] ?? row;
   return (
     <>
       <h3>{words.timeline}</h3>

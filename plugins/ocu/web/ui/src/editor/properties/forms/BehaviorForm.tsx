@@ -3,7 +3,7 @@ import { useMemo } from "preact/hooks";
 import type { Behavior, Parameter } from "../../../shared/types";
 import { fill, strings } from "../../../strings";
 import { titleOf, useOf } from "../../blocks/blocks";
-import { behaviorOf, setBehavior, type BehaviorUse } from "../../moddle/behavior";
+import { behaviorOf, isByNeed, setBehavior, type BehaviorUse } from "../../moddle/behavior";
 import { isA, text } from "../../moddle/moddle";
 import type { Catalogue } from "../../session/catalogue";
 import { ComboField } from "../fields/ComboField";
@@ -141,7 +141,9 @@ function changedTo(catalogue: Catalogue, behavior: Behavior, before: BehaviorUse
   const names = new Set(behavior.parameters.map(({ name }) => name));
   const kept = before.parameters.filter(({ name }) => names.has(name));
   const added = fresh.parameters.filter(({ name }) => !kept.some((each) => each.name === name));
-  const roles = before.roles.filter((role) => candidates.some(({ id }) => id === role.resource));
+  const roles = before.roles.filter(
+    (role) => isByNeed(role) || candidates.some(({ id }) => id === role.resource),
+  );
   return {
     ...fresh,
     parameters: [...kept, ...added],

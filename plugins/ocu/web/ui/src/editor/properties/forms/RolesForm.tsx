@@ -1,14 +1,19 @@
 // Who does what a task commands: roles, each with a vehicle, a payload or a team.
 import { fill, strings } from "../../../strings";
 import { roleName } from "../../blocks/blocks";
-import { behaviorOf, serviceOf, setBehavior, setService, type Role } from "../../moddle/behavior";
+import { behaviorOf, isByNeed, serviceOf, setBehavior, setService } from "../../moddle/behavior";
+import { WAITS, type Need, type Role } from "../../moddle/behavior";
 import type { Candidate, Catalogue } from "../../session/catalogue";
 import { CheckField, SelectField, type Option } from "../fields/SelectField";
 import { TextField } from "../fields/TextField";
 import { apply, factoryOf, objectOf, type FormProps } from "../form";
+import { NeedFields } from "./NeedFields";
 import { Rows } from "./Rows";
 
 const words = strings.editor.roles;
+
+/** The choice of a role that names nothing; no resource can have that name. */
+const BY_NEED = "/";
 
 export function RolesForm(form: FormProps) {
   const task = objectOf(form);
@@ -38,13 +43,10 @@ export function RolesForm(form: FormProps) {
             id={`m2-role-${index}`}
             label={role.optional ? words.resourceOptional : words.resource}
             required={!role.optional}
-            value={role.resource}
-            options={optionsOf(candidates)}
+            value={isByNeed(role) ? BY_NEED : role.resource}
+            options={optionsOf(candidates, behavior !== undefined)}
             error={errorOf(catalogue, role, candidates)}
-            write={(id) => {
-              const kind = candidates.find((each) => each.id === id)?.kind ?? role.kind;
-              change(index, { ...role, kind, resource: id });
-            }}
+            write={(id) => change(index, filledBy(role, id, candidates))}
           />
           <TextField
             id={`m2-role-name-${index}`}
@@ -59,6 +61,14 @@ export function RolesForm(form: FormProps) {
             value={role.optional}
             write={(optional) => change(index, { ...role, optional })}
           />
+          {behavior && (
+            <NeedFields
+              form={form}
+              index={index}
+              role={role}
+              write={(need) => change(index, { ...role, need })}
+            />
+          )}
         </>
       )}
     />
@@ -98,13 +108,24 @@ function newRole(catalogue: Catalogue, candidates: Candidate[], roles: readonly 
   };
 }
 
-function optionsOf(candidates: readonly Candidate[]): Option[] {
+/** A role that names a resource, or that takes any which can do it until more is said. */
+function filledBy(role: Role, id: string, candidates: readonly Candidate[]): Role {
+  if (id === BY_NEED)
+    return { ...role, resource: "", need: { requires: "true", ...role.need } };
+  const kind = candidates.find((each) => each.id === id)?.kind ?? role.kind;
+  const need: Need = {};
+  for (const name of WAITS) if (role.need?.[name]) need[name] = role.need[name];
+  return { ...role, kind, resource: id, need };
+}
+
+function optionsOf(candidates: readonly Candidate[], byNeed: boolean): Option[] {
   const options = candidates.map(({ kind, id, domain }) => ({
     value: id,
     label: id,
     group: kind === "vehicle" && domain ? strings.editor.blocks.groups[domain] : words.kinds[kind],
   }));
-  return [{ value: "", label: words.choose }, ...options];
+  const chosen = byNeed ? [{ value: BY_NEED, label: words.byNeed }] : [];
+  return [{ value: "", label: words.choose }, ...chosen, ...options];
 }
 
 function errorOf(
@@ -112,6 +133,7 @@ function errorOf(
   role: Role,
   candidates: readonly Candidate[],
 ): string | undefined {
+  if (isByNeed(role)) return undefined;
   if (role.resource === "") return words.nobody;
   if (candidates.some(({ id }) => id === role.resource)) return undefined;
   const { vehicles, payloads, teams } = catalogue.fleet;
