@@ -38,12 +38,12 @@ LOOK_AGAIN_US = 500_000
 
 @dataclass(slots=True)
 class _Asked:
-    """A request that has no behavior yet. `chosen`: its resources are held for it. `told`: what its
-    run was told that it lacks, without the values of telemetry, which change all the time."""
+    """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what its
+    run knows that it lacks, without the values of telemetry, which change all the time."""
 
     runner: Runner
     chosen: bool = False
-    told: object = None
+    lacks: object = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,9 +299,9 @@ class Allocator:
         }
         why = reason(each.roles, given)
         lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])
-        if each.waits and each.asked.told == lacks:
+        if each.waits and each.asked.lacks == lacks:
             return
-        each.asked.told = lacks
+        each.asked.lacks = lacks
         code = "" if each.waits else UNAVAILABLE
         each.asked.runner.post(ResourcesNotFree(each.request.id, why, holders, code))
 

@@ -44,6 +44,7 @@ from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
+from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.executive.waiting_tasks import waiting_tasks
@@ -276,7 +277,7 @@ class Control:
         try:
             yield
         except OperatorError as error:
-            if runner is not None and not ended and not runner.done.is_set():
+            if runner is not None and not ended and not self._has_ended_whole(runner):
                 raise
             lines = {each.run: each for each in await self._supervisor.journal.runs()}
             line = lines.get(run)
@@ -288,6 +289,11 @@ class Control:
     def _refuse_ended(self, run: RunId) -> None:
         if self._has_ended(run):
             raise OperatorError(f"{run} has ended")
+
+    @staticmethod
+    def _has_ended_whole(runner: Runner) -> bool:
+        """Whether a run's end is in the journal, and nothing that it commanded is left."""
+        return runner.failure is None and runner.done.is_set()
 
     def _has_ended(self, run: RunId) -> bool:
         """Whether a run has ended that this executive knows, and its journal has that."""
