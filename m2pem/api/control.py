@@ -207,6 +207,8 @@ class WaitingTask:
 LOGGED = "LOGGED"
 """The code of alerts that are also logged: what an arbiter warns of, for instance. Who shows the
 log to an operator need not show them again."""
+LEFT_ARMED = "LEFT_ARMED"
+"""The code of the alert that says which vehicles stay armed when a run has ended."""
 
 
 @dataclass(frozen=True, slots=True)

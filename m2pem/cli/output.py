@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from m2pem.api.control import LOGGED, Alert, ControlEvent, RunId, StampedRecord
+from m2pem.api.control import LEFT_ARMED, LOGGED, Alert, ControlEvent, RunId, StampedRecord
 from m2pem.api.description import printable
 from m2pem.cli.line_formatter import LineFormatter
 from m2pem.cli.standard_streams import LineWriter, writer_for
@@ -33,7 +33,7 @@ class Output:
         self._stream = stream
         self._as_json = as_json
         self._covered = False
-        self._ends: list[str] = []
+        self._kept: list[tuple[TextIO, str]] = []
         self.writer: LineWriter = writer_for(stream)
 
     @property
@@ -48,15 +48,16 @@ class Output:
         self.lines = LineFormatter(mission, colour=wants_colour(self._stream), one=one, asks=asks)
 
     def cover(self) -> None:
-        """An operator's screen covers the terminal: only how runs end is kept, for `uncover`."""
+        """An operator's screen covers the terminal. How runs end, and which vehicles stay armed
+        then, is kept for `uncover`."""
         self._covered = self._stream.isatty()
 
     def uncover(self) -> None:
         """The terminal is free again."""
         self._covered = False
-        for line in self._ends:
-            self.writer.put(line)
-        self._ends.clear()
+        for stream, line in self._kept:
+            writer_for(stream).put(line)
+        self._kept.clear()
 
     def show(self, stamped: StampedRecord) -> None:
         """Print a record."""
@@ -66,7 +67,7 @@ class Output:
         if not self._covered:
             self.writer.put(line)
         elif isinstance(stamped.record, RunEnded):
-            self._ends.append(line)
+            self._kept.append((self._stream, line))
 
     def _line(self, stamped: StampedRecord) -> str | None:
         if self._as_json:
@@ -86,9 +87,16 @@ class Output:
                     await self.drain()
             if isinstance(notice, StampedRecord):
                 self.show(notice)
-            elif isinstance(notice, Alert) and notice.code != LOGGED and not self._covered:
-                where = f"{notice.run}: " if notice.run else ""
-                writer_for(sys.stderr).put(f"m2pem: {where}{printable(notice.text)}")
+            elif isinstance(notice, Alert) and notice.code != LOGGED:
+                self._warn(notice)
+
+    def _warn(self, alert: Alert) -> None:
+        where = f"{alert.run}: " if alert.run else ""
+        line = f"m2pem: {where}{printable(alert.text)}"
+        if not self._covered:
+            writer_for(sys.stderr).put(line)
+        elif alert.code == LEFT_ARMED:
+            self._kept.append((sys.stderr, line))
 
     async def drain(self) -> None:
         """Wait until all is printed."""

@@ -98,6 +98,7 @@ async def driving(
                 output.uncover()
         await printing
         await output.drain()
+        await asyncio.to_thread(writer_for(sys.stderr).drain, GIVE_UP_PRINTING_S)
     if output.writer.broken:
         ignore_closed_stdout()
 

@@ -15,7 +15,7 @@ from m2pem.allocation.assignment import load_solver
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock
-from m2pem.api.control import Alert, HandedOver, RunId
+from m2pem.api.control import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
@@ -359,7 +359,7 @@ class Supervisor:
             if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
         ]
         if not self.fleet.simulated and (text := describe_armed_vehicles(free, self._bus)):
-            self.events.publish(Alert(runner.id, "LEFT_ARMED", text))
+            self.events.publish(Alert(runner.id, LEFT_ARMED, text))
         over = [each for each in self.runners.values() if each.done.is_set()]
         for oldest in over[:-REMEMBERED_RUNS]:
             del self.runners[oldest.id]

@@ -1,11 +1,15 @@
 """Standard output, while an operator's screen covers the terminal and while it does not."""
 
+import asyncio
 import io
+import sys
+from collections.abc import AsyncIterator
 
 import pytest
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.control import LEFT_ARMED, Alert, ControlEvent, StampedRecord
 from m2pem.cli.output import Output
+from m2pem.cli.standard_streams import writer_for
 from m2pem.engine.records import RunEnded, RunOutcome, RunPaused
 
 
@@ -39,6 +43,26 @@ def test_a_covered_terminal_gets_the_end_alone_and_late() -> None:
     before, after = told(terminal=True, cover=True)
     assert before == ""
     assert [word for word in ("RunPaused", "RunEnded") if word in after] == ["RunEnded"]
+
+
+def test_which_vehicles_stay_armed_is_printed_when_the_terminal_is_free_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    errors = Screen(terminal=True)
+    monkeypatch.setattr(sys, "stderr", errors)
+    output = Output(Screen(terminal=True), as_json=True)
+
+    async def alerts() -> AsyncIterator[ControlEvent]:
+        yield Alert("r1", "SLOW_DISK", "the journal is slow")
+        yield Alert("r1", LEFT_ARMED, "uav1 stays armed in RTL")
+
+    output.cover()
+    asyncio.run(output.follow(alerts()))
+    writer_for(errors).drain()
+    assert errors.getvalue() == ""
+    output.uncover()
+    writer_for(errors).drain()
+    assert errors.getvalue() == "m2pem: r1: uav1 stays armed in RTL\n"
 
 
 @pytest.mark.parametrize(("terminal", "cover"), [(True, False), (False, True)])
