@@ -29,14 +29,23 @@ def describe_end(request: str, run: str, line: RunInfo | None, released: str = "
     how = ""
     if line is not None and line.outcome is not None:
         how = f" ({line.outcome.value}{f': {line.detail}' if line.detail else ''})"
-    when = ""
-    if line is not None and line.ended_us is not None:
-        at = datetime.fromtimestamp(line.ended_us / US_PER_S, UTC)
-        when = f" on {at:%Y-%m-%d at %H:%M:%S} UTC"
+    when = "" if line is None else _when(line)
     what = NOTHING_TO_DO.get(request, "")
     if released and request == "stop":
         what = f"STOP went to what it is still releasing: {released}"
     return f"{run} has ended{when}{how}{f'; {what}' if what else ''}"
+
+
+def _when(line: RunInfo) -> str:
+    """When a run has ended. A clock that `--speed` takes ahead of the wall clock has no date."""
+    if line.ended_us is None:
+        return ""
+    speed = line.header.speed
+    if speed != 1.0:
+        took_s = (line.ended_us - line.started_us) / US_PER_S
+        return f" {took_s:.0f} s after its start, by a clock at {speed:g} times real time"
+    at = datetime.fromtimestamp(line.ended_us / US_PER_S, UTC)
+    return f" on {at:%Y-%m-%d at %H:%M:%S} UTC"
 
 
 def in_words(item: Input, reason: str) -> str:

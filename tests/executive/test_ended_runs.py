@@ -3,9 +3,11 @@
 import pytest
 
 from m2pem.api.control import RunStatus
+from m2pem.engine.records import RunOutcome
 from m2pem.errors import NotDrivenError, OperatorError
 from m2pem.executive.ended_runs import describe_end
-from m2pem.journal import MemoryJournal
+from m2pem.journal import MemoryJournal, RunInfo
+from m2pem.journal.base import RunHeader
 
 from .conftest import World, mission, question, sequence
 
@@ -75,6 +77,15 @@ def test_a_run_that_is_not_in_that_state_is_told_so_in_words(play) -> None:
         return resumed, await refused(control.pause(run))
 
     assert play(story) == ("r1: it is not paused", "r1: it is paused already")
+
+
+def test_at_another_speed_no_date_is_made_of_mission_time() -> None:
+    header = RunHeader("m.bpmn", b"", "P", speed=20.0, created_us=1_000_000)
+    line = RunInfo("r1", header, 1, 9, 1_000_000, outcome=RunOutcome.STOPPED, ended_us=41_000_000)
+    assert describe_end("stop", "r1", line) == (
+        "r1 has ended 40 s after its start, by a clock at 20 times real time (stopped); "
+        "there was nothing to stop"
+    )
 
 
 def test_a_stop_that_goes_to_what_is_still_released_says_so() -> None:
