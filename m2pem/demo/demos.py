@@ -22,6 +22,8 @@ AUTOPILOT = (
     *("--ekf", "6s", "--set", "FS_GCS_ENABLE=1", "--set", "FS_GCS_TIMEOUT=10"),
     *("--set", "BATT_FS_LOW_ACT=2"),
 )
+FOLDER = Path(".demo")
+"""Of the journal: the user's own, in which missions of their own are numbered, stays as it is."""
 ROS_DOMAIN = 101
 """None of those that tests reserve, so that a demonstration meets no test."""
 ROS_SPEED = 10
@@ -38,6 +40,7 @@ def vignette() -> int:
         *("run", here / "missions/vignette1.bpmn"),
         *("--fleet", here / "fleet_configs/vignette1.yaml"),
         *("--simulate", "--speed", str(SIMULATED_SPEED)),
+        *("--journal", _journal(FOLDER)),
     )
     with Programs() as programs:
         _say("The first way: a hazard is detected. Continue; at the second prompt, abort.")
@@ -81,7 +84,8 @@ def air(ardupilot: Path | None = None) -> int:
             words += ["--home", "38.1075,-77.3192,60", "--fault", LINK_LOST, "--speed", str(speed)]
             programs.start(words)
         mission = here / "missions/survey_pair.bpmn"
-        return programs.run(m2pem("run", mission, "--fleet", fleet, "--speed", str(speed)))
+        words = m2pem("run", mission, "--fleet", fleet, "--speed", str(speed))
+        return programs.run([*words, "--journal", _journal(FOLDER)])
 
 
 def web(folder: Path) -> int:
@@ -192,6 +196,24 @@ def team(
         if status == 0 and measured is not None:
             status = measured.finish()
     return status
+
+
+def _journal(folder: Path) -> Path:
+    """The journal of demonstrations in a folder, which is made; says where it is.
+
+    Raises:
+        OperatorError: the folder cannot be made.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OperatorError(
+            f"{folder.absolute()}, the folder of the journal, cannot be made: {error.strerror}; "
+            "run the demonstration in a folder of yours"
+        ) from error
+    journal = folder / "journal.db"
+    _say(f"The journal is {journal}: `m2pem runs --journal {journal}` lists its runs.")
+    return journal
 
 
 def _operator(mission: Path, answers: Path) -> list[str]:

@@ -26,11 +26,24 @@ def test_the_paper_mission_runs_in_two_ways_outside_of_the_repository(tmp_path: 
         text=True,
     )
     assert done.returncode == 0, done.stderr
+    assert "`m2pem runs --journal .demo/journal.db`" in done.stdout
+    assert [each.name for each in tmp_path.iterdir()] == [".demo"], "the user's own journal"
     assert "r1 terminated: terminated by mission ended" in done.stdout
     assert "r2 terminated: terminated by mission ended" in done.stdout
     first, second = done.stdout.split("The second way")
     assert "hazard" in first
     assert "DRIVE ROUTE: evsg1 ends single_vehicle_routing: succeeded" in second
+
+
+def test_a_folder_in_which_no_journal_can_be_is_reported(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from m2pem.demo import demos
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".demo").write_text("a file", encoding="utf-8")
+    with pytest.raises(OperatorError, match="in a folder of yours"):
+        demos.vignette()
 
 
 def test_a_demonstration_without_its_plugin_names_the_plugin(
