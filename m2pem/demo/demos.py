@@ -35,7 +35,8 @@ def vignette() -> int:
     here = examples()
     answers = here / "missions/answers"
     # On a terminal only the detector is scripted, and the person there is the operator.
-    operator = "_live" if sys.stdin.isatty() and sys.stdout.isatty() else ""
+    live = sys.stdin.isatty() and sys.stdout.isatty()
+    operator = "_live" if live else ""
     words = m2pem(
         *("run", here / "missions/vignette1.bpmn"),
         *("--fleet", here / "fleet_configs/vignette1.yaml"),
@@ -43,7 +44,12 @@ def vignette() -> int:
         *("--journal", _journal(FOLDER)),
     )
     with Programs() as programs:
-        _say("The first way: a hazard is detected. Continue; at the second prompt, abort.")
+        _say(
+            f"Two ways through one mission, {SIMULATED_SPEED} times as fast as real time.\n"
+            "The first way: a hazard is detected. Continue; at the second prompt, abort."
+        )
+        if live:
+            _wait_for_enter("Answer 1 (Continue), and 2 (Abort) when you are asked again.")
         detection = answers / f"vignette1_detection{operator}.yaml"
         status = programs.run([*words, "--answers", detection])
         if status == 0:
@@ -51,6 +57,8 @@ def vignette() -> int:
                 "\nThe second way: nothing is detected. Continue, and the route is driven"
                 " to its end."
             )
+            if live:
+                _wait_for_enter("The same question comes on the same screen: answer 1.")
             status = programs.run(
                 [*words, "--answers", answers / f"vignette1_route{operator}.yaml"]
             )
@@ -196,6 +204,12 @@ def team(
         if status == 0 and measured is not None:
             status = measured.finish()
     return status
+
+
+def _wait_for_enter(text: str) -> None:
+    """Let a person read what is printed, before a screen covers it."""
+    _say(f"{text}\nPress Enter to begin, Ctrl-C to end.")
+    sys.stdin.readline()
 
 
 def _journal(folder: Path) -> Path:

@@ -13,6 +13,9 @@ from m2pem.demo.programs import Programs, m2pem
 from m2pem.demo.shipped_files import examples
 from m2pem.errors import OperatorError
 from tests.command_line import REPOSITORY
+from tests.terminal import CTRL_C, Terminal
+
+CTRL_X = b"\x18"
 
 
 def test_the_paper_mission_runs_in_two_ways_outside_of_the_repository(tmp_path: Path) -> None:
@@ -33,6 +36,28 @@ def test_the_paper_mission_runs_in_two_ways_outside_of_the_repository(tmp_path: 
     first, second = done.stdout.split("The second way")
     assert "hazard" in first
     assert "DRIVE ROUTE: evsg1 ends single_vehicle_routing: succeeded" in second
+
+
+def test_on_a_terminal_a_person_reads_what_to_do_before_the_screen_covers_it(
+    tmp_path: Path,
+) -> None:
+    with Terminal(tmp_path, "demo", M2PEM_OPERATOR="anna@here") as terminal:
+        terminal.until(r"and 2 \(Abort\) when you are asked again")
+        terminal.until("Press Enter to begin")
+        terminal.press(b"\r")
+        terminal.until("Send the route")
+        terminal.press(CTRL_X)
+        terminal.until("STOP r1")
+        terminal.press(CTRL_X)
+        assert terminal.rest() == 130
+
+
+def test_a_demonstration_that_was_not_begun_has_no_run(tmp_path: Path) -> None:
+    with Terminal(tmp_path, "demo") as terminal:
+        terminal.until("Press Enter to begin")
+        terminal.press(CTRL_C)
+        assert terminal.rest() == 130
+    assert list((tmp_path / ".demo").iterdir()) == []
 
 
 def test_a_folder_in_which_no_journal_can_be_is_reported(
