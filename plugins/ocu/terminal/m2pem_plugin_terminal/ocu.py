@@ -21,8 +21,12 @@ LINGERS_FOR_S = 2.0
 class TerminalOcu:
     """Uses the whole terminal while it serves, and restores it afterwards."""
 
-    capabilities = OcuCapabilities(takes_terminal=True)
-    """The command line prints nothing while this unit serves."""
+    capabilities = OcuCapabilities(
+        takes_terminal=True,
+        imports=("m2pem_plugin_terminal.app", "textual.drivers.linux_driver"),
+    )
+    """The command line prints nothing while this unit serves. Textual takes up to a second to
+    import, and imports the driver of its screen when an app is made."""
 
     def __init__(self, control: "MissionControl") -> None:
         self._control = control
@@ -34,7 +38,7 @@ class TerminalOcu:
             OperatorError: standard input or output is not a terminal.
             PluginError: the screen failed; Textual has printed the error.
         """
-        from m2pem_plugin_terminal.app import TerminalApp  # noqa: PLC0415  # half a second
+        from m2pem_plugin_terminal.app import TerminalApp  # noqa: PLC0415  # not to list units
 
         if not (sys.__stdin__ and sys.__stdin__.isatty()):
             raise OperatorError(

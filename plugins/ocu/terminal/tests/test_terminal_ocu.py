@@ -3,6 +3,7 @@
 import ast
 import asyncio
 import logging
+import subprocess
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -53,6 +54,17 @@ def test_the_terminal_unit_is_found_as_a_plugin_and_takes_the_terminal() -> None
     factory = PluginManager().ocu("terminal")
     assert factory is TerminalOcu
     assert TerminalOcu.capabilities.takes_terminal
+
+
+def test_all_that_takes_long_to_import_is_imported_before_an_executive_exists() -> None:
+    code = (
+        "import sys; from m2pem.cli.ocus import Operators; from m2pem.plugins import PluginManager;"
+        "Operators(['terminal'], PluginManager());"
+        "before = set(sys.modules); import m2pem_plugin_terminal.app, textual.drivers.linux_driver;"
+        "print(set(sys.modules) - before)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout == "set()\n"
 
 
 async def test_without_a_terminal_it_says_what_to_use(
