@@ -17,11 +17,12 @@ UI_SOURCES := $(shell find $(UI) -path $(UI)/node_modules -prune -o -type f -pri
 PAGE := plugins/ocu/web/m2pem_plugin_web/static/index.html
 DEBIAN_PACKAGES := chromium curl nodejs npm spin systemd tcc tmux
 
-# An environment holds absolute paths: one made elsewhere, or by another Python, is made anew.
+# An environment holds absolute paths: one made elsewhere, or by another Python, is made anew. Which Python the
+# shell has counts only where it was asked for (PYTHON=...). One that make has not made is left alone.
 # Each target adds what it needs: a demonstration a few packages, the tests all (`installed`).
 CREATED := $(VENV)/created
 INSTALLED := $(VENV)/installed
-IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1))
+IDENTITY := $(strip $(CURDIR) $(shell $(if $(filter file,$(origin PYTHON)),$(BIN)/python,$(PYTHON)) -V 2>&1))
 ifeq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(CREATED) 2>/dev/null),$(IDENTITY))
 packages_for = $(or $(wildcard $(INSTALLED)),$(VENV)/for-$(1))
 else
@@ -50,9 +51,13 @@ python-packages: $(INSTALLED)
 $(CREATED):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo "m2pem needs Python 3.11 or newer, and $(PYTHON) is not: try make PYTHON=python3.12" >&2; exit 1; }
-	@$(PYTHON) -m venv --clear $(VENV) || { \
+	@[ ! -e $(VENV) ] || [ -e $@ ] || { \
+	  echo "$(VENV) was not made by make, which would empty it. Use it without make (docs/start.md), let make have another" \
+	    "one (the same make command with VENV=.venv-make), or remove it: rm -r $(VENV)" >&2; exit 1; }
+	@[ ! -e $(VENV) ] || echo "Making $(VENV) anew: it was made in another folder, or by another Python"
+	@$(PYTHON) -m venv --clear $(VENV) || { rm -rf $(VENV); \
 	  echo "$(PYTHON) cannot make virtual environments; on Debian: apt-get install python3-venv" >&2; exit 1; }
-	@echo '$(IDENTITY)' > $@
+	@echo "$(CURDIR) $$($(BIN)/python -V)" > $@
 
 $(INSTALLED): $(CREATED) pyproject.toml constraints.txt $(PLUGINS:%=%/pyproject.toml)
 	@echo "Installing m2pem, its plugins and what their tests need into $(VENV)"

@@ -32,6 +32,13 @@ def program(folder: Path, name: str, script: str) -> None:
     (folder / name).chmod(0o755)
 
 
+def made_by_make(venv: Path, python: str) -> None:
+    """An environment that make has made, of Python 3.11.0, which else does what `python` says."""
+    (venv / "bin").mkdir(parents=True)
+    program(venv / "bin", "python", f'[ "$1" != -V ] || {{ echo Python 3.11.0; exit; }}\n{python}')
+    (venv / "created").write_text(f"{REPOSITORY} Python 3.11.0\n")
+
+
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
     """A folder of programs: the user is root, and apt-get lists what it is asked to install."""
@@ -90,10 +97,7 @@ def test_a_demonstration_installs_the_plugins_that_it_needs_alone(
 
 def test_an_environment_with_everything_is_not_changed_by_a_demonstration(tmp_path: Path) -> None:
     venv = tmp_path / "venv"
-    (venv / "bin").mkdir(parents=True)
-    program(venv / "bin", "python", "exit 0")
-    version = subprocess.run(["python3", "-V"], capture_output=True, text=True, check=True).stdout
-    (venv / "created").write_text(f"{REPOSITORY} {version}")
+    made_by_make(venv, "exit 0")
     (venv / "installed").touch()
     done = make("--dry-run", "demo", f"VENV={venv}")
     assert done.returncode == 0, done.stderr
@@ -103,12 +107,32 @@ def test_an_environment_with_everything_is_not_changed_by_a_demonstration(tmp_pa
 
 def test_a_failed_installation_is_said_in_one_line_with_its_remedy(tmp_path: Path) -> None:
     venv = tmp_path / "venv"
-    (venv / "bin").mkdir(parents=True)
-    program(venv / "bin", "python", '[ "$1" != -m ] || { echo "ERROR: no index" >&2; exit 1; }')
-    version = subprocess.run(["python3", "-V"], capture_output=True, text=True, check=True).stdout
-    (venv / "created").write_text(f"{REPOSITORY} {version}")
+    made_by_make(venv, '[ "$1" != -m ] || { echo "ERROR: no index" >&2; exit 1; }')
     done = make("demo", f"VENV={venv}")
     assert done.returncode != 0
     assert "ERROR: no index" in done.stderr
     assert "pip could not install what is needed" in done.stderr
     assert "Then the same make command again" in done.stderr
+
+
+def test_an_environment_that_make_has_not_made_is_not_emptied(tmp_path: Path) -> None:
+    venv = tmp_path / "venv"
+    (venv / "lib").mkdir(parents=True)
+    done = make("demo", f"VENV={venv}")
+    assert done.returncode != 0
+    assert f"{venv} was not made by make" in done.stderr
+    assert f"rm -r {venv}" in done.stderr
+    assert (venv / "lib").is_dir()
+
+
+@pytest.mark.parametrize(("asked", "kept"), [((), True), (("PYTHON=python3.99",), False)])
+def test_another_python_of_the_shell_empties_no_environment(
+    tmp_path: Path, asked: tuple[str, ...], kept: bool
+) -> None:
+    venv = tmp_path / "venv"
+    made_by_make(venv, "exit 0")
+    for name in ("python3", "python3.99"):
+        program(tmp_path, name, "echo Python 3.99.0")
+    done = make("--dry-run", "dist", f"VENV={venv}", *asked, path=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert ("-m venv --clear" not in done.stdout) == kept
