@@ -396,16 +396,30 @@ class MavlinkArbiter:
             late = not was_late and now_us - looked_us > LATE * TELEMETRY_EVERY_S * 1e6
             looked_us, was_late = now_us, late
             silent_s = vehicle.silent_s
+            never_received = silent_s is None
             if silent_s is None:
                 silent_s = (now_us - began_us) / 1e6
             if silent_s >= bound_s and not late and self._tracker.holder(resource) is not None:
                 controller.release()
-                self._tracker.lose(resource, f"no message for {silent_s:.1f} s")
+                reason = (
+                    self._never_received(resource)
+                    if never_received
+                    else f"no message for {silent_s:.1f} s"
+                )
+                self._tracker.lose(resource, reason)
             if vehicle.state.changes != published or vehicle.link_state != link:
                 published, link = vehicle.state.changes, vehicle.link_state
                 self._states.put(replace(vehicle.telemetry(), behavior=controller.behavior))
             left_s = bound_s - silent_s
             await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
+
+    def _never_received(self, resource: ResourceId) -> str:
+        settings = self._settings[resource]
+        where = ", ".join(map(str, settings.urls))
+        return (
+            f"no message of system {settings.system_id} has ever arrived on {where}: is its "
+            "autopilot, or the simulation of it, running, and does it send there?"
+        )
 
     def _publish_mode_changes(self, controller: "VehicleController") -> None:
         """Publish a change of mode or arming at once: it may end a run, and operators then read the

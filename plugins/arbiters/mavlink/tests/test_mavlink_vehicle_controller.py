@@ -292,10 +292,14 @@ def test_a_change_of_mode_is_in_its_state_at_once(monkeypatch: pytest.MonkeyPatc
     play(Body().fly(), main)
 
 
-def test_a_vehicle_that_was_never_heard_is_lost() -> None:
+def test_a_vehicle_that_was_never_heard_is_lost_and_it_is_said_where_it_was_expected() -> None:
     async def main(bench) -> None:
         end = await bench.do("goto", 10.0, target=FAR)
         assert end.state is BehaviorState.LOST
+        assert end.reason == (
+            "no message of system 1 has ever arrived on udpin://127.0.0.1:14550: is its "
+            "autopilot, or the simulation of it, running, and does it send there?"
+        )
         assert bench.told == []
 
     play(Body(heard_by_us=False), main)
