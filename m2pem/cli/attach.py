@@ -14,7 +14,7 @@ from m2pem.cli.options import (
     optional_run_argument,
     path_option,
 )
-from m2pem.cli.run_control import journal_file
+from m2pem.cli.run_control import explain, journal_file
 
 
 @click.command(epilog=example("m2pem attach r1"))
@@ -47,13 +47,19 @@ async def _attach(
     from m2pem.control_socket.client import find_executive
     from m2pem.control_socket.paths import ControlSocketError
     from m2pem.control_socket.remote import RemoteControl
+    from m2pem.errors import NotDrivenError
     from m2pem.executive.loading import load_source
     from m2pem.plugins import PluginManager
 
     path = journal_file(journal_url)
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
-    executive = await asyncio.to_thread(find_executive, path, run)
+    try:
+        executive = await asyncio.to_thread(find_executive, path, run)
+    except NotDrivenError as error:
+        if run is None:
+            raise
+        raise await asyncio.to_thread(explain, error, journal_url, path, "attach", run) from error
     async with RemoteControl(executive, partial(load_source, search_path=search_path)) as control:
         operators.begin(control, lambda: None)
         try:

@@ -16,6 +16,7 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from m2pem.errors import NotDrivenError, OperatorError
     from m2pem.mission.values import Value
 
 by_option = click.option(
@@ -32,15 +33,28 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
     """
     from m2pem.api.operator import operator_name
     from m2pem.control_socket.client import ask_driver
-    from m2pem.errors import NotDrivenError, OperatorError
+    from m2pem.errors import NotDrivenError
 
     path = journal_file(journal_url)
     try:
         ask_driver(path, run, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
-        if ended := _ended(journal_url, path, method, run):
-            raise OperatorError(ended) from error
-        raise NotDrivenError(f"{error}{_left_behind(journal_url, path, run)}") from error
+        raise explain(error, journal_url, path, method, run) from error
+
+
+def explain(
+    error: "NotDrivenError", journal_url: str | None, path: Path, method: str, run: str
+) -> "OperatorError":
+    """Return an error that says what the journal knows of a run that no executive drives: how and
+    when it has ended, or what it has left behind.
+
+    `path`: the file of the journal.
+    """
+    from m2pem.errors import NotDrivenError, OperatorError
+
+    if ended := _ended(journal_url, path, method, run):
+        return OperatorError(ended)
+    return NotDrivenError(f"{error}{_left_behind(journal_url, path, run)}")
 
 
 def steer_all(journal_url: str | None, method: str, by: str | None, **params: Any) -> list[str]:

@@ -91,7 +91,8 @@ def find_executive(journal: Path, run: str | None) -> Path:
     """The socket of the executive that drives `run`; of the only one on the journal if None.
 
     Raises:
-        OperatorError: there is none, or (without a run) more than one.
+        NotDrivenError: there is none.
+        OperatorError: without a run, there is more than one.
     """
     paths = executives(journal)
     if run is None:
@@ -110,7 +111,7 @@ def find_executive(journal: Path, run: str | None) -> Path:
             return path  # it drove the run to its end
         else:
             return path
-    raise OperatorError("; ".join(elsewhere))
+    raise NotDrivenError("; ".join(elsewhere))
 
 
 def choose_executive(journal: Path, name: str | None) -> Path:

@@ -9,6 +9,7 @@ from m2pem.journal.base import RunInfo
 from m2pem.units import US_PER_S
 
 NOTHING_TO_DO = {
+    "attach": "m2pem replay prints what it did",
     "stop": "there was nothing to stop",
     "pause": "there was nothing to pause",
     "resume": "there is nothing to go on with: m2pem start begins its mission anew",
@@ -17,7 +18,7 @@ NOTHING_TO_DO = {
     "message": "it takes no messages any more",
     "set_geometry": "it takes no geometries any more",
 }
-"""By the method of `MissionControl`: what its end means for the request."""
+"""By the method of `MissionControl`, or the command: what its end means for the request."""
 
 
 def describe_end(request: str, run: str, line: RunInfo | None, released: str = "") -> str:

@@ -10,6 +10,7 @@ from m2pem.api import OPERATIONS
 from m2pem.control_socket import client
 from m2pem.errors import OperatorError
 from tests.cli.conftest import Invoke
+from tests.command_line import ANSWERS, FLEET, MISSION
 
 CALLS = [
     ("answer r1 p1 go", "answer", {"prompt": "p1", "decision": "go"}),
@@ -115,6 +116,25 @@ def test_where_nobody_runs_the_journal_is_named(invoke: Invoke, tmp_path: Path, 
     status, _, err = invoke(*words.split(), "--journal", tmp_path / "j.db")
     assert status == 1
     assert f"no executive with the journal {tmp_path / 'j.db'}" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("stop r1", "there was nothing to stop"),
+        ("answer r1 p1 abort", "no question of it is open"),
+        ("attach r1 --ocu plain", "m2pem replay prints what it did"),
+    ],
+)
+def test_of_a_run_that_has_ended_the_journal_says_how(
+    invoke: Invoke, words: str, told: str
+) -> None:
+    abort = ("--answers", ANSWERS / "vignette1_abort.yaml", "--ocu", "none")
+    assert invoke("run", MISSION, "--fleet", FLEET, "--simulate", *abort)[0] == 0
+    status, _, err = invoke(*words.split())
+    assert status == 1
+    assert err.startswith("m2pem: r1 has ended on 20")
+    assert err.endswith(f" (terminated: terminated by mission ended); {told}\n")
 
 
 @pytest.mark.parametrize("words", ["pause r1", "attach"])
