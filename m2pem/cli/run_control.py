@@ -24,14 +24,17 @@ by_option = click.option(
 )
 
 
-def steer(journal_url: str | None, run: str, method: str, by: str | None, **params: Any) -> None:
-    """Call a method of the executive that drives the run.
+def steer(
+    journal_url: str | None, run: str, method: str, by: str | None, done: str, **params: Any
+) -> None:
+    """Call a method of the executive that drives the run; then note what was `done`.
 
     Raises:
         OperatorError: it refused, or none drives the run; then, what the run has left behind.
         UnusableError: the journal is in memory.
     """
     from m2pem.api.operator import operator_name
+    from m2pem.cli.notes import note
     from m2pem.control_socket.client import ask_driver
     from m2pem.errors import NotDrivenError
 
@@ -40,6 +43,7 @@ def steer(journal_url: str | None, run: str, method: str, by: str | None, **para
         ask_driver(path, run, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
         raise explain(error, journal_url, path, method, run) from error
+    note(done)
 
 
 def explain(
@@ -131,7 +135,8 @@ def answer(run_id: str, prompt: str, decision: str, journal: str | None, by: str
 
     The first answer wins; a later one ends with 1.
     """
-    steer(journal, run_id, "answer", by, prompt=prompt, decision=decision)
+    done = f"{run_id}: {prompt} is answered: {decision}"
+    steer(journal, run_id, "answer", by, done, prompt=prompt, decision=decision)
 
 
 @click.command(epilog=example("m2pem signal r1 'Stop driving'"))
@@ -147,7 +152,8 @@ def signal(
 
     SIGNAL is its id, or its name.
     """
-    steer(journal, run_id, "signal", by, id=signal_id, data=data)
+    done = f"{run_id}: signal {signal_id!r} is sent"
+    steer(journal, run_id, "signal", by, done, id=signal_id, data=data)
 
 
 @click.command(epilog=example("m2pem pause r1"))
@@ -159,7 +165,7 @@ def pause(run_id: str, journal: str | None, by: str | None) -> None:
 
     Its vehicles hold, and its timers stand.
     """
-    steer(journal, run_id, "pause", by)
+    steer(journal, run_id, "pause", by, f"{run_id} is paused")
 
 
 @click.command("continue", epilog=example("m2pem continue r1"))
@@ -168,7 +174,7 @@ def pause(run_id: str, journal: str | None, by: str | None) -> None:
 @by_option
 def continue_(run_id: str, journal: str | None, by: str | None) -> None:
     """Let a run on this host go on after a pause."""
-    steer(journal, run_id, "resume", by)
+    steer(journal, run_id, "resume", by, f"{run_id} goes on")
 
 
 @click.command(epilog=example("m2pem stop r1 --reason 'people on the road'"))
@@ -185,7 +191,7 @@ def stop(run_id: str | None, every: bool, reason: str, journal: str | None, by: 
     if every == (run_id is not None):
         raise click.UsageError("name a run to stop, or --all")
     if run_id is not None:
-        steer(journal, run_id, "stop", by, reason=reason)
+        steer(journal, run_id, "stop", by, f"stopped: {run_id}", reason=reason)
         return
     stopped = steer_all(journal, "stop_all", by, reason=reason)
     click.echo(f"stopped: {', '.join(stopped) or 'no run was running'}")

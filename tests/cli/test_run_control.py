@@ -13,11 +13,16 @@ from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, FLEET, MISSION
 
 CALLS = [
-    ("answer r1 p1 go", "answer", {"prompt": "p1", "decision": "go"}),
-    ("signal r1 Home --data a.b=3", "signal", {"id": "Home", "data": {"a.b": 3}}),
-    ("pause r1", "pause", {}),
-    ("continue r1", "resume", {}),
-    ("stop r1 --reason rain", "stop", {"reason": "rain"}),
+    ("answer r1 p1 go", "answer", {"prompt": "p1", "decision": "go"}, "r1: p1 is answered: go"),
+    (
+        "signal r1 Home --data a.b=3",
+        "signal",
+        {"id": "Home", "data": {"a.b": 3}},
+        "r1: signal 'Home' is sent",
+    ),
+    ("pause r1", "pause", {}, "r1 is paused"),
+    ("continue r1", "resume", {}, "r1 goes on"),
+    ("stop r1 --reason rain", "stop", {"reason": "rain"}, "stopped: r1"),
 ]
 
 OTHERWISE = {
@@ -53,13 +58,16 @@ NO_COMMAND = {
 
 
 def test_every_operation_has_a_command_or_a_reason_why_not() -> None:
-    commands = {method for _, method, _ in CALLS}
+    commands = {method for _, method, _, _ in CALLS}
     assert commands | {*OTHERWISE} | {*NO_COMMAND} == set(OPERATIONS)
 
 
 @pytest.mark.parametrize(
     ("method", "params"),
-    [*((method, {"run": "r1", **more}) for _, method, more in CALLS), ("stop_all", {"reason": ""})],
+    [
+        *((method, {"run": "r1", **more}) for _, method, more, _ in CALLS),
+        ("stop_all", {"reason": ""}),
+    ],
 )
 def test_an_operation_accepts_what_a_command_sends(method: str, params: dict[str, Any]) -> None:
     parameters = OPERATIONS[method].parameters
@@ -67,20 +75,22 @@ def test_an_operation_accepts_what_a_command_sends(method: str, params: dict[str
     assert msgspec.to_builtins(read).items() >= params.items()
 
 
-@pytest.mark.parametrize(("words", "method", "params"), CALLS)
-def test_a_command_asks_the_executive_of_its_journal(
+@pytest.mark.parametrize(("words", "method", "params", "done"), CALLS)
+def test_a_command_asks_the_executive_of_its_journal_and_says_what_was_done(
     invoke: Invoke,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     words: str,
     method: str,
     params: dict[str, Any],
+    done: str,
 ) -> None:
     asked: list[Any] = []
     monkeypatch.setattr(client, "ask_driver", lambda *args, **more: asked.append((args, more)))
     journal = tmp_path / "j.db"
-    assert invoke(*words.split(), "--journal", journal, "--by", "anna") == (0, "", "")
+    assert invoke(*words.split(), "--journal", journal, "--by", "anna") == (0, "", f"{done}\n")
     assert asked == [((journal, "r1", method), {"by": "anna", **params})]
+    assert invoke("--quiet", *words.split(), "--journal", journal) == (0, "", "")
 
 
 @pytest.mark.parametrize(("variable", "by"), [("carol", "carol"), ("", "user@host")])
@@ -111,7 +121,7 @@ def test_a_refusal_ends_with_1(invoke: Invoke, monkeypatch: pytest.MonkeyPatch) 
     assert invoke("answer", "r1", "p1", "go") == (1, "", "m2pem: r1: somebody was first\n")
 
 
-@pytest.mark.parametrize("words", [*(words for words, _, _ in CALLS), "attach r1", "attach"])
+@pytest.mark.parametrize("words", [*(words for words, _, _, _ in CALLS), "attach r1", "attach"])
 def test_where_nobody_runs_the_journal_is_named(invoke: Invoke, tmp_path: Path, words: str) -> None:
     status, _, err = invoke(*words.split(), "--journal", tmp_path / "j.db")
     assert status == 1

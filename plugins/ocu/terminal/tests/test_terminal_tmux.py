@@ -124,7 +124,7 @@ def test_two_terminals_and_a_script_steer_one_mission(tmux: Tmux) -> None:
 
     bob.until_shown("Question: USER SEND ROUTE")
     answered = tmux.m2pem("answer r1 p2 abort")
-    assert (answered.returncode, answered.stdout) == (0, "")
+    assert (answered.returncode, answered.stdout) == (0, "r1: p2 is answered: abort\n")
     bob.until_shown("script@here")
     anna.until_shown("r1 terminated", "status 0")
     bob.until_shown("TERMINATED", "The executive has ended.")
