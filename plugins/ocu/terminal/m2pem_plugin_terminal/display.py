@@ -142,7 +142,8 @@ class Display(App[None], Listener, inherit_bindings=False):
     async def _follow(self) -> None:
         try:
             await self.follower.run()
-            self.say("The executive has ended.", alarm=True)
+            self._vehicles.end()
+            self.say("The executive has ended. q quits", alarm=True)
         except M2pemError as error:
             self.say(f"The connection to the executive has failed: {error}", alarm=True)
 

@@ -53,6 +53,11 @@ class Vehicles:
         self._fleet = fleet
         self._latest: dict[str, _Latest] = {}
         self._marching: dict[str, tuple[TeamMemberState, float]] = {}
+        self._ended = False
+
+    def end(self) -> None:
+        """The executive has ended: a vehicle of which nothing comes any more is not silent."""
+        self._ended = True
 
     def update(self, state: Telemetry, now: float) -> None:
         """Keep a state as the latest; `now` is the operator's clock, in seconds."""
@@ -79,8 +84,10 @@ class Vehicles:
                 continue
             age_s = now - latest.at
             payloads = [self._latest[p].state for p in vehicle.payloads if p in self._latest]
-            if age_s > silent_s or latest.state.link is LinkState.LOST:
-                lines += _silent(latest.state, age_s)
+            if self._ended:
+                lines += _not_seen(latest.state, "○", "not watched now")
+            elif age_s > silent_s or latest.state.link is LinkState.LOST:
+                lines += _not_seen(latest.state, "✗", f"silent for {int(age_s)} s")
             else:
                 lines += _vehicle(latest.state, payloads, width, named)
                 lines += self._place(vehicle.id, now)
@@ -113,8 +120,8 @@ def _taken(resources: Iterable[str], taken: Mapping[str, str], width: int) -> li
     return lines
 
 
-def _silent(state: VehicleState, age_s: float) -> list[Text]:
-    lines = [Text(f"✗ {_name(state.resource)} silent for {int(age_s)} s", GREY)]
+def _not_seen(state: VehicleState, mark: str, why: str) -> list[Text]:
+    lines = [Text(f"{mark} {_name(state.resource)} {why}", GREY)]
     if state.position is not None:
         lines.append(Text(f"  last at {_position(state)}", GREY))
     return lines

@@ -225,7 +225,18 @@ async def test_the_executives_end_is_told(world: World) -> None:
     async with world.terminal() as terminal:
         await terminal.until_shown("no mission is running")
         world.executive.events.end()
-        await terminal.until_shown("The executive has ended.")
+        await terminal.until_shown("The executive has ended. q quits")
+
+
+async def test_after_the_executives_end_no_vehicle_seems_lost(world: World) -> None:
+    async with world.terminal() as terminal:
+        world.fake.say(scout(0.75))
+        await terminal.until_shown("● scout")
+        world.executive.events.end()
+        await terminal.until_shown("○ scout     not watched now", "last at 38.10750")
+        world.hand.now_s += 60
+        await terminal.until_gone("The executive has ended")
+        assert "silent" not in terminal.screen
 
 
 async def test_the_log_follows_unless_looked_back(world: World) -> None:
