@@ -38,8 +38,8 @@ LOOK_AGAIN_US = 500_000
 
 @dataclass(slots=True)
 class _Asked:
-    """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what its
-    run knows that it lacks, without the values of telemetry, which change all the time."""
+    """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what
+    its run knows that it lacks, without the values of telemetry, which change all the time."""
 
     runner: Runner
     chosen: bool = False

@@ -277,7 +277,7 @@ class Control:
         try:
             yield
         except OperatorError as error:
-            if runner is not None and not ended and not self._has_ended_whole(runner):
+            if runner is not None and not ended and not self._ended_and_released(runner):
                 raise
             lines = {each.run: each for each in await self._supervisor.journal.runs()}
             line = lines.get(run)
@@ -291,7 +291,7 @@ class Control:
             raise OperatorError(f"{run} has ended")
 
     @staticmethod
-    def _has_ended_whole(runner: Runner) -> bool:
+    def _ended_and_released(runner: Runner) -> bool:
         """Whether a run's end is in the journal, and nothing that it commanded is left."""
         return runner.failure is None and runner.done.is_set()
 
