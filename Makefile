@@ -72,7 +72,7 @@ $(VENV)/for-demo-web: $(DEMO_WEB_PLUGINS:%=%/pyproject.toml)
 $(VENV)/for-demo-web: NEEDED = $(DEMO_WEB_PLUGINS)
 
 $(VENV)/for-%: $(CREATED) pyproject.toml constraints.txt
-	@echo "Installing m2pem with $(NEEDED) into $(VENV)"
+	@echo "Installing m2pem with $(NEEDED) into $(VENV); this takes about half a minute"
 	@$(PIP) install --editable . $(NEEDED:%=--editable %) || $(PIP_FAILED)
 	@touch $@
 
@@ -210,6 +210,7 @@ fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
 	@$(BIN)/python -m tools.fuzzer.fuzz --seconds $(FUZZ_S) $(M2PEM_CORPORA)
 
 dist: $(CREATED) ## build the wheels of m2pem and its plugins, into dist/
+	@echo "Building the wheels of m2pem and its plugins into dist; this takes about two minutes"
 	@rm -rf dist && mkdir dist
 	@$(PIP) wheel --no-deps --wheel-dir dist . $(PLUGINS:%=./%) || $(PIP_FAILED)
 	@ls dist
