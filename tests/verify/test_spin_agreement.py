@@ -159,7 +159,7 @@ def _random_mission(seed: int) -> PetriNet:
     return (simplify if seed % 3 else lambda net: net)(translate(notation(text)))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_random_missions_with_roles_by_need_have_the_same_states(seed: int) -> None:
     mission = notation(branches_with_needs(Random(seed)))
     net = simplify(net_of(mission)) if seed % 3 else net_of(mission)
@@ -167,7 +167,7 @@ def test_random_missions_with_roles_by_need_have_the_same_states(seed: int) -> N
     same(watched[0] if watched is not None and seed % 2 else net)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_missions_with_roles_by_need_have_one_answer(seed: int) -> None:
     mission = notation(branches_with_needs(Random(seed)))
     one_answer(mission, fleet_of(mission), OPEN)
