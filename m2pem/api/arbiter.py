@@ -111,7 +111,8 @@ class BehaviorReport:
     behavior's `BehaviorSpec.writes` declares, such as `picture.files`. `held` (answers to `query`):
     the behavior goes on, but one of its resources is held. `not_begun` (answers UNKNOWN to
     `query`): the resource shows that it has not begun the behavior, at most prepared for it, so
-    that it can be started now.
+    that it can be started now. `remaining`: the parameters by which another vehicle would do what
+    is left, such as the rest of a route; None: nothing is known beyond what was reported before.
     """
 
     id: BehaviorId
@@ -123,6 +124,7 @@ class BehaviorReport:
     outputs: Mapping[str, Value] = field(default_factory=dict)
     held: bool = False
     not_begun: bool = False
+    remaining: Mapping[str, Value] | None = None
 
 
 class Arbiter(Protocol):

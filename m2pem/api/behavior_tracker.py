@@ -124,8 +124,20 @@ class BehaviorTracker:
             return
         entry.last = replace(entry.last, native_ref=native_ref)
         if entry.last.state is BehaviorState.RUNNING:
-            entry.last = replace(entry.last, number=entry.last.number + 1)
-            self._reports.put(entry.last)
+            self._report_again(entry)
+
+    def remains(self, behavior: BehaviorId, remaining: Mapping[str, Value]) -> None:
+        """Report what is left of a behavior that is RUNNING, where that has changed.
+
+        `remaining`: the parameters by which another vehicle would do it. Each report is journaled:
+        report at waypoints, not with every telemetry.
+        """
+        entry = self._entries.get(behavior)
+        if entry is None or entry.last.state is not BehaviorState.RUNNING:
+            return
+        if entry.last.remaining != remaining:
+            entry.last = replace(entry.last, remaining=dict(remaining))
+            self._report_again(entry)
 
     def end(
         self,
@@ -228,8 +240,19 @@ class BehaviorTracker:
         last = entry.last
         number = max(3, last.number + 1) if state.terminal else 2
         entry.last = BehaviorReport(
-            last.id, number, state, code, reason, last.native_ref, outputs or {}
+            last.id,
+            number,
+            state,
+            code,
+            reason,
+            last.native_ref,
+            outputs or {},
+            remaining=last.remaining,
         )
+        self._reports.put(entry.last)
+
+    def _report_again(self, entry: _Entry) -> None:
+        entry.last = replace(entry.last, number=entry.last.number + 1)
         self._reports.put(entry.last)
 
     def _forget(self) -> None:

@@ -80,7 +80,8 @@ class GiveUp(_Input, frozen=True):
 
 class BehaviorReported(_Input, frozen=True):
     """An arbiter's report. `number` rises with each report of one behavior. `outputs`: what is
-    written for its task when it has ended."""
+    written for its task when it has ended. `remaining`: parameters of what is left to do; None: as
+    reported before."""
 
     behavior: str
     number: int
@@ -89,6 +90,7 @@ class BehaviorReported(_Input, frozen=True):
     reason: str = ""
     native_ref: str | None = None
     outputs: dict[str, Value] = msgspec.field(default_factory=dict)
+    remaining: dict[str, Value] | None = None
 
 
 class BehaviorMissing(_Input, frozen=True):

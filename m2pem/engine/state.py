@@ -217,7 +217,10 @@ class BehaviorPhase(StrEnum):
 
 @dataclass(slots=True, eq=False)
 class Behavior:
-    """A behavior that was requested and has not ended. Fields as in record `BehaviorRequested`."""
+    """A behavior that was requested and has not ended. Fields as in record `BehaviorRequested`.
+
+    `remaining`: the parameters by which another vehicle would do what is left, as last reported.
+    """
 
     id: str
     token: int
@@ -234,6 +237,7 @@ class Behavior:
     state: BehaviorState | None = None
     number: int = 0
     native_ref: str | None = None
+    remaining: dict[str, Value] | None = None
 
 
 @dataclass(slots=True, eq=False)

@@ -33,7 +33,17 @@ def reported(
         report.reason,
         report.native_ref,
         _outputs(report, behavior, arbiters) if report.outputs and behavior is not None else {},
+        _remaining(report),
     )
+
+
+def _remaining(report: BehaviorReport) -> dict[str, Value] | None:
+    """What is left, if it can be kept; else what was reported before counts."""
+    remaining = dict(report.remaining) if report.remaining is not None else None
+    if not _can_be_kept(remaining):
+        log.error("%s: JSON cannot say what its arbiter says is left: %r", report.id, remaining)
+        return None
+    return remaining
 
 
 def _outputs(

@@ -62,6 +62,8 @@ def behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:
     behavior.state = record.state
     if record.native_ref is not None:
         behavior.native_ref = record.native_ref
+    if record.remaining is not None:
+        behavior.remaining = record.remaining
 
 
 def behavior_cancel_requested(state: RunState, record: r.BehaviorCancelRequested) -> None:

@@ -148,7 +148,11 @@ def behavior_reported(x: Execution, item: i.BehaviorReported) -> None:
         if item.number <= behavior.number:
             x.ignore(f"report {item.number} of {item.behavior} came before")
             return
-        x.emit(r.BehaviorProgressed(item.behavior, item.number, item.state, item.native_ref))
+        x.emit(
+            r.BehaviorProgressed(
+                item.behavior, item.number, item.state, item.native_ref, item.remaining
+            )
+        )
         return
     _ended(x, behavior, item.state, item.code, item.reason, item.outputs)
 

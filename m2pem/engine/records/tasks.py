@@ -81,12 +81,14 @@ class BehaviorRequested(BaseRecord, frozen=True):
 
 
 class BehaviorProgressed(BaseRecord, frozen=True):
-    """A behavior is ACCEPTED or RUNNING; `native_ref`: the arbiter's own reference to it."""
+    """A behavior is ACCEPTED or RUNNING; `native_ref`: the arbiter's own reference to it.
+    `remaining`: the parameters by which another vehicle would do what is left; None: as before."""
 
     behavior: str
     number: int
     state: BehaviorState
     native_ref: str | None = None
+    remaining: dict[str, Value] | None = None
 
 
 class BehaviorCancelRequested(BaseRecord, frozen=True):
