@@ -17,9 +17,10 @@ from m2pem.bpmn.xml import M2PEM
 
 _RULES_HEAD = """# Rules of mission files
 
-`m2pem check` applies these rules to a mission file. A finding ends with its rule's name and number:
-`[idle-gateway B10601]`. m2pem does not load a mission with errors, nor, with `--strict`, one with
-warnings. Numbers never change, and are never used again.
+`m2pem check` applies these rules to a mission file. A finding says where, what is wrong and what
+would be right, and ends with its rule's name and number: `[idle-gateway B10601]`. m2pem does not
+load a mission with errors, nor, with `--strict`, one with warnings. Numbers never change, and are
+never used again.
 
 A `B` number is a section of the BPMN 2.0.2 specification (formal/13-12-09) and two digits: `B10601`
 is the first rule of section 10.6. A construct that cannot be executed, or has no meaning, is an
@@ -30,16 +31,15 @@ This page is generated from the rules: `python -m m2pem.bpmn.pages rules`.
 _RULES_OF_BPMN = """
 ## BPMN's rules
 
-| rule | clause | level | wrong | right |
-|---|---|---|---|---|
 """
 _RULES_OF_M2PEM = """
 ## m2pem's own rules
 
 For questions that BPMN leaves open, and for m2pem's own elements of [mission files](missions.md).
 
-| rule | level | wrong | right |
-|---|---|---|---|
+"""
+_RULES_TABLE = """| rule | level | what is wrong |
+|---|---|---|
 """
 
 
@@ -48,8 +48,10 @@ def rules_page() -> str:
     return (
         _RULES_HEAD
         + _RULES_OF_BPMN
+        + _RULES_TABLE
         + "".join(_rule_rows("B"))
         + _RULES_OF_M2PEM
+        + _RULES_TABLE
         + "".join(_rule_rows("M"))
     )
 
@@ -57,10 +59,7 @@ def rules_page() -> str:
 def _rule_rows(letter: str) -> Iterator[str]:
     for rule in RULES:
         if rule.code[0] == letter:
-            clause = [rule.clause] if letter == "B" else []
-            name = f"`{rule.slug} {rule.code}`"
-            cells = [name, *clause, rule.severity.value, rule.wrong, rule.right]
-            yield f"| {' | '.join(cells)} |\n"
+            yield f"| `{rule.slug} {rule.code}` | {rule.severity.value} | {rule.wrong} |\n"
 
 
 _EXTENSIONS_HEAD = f"""# m2pem's elements and attributes
@@ -88,14 +87,12 @@ This page is generated from the table by which m2pem checks files:
 
 ## Elements
 
-"In" names the BPMN elements whose `extensionElements` may have the element, "Inside" the m2pem
-elements that may contain it.
+"In" names the BPMN elements whose `extensionElements` may have the element, "inside" the m2pem
+elements that may contain it. Attributes have the kind of their value in parentheses.
 """
 _EXTENSIONS_ATTRIBUTES = """
 ## Attributes of BPMN's elements
 
-| attribute | of | it is | for |
-|---|---|---|---|
 """
 
 
@@ -106,20 +103,18 @@ def extensions_page() -> str:
 
 
 def _element(element: OwnElement) -> str:
-    text = f"\n### `m2pem:{element.name}`\n\n{element.doc}\n\n"
-    if element.places:
-        text += f"- In: {_quoted(element.places)}\n"
-    inside = [each.name for each in ELEMENTS.values() if element.name in each.children]
+    where = [f"In {_quoted(element.places)}"] if element.places else []
+    inside = [f"m2pem:{each.name}" for each in ELEMENTS.values() if element.name in each.children]
     if inside:
-        text += f"- Inside: {_quoted(f'm2pem:{name}' for name in inside)}\n"
-    if element.text:
-        text += f"- Its text: {element.text}\n"
-    if element.attributes:
-        text += "\n| attribute | it is | for |\n|---|---|---|\n"
-        text += "".join(
-            f"| `{each.name}` | {each.type} | {each.doc} |\n" for each in element.attributes
-        )
-    return text
+        where.append(f"{'inside' if where else 'Inside'} {_quoted(inside)}")
+    lines = [f"- Its text: {element.text}\n"] if element.text else []
+    lines += [f"- {_attribute(each.name, each)}\n" for each in element.attributes]
+    head = f"\n### `m2pem:{element.name}`\n\n{element.doc} {', '.join(where)}.\n"
+    return "".join([head, "\n" if lines else "", *lines])
+
+
+def _attribute(name: str, attribute: Attribute) -> str:
+    return f"`{name}` ({attribute.type}): {attribute.doc}"
 
 
 def _quoted(names: Iterator[str] | tuple[str, ...]) -> str:
@@ -128,9 +123,9 @@ def _quoted(names: Iterator[str] | tuple[str, ...]) -> str:
 
 def _attributes() -> Iterator[str]:
     for each in EXTENSIONS:
+        yield f"- Of {_quoted(each.places)}:\n"
         for attribute in each.attributes:
-            cells = [f"`m2pem:{attribute.name}`", _quoted(each.places), attribute.type]
-            yield f"| {' | '.join([*cells, attribute.doc])} |\n"
+            yield f"    - {_attribute(f'm2pem:{attribute.name}', attribute)}\n"
 
 
 def descriptor() -> dict[str, object]:

@@ -342,7 +342,7 @@ _BEGIN, _END = "<!-- begin: the life of a behavior -->", "<!-- end: the life of 
 
 
 def write_page(page: str) -> str:
-    """Return a page of the docs with the tables and the diagram between their marks."""
+    """Return a page of the docs with the table and the list between their marks."""
     before, rest = page.split(_BEGIN)
     return f"{before}{_BEGIN}\n\n{_text()}\n{_END}{rest.split(_END)[1]}"
 
@@ -352,15 +352,10 @@ def _text() -> str:
     for state in JOINT_STATES:
         cells = [", ".join(getattr(state, owner)) for owner in OWNERS]
         lines.append(f"| **{state.name}** | {' | '.join(cells)} |")
-    lines += ["", "| stage | what it means |", "|---|---|"]
-    lines += [f"| {state.name} | {state.meaning} |" for state in JOINT_STATES]
-    lines += ["", "```mermaid", "stateDiagram-v2"]
-    ids = {state.name: state.name.replace(" ", "_") for state in JOINT_STATES}
-    lines += [f'    state "{name}" as {id_}' for name, id_ in ids.items() if name != id_]
-    lines.append(f"    [*] --> {ids['requested']}")
-    lines += [f"    {ids[each.source]} --> {ids[each.target]}" for each in TRANSITIONS]
-    lines += ["```", "", "| from | to | when |", "|---|---|---|"]
-    lines += [f"| {each.source} | {each.target} | {each.when} |" for each in TRANSITIONS]
+    lines.append("")
+    for state in JOINT_STATES:
+        ways = [f"*{to.target}* ({to.when})" for to in TRANSITIONS if to.source == state.name]
+        lines.append(f"- **{state.name}**: {state.meaning} Then {'; '.join(ways)}.")
     return "\n".join([*lines, ""])
 
 

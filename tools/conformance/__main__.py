@@ -34,9 +34,9 @@ def main() -> int:
     modules = REPOSITORY / "tests" / "js" / "node_modules"
     for peer in (spiffworkflow(asked.spiffworkflow), bpmn_elements(modules)):
         verdicts[f"{peer.name} {peer.version}"] = ask(peer, cases)
-    table = render(cases, verdicts)
-    print(table)
+    print(render(cases, verdicts, details=True))
     if not asked.only:
+        table = render(cases, verdicts, details=False)
         PAGE.write_text(write(PAGE.read_text(encoding="utf-8"), table), encoding="utf-8")
     return 0
 

@@ -1,7 +1,8 @@
 """The table of conformance as Markdown, between two marks of a page.
 
 Cases of an element that every engine treats alike share a row. m2pem has no column: a test sees to
-it that m2pem does as BPMN says in each case.
+it that m2pem does as BPMN says in each case. The page says whether an engine differs; how it does
+is printed.
 """
 
 import re
@@ -33,12 +34,12 @@ Verdicts = Mapping[str, Sequence[Verdict]]
 """What each engine, by name and version, did in each of the cases."""
 
 
-def render(cases: Sequence[Case], verdicts: Verdicts) -> str:
-    """Counts first, then a table for each chapter."""
+def render(cases: Sequence[Case], verdicts: Verdicts, *, details: bool) -> str:
+    """Counts first, then a table for each chapter. `details`: with how engines differ, and why."""
     parts = [_summary(verdicts)]
     for chapter in dict.fromkeys(case.topic.parent.name for case in cases):
         rows = [number for number, case in enumerate(cases) if case.topic.parent.name == chapter]
-        parts.append(f"### {_title(chapter)}\n\n{_chapter(rows, cases, verdicts)}")
+        parts.append(f"### {_title(chapter)}\n\n{_chapter(rows, cases, verdicts, details)}")
     return "\n".join(parts)
 
 
@@ -78,13 +79,13 @@ def _summary(verdicts: Verdicts) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _chapter(rows: Sequence[int], cases: Sequence[Case], verdicts: Verdicts) -> str:
+def _chapter(rows: Sequence[int], cases: Sequence[Case], verdicts: Verdicts, details: bool) -> str:
     others = [name for name in verdicts if name != "m2pem"]
     alike: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for row in rows:
         case = cases[row]
         why = f" {_plain(f'[{case.extension}]')}" if case.extension else ""
-        cells = " | ".join([why, *(_cell(verdicts[name][row]) for name in others)])
+        cells = " | ".join([why, *(_cell(verdicts[name][row], details) for name in others)])
         alike[_plain(case.element)][cells].append(_plain(case.variant))
     lines = [f"| element | variants | {' | '.join(others)} |", "|---|---|" + "---|" * len(others)]
     for element, variants in alike.items():
@@ -95,7 +96,9 @@ def _chapter(rows: Sequence[int], cases: Sequence[Case], verdicts: Verdicts) -> 
     return "\n".join(lines) + "\n"
 
 
-def _cell(verdict: Verdict) -> str:
+def _cell(verdict: Verdict, details: bool) -> str:
+    if not details:
+        return {"same": "yes", "n.a.": "-"}.get(verdict.kind, verdict.kind)
     word = _WORDS.get(verdict.kind, verdict.kind)
     words = "" if verdict.kind == "n.a." else _NOISE.sub("", verdict.words)
     return _plain(": ".join(part for part in (word, words) if part))

@@ -11,20 +11,17 @@ from mavlink_failsafes import FILE
 
 PAGE = """# Failsafes of a vehicle while a mission runs
 
-What real autopilots, which simulate themselves, and m2pem do when a failsafe of the vehicle acts
-in a mission. Each phase was played with the real program, `m2pem run` and a second ground station
-that brought the failsafe about; `tools/record_failsafes` does it again and writes this page. The
-rules are in [MAVLink vehicles](mavlink.md#when-the-link-is-lost-and-other-failsafes): m2pem
-interrupts no RTL and no LAND that it has not asked for, arms no vehicle that is not ready, and says
-what it sees.
+What real autopilots, which simulate themselves, and m2pem did when a failsafe of the vehicle acted
+in a mission: each phase with the real program, `m2pem run` and a second ground station that brought
+the failsafe about. `tools/record_failsafes` does it again and writes this page. The rules are in
+[MAVLink vehicles](mavlink.md#when-the-link-is-lost-and-other-failsafes).
 
-In the missions of aircraft the first task takes off to 30 m (90 m in "taking off", planes 150 m);
-the fleet says `lost_after: 10 s`. No boundary event catches an error, so that a behavior that fails
-ends the mission; a mission of yours can catch the error and go on. When the mission is over, m2pem
-ends, and with it the heartbeats of the ground station: a vehicle that stays in the air then returns
-by its own ground station failsafe.
+Aircraft take off to 30 m (90 m in "taking off", planes 150 m); the fleet says `lost_after: 10 s`.
+No boundary event catches an error, so that a behavior that fails ends the mission; yours can catch
+it and go on. When the mission is over, m2pem ends, and with it its heartbeats as a ground station:
+a vehicle that stays in the air then returns by its own ground station failsafe.
 
-In the tables, phases that went alike share a row.
+Phases that went alike share a row.
 
 - *The vehicle*: its modes from the failsafe on, also after the mission, and where it ended ("away":
   not at home).
@@ -32,43 +29,24 @@ In the tables, phases that went alike share a row.
   did not command, and then what the vehicle said of it; with `TAKEN_OVER` another ground station or
   a switch did it, else a failsafe of the vehicle. "does not move": it should, but has not for 60 s
   (in RTL 120 s).
-- *Operators read*: what else they read during the mission, mostly what the vehicle says.
 
-Operators read these lines, too, whatever the failsafe is:
+Operators read, besides, what the vehicle says; what is missing until it is ready; of a lost vehicle
+that was armed, its last mode and height; and at the end of the mission which vehicles stay armed.
 
-- Before the takeoff: `uav1 waits until it is ready`, and what is missing.
-- When the link is lost: `uav1: LINK_LOST: its arbiter lost the link`; if the vehicle was armed, its
-  mode and height, that what it does now is not known, and what may be done.
-- When the mission ends and the vehicle is armed: `uav1 stays armed in RTL, 38 m above its home`,
-  and what may be done.
-
-Rovers say "Radio Failsafe" when it is the ground station that they have lost. m2pem commands
-heights above terrain only where a mission says `altitude_frame: terrain`, and serves no terrain
-data: a vehicle that has none does not move. Planes circle where copters stand.
+Rovers say "Radio Failsafe" when it is the ground station that they have lost. Planes circle where
+copters stand.
 
 PX4 arms without manual control, and has then no failsafe for its loss until the pilot is there
-again. Its texts say "Failsafe activated" without the cause, and nothing where it lands or returns
-already; the cause is in its EVENT messages, which m2pem does not read. A simulated PX4 does not
-restart: it denies `MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN` on the ground, and every PX4 does while it is
-armed. PX4 refuses missions with heights above terrain, so that the behavior fails at once ("its
-frame is not supported"). `MAV_CMD_INJECT_FAILURE` stops its motor 1, which PX4 does only where
-`CA_FAILURE_MODE` is not 0.
+again. Its texts say "Failsafe activated" without the cause. PX4 restarts neither in the simulation
+nor while it is armed, and refuses missions with heights above terrain.
 """
 
 HEAD = """
 The fleet says `failsafe: {vehicle.failsafe}`, the vehicle has {parameters}.
 
-| Failsafe | Phase | The vehicle | The mission | Operators read |
-|---|---|---|---|---|
+| Failsafe | Phase | The vehicle | The mission |
+|---|---|---|---|
 """
-
-ROUTINE = re.compile(
-    r"Start|End|Task\d|r1 .*|Task\d: (.* begins|.* ends|error) .*|.* is ready|.*: LINK_LOST: .*"
-    r"|.*( waits until it is ready: | stays armed in | was armed in |an unknown module block).*"
-    r"|.*: (nothing happens|it only warns) when its battery is low.*|.*: fleet says .*"
-    r"|.*the vehicle has not reported its position yet|.*GCS Failsafe Off"
-)
-"""Lines of every mission, what the page says before the tables, and what is of no vehicle."""
 
 SHORTER = (
     (r"(a failsafe of its own|another ground station or a switch) has taken over: ", ""),
@@ -108,10 +86,7 @@ def _cells(seen: dict[str, Any]) -> str:
     said = "\n".join(seen["said"])
     error = re.search(r": error (\w+) \((.*)\), not caught", said)
     mission = f"`{error[1]}` {_shorter(error[2])}" if error else "completed"
-    lines = (line.split(": ", 1)[1] for line in seen["said"] if not ROUTINE.fullmatch(line))
-    plain = (re.sub(r"^\w+( says)?: (BATTERY_LOW: )?", "", _shorter(line)) for line in lines)
-    read = [line for line in dict.fromkeys(plain) if line.casefold() not in mission.casefold()]
-    return f"{modes}; {end} | {mission} | {'; '.join(read) or '-'}"
+    return f"{modes}; {end} | {mission}"
 
 
 def _shorter(text: str) -> str:
