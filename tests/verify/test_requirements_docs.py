@@ -20,7 +20,8 @@ NAMES = Names(MISSION, fleet_for(MISSION))
 
 
 def read(example: str) -> list[Requirement]:
-    return parse_spec(example.encode(), "docs/requirements.md", NAMES)
+    text = f"requirements:\n{example}" if example.startswith("- ") else example
+    return parse_spec(text.encode(), "docs/requirements.md", NAMES)
 
 
 @pytest.mark.parametrize(("example", "after"), EXAMPLES, ids=lambda text: text.split("\n")[1])
