@@ -15,7 +15,7 @@ LOGGER = logging.getLogger("m2pem.onboard")
 
 
 class CameraNode:
-    """Serves the topics of docs/ros.md, "Payloads", in `namespace`. The executive publishes the
+    """Serves the topics of docs/ros-nodes.md, in `namespace`. The executive publishes the
     states of the camera's vehicle and of targets.
 
     `connection`: of the camera, as a fleet has it for the arbiter `ptz`. `origin`: of the fleet's

@@ -1,4 +1,4 @@
-"""A payload's node in plain rclpy, as docs/ros.md says how to write one: `NAMESPACE NAME`.
+"""A payload's node in plain rclpy, as docs/ros-nodes.md says how to write one: `NAMESPACE NAME`.
 
 It wipes its lens (`wipe_lens`), which writes how often it has; anything else it rejects.
 """

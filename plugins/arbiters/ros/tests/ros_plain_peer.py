@@ -2,7 +2,7 @@
 
     ros_plain_peer.py NAMESPACE node|base|nav2 FRAME [TYPE]
 
-`node` keeps to docs/ros.md, "Write your own node"; `base` takes `cmd_vel`, and goes on with
+`node` keeps to docs/ros-nodes.md; `base` takes `cmd_vel`, and goes on with
 the last command that it got; `nav2` drives as long as it has a goal of `navigate_to_pose`. FRAME:
 of its odometry; TYPE: of `cmd_vel`, Twist or TwistStamped, or `pose`, which publishes odometry as a
 PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and "" lets it speak again: it drives on

@@ -1,4 +1,4 @@
-"""Holds the fleets of docs/ros.md to what the code does."""
+"""Holds the fleets of docs/ros*.md to what the code does."""
 
 import re
 from dataclasses import fields
@@ -26,7 +26,8 @@ from m2pem.api import Connection, Fleet, ResourceId
 from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import context
 
-TEXT = (Path(__file__).parents[4] / "docs" / "ros.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[4] / "docs"
+TEXT = "".join(page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("ros*.md")))
 FLEETS = [block for block in re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL) if "ros" in block]
 WHOLE = [block for block in FLEETS if block.startswith("version:")]
 

@@ -1,4 +1,4 @@
-"""The street sweeper of the examples, a node in plain rclpy, keeps to the rules of docs/ros.md."""
+"""The street sweeper of the examples, a node in plain rclpy, keeps to docs/ros-nodes.md."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""What docs/ros.md says of simulated vehicles is so."""
+"""What docs/ros-simulation.md says of simulated vehicles is so."""
 
 import re
 import shlex
@@ -11,15 +11,14 @@ from m2pem_plugin_ros.simulator.specification import DETECTOR_SETTINGS, SETTINGS
 from m2pem_plugin_ros.testing import Peer
 from ros_sim_watch import COMMAND
 
-PAGE = Path(__file__).parents[4] / "docs" / "ros.md"
-TEXT = PAGE.read_text(encoding="utf-8").partition("\n## Simulated vehicles\n")[2]
-SECTION = re.split(r"\n## ", TEXT)[0]
-FLEET = re.search(r"```yaml\n(.*?)```", SECTION, re.S)
-COMMANDS = re.findall(r"^\$ m2pem (sim ros .*)$", SECTION.replace("\\\n", " "), re.M)
+PAGE = Path(__file__).parents[4] / "docs" / "ros-simulation.md"
+TEXT = PAGE.read_text(encoding="utf-8")
+FLEET = re.search(r"```yaml\n(.*?)```", TEXT, re.S)
+COMMANDS = re.findall(r"^\$ m2pem (sim ros .*)$", TEXT.replace("\\\n", " "), re.M)
 
 
 def test_all_faults_are_told_and_can_be_written_so() -> None:
-    table = SECTION.partition("| action | what happens |")[2]
+    table = TEXT.partition("| action | what happens |")[2]
     rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
     told = [word for row in rows for word in re.findall(r"`([^`]+)`", row)]
     assert {GRAMMAR.parse(word).kind.pattern for word in told} == {
@@ -28,7 +27,7 @@ def test_all_faults_are_told_and_can_be_written_so() -> None:
 
 
 def test_all_words_are_told() -> None:
-    told = set(re.findall(r"`([a-z_]+)`", SECTION))
+    told = set(re.findall(r"`([a-z_]+)`", TEXT))
     assert set(SETTINGS) | set(DETECTOR_SETTINGS) <= told
 
 

@@ -1,4 +1,4 @@
-"""Operators over ROS 2: services and topics for units such as MOCU (docs/ros.md)."""
+"""Operators over ROS 2: services and topics for units such as MOCU (docs/ros-operators.md)."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""What operators may ask for: the services of docs/ros.md, "Operators over ROS"."""
+"""What operators may ask for: the services of docs/ros-operators.md."""
 
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager

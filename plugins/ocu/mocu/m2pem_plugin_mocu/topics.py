@@ -1,4 +1,4 @@
-"""The topics that operators receive: docs/ros.md, "Operators over ROS"."""
+"""The topics that operators receive: docs/ros-operators.md."""
 
 import asyncio
 import logging

@@ -55,7 +55,7 @@ SENT_WITHIN_S = 1.0
 
 
 class OnboardNode:
-    """The m2pem node of a vehicle or payload (docs/ros.md, "Write your own node"). It serves
+    """The m2pem node of a vehicle or payload (docs/ros-nodes.md). It serves
     `command`, `behavior_status`, `vehicle_status` and `execute_behavior` in `namespace`, and for a
     payload `payload_status`.
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.simulator.simulation import Simulation
 
 MOST = 100
-"""Vehicles in one process; 20 are moderate, see docs/ros.md."""
+"""Vehicles in one process; 20 are moderate, see docs/ros-simulation.md."""
 
 
 class SettingOption(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare

@@ -1,4 +1,4 @@
-"""The driver of a vehicle with an m2pem node (docs/ros.md, "Write your own node")."""
+"""The driver of a vehicle with an m2pem node (docs/ros-nodes.md)."""
 
 from m2pem_plugin_ros.drivers.node.driver import NodeDriver
 
