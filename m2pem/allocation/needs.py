@@ -10,13 +10,14 @@ from m2pem.allocation.assignment import MAX_COST_S, RoleOptions
 from m2pem.allocation.candidates import Candidates, Group, Place
 from m2pem.errors import ExpressionError
 from m2pem.fleet.allocation import resources_of
-from m2pem.fleet.facts import unfit, vehicle_of
+from m2pem.fleet.facts import possible_resources, unfit, vehicle_of
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind
 from m2pem.mission.candidate_facts import is_fact
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.literals import describe, shown
 from m2pem.mission.expression.partial import first_false
+from m2pem.mission.losses import Loss
 from m2pem.mission.values import ReadValue, Value
 
 if TYPE_CHECKING:
@@ -53,13 +54,15 @@ class Cost:
 @dataclass(frozen=True, slots=True)
 class Task:
     """The task whose roles are to be filled. `read`: the data store, as seen from it. `used`: what
-    its run has commanded before. `occupied`: what is not free for its run, and why."""
+    its run has commanded before. `occupied`: what is not free for its run, and why. `lost`: what
+    did its work before, and is not chosen for it again, and why."""
 
     behavior: Behavior
     place: Place
     read: ReadValue
     used: Collection[str]
     occupied: Mapping[ResourceId, Occupancy]
+    lost: Mapping[str, Loss] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +134,8 @@ class RoleEvaluator:
             least = most = 0 if role.optional and not resources else max(1, len(resources))
         else:
             excluded = self._exclusions(need, role.kind, task)
+            if task.lost:
+                excluded = {**excluded, **_lost_here(task.lost)}
         costs = self._costs(group, need, task, excluded)
         able = [each for each in resources if each not in excluded]
         totals = costs.total_s.tolist()
@@ -143,6 +148,17 @@ class RoleEvaluator:
             [each for each in able if each in occupied and not occupied[each].withdrawn],
         )
         return ConsideredRole(role, options, resources, excluded, occupied, costs)
+
+    def ever(self, role: Role, task: Task) -> list[ResourceId]:
+        """Return what may ever fill a role by need, as far as the fleet file says.
+
+        Raises:
+            ExpressionError: an expression of the role has a wrong type.
+        """
+        candidates = self.candidates
+        found = possible_resources(candidates.fleet, candidates.graph, task.behavior, role)
+        need = role.need or Need()
+        return [each for each in found if not self._why_not_same(each, need, task)]
 
     # --- who may fill it --------------------------------------------------------------------------
 
@@ -181,15 +197,23 @@ class RoleEvaluator:
         fleet = self.candidates.fleet
         if reason := unfit(fleet, self.candidates.graph, name, kind, resource):
             return reason
-        if need.same:
-            same = task.read(need.same)
-            chosen = same if isinstance(same, list) else [same]
-            if resource not in chosen and vehicle_of(fleet, resource).id not in chosen:
-                return f"it is not {need.same}, which is {shown(same)}"
+        if reason := self._why_not_same(resource, need, task):
+            return reason
         if need.condition is None:
             return ""
         read = self._reader(resource, group, task)
         return "" if need.condition.holds(read) else _false_part(need.condition, read)
+
+    def _why_not_same(self, resource: ResourceId, need: Need, task: Task) -> str:
+        """Return why it is not what an earlier role chose; "": it is, or nothing asks for that."""
+        if not need.same:
+            return ""
+        same = task.read(need.same)
+        chosen = same if isinstance(same, list) else [same]
+        vehicle = vehicle_of(self.candidates.fleet, resource).id
+        if resource in chosen or vehicle in chosen:
+            return ""
+        return f"it is not {need.same}, which is {shown(same)}"
 
     def _reader(self, resource: ResourceId, group: Group, task: Task) -> ReadValue:
         """Return what an expression of a role reads about one candidate."""
@@ -230,6 +254,14 @@ class RoleEvaluator:
         known_s = np.nan_to_num(travel_s, nan=UNKNOWN_TRAVEL_S)
         total_s = np.clip(known_s + battery_s + switching_s - preference_s, -MAX_COST_S, MAX_COST_S)
         return _Costs(group, distance_m, travel_s, battery_s, switching_s, preference_s, total_s)
+
+
+def _lost_here(lost: Mapping[str, Loss]) -> dict[ResourceId, str]:
+    return {
+        ResourceId(each): f"this task has lost it: {loss.code}"
+        + (f" ({loss.reason})" if loss.reason else "")
+        for each, loss in lost.items()
+    }
 
 
 def _preference_s(preference: Expression, read: ReadValue) -> float:

@@ -116,7 +116,8 @@ class TakeEffect:
     """What taking a resource would end now: a behavior of a task ends with error TAKEN_OVER.
 
     `task` is the task's label. `caught_by`: the label of the event that catches the error, where
-    the mission goes on; "": no event catches it, and the run fails.
+    the mission goes on; "": no event catches it, and the run fails. `reassigned`: the error comes
+    only if no other can do the rest of the task.
     """
 
     run: RunId
@@ -124,9 +125,13 @@ class TakeEffect:
     element: str
     task: str
     caught_by: str = ""
+    reassigned: bool = False
 
     def __str__(self) -> str:
         ends = f"{self.run}: {self.task} ends with error TAKEN_OVER"
+        if self.reassigned:
+            ends = f"{self.run}: another does the rest of {self.task}, or it"
+            ends += " ends with error TAKEN_OVER"
         if self.caught_by:
             return f"{ends}; the mission goes on at {self.caught_by}"
         return f"{ends}. TAKEN_OVER is not handled: the mission will fail"

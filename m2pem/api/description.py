@@ -14,6 +14,7 @@ from m2pem.api.choices import choice_sentence
 from m2pem.api.control import StampedRecord
 from m2pem.api.run_view import RunView
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.losses import BATTERY_LOW
 
 VALUE_CHARACTERS = 200
 """A sentence has so many characters of a value at most; the record has all of it."""
@@ -269,6 +270,20 @@ def _behavior_ended(view: RunView, record: r.BehaviorEnded) -> _Sentence:
     return text, Importance.DETAIL if cancelled else Importance.WARNING
 
 
+def _work_reassigned(view: RunView, record: r.WorkReassigned) -> _Sentence:
+    behavior = view.behavior(record.behavior)
+    lost = ", ".join(behavior.resources if behavior is not None else record.excluded)
+    why = f"{record.code}{_in_brackets(record.reason)}"
+    text = f"{view.label(record.element)}: another is to do what {lost} left, {why}"
+    return text, Importance.WARNING
+
+
+def _resource_returned(_: RunView, record: r.ResourceReturned) -> _Sentence:
+    charged = record.code == BATTERY_LOW
+    how = "its battery is charged again" if charged else "it has returned, and is held"
+    return f"{record.resource}: {how}{_in_brackets(record.reason)}", Importance.WARNING
+
+
 def _prompt_opened(view: RunView, record: r.PromptOpened) -> _Sentence:
     return f"{view.label(record.element)} asks: {record.text}", Importance.ATTENTION
 
@@ -389,6 +404,8 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.BehaviorContinued: _behavior_continued,
     r.BehaviorRestarted: _behavior_restarted,
     r.BehaviorEnded: _behavior_ended,
+    r.WorkReassigned: _work_reassigned,
+    r.ResourceReturned: _resource_returned,
     r.PromptOpened: _prompt_opened,
     r.PromptAnswered: _prompt_answered,
     r.PromptWithdrawn: _prompt_withdrawn,
@@ -434,6 +451,8 @@ _KINDS: dict[type, Kind] = {
             r.BehaviorContinued,
             r.BehaviorRestarted,
             r.BehaviorEnded,
+            r.WorkReassigned,
+            r.ResourceReturned,
             r.ServiceRequested,
             r.ServiceEnded,
             r.ServiceWithdrawn,

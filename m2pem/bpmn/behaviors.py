@@ -24,9 +24,17 @@ from m2pem.bpmn.rules.behaviors import (
 )
 from m2pem.bpmn.rules.rule import Rule
 from m2pem.bpmn.xml import BPMN, M2PEM, local
-from m2pem.mission.behavior import Behavior, BehaviorType, Parameter, Role, RoleKind, ServiceCall
+from m2pem.mission.behavior import (
+    Behavior,
+    BehaviorType,
+    OnLoss,
+    Parameter,
+    Role,
+    RoleKind,
+    ServiceCall,
+)
 
-_LITERAL_ATTRIBUTES = frozenset({"name", "optional", *RoleKind})
+_LITERAL_ATTRIBUTES = frozenset({"name", "optional", "onLoss", *RoleKind})
 
 
 class BehaviorReader:
@@ -93,6 +101,12 @@ class BehaviorReader:
             return None
         # What is needed is of the behavior's own type; a team is made of the vehicles chosen.
         filled = [role if role.resource else replace(role, kind=RoleKind(kind)) for role in roles]
+        if kind == BehaviorType.TEAM:
+            self._refuse_on_loss(
+                filled,
+                "belongs to a behavior of type vehicle or payload",
+                "delete it; the fleet file says what a team does: on_lost_member",
+            )
         return Behavior(BehaviorType(kind), name, line, tuple(parameters), tuple(filled))
 
     def _head_property(self, element: etree._Element, head: dict[str, str]) -> None:
@@ -134,6 +148,9 @@ class BehaviorReader:
                     f"role '{role.name}' of a service says what it needs, or waits",
                     "only behaviors choose resources as they start: name the payload or vehicle",
                 )
+        self._refuse_on_loss(
+            roles, "belongs to a behavior", "delete it: a service that fails ends with its error"
+        )
         name = (_attribute(element, "class") or "").strip()
         line = self._line(element)
         if not name:
@@ -222,7 +239,34 @@ class BehaviorReader:
             if need is None:
                 return []
         optional = self._optional(line, name, texts["optional"])
-        return [Role(name, kind, resource.strip(), line, optional, need)] if name else []
+        on_loss = self._on_loss(line, name, texts["onLoss"], by_need=by_need)
+        return [Role(name, kind, resource.strip(), line, optional, need, on_loss)] if name else []
+
+    def _on_loss(self, line: int, role: str, text: str | None, *, by_need: bool) -> OnLoss:
+        if text is None:
+            return OnLoss.FAIL
+        if text not in list(OnLoss):
+            self._error(
+                line,
+                ROLE_NEED,
+                f"role '{role}': onLoss='{text}' is none of {', '.join(OnLoss)}",
+                "write onLoss='reassign' to have another do the rest, or delete it",
+            )
+            return OnLoss.FAIL
+        if text == OnLoss.REASSIGN and not by_need:
+            self._error(
+                line,
+                ROLE_NEED,
+                f"role '{role}': onLoss='{text}' belongs to a role that says what it needs",
+                "write requires= in place of the name, so that there is another, or delete onLoss",
+            )
+        return OnLoss(text)
+
+    def _refuse_on_loss(self, roles: Iterable[Role], why: str, remedy: str) -> None:
+        for role in roles:
+            if role.on_loss is not OnLoss.FAIL:
+                text = f"role '{role.name}': onLoss='{role.on_loss.value}' {why}"
+                self._error(role.line, ROLE_NEED, text, remedy)
 
     def _optional(self, line: int, role: str, text: str | None) -> bool:
         if text not in (None, "true", "false", "1", "0"):

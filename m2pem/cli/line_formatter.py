@@ -26,6 +26,8 @@ SHOWN = frozenset(
         r.ResourcesAllocated,
         r.BehaviorRequested,
         r.BehaviorEnded,
+        r.WorkReassigned,
+        r.ResourceReturned,
         r.BehaviorUnsettled,
         r.BehaviorContinued,
         r.BehaviorRestarted,

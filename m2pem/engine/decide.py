@@ -21,6 +21,7 @@ from m2pem.engine.elements.behaviors import (
     control_taken,
     recovery_answered,
     resource_fault,
+    resource_returned,
 )
 from m2pem.engine.elements.subprocesses import begin
 from m2pem.engine.lifecycle import Admission, admission
@@ -251,6 +252,7 @@ def _remember_id(x: Steps, number: str) -> None:
 
 
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
+    i.ResourceReturned: resource_returned,
     i.ControlTaken: control_taken,
     i.ControlReturned: control_returned,
     i.StartRun: _start,

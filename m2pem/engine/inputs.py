@@ -179,6 +179,15 @@ class ResourceFault(_Input, frozen=True):
     reachable: bool = True
 
 
+class ResourceReturned(_Input, frozen=True):
+    """A resource that was lost has returned and is held (LINK_LOST), or its battery is charged
+    again (BATTERY_LOW). `code`: the loss that is over."""
+
+    resource: str
+    code: str
+    reason: str = ""
+
+
 class ControlTaken(_Input, frozen=True):
     """An operator has acquired control of a vehicle or payload; `by` keeps it until
     `ControlReturned`."""
@@ -221,6 +230,7 @@ Input: TypeAlias = Union[
     SignalReceived,
     MessageReceived,
     ResourceFault,
+    ResourceReturned,
     ControlTaken,
     ControlReturned,
     GeometrySet,

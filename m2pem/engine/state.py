@@ -18,6 +18,7 @@ from m2pem.mission.elements import (
     FlowNode,
     SequenceFlow,
 )
+from m2pem.mission.losses import Loss
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 
@@ -143,6 +144,19 @@ class Join:
 
 
 @dataclass(slots=True, eq=False)
+class LostWork:
+    """What a task has lost whose work goes on with other resources.
+
+    `behavior`, `loss`: the last one that was lost. `resources`: what the task does not get again,
+    until it has returned.
+    """
+
+    behavior: str
+    loss: Loss
+    resources: dict[str, Loss] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
 class Token:
     """A token on a flow node. `flow`: how it came. A move makes a new object with the same id.
 
@@ -174,6 +188,8 @@ class Token:
     ended_early: bool = False
     """Its activity was ended early (terminated, or interrupted by an event subprocess), so that
     there is nothing to compensate."""
+    lost_work: LostWork | None = None
+    """What was lost that did the work of its activity before; None: nothing was."""
 
     @property
     def is_reopened(self) -> bool:
@@ -325,6 +341,9 @@ class RunState:
     """Every resource that a behavior of the run has had."""
     taken: dict[str, str] = field(default_factory=dict)
     """Resources that operators have taken, and who has each."""
+    lost: dict[str, str] = field(default_factory=dict)
+    """Resources that ended as LOST, and the behavior that they may still do: until they have
+    returned, or do something else for the run."""
     prompts: dict[str, Prompt] = field(default_factory=dict)
     services: dict[str, Service] = field(default_factory=dict)
 

@@ -19,7 +19,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.control import Alert, RunId
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
-from m2pem.engine.elements.allocations import UNAVAILABLE, behavior_of
+from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.inputs import ResourcesChosen, ResourcesNotFree
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus
 from m2pem.errors import ExpressionError
@@ -31,6 +31,7 @@ from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.losses import UNAVAILABLE, may_return
 
 LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
@@ -52,6 +53,7 @@ class _Considered:
 
     asked: _Asked
     request: AllocationRequest
+    task: Task
     roles: tuple[ConsideredRole, ...]
 
     @property
@@ -162,7 +164,10 @@ class Allocator:
     def _decide(self) -> None:
         self._scheduled = False
         self._looked_us = self._clock.now_us()
-        waiting = self._consider()
+        evaluator = RoleEvaluator(
+            Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
+        )
+        waiting = self._consider(evaluator)
         waiting.sort(key=lambda each: (-each.priority, each.request.at_us, each.request.id))
         requests = [
             Request(each.request.id, tuple(role.options for role in each.roles)) for each in waiting
@@ -180,33 +185,33 @@ class Allocator:
             if number in chosen:
                 self._give(each, chosen[number], [other for other in served if other != number])
             else:
-                self._refuse(each, given)
+                self._refuse(each, given, evaluator)
         self._tell_of_circles([each for each in waiting if each.request.id not in chosen])
 
-    def _consider(self) -> list[_Considered]:
+    def _consider(self, evaluator: RoleEvaluator) -> list[_Considered]:
         found: list[_Considered] = []
-        snapshot = Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
-        evaluator, occupied = RoleEvaluator(snapshot), self._occupied()
+        occupied = self._occupied()
         for allocation, asked in self._asked.items():
             state = asked.runner.run.state
             request = state.allocations.get(allocation)
             if asked.chosen or request is None or state.status is not RunStatus.RUNNING:
                 continue
+            task = self._task(evaluator, asked.runner, request, occupied)
             try:
-                roles = self._roles(evaluator, asked.runner, request, occupied)
+                roles = tuple(evaluator.role(role, task) for role in task.behavior.roles)
             except ExpressionError as error:
                 asked.runner.post(ResourcesNotFree(allocation, str(error), code="EXPRESSION"))
                 continue
-            found.append(_Considered(asked, request, roles))
+            found.append(_Considered(asked, request, task, roles))
         return found
 
-    def _roles(
+    def _task(
         self,
         evaluator: RoleEvaluator,
         runner: Runner,
         request: AllocationRequest,
         occupied: Mapping[ResourceId, Occupancy],
-    ) -> tuple[ConsideredRole, ...]:
+    ) -> Task:
         behavior, state = behavior_of(request), runner.run.state
         ending = {
             each.id for each in state.behaviors.values() if each.phase is BehaviorPhase.CANCELLING
@@ -215,14 +220,15 @@ class Allocator:
             occupied = {
                 each: found for each, found in occupied.items() if found.holder not in ending
             }
-        task = Task(
+        lost = request.token.lost_work
+        return Task(
             behavior,
             self._place(evaluator.candidates, runner.id, behavior, request),
             reader(request.token),
             state.commanded,
             occupied,
+            {} if lost is None else lost.resources,
         )
-        return tuple(evaluator.role(role, task) for role in behavior.roles)
 
     def _occupied(self) -> dict[ResourceId, Occupancy]:
         """Return what is not free, and why; also what behaviors have been given that wait for
@@ -290,7 +296,9 @@ class Allocator:
             )
         )
 
-    def _refuse(self, each: _Considered, given: Mapping[ResourceId, str]) -> None:
+    def _refuse(
+        self, each: _Considered, given: Mapping[ResourceId, str], evaluator: RoleEvaluator
+    ) -> None:
         holders = {
             str(resource): holder
             for role in each.roles
@@ -299,10 +307,11 @@ class Allocator:
         }
         why = reason(each.roles, given)
         lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])
-        if each.waits and each.asked.lacks == lacks:
+        waits = each.waits and not _is_hopeless(each, evaluator)
+        if waits and each.asked.lacks == lacks:
             return
         each.asked.lacks = lacks
-        code = "" if each.waits else UNAVAILABLE
+        code = "" if waits else UNAVAILABLE
         each.asked.runner.post(ResourcesNotFree(each.request.id, why, holders, code))
 
     # --- circles of waiting -----------------------------------------------------------------------
@@ -375,6 +384,23 @@ def _circle_text(waiting: Sequence[_Considered]) -> str:
         f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
         f"{runs[-1]}`), or take what it has and give it back"
     )
+
+
+def _is_hopeless(each: _Considered, evaluator: RoleEvaluator) -> bool:
+    """Whether what is left of a lost behavior will be done by no other, however long it waits."""
+    lost = each.task.lost
+    if each.request.token.lost_work is None:
+        return False
+    for considered in each.roles:
+        role = considered.role
+        if role.resource:
+            continue
+        same = role.need is not None and role.need.same
+        gone = {name for name, loss in lost.items() if same or not may_return(loss.code)}
+        able = [e for e in evaluator.ever(role, each.task) if e not in gone]
+        if len(able) < considered.options.least:
+            return True
+    return False
 
 
 def _withdrawn(role: ConsideredRole) -> frozenset[ResourceId]:

@@ -65,10 +65,11 @@ class Handover:
                 behavior.element,
                 state.mission.elements[behavior.element].label,
                 catcher.label if catcher is not None else "",
+                reassigned,
             )
             for runner in runners
             if not runner.done.is_set() and (state := runner.run.state)
-            for behavior, catcher in preview_control_taken(state, resource)
+            for behavior, catcher, reassigned in preview_control_taken(state, resource)
         ]
 
     async def give_back(self, name: str, by: str, runners: Iterable[Runner]) -> None:

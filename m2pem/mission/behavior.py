@@ -22,6 +22,14 @@ class RoleKind(StrEnum):
     TEAM = "team"
 
 
+class OnLoss(StrEnum):
+    """What becomes of the rest of a behavior whose vehicle or payload is lost: its task ends with
+    the error, or another one that fills the role does the rest."""
+
+    FAIL = "fail"
+    REASSIGN = "reassign"
+
+
 @dataclass(frozen=True, slots=True)
 class Need:
     """What a role asks of the resources that fill it; they are chosen when its task starts.
@@ -55,7 +63,8 @@ class Role:
     """One role of a behavior and what fills it.
 
     `resource` is the id in the fleet: a vehicle ("evsg1"), a payload ("evsg2/ptz") or a team; ""
-    for a role by need. `need` None: the resource is allocated at once or not at all.
+    for a role by need. `need` None: the resource is allocated at once or not at all. `on_loss`:
+    what is done when what fills it is lost.
     """
 
     name: str
@@ -64,6 +73,7 @@ class Role:
     line: int
     optional: bool = False
     need: Need | None = None
+    on_loss: OnLoss = OnLoss.FAIL
 
 
 @dataclass(frozen=True, slots=True)

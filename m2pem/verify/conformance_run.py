@@ -19,7 +19,6 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import definition_of
 from m2pem.engine.data import reader
-from m2pem.engine.elements.allocations import UNAVAILABLE
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
 from m2pem.engine.steps import Steps
@@ -27,6 +26,7 @@ from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.expression import Expression
+from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import ReadValue, Value
 from m2pem.verify.net import choices

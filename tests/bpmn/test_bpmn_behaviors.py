@@ -5,7 +5,15 @@ from collections.abc import Callable
 import pytest
 from bpmn_text import around, load, summary
 
-from m2pem.mission.behavior import Assignment, Behavior, BehaviorType, Role, RoleKind, ThrowError
+from m2pem.mission.behavior import (
+    Assignment,
+    Behavior,
+    BehaviorType,
+    OnLoss,
+    Role,
+    RoleKind,
+    ThrowError,
+)
 from m2pem.mission.elements import ScriptTask
 from m2pem.mission.expression import Expression
 
@@ -165,6 +173,8 @@ ROLES = {
     "count backwards": ('<role name="d" requires="true" count="3..1"/>', "role-need"),
     "wait without a unit": ('<role name="d" requires="true" wait="10"/>', "role-need"),
     "priority in words": ('<role name="d" requires="true" priority="high"/>', "role-need"),
+    "loss of a named one": ('<role name="d" vehicle="v" onLoss="reassign"/>', "role-need"),
+    "loss in words": ('<role name="d" requires="true" onLoss="retry"/>', "role-need"),
     "data without a name": ('<role name="d" requires="true" store="a b"/>', "role-need"),
     "need of what was chosen, no name": ('<role name="d" same="a+b"/>', "role-need"),
     "optional that is no truth": ('<role name="d" vehicle="v" optional="y"/>', "bad-value"),
@@ -262,3 +272,17 @@ def test_a_service_names_its_resources() -> None:
         )
     )
     assert [rule for rule, *_ in found] == ["role-need"]
+
+
+def test_what_is_done_when_a_vehicle_is_lost_is_read() -> None:
+    roles = '<role name="a" requires="true" onLoss="reassign"/><role name="b" vehicle="v"/>'
+    behavior = load(
+        as_child(f'<behavior type="vehicle" name="goto"><resources>{roles}</resources></behavior>')
+    ).elements["T"].behavior  # type: ignore[attr-defined]
+    assert [role.on_loss for role in behavior.roles] == [OnLoss.REASSIGN, OnLoss.FAIL]
+
+
+def test_the_fleet_file_says_what_a_team_does_when_a_member_is_lost() -> None:
+    role = '<role name="crew" requires="true" count="2" onLoss="reassign"/>'
+    text = f'<behavior type="team" name="area_survey"><resources>\n{role}</resources></behavior>'
+    assert summary(as_child(text)) == [("role-need", 4, "T")]

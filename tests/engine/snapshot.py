@@ -12,6 +12,7 @@ from m2pem.engine.state import (
     Join,
     KeptMessage,
     Loop,
+    LostWork,
     Prompt,
     RunState,
     Scope,
@@ -20,6 +21,7 @@ from m2pem.engine.state import (
     Wait,
 )
 from m2pem.mission.elements import Element
+from m2pem.mission.losses import Loss
 from m2pem.mission.mission import Mission
 
 _OBJECTS = (
@@ -63,7 +65,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, (KeptMessage, Loop, DataStores)):
+    if isinstance(value, (KeptMessage, Loop, Loss, LostWork, DataStores)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)

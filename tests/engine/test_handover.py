@@ -119,7 +119,7 @@ def test_the_preview_of_taking_a_vehicle_says_what_taking_it_then_does(
     text: str, catcher: str
 ) -> None:
     play = Play(text).start()
-    [(behavior, caught_by)] = preview_control_taken(play.run.state, "evsg1")
+    [(behavior, caught_by, _)] = preview_control_taken(play.run.state, "evsg1")
     assert (behavior.id, caught_by.id if caught_by else "") == ("r1.b1", catcher)
     play.give(ControlTaken("evsg1", "anna"))
     thrown = [each for each in play.steps[-1].records if isinstance(each, ErrorThrown)]

@@ -9,7 +9,7 @@ from m2pem.allocation.candidates import Candidates, Place
 from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
 from m2pem.engine import inputs as i
 from m2pem.engine.data import reader
-from m2pem.engine.elements.allocations import UNAVAILABLE, behavior_of
+from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunState
 from m2pem.fleet.allocation import resources_of
@@ -18,6 +18,7 @@ from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.losses import UNAVAILABLE
 
 
 def offers_all(resource: ResourceId) -> Sequence[BehaviorSpec]:

@@ -55,6 +55,8 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.BehaviorContinued: tasks.behavior_continued,
     r.BehaviorRestarted: tasks.behavior_restarted,
     r.BehaviorEnded: tasks.behavior_ended,
+    r.WorkReassigned: tasks.work_reassigned,
+    r.ResourceReturned: tasks.resource_returned,
     r.PromptOpened: tasks.prompt_opened,
     r.PromptAnswered: tasks.prompt_ended,
     r.PromptWithdrawn: tasks.prompt_ended,

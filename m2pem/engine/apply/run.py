@@ -1,10 +1,12 @@
 """What records about the run as a whole do to the state."""
 
 from m2pem.engine import records as r
+from m2pem.engine.apply.tasks import end_loss
 from m2pem.engine.state import (
     RunState,
     RunStatus,
 )
+from m2pem.mission.losses import TAKEN_OVER
 
 
 def run_started(state: RunState, record: r.RunStarted) -> None:
@@ -62,6 +64,7 @@ def control_taken(state: RunState, record: r.OperatorTookControl) -> None:
 
 def control_returned(state: RunState, record: r.OperatorGaveControlBack) -> None:
     del state.taken[record.resource]
+    end_loss(state, record.resource, TAKEN_OVER)
 
 
 def geometry_received(state: RunState, record: r.GeometryReceived) -> None:

@@ -6,10 +6,13 @@ from m2pem.engine.state import (
     AllocationRequest,
     Behavior,
     BehaviorPhase,
+    LostWork,
     Prompt,
     RunState,
     Service,
 )
+from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.losses import LINK_LOST, Loss
 
 
 def allocation_requested(state: RunState, record: r.AllocationRequested) -> None:
@@ -53,6 +56,7 @@ def behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
     for resource in record.resources:
         state.held.setdefault(resource, []).append(record.behavior)
         state.commanded[resource] = None
+        state.lost.pop(resource, None)
     state.tokens[record.token].behavior = record.behavior
 
 
@@ -97,7 +101,31 @@ def behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
         holders.remove(behavior.id)
         if not holders:
             del state.held[resource]
+    is_out_of_reach = record.state is BehaviorState.LOST and record.code == LINK_LOST
+    if is_out_of_reach and len(behavior.resources) == 1:
+        state.lost[behavior.resources[0]] = behavior.id
     _forget_behavior(state, behavior)
+
+
+def work_reassigned(state: RunState, record: r.WorkReassigned) -> None:
+    token, loss = state.tokens[record.token], Loss(record.code, record.reason)
+    before = token.lost_work.resources if token.lost_work is not None else {}
+    lost = dict.fromkeys(record.excluded, loss)
+    token.lost_work = LostWork(record.behavior, loss, {**before, **lost})
+
+
+def resource_returned(state: RunState, record: r.ResourceReturned) -> None:
+    if record.code == LINK_LOST:
+        state.lost.pop(record.resource, None)
+    end_loss(state, record.resource, record.code)
+
+
+def end_loss(state: RunState, resource: str, code: str) -> None:
+    """Let tasks that lost a resource have it again, if that is why they lost it."""
+    for token in state.tokens.values():
+        lost = token.lost_work.resources if token.lost_work is not None else {}
+        if resource in lost and lost[resource].code == code:
+            del lost[resource]
 
 
 def _forget_behavior(state: RunState, behavior: Behavior) -> None:

@@ -16,10 +16,8 @@ from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.behavior import Behavior, Role
 from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
+from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
-
-UNAVAILABLE = "RESOURCE_UNAVAILABLE"
-"""The error of a task whose resources are not free."""
 
 
 def request_allocation(
@@ -164,5 +162,9 @@ def allocation_timed_out(x: Execution, token: Token) -> None:
 
 
 def _fail(x: Execution, request: AllocationRequest, code: str, reason: str) -> None:
+    lost = request.token.lost_work
+    if lost is not None and code == UNAVAILABLE:
+        code = lost.loss.code
+        reason = f"{lost.loss.reason}; no other does what is left: {reason}"
     x.emit(r.AllocationEnded(request.id, code, reason))
     throw_error(x, request.token, code, reason)

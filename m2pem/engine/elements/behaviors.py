@@ -9,18 +9,20 @@ mission can wait or go on another way, as its author drew it. Until the operator
 a behavior for the vehicle is refused.
 """
 
+from dataclasses import replace
+
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import await_event
 from m2pem.engine.data import reader
 from m2pem.engine.elements.activities import complete
 from m2pem.engine.elements.allocations import (
-    UNAVAILABLE,
     allocation_timed_out,
     emit_behavior,
     refusal_of,
     request_allocation,
 )
+from m2pem.engine.elements.losses import end_work, is_reassigned
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.engine.scopes import end_run
@@ -33,6 +35,7 @@ from m2pem.mission.behavior import Behavior as BehaviorOfTask
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.elements import Event
 from m2pem.mission.expression import Expression
+from m2pem.mission.losses import BATTERY_LOW, TAKEN_OVER, UNAVAILABLE
 from m2pem.mission.timers import duration_us
 from m2pem.mission.values import Value
 from m2pem.units import Dimension, UnitError, quantity
@@ -154,6 +157,8 @@ def behavior_reported(x: Execution, item: i.BehaviorReported) -> None:
             )
         )
         return
+    if item.remaining is not None:
+        behavior = replace(behavior, remaining=item.remaining)
     _ended(x, behavior, item.state, item.code, item.reason, item.outputs)
 
 
@@ -192,7 +197,8 @@ def _ended(
     if state is BehaviorState.SUCCEEDED:
         complete(x, token)
     else:
-        throw_error(x, token, code, reason or f"{behavior.name} ended {state.value}")
+        reason = reason or f"{behavior.name} ended {state.value}"
+        end_work(x, token, behavior, code, reason, behavior.resources, state)
 
 
 def behavior_missing(x: Execution, item: i.BehaviorMissing) -> None:
@@ -250,7 +256,6 @@ def recovery_answered(x: Execution, behavior: Behavior, answer: i.PromptAnswer) 
         end_run(x, RunOutcome.STOPPED, f"aborted by {answer.by}")
 
 
-BATTERY_LOW = "BATTERY_LOW"
 BRINGS_DOWN = frozenset({"return_to_launch", "land"})
 """What a vehicle with a low battery is to do, as far as it can."""
 
@@ -269,7 +274,7 @@ def resource_fault(x: Execution, item: i.ResourceFault) -> None:
         elif item.code == BATTERY_LOW and _goes_on_to_come_down(x, behavior):
             x.ignore(f"{item.code} of {item.resource}, which {behavior.name} brings down")
         elif behavior.phase is not BehaviorPhase.CANCELLING:
-            fail_behavior(x, behavior, item.code, item.reason)
+            fail_behavior(x, behavior, item.code, item.reason, item.resource)
         else:
             continue  # it ends by its report, or when it has not answered its cancel in time
         ended = True
@@ -282,16 +287,26 @@ def _goes_on_to_come_down(x: Execution, behavior: Behavior) -> bool:
     return behavior.name in BRINGS_DOWN and catcher is None
 
 
-def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str) -> None:
-    """Cancel a behavior, so that its reachable resources stop, and throw its error."""
+def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str, resource: str) -> None:
+    """Cancel a behavior, so that its reachable resources stop, and throw its error, or have
+    another do the rest. `resource`: the one that cannot go on."""
     token = x.state.tokens[behavior.token]
     if token.prompt:
         x.emit(r.PromptWithdrawn(token.prompt))
     x.emit(r.BehaviorCancelRequested(behavior.id, code, reason))
-    throw_error(x, token, code, reason)
+    end_work(x, token, behavior, code, reason, (resource,))
 
 
-CODE = "TAKEN_OVER"
+def resource_returned(x: Execution, item: i.ResourceReturned) -> None:
+    """Let tasks that lost a resource have it again."""
+    was_lost = item.resource in x.state.lost or any(
+        token.lost_work is not None and item.resource in token.lost_work.resources
+        for token in x.state.tokens.values()
+    )
+    if was_lost:
+        x.emit(r.ResourceReturned(item.resource, item.code, item.reason))
+    else:
+        x.ignore(f"{item.resource} was not lost for this run")
 
 
 def control_taken(x: Execution, item: i.ControlTaken) -> None:
@@ -302,17 +317,24 @@ def control_taken(x: Execution, item: i.ControlTaken) -> None:
     x.emit(r.OperatorTookControl(item.resource, item.by))
     for behavior in _commanding(x.state, item.resource):
         if behavior.phase is not BehaviorPhase.CANCELLING:  # then it is ending already
-            fail_behavior(x, behavior, CODE, f"{item.resource} was taken by {item.by}")
+            reason = f"{item.resource} was taken by {item.by}"
+            fail_behavior(x, behavior, TAKEN_OVER, reason, item.resource)
 
 
-def preview_control_taken(state: RunState, resource: str) -> list[tuple[Behavior, Event | None]]:
+def preview_control_taken(
+    state: RunState, resource: str
+) -> list[tuple[Behavior, Event | None, bool]]:
     """Return the behaviors that `control_taken` would end, each with the event that catches its
-    error.
+    error, and whether another resource is looked for first to do the rest.
 
     None instead of an event: none catches it, so the run would fail.
     """
     return [
-        (behavior, catcher_of_error(state.tokens[behavior.token], CODE))
+        (
+            behavior,
+            catcher_of_error(state.tokens[behavior.token], TAKEN_OVER),
+            is_reassigned(state.tokens[behavior.token], behavior, TAKEN_OVER, (resource,)),
+        )
         for behavior in _commanding(state, resource)
     ]
 

@@ -57,10 +57,12 @@ from m2pem.engine.records.tasks import (
     PromptAnswered,
     PromptOpened,
     PromptWithdrawn,
+    ResourceReturned,
     ResourcesAllocated,
     ServiceEnded,
     ServiceRequested,
     ServiceWithdrawn,
+    WorkReassigned,
 )
 from m2pem.engine.records.tokens import (
     ActivitiesChosen,
@@ -114,6 +116,7 @@ __all__ = [
     "PromptOpened",
     "PromptWithdrawn",
     "Record",
+    "ResourceReturned",
     "ResourcesAllocated",
     "RunClaimed",
     "RunEnded",
@@ -137,6 +140,7 @@ __all__ = [
     "TokensGathered",
     "TransactionCancelled",
     "Trigger",
+    "WorkReassigned",
 ]
 
 Record: TypeAlias = Union[
@@ -175,6 +179,8 @@ Record: TypeAlias = Union[
     BehaviorContinued,
     BehaviorRestarted,
     BehaviorEnded,
+    WorkReassigned,
+    ResourceReturned,
     PromptOpened,
     PromptAnswered,
     PromptWithdrawn,

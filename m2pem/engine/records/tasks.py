@@ -136,6 +136,34 @@ class BehaviorEnded(BaseRecord, frozen=True):
     reason: str = ""
 
 
+class WorkReassigned(BaseRecord, frozen=True):
+    """The resources of a behavior are lost, and others are to do what is left; the next request of
+    the token is for them.
+
+    `code`, `reason`: why; the error of the task, if no other can do it. `parameters`: of what is
+    left. `excluded`: resources that the task does not get again until they have returned.
+    """
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    behavior: str
+    code: str
+    reason: str
+    parameters: dict[str, Value]
+    excluded: tuple[str, ...]
+
+
+class ResourceReturned(BaseRecord, frozen=True):
+    """A lost resource has returned and is held, or its battery is charged again: tasks that lost it
+    may get it. `code`: the loss that is over."""
+
+    resource: str
+    code: str
+    reason: str = ""
+
+
 class PromptOpened(BaseRecord, frozen=True):
     """A prompt is open. `behavior`: the behavior that a recovery prompt is about."""
 

@@ -15,11 +15,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from m2pem.engine.elements.allocations import UNAVAILABLE
 from m2pem.fleet.facts import vehicle_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.behavior import Behavior
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
 from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step, Trigger

@@ -28,6 +28,8 @@ LOGGED = frozenset(
         r.BehaviorRequested,
         r.BehaviorUnsettled,
         r.BehaviorEnded,
+        r.WorkReassigned,
+        r.ResourceReturned,
         r.PromptOpened,
         r.PromptAnswered,
         r.PromptWithdrawn,

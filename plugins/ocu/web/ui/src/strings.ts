@@ -276,6 +276,10 @@ export const strings = {
           hint: "For example PT10M, or unlimited. Else the task does not wait.",
         },
         priority: { label: "Priority", hint: "The greatest number is served first. Else 0." },
+        onLoss: {
+          label: "When it is lost",
+          hint: "reassign: another one does the rest. Else the task fails.",
+        },
       },
     },
     service: {

@@ -11,8 +11,18 @@ export type ResourceKind = "vehicle" | "payload" | "team";
 
 export const RESOURCE_KINDS: readonly ResourceKind[] = ["vehicle", "payload", "team"];
 
-/** What says what a role needs, and how long its task waits (docs/allocation.md). */
-export const NEEDS = ["requires", "same", "count", "prefer", "store", "wait", "priority"] as const;
+/** What says what a role needs, how long its task waits, and what is done when it is lost
+ * (docs/allocation.md). */
+export const NEEDS = [
+  "requires",
+  "same",
+  "count",
+  "prefer",
+  "store",
+  "wait",
+  "priority",
+  "onLoss",
+] as const;
 
 /** Those that a role which names its resource may have, too. */
 export const WAITS: readonly NeedName[] = ["wait", "priority"];

@@ -68,7 +68,7 @@ describe("behaviors", () => {
 
   it("keeps and writes what a role needs", async () => {
     const role = `<m2pem:role name="surveyor" requires="vehicle.battery &gt; 0.4" count="1..3"
-      store="s" wait="PT10M"/>`;
+      store="s" wait="PT10M" onLoss="reassign"/>`;
     const { definitions, element } = await read(
       task(`<m2pem:behavior type="vehicle" name="goto"><m2pem:resources>${role}</m2pem:resources>
         </m2pem:behavior>`),
@@ -81,7 +81,7 @@ describe("behaviors", () => {
     apply(setBehavior(factory, element, { ...use, roles: [{ ...read_!, need }] }));
     expect(await written(definitions)).toContain(
       '<m2pem:role name="surveyor" requires="vehicle.battery &#62; 0.4" count="2" store="s"' +
-        ' wait="PT10M" priority="1" />',
+        ' wait="PT10M" priority="1" onLoss="reassign" />',
     );
     const named = { ...read_!, resource: "uav1", need: { wait: "PT1M" } };
     apply(setBehavior(factory, element, { ...use, roles: [named] }));
