@@ -356,6 +356,12 @@ class MissionControl(Protocol):
         """
         ...
 
+    async def unavailable(self) -> Mapping[ResourceId, str]:
+        """Why missions get some resources not now: manned, with an operator, lost, or returned and
+        not stopped yet. "returned: held": it was lost, is free again, and has done nothing since.
+        """
+        ...
+
     async def waiting(self) -> Sequence[WaitingTask]:
         """The tasks of all runs that wait for vehicles or payloads, in the order of service."""
         ...

@@ -216,6 +216,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("holders", Nothing, dict[ResourceId, str]),
         Operation("missions", Nothing, list[str], alone=True),
         Operation("preview_start", Check, StartPreview, alone=True),
+        Operation("unavailable", Nothing, dict[ResourceId, str]),
         Operation("waiting", Nothing, list[WaitingTask]),
         Operation("runs", Nothing, list[RunSummary]),
         Operation("prompts", Nothing, list[OpenPrompt]),

@@ -256,6 +256,15 @@ class Behavior:
     remaining: dict[str, Value] | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class OutOfReach:
+    """A behavior that ended as LOST, and that its resource may still do. `native_ref`: the
+    arbiter's own reference to it."""
+
+    behavior: str
+    native_ref: str | None
+
+
 @dataclass(slots=True, eq=False)
 class AllocationRequest:
     """A task that waits for resources to be chosen. Fields as in record `AllocationRequested`.
@@ -341,9 +350,9 @@ class RunState:
     """Every resource that a behavior of the run has had."""
     taken: dict[str, str] = field(default_factory=dict)
     """Resources that operators have taken, and who has each."""
-    lost: dict[str, str] = field(default_factory=dict)
-    """Resources that ended as LOST, and the behavior that they may still do: until they have
-    returned, or do something else for the run."""
+    lost: dict[str, OutOfReach] = field(default_factory=dict)
+    """Resources that ended as LOST, and what they may still do: until they have returned, or do
+    something else for the run."""
     prompts: dict[str, Prompt] = field(default_factory=dict)
     services: dict[str, Service] = field(default_factory=dict)
 

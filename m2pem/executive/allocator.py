@@ -37,6 +37,10 @@ LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
 
 
+_MAY_FREE = (r.RunResumed, r.ResourceReturned, r.OperatorGaveControlBack)
+"""Records after which a task of the run may get what it could not get before."""
+
+
 @dataclass(slots=True)
 class _Asked:
     """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what
@@ -123,7 +127,7 @@ class Allocator:
             if isinstance(record, r.BehaviorRequested) and record.allocation:
                 if self._asked.pop(record.allocation, None) is not None:
                     self._availability.hand_on(record.allocation, record.behavior)
-            elif isinstance(record, r.RunResumed):
+            elif isinstance(record, _MAY_FREE):
                 self._decide_soon()
 
     def let_go(self, run: RunId) -> None:

@@ -250,6 +250,10 @@ class Control:
         """Who has each resource."""
         return self._supervisor.handover.holders()
 
+    async def unavailable(self) -> Mapping[ResourceId, str]:
+        """Why missions get some resources not now, by resource; see `MissionControl`."""
+        return self._supervisor.unavailable()
+
     async def waiting(self) -> Sequence[WaitingTask]:
         """The tasks of all runs that wait for vehicles or payloads."""
         supervisor = self._supervisor

@@ -4,21 +4,23 @@ Such a vehicle may still drive.
 
 What it did when its link was lost has ended for its mission (LINK_LOST). The vehicle does not know
 that, and goes on with it. So m2pem commands it to stop, at once and until it has acknowledged;
-operators see why it is not ready meanwhile.
+operators see why it is not ready meanwhile, and afterwards that it is held.
+
+After a restart of the executive, the journals of resumed runs say which vehicles were lost before.
 """
 
 import asyncio
 import logging
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from m2pem.api.arbiter import BehaviorId, reclaims
+from m2pem.api.arbiter import Arbiter, BehaviorId, reclaims
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
 from m2pem.fleet.allocation import Availability
-from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 log = logging.getLogger("m2pem.executive")
 
@@ -32,11 +34,25 @@ SAY_EVERY = 10
 """A reason that stays the same is logged the first time, and then each time of so many."""
 
 
+RETURNED = "returned: held"
+"""How a resource is shown that has returned and stopped, until it is commanded again."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Lost:
+    """What a lost resource may still do; None: nothing is known of it. `is_earlier`: it was lost
+    before this executive began, whose arbiters do not know that; `native_ref` as in reports."""
+
+    behavior: BehaviorId | None
+    is_earlier: bool = False
+    native_ref: str | None = None
+
+
 class LostResources:
     """The resources whose link was lost, until they are free again.
 
     `epoch_of`: with which epoch the run of a behavior is driven here. `show`: to operators, how a
-    resource is.
+    resource is. `returned`: is called when a resource has returned and stopped.
     """
 
     def __init__(
@@ -47,6 +63,7 @@ class LostResources:
         clock: Clock,
         epoch_of: Callable[[BehaviorId], int],
         show: Callable[[VehicleState | PayloadState], None],
+        returned: Callable[[ResourceId, str], None],
     ) -> None:
         self._arbiters = arbiters
         self._availability = availability
@@ -54,7 +71,9 @@ class LostResources:
         self._clock = clock
         self._epoch_of = epoch_of
         self._show = show
-        self._lost: dict[ResourceId, BehaviorId | None] = {}
+        self._returned = returned
+        self._held: set[ResourceId] = set()
+        self._lost: dict[ResourceId, _Lost] = {}
         self._stopping: dict[ResourceId, asyncio.Task[None]] = {}
         handover.why_not_free = self._why_not_free
         self._silent: dict[ResourceId, str] = {}
@@ -68,12 +87,39 @@ class LostResources:
             stopping.cancel()
         elif self._availability.reason(resource):
             return  # an operator has it, or it is manned: what it does is theirs
-        holder = self._availability.holder(resource) or self._lost.get(resource)
-        self._lost[resource] = holder
+        holder = self._availability.holder(resource)
+        if holder is not None or resource not in self._lost:
+            self._lost[resource] = _Lost(holder)
+        self._withdraw(resource, reason)
+
+    def lost_before(
+        self, resource: ResourceId, behavior: BehaviorId, native_ref: str | None
+    ) -> None:
+        """A resource was lost before the executive was started again, and may still do what it was
+        commanded: withdraw it until it has returned and stopped."""
+        if resource in self._lost:
+            return
+        self._lost[resource] = _Lost(behavior, is_earlier=True, native_ref=native_ref)
+        self._withdraw(resource, f"the link was lost before a restart, when it did {behavior}")
+
+    def _withdraw(self, resource: ResourceId, reason: str) -> None:
         self._why.pop(resource, None)
+        self._held.discard(resource)
         self._silent[resource] = f"lost: {reason}"
         if resource not in self._handover.taken:
             self._availability.withdraw(resource, self._silent[resource])
+
+    def shown(self, resource: ResourceId) -> str:
+        """Return how a resource is that was lost: why it is not free, or that it is held. "": it
+        was not lost, or does something else by now."""
+        if why := self._why_not_free(resource):
+            return why
+        if resource not in self._held:
+            return ""
+        if resource in self._handover.taken or self._availability.holder(resource) is not None:
+            self._held.discard(resource)
+            return ""
+        return RETURNED
 
     def on_telemetry(self, state: VehicleState | PayloadState) -> None:
         """A resource published its state. If its link was lost, stop it from now on."""
@@ -90,14 +136,18 @@ class LostResources:
         self._stopping[resource] = task
 
     def annotated(self, state: VehicleState | PayloadState) -> VehicleState | PayloadState:
-        """Return the state as operators see it: not ready, and why, until it is free."""
-        why = self._why.get(state.resource)
-        if why is None:
+        """Return the state as operators see it: not ready, and why, until it is free; then that it
+        is held, until it is commanded again."""
+        resource = state.resource
+        if resource not in self._why and resource not in self._held:
             return state
-        self._said[state.resource] = state
-        if not isinstance(state, VehicleState):
+        why = self.shown(resource)
+        if resource in self._why:
+            self._said[resource] = state
+        if not why or not isinstance(state, VehicleState):
             return state
-        return replace(state, ready=False, not_ready_reasons=(why, *state.not_ready_reasons))
+        ready = state.ready if why == RETURNED else False
+        return replace(state, ready=ready, not_ready_reasons=(why, *state.not_ready_reasons))
 
     async def close(self) -> None:
         """Stop nothing more."""
@@ -117,11 +167,14 @@ class LostResources:
                 log.warning("%s: its link is restored, and it is not free yet: %s", resource, why)
             before = why
             await self._clock.sleep(AGAIN_S)
+        ended = self._what(resource)
         del self._lost[resource], self._silent[resource], self._stopping[resource]
         self._why.pop(resource, None)
+        self._held.add(resource)
         self._handover.restore(resource)
+        self._returned(resource, f"it has ended {ended}")
         if (said := self._said.pop(resource, None)) is not None:
-            self._show(said)
+            self._show(self.annotated(said))
         now = self._availability.reason(resource) or "free"
         log.warning(
             "%s: its link is restored, it has ended what it did before, and is %s", resource, now
@@ -132,11 +185,15 @@ class LostResources:
         arbiter = self._arbiters.of(resource)
         try:
             async with asyncio.timeout(ONCE_WITHIN_S):
+                lost = self._lost[resource]
+                if lost.is_earlier and self._availability.holder(resource) is not None:
+                    return ""  # a run that was resumed later has it: it had returned
+                if lost.is_earlier and (why := await self._end_earlier(arbiter, resource, lost)):
+                    return why
                 if reclaims(arbiter):
                     return await arbiter.reclaim(resource)
-                behavior = self._lost[resource]
-                if behavior is not None:
-                    await arbiter.cancel(behavior, self._epoch_of(behavior))
+                if lost.behavior is not None:
+                    await arbiter.cancel(lost.behavior, self._epoch_of(lost.behavior))
                 if resource not in self._handover.taken:
                     await arbiter.hold(resource)
         except TimeoutError:
@@ -144,6 +201,18 @@ class LostResources:
         except Exception as error:  # an arbiter's fault must not make a vehicle free
             log.exception("%s: the arbiter raised", resource)
             return f"it cannot be commanded to stop: {type(error).__name__}: {error}"
+        return ""
+
+    async def _end_earlier(self, arbiter: Arbiter, resource: ResourceId, lost: _Lost) -> str:
+        """End what an earlier executive commanded: the arbiter looks at the resource, which may
+        still do it. Returns "" when it has ended, else why it is not free."""
+        assert lost.behavior is not None
+        report = await arbiter.query(lost.behavior, lost.native_ref)
+        if report.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
+            await arbiter.cancel(lost.behavior, self._epoch_of(lost.behavior))
+            return f"its link is restored, and it still does {lost.behavior}, which is cancelled"
+        if report.state is BehaviorState.UNKNOWN and resource not in self._handover.taken:
+            await arbiter.hold(resource)
         return ""
 
     def _explain(self, resource: ResourceId, why: str) -> None:
@@ -155,4 +224,4 @@ class LostResources:
         return self._why.get(resource) or self._silent.get(resource, "")
 
     def _what(self, resource: ResourceId) -> str:
-        return self._lost[resource] or "what it did before"
+        return self._lost[resource].behavior or "what it did before"

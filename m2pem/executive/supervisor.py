@@ -19,7 +19,7 @@ from m2pem.api.control import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
-from m2pem.engine.records import Record, RunEnded
+from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError
@@ -41,6 +41,7 @@ from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.recovery import replay, take_over
+from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
@@ -53,6 +54,7 @@ from m2pem.journal.base import Journal, RunHeader
 from m2pem.journal.mission import mission_of
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Geometry
+from m2pem.mission.losses import LINK_LOST
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
@@ -152,8 +154,15 @@ class Supervisor:
             events,
             self.runners,
         )
+        self._returns = Returns(self.runners)
         self._lost_resources = LostResources(
-            arbiters, self.availability, self.handover, clock, self.epoch_of, bus.publish
+            arbiters,
+            self.availability,
+            self.handover,
+            clock,
+            self.epoch_of,
+            bus.publish,
+            self._returns.returned,
         )
         self._services = Services(
             plugins.service,
@@ -325,6 +334,9 @@ class Supervisor:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
         await take_over(runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss)
+        self._returns.take_up(runner)
+        for name, was in still_lost(run.state).items():
+            self._lost_resources.lost_before(ResourceId(name), was.behavior, was.native_ref)
         if line.loss is not None:
             await self.losses.ask(runner, line.loss)
         self._drive(runner)
@@ -372,6 +384,12 @@ class Supervisor:
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.losses.on_records(run, records)
         self.allocator.on_records(run, records)
+        self._returns.on_records(run, records)
+        for record in records:
+            if isinstance(record, WorkReassigned) and record.code == LINK_LOST:
+                for resource in map(ResourceId, record.excluded):
+                    if not self.availability.reason(resource):
+                        self._lost(resource, record.reason)  # its arbiter noticed it first
         if self.settings.on_records is not None:
             self.settings.on_records(run, records)
         if self._observers is not None:
@@ -398,6 +416,7 @@ class Supervisor:
         """An arbiter published the state of a vehicle, payload or team."""
         if not isinstance(state, TeamState):
             self._lost_resources.on_telemetry(state)
+            self._returns.on_telemetry(state)
             state = self._lost_resources.annotated(state)
         self._bus.publish(state)
         self.allocator.on_telemetry()
@@ -414,11 +433,21 @@ class Supervisor:
         for runner in self.runners.values():
             if not with_team and fault.resource in runner.run.state.held:
                 runner.post(fault)
+                if not fault.reachable:
+                    self._returns.faulted(fault.resource, runner.id)
 
     def _lost(self, resource: ResourceId, reason: str) -> None:
         self._lost_resources.lost(resource, reason)
         if self._separation:
             self._separation.airspace.lost(resource)
+
+    def unavailable(self) -> dict[ResourceId, str]:
+        """Why missions get some resources not now; also which were lost and are held."""
+        found = {
+            each: self.availability.reason(each) or self._lost_resources.shown(each)
+            for each in self.arbiters.resources
+        }
+        return {each: why for each, why in found.items() if why}
 
     def set_geometry(
         self, name: str, geometry: Mapping[str, Value], run: RunId | None, by: str

@@ -64,13 +64,16 @@ class FakeArbiter:
         code: str = "",
         reason: str = "",
         outputs: Mapping[str, Value] | None = None,
+        remaining: Mapping[str, Value] | None = None,
     ) -> None:
         """Make the arbiter report the state of a behavior, after what `known` says of it."""
         known = self.known.get(behavior)
         before = self._numbers.get(behavior, known.number if known is not None else 0)
         number = self._numbers[behavior] = before + 1
         self._reports.put_nowait(
-            BehaviorReport(behavior, number, state, code, reason, outputs=outputs or {})
+            BehaviorReport(
+                behavior, number, state, code, reason, outputs=outputs or {}, remaining=remaining
+            )
         )
 
     def say(self, state: Telemetry) -> None:

@@ -276,9 +276,15 @@ def test_a_service_names_its_resources() -> None:
 
 def test_what_is_done_when_a_vehicle_is_lost_is_read() -> None:
     roles = '<role name="a" requires="true" onLoss="reassign"/><role name="b" vehicle="v"/>'
-    behavior = load(
-        as_child(f'<behavior type="vehicle" name="goto"><resources>{roles}</resources></behavior>')
-    ).elements["T"].behavior  # type: ignore[attr-defined]
+    behavior = (
+        load(
+            as_child(
+                f'<behavior type="vehicle" name="goto"><resources>{roles}</resources></behavior>'
+            )
+        )
+        .elements["T"]
+        .behavior
+    )  # type: ignore[attr-defined]
     assert [role.on_loss for role in behavior.roles] == [OnLoss.REASSIGN, OnLoss.FAIL]
 
 

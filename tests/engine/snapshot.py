@@ -13,6 +13,7 @@ from m2pem.engine.state import (
     KeptMessage,
     Loop,
     LostWork,
+    OutOfReach,
     Prompt,
     RunState,
     Scope,
@@ -65,7 +66,7 @@ def _plain(value: object) -> object:
         return value.id
     if isinstance(value, _OBJECTS):
         return f"{type(value).__name__} {value.id}"
-    if isinstance(value, (KeptMessage, Loop, Loss, LostWork, DataStores)):
+    if isinstance(value, (KeptMessage, Loop, Loss, LostWork, OutOfReach, DataStores)):
         return [(each.name, _plain(getattr(value, each.name))) for each in fields(value)]
     if isinstance(value, Join):
         return _plain(value.by_flow)

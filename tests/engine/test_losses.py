@@ -186,7 +186,7 @@ def test_the_preview_of_a_takeover_says_that_another_is_looked_for() -> None:
 
 def test_a_resource_that_ended_lost_is_known_until_it_returns_or_is_given_again() -> None:
     world = play('requires="true"').report("go", LOST)
-    assert world.run.state.lost == {"ugv1": "r1.b1"}
+    assert {each: x.behavior for each, x in world.run.state.lost.items()} == {"ugv1": "r1.b1"}
     world.give(i.ResourceReturned("ugv2", "LINK_LOST"))
     assert world.ignored() == "ugv2 was not lost for this run"
     world.give(i.ResourceReturned("ugv1", "LINK_LOST", "it drove on"))

@@ -7,6 +7,7 @@ from m2pem.engine.state import (
     Behavior,
     BehaviorPhase,
     LostWork,
+    OutOfReach,
     Prompt,
     RunState,
     Service,
@@ -103,7 +104,7 @@ def behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
             del state.held[resource]
     is_out_of_reach = record.state is BehaviorState.LOST and record.code == LINK_LOST
     if is_out_of_reach and len(behavior.resources) == 1:
-        state.lost[behavior.resources[0]] = behavior.id
+        state.lost[behavior.resources[0]] = OutOfReach(behavior.id, behavior.native_ref)
     _forget_behavior(state, behavior)
 
 
