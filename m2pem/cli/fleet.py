@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -146,18 +146,20 @@ def _as_text(arbiters: "FleetArbiters") -> str:
 
 @dataclass(frozen=True, slots=True)
 class Holding:
-    """What an executive says of its fleet. `holders`: by resource, "" if it is free."""
+    """What an executive says of its fleet. `holders`: by resource, "" if it is free. `unavailable`:
+    why missions do not get some, or that one has returned and is held."""
 
     executive: str
     fleet: str
     holders: Mapping[str, str]
     waiting: "Sequence[WaitingTask]"
+    unavailable: Mapping[str, str] = field(default_factory=dict)
 
     def as_text(self) -> str:
         """Return it as text."""
         from m2pem.cli.table import table
 
-        held = [(name, holder or "free") for name, holder in self.holders.items()]
+        held = [(name, self._state(name, holder)) for name, holder in self.holders.items()]
         parts = [
             f"executive {self.executive} with fleet {self.fleet}",
             table(("RESOURCE", "HELD BY"), held),
@@ -178,6 +180,12 @@ class Holding:
             parts.append(table(header, rows))
         return "\n\n".join(parts)
 
+    def _state(self, name: str, holder: str) -> str:
+        why = self.unavailable.get(name, "")
+        if holder and why and not why.startswith("with "):
+            return f"{holder} ({why})"
+        return holder or why or "free"
+
 
 def _show_running(journal: str | None, output: str) -> None:
     """Print who holds what in the executives that serve a journal, and which tasks wait."""
@@ -193,6 +201,7 @@ def _show_running(journal: str | None, output: str) -> None:
             fleet_name(socket),
             ask(socket, "holders"),
             msgspec.convert(ask(socket, "waiting"), list[WaitingTask]),
+            ask(socket, "unavailable"),
         )
         for socket in executives(journal_file(journal))
     ]

@@ -298,8 +298,9 @@ class PlainOcu:
         await self._control.give_back(words[0], by=NAME)
 
     async def _who(self, _: list[str]) -> None:
+        unavailable = await self._control.unavailable()
         for resource, holder in (await self._control.holders()).items():
-            self._say(f"{resource}: {holder or 'free'}")
+            self._say(f"{resource}: {holder or unavailable.get(resource) or 'free'}")
         for task in await self._control.waiting():
             self._say(str(task))
 

@@ -36,6 +36,7 @@ OTHERWISE = {
     "preview_take": "takeover in m2pem attach",
     "give_back": "handback in m2pem attach",
     "holders": "m2pem fleet --running, and who in m2pem attach",
+    "unavailable": "m2pem fleet --running, and who in m2pem attach",
     "waiting": "m2pem fleet --running, and who in m2pem attach",
     "runs": "m2pem runs, and runs in m2pem attach",
     "prompts": "m2pem attach shows them",

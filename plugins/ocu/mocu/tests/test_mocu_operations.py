@@ -63,6 +63,7 @@ NOT_SERVED = {
     "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",
     "holders": "no message has them; a refused take_vehicle names the holder",
+    "unavailable": "no message has it; diagnostics say why a vehicle is not ready",
     "waiting": "no message has them; topic events says what a task waits for",
     "records": "a client has them from topic events on; older ones are in the journal",
     "wait": "topic status shows that a run has ended",

@@ -50,6 +50,7 @@ QUERIES = {
     "mission_time_s": "/api/runs/{run}",
     "prompts": "/api/prompts",
     "holders": "/api/resources",
+    "unavailable": "/api/resources",
     "waiting": "/api/resources",
     "fleet": "/api/fleet",
     "catalogue": "/api/behaviors",

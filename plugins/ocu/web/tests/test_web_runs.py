@@ -155,7 +155,11 @@ async def test_a_vehicle_is_taken_and_given_back(world: MakeWorld) -> None:
         path = f"/api/resources/{VEHICLE}"
         assert (await otto.http.post(f"{path}/take")).status_code == 204
         found = (await otto.http.get("/api/resources")).json()
-        assert found == {"holders": {VEHICLE: "otto"}, "waiting": []}
+        assert found == {
+            "holders": {VEHICLE: "otto"},
+            "waiting": [],
+            "unavailable": {VEHICLE: "with otto"},
+        }
         again = await otto.http.post(f"{path}/take")
         assert (again.status_code, again.json()["detail"]) == (409, f"{VEHICLE} is with otto")
         assert (await otto.http.post(f"{path}/give-back")).status_code == 204

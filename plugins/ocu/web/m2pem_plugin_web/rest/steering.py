@@ -148,6 +148,7 @@ class HoldersModel(BaseModel):
 
     holders: dict[str, str]
     waiting: list[WaitingTaskModel]
+    unavailable: dict[str, str]
 
 
 def resource_router(control: MissionControl) -> APIRouter:
@@ -160,7 +161,7 @@ def resource_router(control: MissionControl) -> APIRouter:
 
     @routes.get("")
     async def holders(_: Viewer) -> HoldersModel:
-        """Who has what, and which tasks wait."""
+        """Who has what, which tasks wait, and what missions do not get now, and why."""
         found = await control.holders()
         return HoldersModel(
             holders={str(each): who for each, who in found.items()},
@@ -168,6 +169,7 @@ def resource_router(control: MissionControl) -> APIRouter:
                 WaitingTaskModel.model_validate(each, from_attributes=True)
                 for each in await control.waiting()
             ],
+            unavailable={str(each): why for each, why in (await control.unavailable()).items()},
         )
 
     @routes.post("/{resource:path}/take", status_code=204)

@@ -74,7 +74,8 @@ function Card({ vehicle, state, payloads, silent_s }: CardProps) {
       {state && <Numbers state={state} />}
       {state && state.not_ready_reasons.length > 0 && (
         <p class="card-reasons">
-          {text.notReady}: {state.not_ready_reasons.join("; ")}
+          {state.ready === false && `${text.notReady}: `}
+          {state.not_ready_reasons.join("; ")}
         </p>
       )}
       <Doing resource={vehicle.id} name={text.does} />
