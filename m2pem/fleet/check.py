@@ -1,15 +1,16 @@
 """The static check: whether a mission fits a fleet, before anything moves (paper, section 4.2)."""
 
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from m2pem.findings import Finding, Severity
+from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import Catalogue, ResourceGraph
-from m2pem.fleet.need_check import check_needs
+from m2pem.fleet.need_check import KnownFits, check_needs, places_of
 from m2pem.fleet.parameters import ParameterProblem, examine
+from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
@@ -180,7 +181,8 @@ def check_mission(
     graph = ResourceGraph(fleet, catalogue)
     check = _Check(mission, fleet, graph, catalogue, handed_over)
     findings = [finding for task in mission.activities() for finding in check.task(task)]
-    return [*findings, *_returned(mission, fleet)]
+    shortages = check_shortages(mission, check.demands)
+    return [*findings, *shortages, *_returned(mission, fleet)]
 
 
 def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
@@ -250,20 +252,29 @@ class _Check:
     graph: ResourceGraph
     catalogue: Catalogue
     handed_over: Container[str]
+    demands: dict[Activity, Demand] = field(default_factory=dict)
+    """What tasks need whose roles can be filled."""
+    known: KnownFits = field(default_factory=dict)
 
     def task(self, task: Activity) -> list[Finding]:
         findings = TaskFindings(self.mission.file_of(task), task)
         if isinstance(task, ScriptTask | ServiceTask | SendTask) and task.behavior:
-            self._behavior(task.behavior, findings)
+            possible = self._behavior(task.behavior, findings)
+            if not has_errors(findings.found):
+                places = places_of(task.behavior, self.fleet, possible)
+                self.demands[task] = Demand.of(task.behavior, places)
         elif isinstance(task, ServiceTask) and task.call:
             self._service(task.call, findings)
         return findings.found
 
-    def _behavior(self, behavior: Behavior, findings: TaskFindings) -> None:
+    def _behavior(
+        self, behavior: Behavior, findings: TaskFindings
+    ) -> dict[str, tuple[ResourceId, ...]]:
+        """Check a behavior, and return what may fill its roles by need."""
         named = [role for role in behavior.roles if role.resource]
         filled = check_roles(named, self.fleet, findings)
         matching = [role for role in filled if role.kind.value == behavior.type.value]
-        possible = check_needs(behavior, self.fleet, self.graph, findings)
+        possible = check_needs(behavior, self.fleet, self.graph, findings, self.known)
         if len(named) == len(behavior.roles):
             self._check_role_kinds(behavior, filled, findings)
         takers: list[_Taker] = []
@@ -296,6 +307,7 @@ class _Check:
         for role in matching:
             for resource in resources_of(role, self.fleet):
                 self._check_speed(behavior, role, resource, findings)
+        return possible
 
     def _check_role_kinds(
         self, behavior: Behavior, filled: Sequence[Role], findings: TaskFindings

@@ -16,7 +16,8 @@ from m2pem.geo.local_frame import offset
 from m2pem.geo.positions import is_local
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import ParameterKind, ResourceId
-from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
+from m2pem.mission.concurrency import instances_at_once
+from m2pem.mission.elements import Activity, ScriptTask, SendTask, ServiceTask, SubProcess
 from m2pem.mission.expression import Expression
 from m2pem.mission.expression.tree import Compare, Comparison, In, Literal, Name, walk
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
@@ -25,6 +26,8 @@ from m2pem.mission.mission import Mission
 ORIGIN = (38.1075, -77.3192, 60.0)
 TEAM_SIZE = 3
 SPACING_M = 10.0
+MOST_INSTANCES = 100
+"""Instances of a task that get vehicles of their own."""
 
 _AIR_BEHAVIORS = frozenset({"takeoff", "land", "return_to_launch", "change_altitude", "orbit"})
 _KIND_BY_NAME = {
@@ -40,14 +43,18 @@ def fleet_for(mission: Mission) -> Fleet:
 
     A vehicle flies if one of its behaviors only makes sense in the air, or takes an altitude; it
     drives otherwise. A team has members of its own (`section_1`, ...). A role by need gets vehicles
-    of its own for each task, with the domain, tags and payloads that its condition names. A name
-    that the mission reads from its data while it runs cannot be known here.
+    of its own for each task and parallel instance, with the domain, tags and payloads that its
+    condition names. A name that the mission reads from its data while it runs cannot be known here.
     """
     draft = _Draft()
     tasks = list(_tasks(mission))
     for task in tasks:
         for role in task.roles:
             draft.add_role(role, task)
+    for activity in mission.activities():
+        behavior = getattr(activity, "behavior", None)
+        if isinstance(behavior, Behavior):
+            draft.add_instances(behavior, _at_once(activity))
     for task in tasks:
         if isinstance(task, Behavior):
             draft.add_targets(task)
@@ -65,6 +72,15 @@ def _tasks(mission: Mission) -> Iterator[Behavior | ServiceCall]:
             yield task.behavior
         elif isinstance(task, ServiceTask) and task.call:
             yield task.call
+
+
+def _at_once(activity: Activity) -> int:
+    """Return how many instances of a task run at once, with those of the subprocesses around."""
+    count, container = instances_at_once(activity), activity.container
+    while isinstance(container, SubProcess):
+        count *= instances_at_once(container)
+        container = container.container
+    return count
 
 
 @dataclass(slots=True)
@@ -118,6 +134,13 @@ class _Draft:
                 payloads = [role.name]
             for payload in payloads:
                 self.payloads.setdefault(f"{name}/{payload}", False)
+
+    def add_instances(self, behavior: Behavior, count: int) -> None:
+        """Add vehicles for all instances of a task that run at once, but the first."""
+        for _ in range(min(count, MOST_INSTANCES) - 1):
+            for role in behavior.roles:
+                if role.need is not None and not role.resource:
+                    self._add_needed(role, role.need, behavior)
 
     def add_any_detector(self) -> None:
         if not any(self.payloads.values()):

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
+from typing import TypeAlias
 
 import rustworkx
 
@@ -24,13 +25,23 @@ SOLVER = "scipy"
 """The package that chooses; it is an extra of m2pem, as missions without such roles need it not."""
 
 
+KnownFits: TypeAlias = dict[tuple[object, ...], list[Fit]]
+"""What may fill roles that ask for the same, as it was found before."""
+
+
 def check_needs(
-    behavior: Behavior, fleet: Fleet, graph: ResourceGraph, findings: TaskFindings
+    behavior: Behavior,
+    fleet: Fleet,
+    graph: ResourceGraph,
+    findings: TaskFindings,
+    known: KnownFits | None = None,
 ) -> dict[str, tuple[ResourceId, ...]]:
     """Check the roles of a behavior that are filled when it starts.
 
-    Returns what may fill each role by need that is right, by the role's name.
+    Returns what may fill each role by need that is right, by the role's name. `known`: is kept from
+    task to task of a mission.
     """
+    known = {} if known is None else known
     by_need = [role for role in behavior.roles if role.need is not None]
     if by_need and find_spec(SOLVER) is None:
         findings.add(
@@ -46,7 +57,7 @@ def check_needs(
         _check_facts(role, findings)
         _check_count(behavior, role, findings)
         try:
-            found = fits(fleet, graph, behavior, role)
+            found = _fits(behavior, role, fleet, graph, known)
         except ExpressionError as error:
             findings.add("bad-need", f"requires: {error}", line=role.line, role=role.name)
             continue
@@ -58,6 +69,16 @@ def check_needs(
             possible[role.name] = able
     _check_together(behavior, fleet, possible, findings)
     return possible
+
+
+def _fits(
+    behavior: Behavior, role: Role, fleet: Fleet, graph: ResourceGraph, known: KnownFits
+) -> list[Fit]:
+    condition = role.need.condition if role.need is not None else None
+    key = (role.kind, behavior.name, behavior.type, condition)
+    if key not in known:
+        known[key] = fits(fleet, graph, behavior, role)
+    return known[key]
 
 
 def _check_facts(role: Role, findings: TaskFindings) -> None:
@@ -125,6 +146,22 @@ def _unknown_tag(role: Role, fleet: Fleet) -> str:
     return ""
 
 
+def places_of(
+    behavior: Behavior, fleet: Fleet, possible: Mapping[str, tuple[ResourceId, ...]]
+) -> list[tuple[Role, tuple[ResourceId, ...]]]:
+    """Return for each resource that a behavior needs its role, and what may be that resource.
+
+    `possible`: what may fill the roles by need, as `check_needs` returns it.
+    """
+    places: list[tuple[Role, tuple[ResourceId, ...]]] = []
+    for role in behavior.roles:
+        if role.name in possible and role.need is not None and not role.optional:
+            places += [(role, possible[role.name])] * role.need.least
+        elif role.resource:
+            places += [(role, (each,)) for each in resources_of(role, fleet)]
+    return places
+
+
 def _check_together(
     behavior: Behavior,
     fleet: Fleet,
@@ -132,12 +169,7 @@ def _check_together(
     findings: TaskFindings,
 ) -> None:
     """Check that all roles of one task can be filled at once, each resource in one of them."""
-    places: list[tuple[Role, Sequence[ResourceId]]] = []
-    for role in behavior.roles:
-        if role.name in possible and role.need is not None and not role.optional:
-            places += [(role, possible[role.name])] * role.need.least
-        elif role.resource:
-            places += [(role, (each,)) for each in resources_of(role, fleet)]
+    places = places_of(behavior, fleet, possible)
     if len(places) < 2 or not possible:
         return
     graph: rustworkx.PyGraph = rustworkx.PyGraph()

@@ -112,7 +112,8 @@ def test_tasks_that_begin_in_one_step_get_a_vehicle_each(play):
 
 def test_a_task_that_does_not_wait_fails_with_what_is_in_its_way(play):
     async def story(world: World):
-        run = await world.executive.control.start(both("requires='true'", "requires='true'"))
+        both_tasks = both("requires='true' wait='PT5M'", "requires='true'")
+        run = await world.executive.control.start(both_tasks)
         summary = await world.executive.control.wait(run)
         errors = [each for each in world.seen if isinstance(each, ErrorThrown)]
         return summary, errors

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from m2pem.engine.records import RunOutcome
+from m2pem.fleet.check import check_mission
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.mission import Mission
@@ -15,7 +16,7 @@ from m2pem.verify.check import Report, check
 from m2pem.verify.conformance_run import ConformanceRun
 from m2pem.verify.ltl.model_check import Result as Answered
 from m2pem.verify.net.choices import in_words, read
-from m2pem.verify.net.petri_net import Action, Exactness, PetriNet, Step, Trigger
+from m2pem.verify.net.petri_net import Action, Exactness, Flag, PetriNet, Step, Trigger
 from m2pem.verify.net.simplify import simplify
 from m2pem.verify.properties.results import Verdict
 from m2pem.verify.report.data import as_data
@@ -23,10 +24,10 @@ from m2pem.verify.report.findings import findings_of
 from m2pem.verify.requirements import Names, parse_spec
 from m2pem.verify.requirements.check import check_requirement, net_for
 from m2pem.verify.search.explore import Exploration, Limits, explore
-from m2pem.verify.translate import Options
+from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import structured
-from tests.verify.allocator import Allocator, with_vehicles
+from tests.verify.allocator import Allocator, offers_all, with_vehicles
 from tests.verify.models import Walk
 from tests.verify.random_needs import NEEDS, OPEN, branches_with_needs, fleet_of, net_of
 from tests.verify.trace_mapping import TooManyStatesError
@@ -412,3 +413,26 @@ def assert_pools_are_whole(found: Exploration, state: int) -> None:
         if pool.free:
             held = sum(tokens.get(p.index, 0) for p in found.net.places if pool.index in p.returns)
             assert tokens.get(pool.index, 0) + held == len(pool.free), pool.name
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_the_static_check_says_of_tasks_that_compete_can_happen(seed: int) -> None:
+    mission = notation(branches_with_needs(Random(seed), COMPETING))
+    vehicles = fleet_of(mission)
+    findings = check_mission(mission, vehicles, offers_all)
+    assert all(each.rule == "tasks-compete" for each in findings)
+    net = translate(mission, vehicles, options=OPEN)
+    found = explore(net, SMALL)
+    fired = [net.transitions[number] for number in found.fired]
+    if found.stopped or any(each.flag is Flag.CONFLICT for each in fired):
+        return  # tasks that name one vehicle are in each other's way before
+    unavailable = {
+        step.element
+        for transition in fired
+        for step in transition.steps
+        if "RESOURCE_UNAVAILABLE" in step.detail
+    }
+    assert {each.element for each in findings} <= unavailable
+
+
+COMPETING = tuple(each for each in NEEDS if "same" not in each and "count" not in each)
