@@ -127,9 +127,11 @@ def simulate(
 
 
 def _draw(file: Path, records: "list[StampedRecord]", fleet: "Fleet | None") -> None:
+    from m2pem.cli.notes import note
     from m2pem.rehearsal.gantt import gantt_svg
 
     try:
         file.write_text(gantt_svg(records, fleet), encoding="utf-8")
     except OSError as error:
         raise UnusableError(f"{file} cannot be written: {error.strerror}") from error
+    note(f"the chart is in {file}")

@@ -119,7 +119,9 @@ def test_answers_that_do_not_fit_are_refused(invoke: Invoke, tmp_path: Path) -> 
 
 def test_a_gantt_chart_is_drawn(invoke: Invoke, tmp_path: Path) -> None:
     chart = tmp_path / "chart.svg"
-    assert invoke("simulate", *DETECTION, "--gantt", chart)[0] == 0
+    status, _, err = invoke("simulate", *DETECTION, "--gantt", chart)
+    assert status == 0
+    assert f"the chart is in {chart}\n" in err
     text = chart.read_text(encoding="utf-8")
     assert text.lstrip().startswith("<svg") or text.startswith("<?xml")
     assert "evsg1" in text

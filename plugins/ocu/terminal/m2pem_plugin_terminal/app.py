@@ -102,8 +102,7 @@ class TerminalApp(Display):
             self.say(f"Stopping {view.run} ...", alarm=True)
             while self._in_dialog:
                 self.pop_screen()
-            reason = f"by {self.by}"
-            self._carry_out("Stop", self.control.stop(view.run, by=self.by, reason=reason))
+            self._carry_out("Stop", self.control.stop(view.run, by=self.by))
         self.show()
 
     def action_stop_all(self) -> None:
@@ -112,7 +111,7 @@ class TerminalApp(Display):
             self.say("Stopping all runs ...", alarm=True)
             while self._in_dialog:
                 self.pop_screen()
-            self._carry_out(STOP_ALL, self.control.stop_all(by=self.by, reason=f"by {self.by}"))
+            self._carry_out(STOP_ALL, self.control.stop_all(by=self.by))
         self.show()
 
     def action_interrupt(self) -> None:

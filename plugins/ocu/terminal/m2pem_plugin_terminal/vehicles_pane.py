@@ -47,10 +47,15 @@ class _Latest:
 
 
 class Vehicles:
-    """Remembers the newest telemetry of each vehicle and payload of the fleet."""
+    """Remembers the newest telemetry of each vehicle and payload of the fleet.
 
-    def __init__(self, fleet: "Fleet") -> None:
+    `speed`: seconds of the executive's clock in a second of the operator's. The table counts how
+    long a vehicle was silent by the former, as the reasons of lost links do.
+    """
+
+    def __init__(self, fleet: "Fleet", speed: float = 1.0) -> None:
         self._fleet = fleet
+        self._speed = speed
         self._latest: dict[str, _Latest] = {}
         self._marching: dict[str, tuple[TeamMemberState, float]] = {}
         self._ended = False
@@ -87,7 +92,7 @@ class Vehicles:
             if self._ended:
                 lines += _not_seen(latest.state, "○", "not watched now")
             elif age_s > silent_s or latest.state.link is LinkState.LOST:
-                lines += _not_seen(latest.state, "✗", f"silent for {int(age_s)} s")
+                lines += _not_seen(latest.state, "✗", f"silent for {int(age_s * self._speed)} s")
             else:
                 lines += _vehicle(latest.state, payloads, width, named)
                 lines += self._place(vehicle.id, now)

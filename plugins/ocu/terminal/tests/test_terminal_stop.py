@@ -19,7 +19,7 @@ async def test_the_second_press_stops_the_mission(world: World) -> None:
         assert await status(world, run) is RunStatus.RUNNING
         await terminal.press("ctrl+x")
         await terminal.until_shown("STOPPED")
-        assert (await world.control.runs())[0].detail == "by anna@gcs1"
+        assert (await world.control.runs())[0].detail == "stopped by anna@gcs1"
 
 
 async def test_another_key_stops_every_mission(world: World) -> None:
