@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from m2pem.bpmn.extensions import ELEMENTS, EXTENSIONS, Attribute, OwnElement
 from m2pem.bpmn.rules.registry import RULES
 from m2pem.bpmn.xml import M2PEM
+from m2pem.findings import Severity
 
 _RULES_HEAD = """# Rules of mission files
 
@@ -30,16 +31,15 @@ This page is generated from the rules: `python -m m2pem.bpmn.pages rules`.
 """
 _RULES_OF_BPMN = """
 ## BPMN's rules
-
 """
 _RULES_OF_M2PEM = """
 ## m2pem's own rules
 
 For questions that BPMN leaves open, and for m2pem's own elements of [mission files](missions.md).
-
 """
-_RULES_TABLE = """| rule | level | what is wrong |
-|---|---|---|
+_RULES_TABLE = """
+| {level} | what is wrong |
+|---|---|
 """
 
 
@@ -48,18 +48,19 @@ def rules_page() -> str:
     return (
         _RULES_HEAD
         + _RULES_OF_BPMN
-        + _RULES_TABLE
         + "".join(_rule_rows("B"))
         + _RULES_OF_M2PEM
-        + _RULES_TABLE
         + "".join(_rule_rows("M"))
     )
 
 
 def _rule_rows(letter: str) -> Iterator[str]:
-    for rule in RULES:
-        if rule.code[0] == letter:
-            yield f"| `{rule.slug} {rule.code}` | {rule.severity.value} | {rule.wrong} |\n"
+    """A table of the errors, and one of the warnings."""
+    for severity in Severity:
+        yield _RULES_TABLE.format(level=severity.value)
+        for rule in RULES:
+            if rule.code[0] == letter and rule.severity is severity:
+                yield f"| `{rule.slug} {rule.code}` | {rule.wrong} |\n"
 
 
 _EXTENSIONS_HEAD = f"""# m2pem's elements and attributes

@@ -21,7 +21,7 @@ No boundary event catches an error, so that a behavior that fails ends the missi
 it and go on. When the mission is over, m2pem ends, and with it its heartbeats as a ground station:
 a vehicle that stays in the air then returns by its own ground station failsafe.
 
-Phases that went alike share a row.
+Phases that went alike share a row, and failsafes their rows.
 
 - *The vehicle*: its modes from the failsafe on, also after the mission, and where it ended ("away":
   not at home).
@@ -68,13 +68,16 @@ def _page() -> Iterator[str]:
     for vehicle in VEHICLES.values():
         parameters = ", ".join(f"`{key}` {value:g}" for key, value in vehicle.parameters.items())
         yield f"\n## {vehicle.title}\n{HEAD.format(vehicle=vehicle, parameters=parameters)}"
+        alike = defaultdict(list)
         for name, phases in kept[vehicle.name].items():
             rows = defaultdict(list)
             for phase in vehicle.phases_of(vehicle.failsafes[name]):
                 rows[_cells(phases[phase])].append(phase)
-            first = f"**{name}**"
-            for cells, alike in rows.items():
-                yield f"| {first} | {', '.join(alike)} | {cells} |\n"
+            alike[tuple(f"{', '.join(row)} | {cells}" for cells, row in rows.items())].append(name)
+        for lines, names in alike.items():
+            first = f"**{'; '.join(names)}**"
+            for line in lines:
+                yield f"| {first} | {line} |\n"
                 first = ""
 
 
