@@ -31,7 +31,7 @@ def boat_has_gimbal(ground: Ground) -> bool:
     return bool(told.gimbal_device_id)
 
 
-def test_vehicles_are_named_and_simulated_until_ctrl_c() -> None:
+def test_vehicles_are_named_and_simulated_until_they_are_ended() -> None:
     ground = Ground("udpin:127.0.0.1:0")
     words = ["sim", "mavlink", "--copters", "2", "--boats", "1", "--speed", "10", "--gimbal"]
     words += ["--to", f"udp://127.0.0.1:{ground.port}", "--home", "60.1,24.9,5", "--ekf", "500ms"]
@@ -49,8 +49,8 @@ def test_vehicles_are_named_and_simulated_until_ctrl_c() -> None:
             assert boat_has_gimbal(ground)
             lines = [process.stdout.readline().split() for _ in range(3)]
         finally:
-            process.send_signal(signal.SIGINT)
-        process.wait(10)
+            process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
     ground.close()
     assert [line[:3] for line in lines] == [
         ["system", "1", "copter"],

@@ -47,7 +47,7 @@ def test_a_camera_is_simulated_until_ctrl_c():
                 assert answer.read(3) == b"\xff\xd8\xff"
         finally:
             process.send_signal(signal.SIGINT)
-        process.wait(40)
+        assert process.wait(40) == 0
     assert line[0] == "camera"
     assert line[1].startswith("http://127.0.0.1:")
 

@@ -12,6 +12,7 @@ import click
 from m2pem.api import GeoPosition
 from m2pem.api.command_options import DurationOption, FaultOption, PositionOption
 from m2pem.api.faults import PlannedFault
+from m2pem.api.foreground import interrupted
 from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, Faults
 from m2pem_plugin_mavlink.simulator.firmware import FIRMWARES
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
@@ -194,8 +195,15 @@ def _check_parameters(simulator: Simulator, names: Iterable[str]) -> None:
 
 
 async def _run(simulator: Simulator) -> None:
+    stop = interrupted()
     async with simulator as vehicles:
         for vehicle in vehicles:
             spec, (host, port) = vehicle.autopilot.spec, vehicle.address
             click.echo(f"system {spec.system}  {spec.kind:<6}  udp://{host}:{port}")
-        await vehicles.stopped()
+        waiting = [asyncio.ensure_future(each) for each in (vehicles.stopped(), stop.wait())]
+        await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        if waiting[0].done():
+            waiting[0].result()
+        for each in waiting:
+            each.cancel()
+        await asyncio.gather(*waiting, return_exceptions=True)

@@ -8,6 +8,7 @@ import click
 
 from m2pem.api.command_options import DurationOption, FaultOption
 from m2pem.api.faults import PlannedFault
+from m2pem.api.foreground import interrupted
 from m2pem.errors import PluginError
 from m2pem_plugin_ptz.drivers.onvif.settings import read_credentials
 from m2pem_plugin_ptz.simulator.onvif.camera import Account, CameraSpec
@@ -146,8 +147,9 @@ def onvif(
 
 
 async def _run(server: OnvifServer, faults: tuple[PlannedFault[Faults], ...]) -> None:
+    stop = interrupted()
     async with server:
         click.echo(f"camera  http://{server.host}:{server.port}/onvif/device_service")
         for fault in faults:
             server.faults.plan(fault)
-        await asyncio.Event().wait()
+        await stop.wait()
