@@ -25,6 +25,7 @@ from m2pem.engine.state import RunStatus
 from m2pem.errors import JournalError, NotDrivenError, OperatorError
 from m2pem.executive.allocator import Allocator
 from m2pem.executive.armed_vehicles import describe_armed_vehicles
+from m2pem.executive.battery_forecast import BatteryForecast
 from m2pem.executive.behavior_lifecycle import (
     AirspaceView,
     ExecutiveViews,
@@ -163,6 +164,9 @@ class Supervisor:
             self.epoch_of,
             bus.publish,
             self._returns.returned,
+        )
+        self._forecast = BatteryForecast(
+            arbiters, self.availability, self._geometry, self.runners, self.fault
         )
         self._services = Services(
             plugins.service,
@@ -417,6 +421,7 @@ class Supervisor:
         if not isinstance(state, TeamState):
             self._lost_resources.on_telemetry(state)
             self._returns.on_telemetry(state)
+            self._forecast.on_telemetry(state, self.clock.now_us())
             state = self._lost_resources.annotated(state)
         self._bus.publish(state)
         self.allocator.on_telemetry()

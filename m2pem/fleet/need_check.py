@@ -7,15 +7,17 @@ from typing import TypeAlias
 import rustworkx
 
 from m2pem.errors import ExpressionError
-from m2pem.fleet.allocation import resources_of
+from m2pem.findings import Severity
+from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.facts import Fit, fits
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.fleet.task_findings import TaskFindings
-from m2pem.mission.behavior import Behavior, BehaviorType, Role
+from m2pem.mission.behavior import Behavior, BehaviorType, OnLoss, Role, RoleKind
 from m2pem.mission.candidate_facts import CANDIDATE_FACTS, is_fact
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.tree import In, Literal, Name, walk
+from m2pem.mission.mission import Mission
 from m2pem.suggestions import did_you_mean
 
 NAMED = 6
@@ -31,6 +33,7 @@ KnownFits: TypeAlias = dict[tuple[object, ...], list[Fit]]
 
 def check_needs(
     behavior: Behavior,
+    mission: Mission,
     fleet: Fleet,
     graph: ResourceGraph,
     findings: TaskFindings,
@@ -67,6 +70,7 @@ def check_needs(
             _cannot_fill(role, fleet, found, able, least, findings)
         else:
             possible[role.name] = able
+            _check_loss(mission, role, able, findings)
     _check_together(behavior, fleet, possible, findings)
     return possible
 
@@ -128,6 +132,39 @@ def _cannot_fill(
         line=role.line,
         role=role.name,
     )
+
+
+def _check_loss(
+    mission: Mission, role: Role, able: Sequence[ResourceId], findings: TaskFindings
+) -> None:
+    """Check that another can do the rest when what fills a role is lost, as far as is certain."""
+    if role.on_loss is not OnLoss.REASSIGN:
+        return
+    if len(able) == 1:
+        why = f"only {able[0]} can fill it, so that no other does the rest when it is lost"
+        remedy = "ask for less, give the fleet another, or delete onLoss"
+    elif role.kind is RoleKind.VEHICLE and (same := _one_stored(mission, role)):
+        why = f"it is filled by '{same}' alone, so that no other does the rest"
+        remedy = "write requires= in place of same, or delete onLoss"
+    else:
+        return
+    text = f"onLoss='reassign', and {why}"
+    findings.add(
+        "no-other",
+        text,
+        remedy,
+        line=role.line,
+        role=role.name,
+        severity=Severity.WARNING,
+    )
+
+
+def _one_stored(mission: Mission, role: Role) -> str:
+    """Return the name under which roles store the one vehicle that alone may fill a role; ""."""
+    same = role.need.same if role.need is not None else ""
+    needs = [each.need for each in roles_of_mission(mission) if each.need is not None]
+    stored = [need.most for need in needs if same and need.store == same]
+    return same if stored and max(stored) == 1 else ""
 
 
 def _unknown_tag(role: Role, fleet: Fleet) -> str:

@@ -9,6 +9,7 @@ from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.bus import FleetBus
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import VehicleState
+from m2pem.fleet.endurance import lasts_s
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import ResourceId
@@ -38,8 +39,6 @@ def alike(request: BehaviorRequest) -> Plan:
 
 SEEN_WITHIN_S = 1.5
 LOOK_EVERY_S = 0.1
-LEFT_OVER = 0.2
-"""Fraction of a full battery that a plan leaves unused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +103,7 @@ class TeamSituation:
             begun,
             {each: v.cruise_speed_m_s for each, v in vehicles.items() if v.cruise_speed_m_s},
             {
-                each: lasts_s(vehicle.endurance_s, states[each])
+                each: lasts_s(vehicle.endurance_s, _charge(states[each]))
                 for each, vehicle in vehicles.items()
                 if vehicle.endurance_s
             },
@@ -136,10 +135,8 @@ class TeamSituation:
         return state if isinstance(state, VehicleState) else None
 
 
-def lasts_s(endurance_s: float, state: VehicleState | None) -> float:
-    """Return how long a vehicle can move until its battery is at `LEFT_OVER`."""
-    charged = state.battery_fraction if state is not None else None
-    return endurance_s * max(0.0, (1.0 if charged is None else charged) - LEFT_OVER)
+def _charge(state: VehicleState | None) -> float | None:
+    return state.battery_fraction if state is not None else None
 
 
 def pose_of(frame: LocalFrame, state: VehicleState) -> MemberPose:

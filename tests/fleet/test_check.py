@@ -11,8 +11,17 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.check import check_mission, check_roles, place
 from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.fleet.task_findings import TaskFindings
-from m2pem.mission.behavior import Behavior, BehaviorType, Role, ServiceCall
+from m2pem.mission.behavior import (
+    Behavior,
+    BehaviorType,
+    Need,
+    OnLoss,
+    Role,
+    RoleKind,
+    ServiceCall,
+)
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.expression import parse
 
 from .fleets import PATROL, everything, patrol
 from .missions import READ_LATER, behavior, drive, mission, payload, team, vehicle
@@ -421,3 +430,33 @@ def test_an_optional_role_of_another_vehicle_is_not_taken_for_mistyped(
     fleet: Fleet, resource: str
 ) -> None:
     assert filled_by(fleet, vehicle(resource, optional=True))[1].found == []
+
+
+ONE_FIELD = (
+    "version: 1\nvehicles: {evsg1: {domain: ground, arbiter: sim}, "
+    "uav1: {domain: air, arbiter: sim}, uav2: {domain: air, arbiter: sim}}\n"
+)
+
+
+def by_need(condition: str | None, *, same: str = "", store: str = "", most: int = 1) -> Role:
+    """A role whose work another is to do when what fills it is lost."""
+    need = Need(parse(condition) if condition else None, most=most, same=same, store=store)
+    return Role("driver", RoleKind.VEHICLE, "", 15, need=need, on_loss=OnLoss.REASSIGN)
+
+
+def test_a_role_that_one_vehicle_alone_can_fill_is_not_reassigned(tmp_path: Path) -> None:
+    fleet = patrol(tmp_path, ONE_FIELD)
+    found = only(check(fleet, behavior("drive_stop", by_need("vehicle.domain == 'ground'"))))
+    assert (found.severity, found.rule) == (Severity.WARNING, "no-other")
+    assert "only evsg1 can fill it" in found.message
+    assert check(fleet, behavior("drive_stop", by_need("vehicle.domain == 'air'"))) == []
+
+
+def test_a_role_that_must_be_the_vehicle_of_an_earlier_one_is_not_reassigned(
+    tmp_path: Path,
+) -> None:
+    fleet = patrol(tmp_path, ONE_FIELD)
+    first = behavior("drive_stop", by_need("vehicle.domain == 'air'", store="who"))
+    found = only(check(fleet, first, behavior("drive_stop", by_need(None, same="who"))))
+    assert found.rule == "no-other"
+    assert "it is filled by 'who' alone" in found.message

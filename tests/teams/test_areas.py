@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Route
 from m2pem.teams.areas import owners, split
 from m2pem.teams.plan import Plan, TeamRefusedError
 from m2pem.teams.restart import Reference, read_reference
-from m2pem.teams.team_state import PLANS, lasts_s
+from m2pem.teams.team_state import PLANS
 
 from .test_planning import FIELD, setting
 
@@ -97,11 +96,3 @@ def test_after_a_restart_the_split_is_what_it_was() -> None:
     assert kept.split == tired.split
     again = PLANS["area_survey"](replace(wished, begun=True, split=kept.split))
     assert [leg.parameters for leg in again.legs] == [leg.parameters for leg in tired.legs]
-
-
-@pytest.mark.parametrize(
-    ("battery", "lasts"), [(None, 800.0), (1.0, 800.0), (0.6, 400.0), (0.1, 0)]
-)
-def test_a_fifth_of_the_battery_is_left_over(battery: float | None, lasts: float) -> None:
-    state = VehicleState(ResourceId("v0"), 0, GeoPosition(0.0, 0.0, 0.0), battery_fraction=battery)
-    assert lasts_s(1000.0, state) == pytest.approx(lasts)
