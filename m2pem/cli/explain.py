@@ -103,6 +103,7 @@ def _roles_of(element: "Element") -> "Behavior | ServiceCall | None":
 class Request:
     """One time that the task asked for resources. Times are mission time in seconds.
 
+    `rest_of`: what was lost before, whose rest the request is for; None: the task begins.
     `instance`: which one of a loop or multi-instance task, from 0. `ends_waiting_s`: when its wait
     is over, None: never, or it does not wait. `resources`: by role, what it got.
     """
@@ -111,6 +112,7 @@ class Request:
     asked_s: float
     instance: int | None
     ends_waiting_s: float | None
+    rest_of: "r.WorkReassigned | None" = None
     delays: "list[tuple[float, r.AllocationDelayed]]" = field(default_factory=list)
     chosen: "tuple[float, r.ResourcesAllocated] | None" = None
     ended: "tuple[float, r.AllocationEnded] | None" = None
@@ -134,6 +136,7 @@ class History:
         self._element = element
         self._instances: dict[int, int | None] = {}
         self._due_s: dict[int, float] = {}
+        self._lost: dict[int, r.WorkReassigned] = {}
 
     def take(self, stamped: Any) -> None:
         """Read the next record."""
@@ -147,12 +150,15 @@ class History:
                 self._instances[record.token] = record.instance
             case r.EventAwaited(due_us=due_us):
                 self._due_s[record.wait] = due_us / US_PER_S
+            case r.WorkReassigned():
+                self._lost[record.token] = record
             case r.AllocationRequested():
                 self.requests[record.allocation] = Request(
                     record.allocation,
                     t_s,
                     self._instances.get(record.token),
                     self._due_s.get(record.deadline),
+                    self._lost.pop(record.token, None),
                 )
             case r.AllocationDelayed() if request := self.requests.get(record.allocation):
                 request.delays.append((t_s, record))
@@ -199,6 +205,13 @@ class Explanation:
             "asked": request.asked_s,
             "waits_until": request.ends_waiting_s,
             "waiting": self._is_waiting(request),
+            "rest_of": request.rest_of
+            and {
+                "behavior": request.rest_of.behavior,
+                "code": request.rest_of.code,
+                "reason": request.rest_of.reason,
+                "parameters": request.rest_of.parameters,
+            },
             "delays": [
                 {"t": t_s, "reason": each.reason, "holders": each.holders, "again": each.again}
                 for t_s, each in request.delays
@@ -268,6 +281,10 @@ class Explanation:
 
         asked = f"\nat {request.asked_s:.1f} s{_instance(request.instance)}: asks"
         lines = [f"{asked} for resources ({request.allocation})"]
+        if (lost := request.rest_of) is not None:
+            why = f"{lost.code}: {lost.reason}" if lost.reason else lost.code
+            left = f", to do what {self.view.holder(lost.behavior)} left, {printable(why)}"
+            lines[0] += left
         for t_s, delay in request.delays:
             what = f"asks again, as {delay.reason}" if delay.again else waiting(delay.reason)
             lines.append(f"at {t_s:.1f} s: {printable(what)}")

@@ -104,6 +104,30 @@ def test_programs_get_every_candidate_with_the_reason(invoke: Invoke, journal: P
     assert candidates[2]["excluded"]
 
 
+def test_what_was_lost_and_who_did_the_rest_is_explained(invoke: Invoke, tmp_path: Path) -> None:
+    file, fleet = mission(
+        tmp_path,
+        '<startEvent id="S"/>',
+        flow("S", "Scout"),
+        task("Scout", 38.1175, f"{AIR} onLoss='reassign'"),
+    )
+    text, where = fleet.read_text(), "connection: {home: [38.1095, -77.3192]"
+    fleet.write_text(text.replace(where, f"{where}, faults: ['goto: cut link at 20 s']"))
+    journal = tmp_path / "journal.db"
+    words = ("run", file, "--fleet", fleet, "--speed", "50", "--ocu", "none")
+    status, out, _ = invoke(*words, "--journal", journal)
+    assert status == 0
+    assert "Scout it: another is to do what uav1 left, LINK_LOST" in out
+    _, out, _ = invoke("explain", "r1", "Scout", "--journal", journal)
+    assert "to do what goto of Scout it (r1.b1) left, LINK_LOST: " in out
+    assert re.search(r"^uav1 .*excluded, this task has lost it: LINK_LOST", out, re.M)
+    _, out, _ = invoke("explain", "r1", "Scout", "--journal", journal, "--format", "json")
+    first, second = json.loads(out)["requests"]
+    assert first["rest_of"] is None
+    assert second["rest_of"]["behavior"] == "r1.b1"
+    assert second["chosen"]["roles"] == {"scout": ["uav2"]}
+
+
 @pytest.mark.parametrize(
     ("element", "said"),
     [
