@@ -360,6 +360,38 @@ def _error_thrown(view: RunView, record: r.ErrorThrown) -> _Sentence:
     return text, Importance.ATTENTION if record.caught_by else Importance.ERROR
 
 
+def _incident_opened(view: RunView, record: r.IncidentOpened) -> _Sentence:
+    held = f"; held for it: {', '.join(record.resources)}" if record.resources else ""
+    reason = _after_colon(record.reason)
+    text = f"{view.label(record.element)}: incident {record.incident}, {record.code}{reason}{held}"
+    return text, Importance.ERROR
+
+
+def _incident_updated(view: RunView, record: r.IncidentUpdated) -> _Sentence:
+    text = f"{view.label(record.element)}: data written for incident {record.incident}{_by(record)}"
+    return text, Importance.NORMAL
+
+
+_CHOSEN = {
+    "retry": "begins anew",
+    "retry_with": "begins anew with {roles}",
+    "skip": "counts as done",
+    "move": "the token moves to {to}",
+    "end": "the run ends",
+}
+
+
+def _incident_resolved(view: RunView, record: r.IncidentResolved) -> _Sentence:
+    roles = ", ".join(f"{', '.join(ids)} as {role}" for role, ids in record.roles.items())
+    chosen = _CHOSEN[record.choice].format(roles=roles, to=view.label(record.to))
+    label = view.label(record.element)
+    return f"{label}: {chosen}, decided about {record.incident}{_by(record)}", Importance.NORMAL
+
+
+def _incident_closed(view: RunView, record: r.IncidentClosed) -> _Sentence:
+    return f"incident {record.incident} is over without a decision", Importance.NORMAL
+
+
 # --- compensation and transactions ----------------------------------------------------------------
 
 
@@ -419,6 +451,10 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.MessageThrown: _message_thrown,
     r.EscalationThrown: _escalation_thrown,
     r.ErrorThrown: _error_thrown,
+    r.IncidentOpened: _incident_opened,
+    r.IncidentUpdated: _incident_updated,
+    r.IncidentResolved: _incident_resolved,
+    r.IncidentClosed: _incident_closed,
     r.CompensationTriggered: _compensation_triggered,
     r.CompensationBegan: _compensation_began,
     r.TransactionCancelled: _transaction_cancelled,
@@ -464,6 +500,10 @@ _KINDS: dict[type, Kind] = {
             r.MessageThrown,
             r.EscalationThrown,
             r.ErrorThrown,
+            r.IncidentOpened,
+            r.IncidentUpdated,
+            r.IncidentResolved,
+            r.IncidentClosed,
             r.EventAwaited,
             r.EventTriggered,
             r.ConditionReset,

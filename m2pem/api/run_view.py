@@ -35,7 +35,8 @@ class ElementState(msgspec.Struct):
     """An element: the tokens on it now and so far, and the mission time of its last change.
 
     `failed`: the last token that left it had failed. `asking`: a prompt of it is open. `waiting`:
-    a task of it waits for vehicles or payloads that are not free.
+    a task of it waits for vehicles or payloads that are not free. `stopped`: an incident stops a
+    token on it.
     """
 
     active: int = 0
@@ -44,6 +45,7 @@ class ElementState(msgspec.Struct):
     failed: bool = False
     asking: bool = False
     waiting: bool = False
+    stopped: bool = False
 
 
 @dataclass(slots=True)
@@ -211,6 +213,7 @@ class RunView:
         self.allocations: dict[str, Allocation] = {}
         self.services: dict[str, Service] = {}
         self.prompts: dict[str, r.PromptOpened] = {}
+        self.incidents: dict[str, r.IncidentOpened] = {}
         self.waits: dict[int, Wait] = {}
         self.holders: dict[str, str] = {}
         """Operators who have taken a resource, by resource, as far as the run's records say."""
@@ -276,6 +279,8 @@ class RunView:
             return f"{behavior.name} of {self.label(behavior.element)} ({id_})"
         if (allocation := self.allocation(id_)) is not None:
             return f"{self.label(allocation.element)} ({id_})"
+        if (incident := self.incidents.get(id_)) is not None:
+            return f"the incident of {self.label(incident.element)} ({id_})"
         return id_
 
     def prompt(self, id_: str) -> r.PromptOpened | None:
@@ -356,13 +361,15 @@ class RunView:
         for prompt in list(self.prompts):
             self._close_prompt(prompt)
         for place, state in self.elements.items():
-            if state.active or state.asking or state.waiting:
+            if state.active or state.asking or state.waiting or state.stopped:
                 state.active = 0
                 state.asking = False
                 state.waiting = False
+                state.stopped = False
                 self._touch(place, state)
         self.tokens.clear()
         self.allocations.clear()
+        self.incidents.clear()
         self.waits.clear()
 
     def _take(self, record: r.OperatorTookControl) -> None:
@@ -559,6 +566,25 @@ class RunView:
         if self.changes is not None:
             self.changes.prompts.add(id_)
 
+    def _open_incident(self, record: r.IncidentOpened) -> None:
+        self.incidents[record.incident] = record
+        token = self.tokens.get(record.token)
+        for id_, wait in list(token.waits.items()) if token is not None else ():
+            if record.rearm or wait.element == record.element:
+                self.waits.pop(id_, None)
+        self._note_stopped(record)
+
+    def _close_incident(self, record: r.IncidentResolved | r.IncidentClosed) -> None:
+        opened = self.incidents.pop(record.incident, None)
+        if opened is not None:
+            self._note_stopped(opened)
+
+    def _note_stopped(self, record: r.IncidentOpened) -> None:
+        place = (record.process, record.element)
+        state = self._element(place)
+        state.stopped = any((i.process, i.element) == place for i in self.incidents.values())
+        self._touch(place, state)
+
     def _await_event(self, record: r.EventAwaited) -> None:
         lasts = record.trigger is r.Trigger.TIMER and not record.calendar
         wait = self.waits[record.wait] = Wait(
@@ -629,6 +655,9 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.PromptOpened: RunView._open_prompt,
     r.PromptAnswered: RunView._answer_prompt,
     r.PromptWithdrawn: RunView._answer_prompt,
+    r.IncidentOpened: RunView._open_incident,
+    r.IncidentResolved: RunView._close_incident,
+    r.IncidentClosed: RunView._close_incident,
     r.EventAwaited: RunView._await_event,
     r.EventTriggered: RunView._trigger_event,
 }

@@ -218,6 +218,18 @@ EXTENSIONS = (
         ),
     ),
     OwnAttributes(
+        "Errors",
+        ("process",),
+        (
+            Attribute(
+                "onError",
+                Type.NAME,
+                "`incident`: an error that no event catches opens an incident; `end`: it ends the "
+                "run; otherwise what the caller, else the fleet file says",
+            ),
+        ),
+    ),
+    OwnAttributes(
         "Choice",
         ("adHocSubProcess",),
         (Attribute("activeElements", Type.EXPRESSION, "the list of ids to begin"),),

@@ -28,6 +28,7 @@ from m2pem.mission.elements import (
     AdHocOrdering,
     AdHocSubProcess,
     Container,
+    ErrorPolicy,
     FlowNode,
     Process,
     SubProcess,
@@ -144,6 +145,23 @@ class _Frame:
     order: ChildOrder = field(default_factory=ChildOrder)
 
 
+def _on_error(
+    context: ReadingContext, element: etree._Element, identifier: str
+) -> ErrorPolicy | None:
+    """Read what an error of the process does that no event catches; None: it does not say."""
+    text = element.get(M2PEM + "onError")
+    if text is None or text in list(ErrorPolicy):
+        return None if text is None else ErrorPolicy(text)
+    context.findings.error(
+        element,
+        identifier,
+        BAD_VALUE,
+        f"m2pem:onError='{text}' says nothing that m2pem knows",
+        'write m2pem:onError="incident" or m2pem:onError="end", or delete it',
+    )
+    return None
+
+
 def read_process(context: ReadingContext, element: etree._Element) -> None:
     """Read a process and all that it contains."""
     identifier = context.claim(element)
@@ -152,6 +170,7 @@ def read_process(context: ReadingContext, element: etree._Element) -> None:
         element.get("name", ""),
         context.findings.line(element),
         context.boolean(element, "isExecutable", False, identifier),
+        on_error=_on_error(context, element, identifier),
     )
     context.processes.append(process)
     stack = [_frame(context, process, element)]

@@ -72,7 +72,7 @@ def arm(
             except (ExpressionError, ExpressionSyntaxError, _NotATimeError) as error:
                 reason = f"timer of {node.id}: {error}"
                 if isinstance(holder, Token):
-                    throw_error(x, holder, "EXPRESSION", reason)
+                    throw_error(x, holder, "EXPRESSION", reason, arming=not spent)
                 else:
                     throw_expression_error(x, holder, reason)
                 return False
@@ -195,13 +195,16 @@ def definition_of(wait: Wait) -> ConditionalEventDefinition:
 def condition_fires(x: Execution, wait: Wait) -> bool:
     """Whether an armed condition fires now; a spent one that is false may fire from now on.
 
-    A condition that cannot be evaluated throws error EXPRESSION where it is awaited.
+    A condition that cannot be evaluated throws error EXPRESSION where it is awaited, once: not
+    while an incident is open there.
     """
     holder = wait.token or wait.scope
     try:
         holds = definition_of(wait).condition.holds(reader(holder))
     except ExpressionError as error:
         reason = f"condition of {wait.node.id}: {error}"
+        if wait.token is not None and wait.token.incident:
+            return False
         if wait.token is not None:
             throw_error(x, wait.token, "EXPRESSION", reason)
         else:
@@ -216,7 +219,7 @@ def condition_fires(x: Execution, wait: Wait) -> bool:
 def arm_next(x: Execution) -> None:
     """Arm the element of the first token that entered, unless the token has left already."""
     token = x.entered.popleft()
-    if x.state.tokens.get(token.id) is token:
+    if x.is_active(token):
         x.handlers[type(token.node)].enter(x, token)
 
 

@@ -26,6 +26,7 @@ from m2pem.engine.elements.behaviors import (
 from m2pem.engine.elements.subprocesses import begin
 from m2pem.engine.lifecycle import Admission, admission
 from m2pem.engine.records import RunOutcome
+from m2pem.engine.resolving import resolve_incident, why_refused
 from m2pem.engine.scopes import end_run
 from m2pem.engine.state import BehaviorPhase
 from m2pem.engine.steps import Steps
@@ -63,7 +64,11 @@ def decide(x: Steps, item: i.Input) -> None:
 
 
 def _defer(x: Steps, item: i.Input) -> None:
-    refusal = _why_refused(x, item) if isinstance(item, i.PromptAnswer) else ""
+    refusal = ""
+    if isinstance(item, i.PromptAnswer):
+        refusal = _why_refused(x, item)
+    elif isinstance(item, i.ResolveIncident):
+        refusal = why_refused(x.state, x.fleet, item)
     if refusal:
         x.ignore(refusal)
     else:
@@ -145,6 +150,10 @@ def _give_up(x: Steps, item: i.GiveUp) -> None:
         for request in state.allocations.values()
     ]
     awaited += [f"{prompt.token.node.id} (an answer)" for prompt in state.prompts.values()]
+    awaited += [
+        f"{incident.token.node.id} (a choice about incident {incident.id}: {incident.code})"
+        for incident in state.incidents.values()
+    ]
     awaited += [f"{service.token.node.id} ({service.name})" for service in state.services.values()]
     awaited += [f"{wait.node.id} ({wait.trigger.value})" for wait in state.waits.values()]
     waiting = f"; awaited: {', '.join(dict.fromkeys(awaited))}" if awaited else ""
@@ -268,6 +277,7 @@ _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.ResourcesChosen: resources_chosen,
     i.ResourcesNotFree: resources_not_free,
     i.PromptAnswer: _answer,
+    i.ResolveIncident: resolve_incident,
     i.ServiceCompleted: _service_completed,
     i.ServiceFailed: _service_failed,
     i.SignalReceived: _signal,

@@ -238,9 +238,16 @@ class Execution:
         """Put a new token on a node."""
         return self.enter(self.state.last_token + 1, node, scope)
 
+    def is_active(self, token: Token) -> bool:
+        """Whether a token is still there, and no incident stops it."""
+        return self.state.tokens.get(token.id) is token and not token.incident
+
     def leave(self, token: Token, outcome: TokenOutcome) -> None:
         """Remove a token from its node. It is consumed unless it enters another node next."""
         node = token.node
+        if token.incident:
+            resources = self.state.incidents[token.incident].resources
+            self.emit(r.IncidentClosed(token.incident, resources))
         self.emit(
             r.TokenLeft(
                 token.id,

@@ -4,12 +4,30 @@ Each carries all that it needs, apart from the time, so that a journaled input c
 `id`, where given, makes an input idempotent: an id that was seen is ignored, and a record says so.
 """
 
+from enum import StrEnum
 from typing import TypeAlias, Union
 
 import msgspec
 
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.values import Value
+
+
+class IncidentChoice(StrEnum):
+    """What an operator can do about an incident."""
+
+    RETRY = "retry"
+    """The element begins anew."""
+    RETRY_WITH = "retry_with"
+    """The element begins anew, with other resources for its roles."""
+    SKIP = "skip"
+    """The token goes on as if the element had completed."""
+    SET_DATA = "set_data"
+    """Values are written where the element sees them; the incident stays open."""
+    MOVE = "move"
+    """The token goes to another element of its scope, or along a sequence flow there."""
+    END = "end"
+    """The run fails with the error."""
 
 
 class _Input(
@@ -134,6 +152,21 @@ class PromptAnswer(_Input, frozen=True):
     by: str = ""
 
 
+class ResolveIncident(_Input, frozen=True):
+    """An operator's choice about an incident; the first one that ends it wins.
+
+    `data`: what SET_DATA writes. `to`: the element or sequence flow that MOVE goes to. `roles`:
+    the resources of the roles that RETRY_WITH replaces.
+    """
+
+    incident: str
+    choice: IncidentChoice
+    by: str = ""
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
+    to: str = ""
+    roles: dict[str, tuple[str, ...]] = msgspec.field(default_factory=dict)
+
+
 class ServiceCompleted(_Input, frozen=True):
     """A service has completed and writes `data`."""
 
@@ -225,6 +258,7 @@ Input: TypeAlias = Union[
     ResourcesChosen,
     ResourcesNotFree,
     PromptAnswer,
+    ResolveIncident,
     ServiceCompleted,
     ServiceFailed,
     SignalReceived,

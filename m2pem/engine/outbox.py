@@ -1,6 +1,6 @@
 """The outbox: the commands that records lead to, and those that are still to be carried out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from m2pem.engine import records as r
 from m2pem.engine.commands import (
@@ -16,6 +16,7 @@ from m2pem.engine.commands import (
     StartBehavior,
     WithdrawAllocation,
 )
+from m2pem.engine.incidents import incident_holding
 from m2pem.engine.records import Record
 from m2pem.engine.state import Behavior, BehaviorPhase, Prompt, RunState, RunStatus, Service
 from m2pem.mission.behavior import Decision
@@ -37,6 +38,10 @@ _WITH_COMMANDS = frozenset(
         r.ServiceWithdrawn,
         r.RunPaused,
         r.RunResumed,
+        r.IncidentOpened,
+        r.IncidentResolved,
+        r.IncidentClosed,
+        r.OperatorGaveControlBack,
     }
 )
 """Records that may lead to a command: few of those that a run writes."""
@@ -55,22 +60,16 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
         match record:
             case r.AllocationRequested() | r.AllocationDelayed() | r.AllocationEnded():
                 commands.extend(_allocation(state, record))
-            case r.BehaviorRequested() | r.BehaviorRestarted():
-                behavior = state.behaviors.get(record.behavior)
-                if behavior is not None and behavior.phase is not BehaviorPhase.CANCELLING:
-                    commands.append(_start(state, behavior))
-            case r.BehaviorCancelRequested():
-                behavior = state.behaviors.get(record.behavior)
-                if behavior is not None:
-                    commands.append(_cancel(state, behavior))
-            case r.BehaviorUnsettled():
+            case (
+                r.BehaviorRequested()
+                | r.BehaviorRestarted()
+                | r.BehaviorCancelRequested()
+                | r.BehaviorUnsettled()
+                | r.BehaviorContinued()
+            ):
                 behavior = state.behaviors.get(record.behavior)
                 if behavior is not None:
-                    commands.extend(_hold(behavior))
-            case r.BehaviorContinued():
-                behavior = state.behaviors.get(record.behavior)
-                if behavior is not None and behavior.phase is BehaviorPhase.ACTIVE:
-                    commands.extend(ResumeResource(name) for name in behavior.resources)
+                    commands.extend(_behavior(state, behavior, record))
             case r.PromptOpened():
                 prompt = state.prompts.get(record.prompt)
                 if prompt is not None:
@@ -91,6 +90,10 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
             case r.ServiceWithdrawn():
                 if record.service not in never_opened:
                     commands.append(CancelService(record.service))
+            case r.IncidentOpened() | r.IncidentResolved() | r.IncidentClosed():
+                commands.extend(_incident(state, record))
+            case r.OperatorGaveControlBack() if incident_holding(state, record.resource):
+                commands.extend(_held_for(state, [record.resource]))
             case r.RunPaused():
                 commands.extend(HoldResource(resource) for resource in _commanded(state))
             case r.RunResumed():
@@ -100,6 +103,20 @@ def commands_of(state: RunState, records: Sequence[Record]) -> list[Command]:
             case _:
                 pass
     return commands
+
+
+def _behavior(state: RunState, behavior: Behavior, record: Record) -> list[Command]:
+    match record:
+        case r.BehaviorRequested() | r.BehaviorRestarted():
+            if behavior.phase is not BehaviorPhase.CANCELLING:
+                return [_start(state, behavior)]
+        case r.BehaviorCancelRequested():
+            return [_cancel(state, behavior)]
+        case r.BehaviorUnsettled():
+            return _hold(behavior)
+        case r.BehaviorContinued() if behavior.phase is BehaviorPhase.ACTIVE:
+            return [ResumeResource(name) for name in behavior.resources]
+    return []
 
 
 def _allocation(
@@ -132,9 +149,36 @@ def outstanding(state: RunState) -> list[Command]:
     commands.extend(AllocateResources(allocation) for allocation in state.allocations)
     commands.extend(_open(prompt) for prompt in state.prompts.values())
     commands.extend(_run(service) for service in state.services.values())
+    for incident in state.incidents.values():
+        commands.extend(_held_for(state, incident.resources))
     if state.status is RunStatus.PAUSED:
         commands.extend(HoldResource(resource) for resource in _commanded(state))
     return commands
+
+
+def _incident(
+    state: RunState, record: r.IncidentOpened | r.IncidentResolved | r.IncidentClosed
+) -> list[Command]:
+    if not isinstance(record, r.IncidentOpened):
+        return _let_go(state, record.resources)
+    return _held_for(state, record.resources) if record.incident in state.incidents else []
+
+
+def _held_for(state: RunState, resources: Iterable[str]) -> list[Command]:
+    """Return the holds of what an incident keeps, but for what an operator steers."""
+    return [HoldResource(resource) for resource in resources if resource not in state.taken]
+
+
+def _let_go(state: RunState, resources: Iterable[str]) -> list[Command]:
+    """Return the commands for what an incident has kept and nothing has now: what got a behavior
+    has a command of its own, and what is being cancelled comes to a stand."""
+    return [
+        ResumeResource(resource)
+        for resource in resources
+        if resource not in state.held
+        and resource not in state.taken
+        and not incident_holding(state, resource)
+    ]
 
 
 def _commanded(state: RunState) -> list[str]:

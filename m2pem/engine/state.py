@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TypeAlias
 
-from m2pem.engine.inputs import Input
+from m2pem.engine.inputs import IncidentChoice, Input
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.elements import (
@@ -190,6 +190,10 @@ class Token:
     there is nothing to compensate."""
     lost_work: LostWork | None = None
     """What was lost that did the work of its activity before; None: nothing was."""
+    incident: str = ""
+    """The open incident that stops it."""
+    replacements: dict[str, tuple[str, ...]] | None = None
+    """Who fills the roles of the behavior that begins anew, by an operator's choice."""
 
     @property
     def is_reopened(self) -> bool:
@@ -294,6 +298,19 @@ class Prompt:
 
 
 @dataclass(slots=True, eq=False)
+class Incident:
+    """An open incident. Fields as in record `IncidentOpened`."""
+
+    id: str
+    token: Token
+    code: str
+    reason: str
+    choices: tuple[IncidentChoice, ...]
+    resources: tuple[str, ...]
+    roles: dict[str, tuple[str, ...]]
+
+
+@dataclass(slots=True, eq=False)
 class Service:
     """A running service."""
 
@@ -337,6 +354,7 @@ class RunState:
     last_behavior: int = 0
     last_prompt: int = 0
     last_service: int = 0
+    last_incident: int = 0
 
     shared: DataStores = field(init=False)
     root: Scope | None = None
@@ -355,6 +373,7 @@ class RunState:
     something else for the run."""
     prompts: dict[str, Prompt] = field(default_factory=dict)
     services: dict[str, Service] = field(default_factory=dict)
+    incidents: dict[str, Incident] = field(default_factory=dict)
 
     waits: dict[int, Wait] = field(default_factory=dict)
     catchers: dict[tuple[Trigger, str], dict[int, Wait]] = field(default_factory=dict)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from m2pem.engine import records as r
 from m2pem.engine.arming import arm_next, condition_fires
 from m2pem.engine.elements import HANDLERS
-from m2pem.engine.elements.activities import has_been_entered
+from m2pem.engine.elements.activities import activate_later
 from m2pem.engine.elements.gateways import fire_joins
 from m2pem.engine.elements.subprocesses import check_scope
 from m2pem.engine.execution import Execution, definitions_of
@@ -61,7 +61,7 @@ class Steps(Execution):
                 item = queue.popleft()
                 # Written out, as this is the inner loop.
                 if type(item) is Token:
-                    if state.tokens.get(item.id) is item:
+                    if state.tokens.get(item.id) is item and not item.incident:
                         self.steps_left -= 1
                         _ACTIVATE[type(item.node)](self, item)
                 elif state.scopes.get(item.id) is item:
@@ -95,7 +95,7 @@ class Steps(Execution):
     def _is_current(self, item: Token | Scope) -> bool:
         """Whether a queued token or scope has not moved or ended before its turn."""
         if type(item) is Token:
-            return self.state.tokens.get(item.id) is item
+            return self.is_active(item)
         return self.state.scopes.get(item.id) is item
 
     def finish(self) -> list[Record]:
@@ -115,7 +115,7 @@ class Steps(Execution):
         steps = []
         for item in dict.fromkeys(self._in_order()):
             if type(item) is Token:
-                if tokens.get(item.id) is item:
+                if tokens.get(item.id) is item and not item.incident:
                     steps.append(item.id)
             elif scopes.get(item.id) is item:
                 steps.append(-item.id)
@@ -141,16 +141,13 @@ class Steps(Execution):
             # The batch before may have been another process.
             self.joins_to_check.update(self.state.scopes)
             self.data_changed = True
-        tokens, queue, waits = self.state.tokens, self.queue, self.waits
+        tokens = self.state.tokens
         for number in steps:
             if number > 0:
                 token = tokens.get(number)
                 if token is None:
                     continue
-                if (token.instance is None and token.node not in waits) or has_been_entered(token):
-                    queue.append(token)
-                else:
-                    self.execute_later(token)
+                activate_later(self, token)
             else:
                 scope = self.state.scopes.get(-number)
                 if scope is not None:
@@ -173,6 +170,7 @@ class Steps(Execution):
             state.allocations
             or state.prompts
             or state.services
+            or state.incidents
             or len(state.waits) > len(state.conditions)
         ):
             return

@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
+from m2pem.engine.incidents import open_incident, opens_incident
 from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.scopes import (
     ErrorPath,
@@ -14,7 +15,7 @@ from m2pem.engine.scopes import (
     move_to_boundary,
     start_event_subprocess,
 )
-from m2pem.engine.state import Scope, Token
+from m2pem.engine.state import Behavior, Scope, Token
 from m2pem.mission.elements import Activity, BoundaryEvent, Event, StartEvent
 from m2pem.mission.events import (
     Escalation,
@@ -27,14 +28,22 @@ from m2pem.mission.events import (
 
 
 def throw_error(
-    x: Execution, token: Token, code: str, reason: str = "", *, leaving: bool = False
+    x: Execution,
+    token: Token,
+    code: str,
+    reason: str = "",
+    *,
+    leaving: bool = False,
+    behavior: Behavior | None = None,
+    arming: bool = False,
 ) -> None:
     """Throw an error where a token is; it goes outwards scope by scope (BPMN 2.0.2, clause 10.5.7).
 
     An activity's own boundary events are checked first, then the event subprocesses of its scope,
     then the boundary events of the activity around it, and so on. What catches it ends the
-    activity or scope. Uncaught, the run fails. `leaving`: the token is consumed (an error end
-    event).
+    activity or scope. Uncaught, the run fails, or an incident opens (`m2pem.engine.incidents`): the
+    token is then still there. `leaving`: the token is consumed (an error end event). `behavior`:
+    the one that failed. `arming`: an event at the element could not be armed.
     """
     node = token.node
     caught = _find_catcher(token, code, error_code)
@@ -49,23 +58,31 @@ def throw_error(
             caught.event.id if caught is not None else "",
         )
     )
+    if caught is None and opens_incident(x, token):
+        if not token.incident:
+            open_incident(x, token, code, reason, behavior, rearm=arming)
+        return
     failed = error_path(token)
     if leaving:
         x.leave(token, TokenOutcome.COMPLETED)
     if caught is None:
-        because = f": {reason}" if reason else ""
-        end_run(
-            x,
-            RunOutcome.FAILED,
-            f"error {code} from {node.id}, which no event catches{because}",
-            failed,
-        )
+        fail_run(x, token, code, reason, failed)
     else:
         _catch(x, caught, failed)
 
 
+def fail_run(x: Execution, token: Token, code: str, reason: str, failed: ErrorPath) -> None:
+    """End the run with an error from the element of a token; `failed`: what it has passed."""
+    because = f": {reason}" if reason else ""
+    detail = f"error {code} from {token.node.id}, which no event catches{because}"
+    end_run(x, RunOutcome.FAILED, detail, failed)
+
+
 def throw_expression_error(x: Execution, scope: Scope, reason: str) -> None:
-    """Throw the error of an expression that a scope as a whole evaluates, from its activity."""
+    """Throw the error of an expression that a scope as a whole evaluates, from its activity.
+
+    A process that was not called has no element that could be retried: its error ends the run.
+    """
     code = "EXPRESSION"
     if scope.owner is not None:
         throw_error(x, scope.owner, code, reason)

@@ -89,7 +89,7 @@ def take_kept_messages(x: Execution, holder: TokenOrScope) -> bool:
                 found = True
                 kept = x.state.kept_messages[wait.ref][number]
                 trigger(x, wait, kept.data, kept.keys, kept_index=number)
-                if isinstance(holder, Token) and x.state.tokens.get(holder.id) is not holder:
+                if isinstance(holder, Token) and not x.is_active(holder):
                     return False
     return True
 
@@ -127,7 +127,7 @@ def fire_true_conditions(x: Execution, token: Token) -> bool:
     for number in list(token.waits or ()):
         if number in x.state.conditions and condition_fires(x, x.state.waits[number]):
             trigger(x, x.state.waits[number], {})
-    return x.state.tokens.get(token.id) is token
+    return x.is_active(token)
 
 
 # --- triggering ---------------------------------------------------------------------------------
@@ -234,7 +234,7 @@ def await_events_of_gateway(x: Execution, token: Token, but: FlowNode | None = N
         for definition in definitions_of(flow.target):
             if not arm(x, token, flow.target, definition):
                 return False
-            if x.state.tokens.get(token.id) is not token:
+            if not x.is_active(token):
                 return False
     return True
 

@@ -10,6 +10,7 @@ import msgspec
 from m2pem.errors import JournalError
 from m2pem.geo.geojson import kind_of
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.geometry import Area, Geometry, Point, Route, VehiclePosition
 
 SIMULATED = "sim"
@@ -89,7 +90,8 @@ class Fleet:
     `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
     `handed_over`: names of geometries that missions may use and operators hand over.
     `battery_cost_s`, `switching_cost_s`: travel time that an empty battery, and a vehicle which is
-    new to a run, count as when vehicles are chosen for roles.
+    new to a run, count as when vehicles are chosen for roles. `on_error`: what an error does that
+    no event of the mission catches, where the mission does not say.
     """
 
     name: str
@@ -108,6 +110,7 @@ class Fleet:
     handed_over: tuple[str, ...] = ()
     battery_cost_s: float = 60.0
     switching_cost_s: float = 10.0
+    on_error: ErrorPolicy = ErrorPolicy.END
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -14,6 +14,7 @@ from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.geo.local_frame import Origin
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.geometry import Area, Coordinate, Geometry, Point, Route
 from m2pem.suggestions import suggest
 
@@ -183,6 +184,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         handed_over=tuple(model.handed_over),
         battery_cost_s=costs.battery,
         switching_cost_s=costs.switching,
+        on_error=ErrorPolicy(model.on_error),
     )
 
 

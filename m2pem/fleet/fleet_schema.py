@@ -191,6 +191,13 @@ class FleetModel(_Model):
             description="A run that executes more elements without waiting once is paused.",
         ),
     ] = 200_000
+    on_error: Annotated[
+        Literal["end", "incident"],
+        Field(
+            description="An error that no event catches ends the run, or opens an incident, about "
+            "which an operator decides. What a process of the mission says comes first."
+        ),
+    ] = "end"
     vehicles: dict[Name, VehicleModel] = {}
     teams: dict[Name, TeamModel] = {}
     routes: Annotated[

@@ -94,15 +94,25 @@ class DataObject(Element):
         return self.name or self.id
 
 
+class ErrorPolicy(StrEnum):
+    """What an error does that no event catches: it ends the run, or opens an incident."""
+
+    END = "end"
+    INCIDENT = "incident"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Process(Element):
     """A process (clause 10.2). `executable` is the file's `isExecutable`.
 
     `global_task`: it has a global task of its id in it, and nothing else; it can only be called.
+    `on_error`: what an error in it does that no event catches; None: what its caller, else the
+    fleet, says.
     """
 
     executable: bool = False
     global_task: bool = False
+    on_error: ErrorPolicy | None = None
     file: str = field(init=False, repr=False, default="")
     """The file that it is in; "" in the mission's own."""
     nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())

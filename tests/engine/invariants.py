@@ -1,7 +1,7 @@
 """What is always true of a run's state between two inputs."""
 
 from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope
-from m2pem.mission.elements import Activity
+from m2pem.mission.elements import Activity, BoundaryEvent
 
 
 def check_state(state: RunState) -> None:
@@ -18,6 +18,7 @@ def check_state(state: RunState) -> None:
         assert not state.allocations
         assert not state.prompts
         assert not state.services
+        assert not state.incidents
         assert not state.yielded
         assert all(b.phase is BehaviorPhase.CANCELLING for b in state.behaviors.values())
         assert not state.kept_messages
@@ -43,8 +44,9 @@ def _check_tokens(state: RunState) -> None:
         assert token.scope.tokens[token.id] is token
         assert token.node.container is token.scope.container
         assert token.inner is None or state.scopes[token.inner.id] is token.inner
-        busy = [token.behavior, token.allocation, token.service, token.inner]
+        busy = [token.behavior, token.allocation, token.service, token.inner, token.incident]
         assert sum(bool(each) for each in busy) <= 1
+        assert not (token.incident and token.prompt)
 
 
 def _check_done(scope: Scope, *, looked_at: bool) -> None:
@@ -149,5 +151,14 @@ def _check_work(state: RunState) -> None:
     for prompt in state.prompts.values():
         assert state.tokens[prompt.token.id] is prompt.token
         assert prompt.token.prompt == prompt.id
+    assert {token.incident for token in state.tokens.values()} - {""} == set(state.incidents)
+    for incident in state.incidents.values():
+        assert state.tokens[incident.token.id] is incident.token
+        assert incident.token.incident == incident.id
+        own = {wait.node for wait in (incident.token.waits or {}).values()}
+        assert all(isinstance(node, BoundaryEvent) for node in own)
+        assert incident.choices
+    kept = [each for incident in state.incidents.values() for each in incident.resources]
+    assert len(set(kept)) == len(kept), "two incidents hold one resource"
     for service in state.services.values():
         assert state.tokens[service.token.id] is service.token

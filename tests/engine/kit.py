@@ -1,7 +1,7 @@
 """Playing a mission by hand: inputs in, records out, with a clock that the test moves."""
 
 from collections.abc import Iterator
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
@@ -78,6 +78,13 @@ class Play:
         behavior = self.behavior(element)
         number = number or behavior.number + 1
         return self.give(i.BehaviorReported(behavior.id, number, state, code))
+
+    def resolve(self, choice: str, incident: str = "", **options: Any) -> Self:
+        """Choose what is done about the incident of that element, or the one that opened first."""
+        incidents = self.run.state.incidents
+        named = [each.id for each in incidents.values() if incident in ("", each.token.node.id)]
+        number = named[0] if named else incident
+        return self.give(i.ResolveIncident(number, i.IncidentChoice(choice), "ops", **options))
 
     def complete(self, element: str, **data: Value) -> Self:
         return self.give(i.ServiceCompleted(self.service(element), data))
@@ -218,5 +225,6 @@ class Play:
             or state.allocations
             or state.prompts
             or state.services
+            or state.incidents
             or any(token.behavior for token in state.tokens.values())
         )

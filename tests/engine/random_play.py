@@ -3,15 +3,16 @@
 `Outside` keeps book of the commands and asserts that they make sense to whoever carries them out.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 from m2pem.engine import commands as c
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
-from m2pem.engine.state import BehaviorPhase, RunStatus
+from m2pem.engine.state import BehaviorPhase, Incident, RunStatus
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
+from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.mission import Mission
 from tests.engine.invariants import check_state
 from tests.engine.kit import SECOND_US, Play
@@ -78,8 +79,12 @@ class Outside:
 class RandomPlay:
     """A play that never waits: what happens is chosen by numbers."""
 
-    def __init__(self, text: str | Mission, batch: int) -> None:
+    def __init__(
+        self, text: str | Mission, batch: int, on_error: ErrorPolicy = ErrorPolicy.END
+    ) -> None:
         self.play = Play(text, batch=batch)
+        fleet = replace(self.play.fleet, on_error=on_error)
+        self.play = Play(self.play.mission, fleet=fleet, batch=batch)
         self.play.goes_on = False
         self.outside = Outside()
         self.spare = MAX_CONTINUES
@@ -117,6 +122,8 @@ class RandomPlay:
             elif state.prompts:
                 prompt = next(iter(state.prompts.values()))
                 self.give(i.PromptAnswer(prompt.id, prompt.decisions[0]["value"]))
+            elif state.incidents:
+                self._get_over(next(iter(state.incidents.values())))
             elif state.services:
                 self.give(i.ServiceCompleted(next(iter(state.services))))
             elif active := [b for b in state.behaviors.values() if b.phase is BehaviorPhase.ACTIVE]:
@@ -165,6 +172,9 @@ class RandomPlay:
             add(i.SignalReceived(signal, id="once"))
         for message in self.play.mission.messages:
             add(i.MessageReceived(message, {"a": 0}))
+        for incident in state.incidents.values():
+            for choice in self._choices_about(incident):
+                add(choice)
         add(i.PauseRun())
         add(i.ResumeRun())
         add(i.ResumeRun())
@@ -178,6 +188,25 @@ class RandomPlay:
         if len(self.play.steps) > 10:
             add(i.StopRun())
         return things
+
+    def _choices_about(self, incident: Incident) -> Iterator[i.ResolveIncident]:
+        """Yield every choice about an incident, wrong ones too."""
+        for choice in i.IncidentChoice:
+            yield i.ResolveIncident(incident.id, choice, "ann")
+        yield i.ResolveIncident(incident.id, i.IncidentChoice.SET_DATA, data={"a": 3, "b": 0})
+        for target in self.play.mission.elements:
+            yield i.ResolveIncident(incident.id, i.IncidentChoice.MOVE, to=target)
+        for role in incident.roles:
+            for resource in self.play.fleet.vehicles:
+                roles = {role: (resource,)}
+                yield i.ResolveIncident(incident.id, i.IncidentChoice.RETRY_WITH, roles=roles)
+
+    def _get_over(self, incident: Incident) -> None:
+        """Go on after an incident, or fail."""
+        can_skip = i.IncidentChoice.SKIP in incident.choices
+        opened = self.play.run.state.last_incident
+        choice = i.IncidentChoice.SKIP if can_skip and opened < 30 else i.IncidentChoice.END
+        self.give(i.ResolveIncident(incident.id, choice))
 
     def _report(self, behavior: str, state: BehaviorState) -> None:
         number = self.play.run.state.behaviors[behavior].number + 1

@@ -9,6 +9,7 @@ from m2pem.engine.state import (
     Compensation,
     CompletedActivity,
     DataStores,
+    Incident,
     Join,
     KeptMessage,
     Loop,
@@ -32,6 +33,7 @@ _OBJECTS = (
     AllocationRequest,
     Behavior,
     Prompt,
+    Incident,
     Service,
     CompletedActivity,
     Compensation,
@@ -44,7 +46,7 @@ def snapshot(state: RunState) -> dict[str, Any]:
     held: list[object] = [state.root] if state.root is not None else []
     for kept in (state.scopes, state.tokens, state.waits, state.behaviors):
         held.extend(kept.values())
-    for also in (state.allocations, state.prompts, state.services):
+    for also in (state.allocations, state.prompts, state.services, state.incidents):
         held.extend(also.values())
     for each in held:
         if isinstance(each, Scope):  # grows while it is walked

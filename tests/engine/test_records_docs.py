@@ -9,7 +9,7 @@ from typing import Any, Union, get_args, get_origin
 import msgspec
 import pytest
 
-from m2pem.engine.inputs import Input
+from m2pem.engine.inputs import IncidentChoice, Input
 from m2pem.engine.records import Record, RunOutcome, TokenOutcome, Trigger
 from m2pem.mission.catalogue import BehaviorState
 
@@ -95,6 +95,7 @@ def test_every_field_is_explained_with_its_type():
 
 def test_every_value_of_a_field_with_few_is_listed():
     assert {name: quoted(values) for name, values in rows("### Values")} == {
+        "`choice`": list(IncidentChoice),
         "`outcome` of a token or scope": list(TokenOutcome),
         "`outcome` of a run": list(RunOutcome),
         "`state`": list(BehaviorState),

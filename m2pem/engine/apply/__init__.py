@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from m2pem.engine import records as r
-from m2pem.engine.apply import compensation, events, run, tasks, tokens
+from m2pem.engine.apply import compensation, events, incidents, run, tasks, tokens
 from m2pem.engine.state import RunState
 
 
@@ -71,6 +71,10 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.MessageThrown: events.message_thrown,
     r.EscalationThrown: run.nothing,
     r.ErrorThrown: run.nothing,
+    r.IncidentOpened: incidents.incident_opened,
+    r.IncidentUpdated: run.nothing,
+    r.IncidentResolved: incidents.incident_resolved,
+    r.IncidentClosed: incidents.incident_closed,
     r.CompensationEnabled: compensation.compensation_enabled,
     r.CompensationTriggered: compensation.compensation_triggered,
     r.CompensationBegan: compensation.compensation_began,

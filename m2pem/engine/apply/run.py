@@ -20,6 +20,7 @@ def run_claimed(state: RunState, record: r.RunClaimed) -> None:
     state.last_behavior += record.lost
     state.last_prompt += record.lost
     state.last_service += record.lost
+    state.last_incident += record.lost
 
 
 def run_paused(state: RunState, record: r.RunPaused) -> None:

@@ -58,7 +58,9 @@ def behavior_requested(state: RunState, record: r.BehaviorRequested) -> None:
         state.held.setdefault(resource, []).append(record.behavior)
         state.commanded[resource] = None
         state.lost.pop(resource, None)
-    state.tokens[record.token].behavior = record.behavior
+    token = state.tokens[record.token]
+    token.behavior = record.behavior
+    token.replacements = None
 
 
 def behavior_progressed(state: RunState, record: r.BehaviorProgressed) -> None:

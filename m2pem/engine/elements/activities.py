@@ -46,6 +46,14 @@ def has_been_entered(token: Token) -> bool:
     return token.armed or len(token.scope.gathered.get(node, ())) in range(1, node.start_quantity)
 
 
+def activate_later(x: Execution, token: Token) -> None:
+    """Queue a token that is on its element already: after a yield, or to begin anew."""
+    if (token.instance is None and token.node not in x.waits) or has_been_entered(token):
+        x.queue.append(token)
+    else:
+        x.execute_later(token)
+
+
 def begin_activity(x: Execution, token: Token) -> None:
     """Begin the work of an activity, whose boundary events are armed.
 

@@ -10,6 +10,7 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import await_event, due_after
 from m2pem.engine.execution import Execution
+from m2pem.engine.incidents import incident_holding
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, Token
 from m2pem.engine.throwing import throw_error
@@ -76,10 +77,17 @@ def resources_chosen(x: Execution, item: i.ResourcesChosen) -> None:
             item.considered,
         )
     )
-    for role in behavior.roles:
-        if role.need is not None and role.need.store and role.name in item.roles:
-            x.write(token, role.need.store, stored(role, item.roles[role.name]))
+    store_chosen(x, token, behavior, item.roles)
     emit_behavior(x, token, behavior, resources, item.roles, request.parameters, request.id)
+
+
+def store_chosen(
+    x: Execution, token: Token, behavior: Behavior, roles: Mapping[str, Sequence[str]]
+) -> None:
+    """Write what was chosen for the roles of a behavior, under the names that they say."""
+    for role in behavior.roles:
+        if role.need is not None and role.need.store and role.name in roles:
+            x.write(token, role.need.store, stored(role, roles[role.name]))
 
 
 def stored(role: Role, resources: Sequence[str]) -> Value:
@@ -97,9 +105,11 @@ def behavior_of(request: AllocationRequest) -> Behavior:
 
 
 def refusal_of(x: Execution, resources: Sequence[str]) -> str:
-    """Return why a behavior cannot have resources: an operator or another behavior of the run has
-    one; "" if it can."""
+    """Return why a behavior cannot have resources: an operator, an incident or another behavior of
+    the run has one; "" if it can."""
     for resource in resources:
+        if incident := incident_holding(x.state, resource):
+            return f"{resource} is held for incident {incident}"
         if resource in x.state.taken:
             return f"{resource} is with {x.state.taken[resource]}"
         for holder in x.state.held.get(resource, ()):

@@ -21,6 +21,7 @@ from m2pem.engine.elements.allocations import (
     emit_behavior,
     refusal_of,
     request_allocation,
+    store_chosen,
 )
 from m2pem.engine.elements.losses import end_work, is_reassigned
 from m2pem.engine.execution import Execution
@@ -56,6 +57,9 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
     if not behavior.roles and behavior.name == "hold":
         _hold_for(x, token, parameters.get("duration"))
         return
+    if token.replacements is not None:
+        _request_with_replacements(x, token, behavior, token.replacements, parameters)
+        return
     if behavior.allocated_at_start:
         request_allocation(x, token, behavior, parameters)
         return
@@ -70,6 +74,22 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
         throw_error(x, token, UNAVAILABLE, refusal)
     else:
         emit_behavior(x, token, behavior, allocation.resources, allocation.roles, parameters)
+
+
+def _request_with_replacements(
+    x: Execution,
+    token: Token,
+    behavior: BehaviorOfTask,
+    roles: dict[str, tuple[str, ...]],
+    parameters: dict[str, Value],
+) -> None:
+    """Request a behavior that begins anew with the resources that an operator has chosen."""
+    resources = tuple(dict.fromkeys(each for chosen in roles.values() for each in chosen))
+    if refusal := refusal_of(x, resources):
+        throw_error(x, token, UNAVAILABLE, refusal)
+        return
+    store_chosen(x, token, behavior, roles)
+    emit_behavior(x, token, behavior, resources, roles, parameters)
 
 
 def time_is_up(x: Execution, token: Token) -> None:

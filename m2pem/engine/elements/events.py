@@ -67,10 +67,10 @@ def throw(x: Execution, token: Token) -> None:
     assert isinstance(node, Event)
     for definition in node.definitions:
         arm_entered(x)  # what the definition before has led to
-        if x.state.tokens.get(token.id) is not token:
+        if not x.is_active(token):
             return
         _throw(x, token, definition)
-        if x.state.tokens.get(token.id) is not token:
+        if not x.is_active(token):
             return
     if isinstance(node, IntermediateThrowEvent) and node.links_to is not None:
         x.leave(token, TokenOutcome.COMPLETED)
@@ -108,7 +108,7 @@ def end(x: Execution, token: Token) -> None:
     assert isinstance(node, Event)
     for definition in sorted(node.definitions, key=_ends_the_scope):
         arm_entered(x)  # what the definition before has led to
-        if x.state.tokens.get(token.id) is not token:
+        if not x.is_active(token):
             return
         match definition:
             case TerminateEventDefinition():
@@ -129,7 +129,7 @@ def end(x: Execution, token: Token) -> None:
                 return
             case _:
                 _throw(x, token, definition)
-                if x.state.tokens.get(token.id) is not token:
+                if not x.is_active(token):
                     return
     if not token.compensations:
         x.consume(token)

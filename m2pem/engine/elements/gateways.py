@@ -211,6 +211,8 @@ def fire_joins(x: Execution) -> bool:
 
 def _fire_one(x: Execution, scope: Scope) -> bool:
     for node, join in scope.joins.items():
+        if x.state.incidents and _is_stopped(join):
+            continue
         if isinstance(node, InclusiveGateway) and not _more_tokens_can_come(
             x, scope, node, join.by_flow
         ):
@@ -219,12 +221,19 @@ def _fire_one(x: Execution, scope: Scope) -> bool:
             split_inclusive(x, last, node)
             return True
     for node, used in scope.activated.items():
+        if x.state.incidents and node in scope.joins and _is_stopped(scope.joins[node]):
+            continue
         waiting = scope.joins[node].by_flow if node in scope.joins else {}
         if not _more_tokens_can_come(x, scope, node, {*used, *waiting}):
             assert isinstance(node, ComplexGateway)
             reset_complex_gateway(x, scope, node)
             return True
     return False
+
+
+def _is_stopped(join: Join) -> bool:
+    """Whether a token that has fired the join is stopped there by an incident."""
+    return any(token.incident for tokens in join.by_flow.values() for token in tokens)
 
 
 def _more_tokens_can_come(

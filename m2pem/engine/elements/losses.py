@@ -37,7 +37,7 @@ def end_work(
     ):
         _reassign(x, token, behavior, code, reason, resources)
     else:
-        throw_error(x, token, code, reason)
+        throw_error(x, token, code, reason, behavior=behavior)
 
 
 def is_reassigned(

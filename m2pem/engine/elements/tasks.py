@@ -148,7 +148,7 @@ def send_task(x: Execution, token: Token) -> None:
         return
     if node.message is not None:
         send(x, token, node.message.id)
-        if x.state.tokens.get(token.id) is not token:
+        if not x.is_active(token):
             return
     complete(x, token)
 

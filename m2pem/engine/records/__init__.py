@@ -29,6 +29,12 @@ from m2pem.engine.records.events import (
     MessageThrown,
     SignalThrown,
 )
+from m2pem.engine.records.incidents import (
+    IncidentClosed,
+    IncidentOpened,
+    IncidentResolved,
+    IncidentUpdated,
+)
 from m2pem.engine.records.run import (
     GeometryReceived,
     InputDeferred,
@@ -105,6 +111,10 @@ __all__ = [
     "GatewayActivated",
     "GatewayReset",
     "GeometryReceived",
+    "IncidentClosed",
+    "IncidentOpened",
+    "IncidentResolved",
+    "IncidentUpdated",
     "InputDeferred",
     "InputIgnored",
     "InputSeen",
@@ -195,6 +205,10 @@ Record: TypeAlias = Union[
     MessageThrown,
     EscalationThrown,
     ErrorThrown,
+    IncidentOpened,
+    IncidentUpdated,
+    IncidentResolved,
+    IncidentClosed,
     CompensationEnabled,
     CompensationTriggered,
     CompensationBegan,

@@ -1,0 +1,196 @@
+"""Incidents: errors that no event catches, where the mission or the fleet says `onError: incident`.
+
+The token stays on its element, whose work is over. Its boundary events stay armed, and all else in
+the run goes on. What the failed work commanded stays with the run until an operator has decided
+(`m2pem.engine.resolving`), or the token is interrupted.
+"""
+
+from collections.abc import Iterator
+
+from m2pem.engine import records as r
+from m2pem.engine.execution import Execution
+from m2pem.engine.inputs import IncidentChoice
+from m2pem.engine.records import TokenOutcome
+from m2pem.engine.scopes import stop_activity
+from m2pem.engine.state import Behavior, RunState, Scope, Token
+from m2pem.mission.behavior import Behavior as BehaviorOfTask
+from m2pem.mission.elements import (
+    Activity,
+    AdHocSubProcess,
+    BoundaryEvent,
+    ComplexGateway,
+    EndEvent,
+    ErrorPolicy,
+    EventBasedGateway,
+    ExclusiveGateway,
+    FlowNode,
+    InclusiveGateway,
+    ParallelGateway,
+    ScriptTask,
+    SendTask,
+    SequenceFlow,
+    ServiceTask,
+    StartEvent,
+    SubProcess,
+)
+from m2pem.mission.events import ErrorEventDefinition
+
+_GATEWAYS = (
+    ComplexGateway,
+    EventBasedGateway,
+    ExclusiveGateway,
+    InclusiveGateway,
+    ParallelGateway,
+)
+
+
+def opens_incident(x: Execution, token: Token) -> bool:
+    """Whether an error at a token that no event catches opens an incident.
+
+    The process of the element says so, else that of its caller, and so on; else the process that
+    the run began with; else the fleet.
+    """
+    scope: Scope | None = token.scope
+    while scope is not None:
+        said = scope.container.process.on_error
+        if said is not None:
+            return said is ErrorPolicy.INCIDENT
+        scope = scope.parent
+    root = x.state.root
+    said = root.container.process.on_error if root is not None else None
+    return (said or x.fleet.on_error) is ErrorPolicy.INCIDENT
+
+
+def open_incident(
+    x: Execution,
+    token: Token,
+    code: str,
+    reason: str,
+    behavior: Behavior | None = None,
+    *,
+    rearm: bool = False,
+) -> None:
+    """Stop a token on its element with an incident, and end what it does there.
+
+    `behavior`: the one that failed, which has ended or is being cancelled. `rearm`: an event at the
+    element could not be armed.
+    """
+    failed = [] if behavior is None else [behavior]
+    failed += _behaviors_of(x.state, token)
+    resources = [resource for each in failed for resource in each.resources]
+    resources += _resources_of_incidents(x.state, token)
+    stop_activity(x, token, TokenOutcome.TERMINATED)
+    node = token.node
+    x.emit(
+        r.IncidentOpened(
+            token.id,
+            x.process_of(node),
+            node.id,
+            token.scope.id,
+            f"{x.state.run}.i{x.state.last_incident + 1}",
+            code,
+            reason,
+            choices_for(token),
+            tuple(dict.fromkeys(resources)),
+            failed[0].roles if failed and failed[0].token == token.id else {},
+            rearm,
+        )
+    )
+
+
+def _behaviors_of(state: RunState, token: Token) -> list[Behavior]:
+    """Return the behaviors of a token and of all within it that are not being cancelled."""
+    return [state.behaviors[each.behavior] for each in _tokens_in(token) if each.behavior]
+
+
+def _resources_of_incidents(state: RunState, token: Token) -> list[str]:
+    """Return what the incidents within a token hold, which end with its work."""
+    incidents = [state.incidents[each.incident] for each in _tokens_in(token) if each.incident]
+    return [resource for each in incidents for resource in each.resources]
+
+
+def _tokens_in(token: Token) -> Iterator[Token]:
+    waiting = [token]
+    while waiting:
+        each = waiting.pop()
+        yield each
+        if each.inner is not None:
+            waiting.extend(reversed(each.inner.tokens.values()))
+
+
+def incident_holding(state: RunState, resource: str) -> str:
+    """Return the id of the incident that holds a resource; "": none does."""
+    for incident in state.incidents.values():
+        if resource in incident.resources:
+            return incident.id
+    return ""
+
+
+# --- choices ------------------------------------------------------------------------------------
+
+
+def choices_for(token: Token) -> tuple[IncidentChoice, ...]:
+    """Return what an operator can do about an incident of a token, as far as it makes sense there.
+
+    An error end event would only throw its error again; a gateway has no work that could be
+    skipped, and which way the token goes is said by moving it.
+    """
+    node = token.node
+    can = [IncidentChoice.SET_DATA, IncidentChoice.END]
+    if not (isinstance(node, EndEvent) and _throws_an_error(node)):
+        can.append(IncidentChoice.RETRY)
+    behavior = behavior_at(node)
+    if behavior is not None and behavior.roles:
+        can.append(IncidentChoice.RETRY_WITH)
+    if not isinstance(node, _GATEWAYS):
+        can.append(IncidentChoice.SKIP)
+    if move_targets(token):
+        can.append(IncidentChoice.MOVE)
+    return tuple(choice for choice in IncidentChoice if choice in can)
+
+
+def _throws_an_error(node: EndEvent) -> bool:
+    return any(isinstance(each, ErrorEventDefinition) for each in node.definitions)
+
+
+def behavior_at(node: FlowNode) -> BehaviorOfTask | None:
+    """Return the behavior that a task commands; None: it commands none."""
+    return node.behavior if isinstance(node, ScriptTask | ServiceTask | SendTask) else None
+
+
+def move_targets(token: Token) -> list[FlowNode | SequenceFlow]:
+    """Return where a token with an incident can go: other elements of its scope.
+
+    A join must know by which of its flows the token comes, so these stand for it. An instance of a
+    loop or multi-instance activity, a token that compensates something, and one in an ad-hoc or on
+    an event subprocess cannot move.
+    """
+    node = token.node
+    if (
+        token.instance is not None
+        or token.compensates is not None
+        or isinstance(node.container, AdHocSubProcess)
+        or _is_outside_the_flow(node)
+    ):
+        return []
+    found: list[FlowNode | SequenceFlow] = []
+    for each in node.container.nodes:
+        if isinstance(each, StartEvent | BoundaryEvent) or _is_outside_the_flow(each):
+            continue
+        if _joins(each):
+            found += each.incoming
+        elif each is not node:
+            found.append(each)
+    return found
+
+
+def _joins(node: FlowNode) -> bool:
+    if isinstance(node, ParallelGateway | InclusiveGateway):
+        return len(node.incoming) > 1
+    return isinstance(node, ComplexGateway)
+
+
+def _is_outside_the_flow(node: FlowNode) -> bool:
+    if isinstance(node, SubProcess) and node.triggered_by_event:
+        return True
+    return isinstance(node, Activity) and node.for_compensation
