@@ -274,9 +274,7 @@ class _Check:
         named = [role for role in behavior.roles if role.resource]
         filled = check_roles(named, self.fleet, findings)
         matching = [role for role in filled if role.kind.value == behavior.type.value]
-        possible = check_needs(
-            behavior, self.mission, self.fleet, self.graph, findings, self.known
-        )
+        possible = check_needs(behavior, self.mission, self.fleet, self.graph, findings, self.known)
         if len(named) == len(behavior.roles):
             self._check_role_kinds(behavior, filled, findings)
         takers: list[_Taker] = []

@@ -56,6 +56,8 @@ def mission(*tasks: Behavior | ServiceCall) -> Mission:
     activities = tuple(_activity(index, task) for index, task in enumerate(tasks))
     for activity in activities:
         object.__setattr__(activity, "container", process)
+        object.__setattr__(activity, "incoming", ())
+        object.__setattr__(activity, "outgoing", ())
     return Mission(
         file="patrol.bpmn",
         source=b"",

@@ -2,7 +2,8 @@
 
 `M2PEM_CORPORA` names a folder of BPMN files with `expected.json` in it: for each model (paths from
 the folder) what was found elsewhere, 1 or 0 for each of `safe`, `proper_completion`,
-`option_to_complete` and `no_dead_activities`. docs/verification-internals.md explains the disagreements.
+`option_to_complete` and `no_dead_activities`. docs/verification-internals.md explains the
+disagreements.
 """
 
 import json
@@ -26,7 +27,8 @@ KNOWN: dict[str, dict[str, Any]] = {
     for file in sorted(CORPORA.rglob("expected.json"))
     for name, verdicts in json.loads(file.read_text(encoding="utf-8")).items()
 }
-PAGE = (Path(__file__).parents[2] / "docs" / "verification-internals.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "verification-internals.md").read_text(encoding="utf-8")
 ASKED = {
     "safe": "one-token",
     "proper_completion": "proper-completion",
