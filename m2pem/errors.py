@@ -81,6 +81,11 @@ class BusyError(OperatorError):
         super().__init__(message)
 
 
+class ScheduleError(OperatorError):
+    """A mission cannot be scheduled so; nothing was scheduled. The message says what would be
+    right."""
+
+
 class NotDrivenError(OperatorError):
     """The run is not driven by this executive; another one may."""
 
@@ -97,6 +102,10 @@ class JournalUrlError(JournalError):
     """What a person gave as a journal's path or URL cannot be one; nothing was opened."""
 
     exit_status = 2
+
+
+class StaleEntryError(JournalError):
+    """The entry of the schedule was changed by another executive since; nothing was written."""
 
 
 class StaleEpochError(JournalError):

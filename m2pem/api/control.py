@@ -16,6 +16,7 @@ from m2pem.api.authoring import (
     SearchProgress,
 )
 from m2pem.api.health import HealthCheck
+from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, ScheduleChanged, When
 from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
 from m2pem.engine.records import Record
 from m2pem.findings import Finding, has_errors
@@ -226,9 +227,12 @@ class Alert:
     text: str
 
 
-ControlEvent: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert]
-"""What a subscriber gets: records and prompts in order, after they were committed, and alerts
-at once."""
+SCHEDULE = "SCHEDULE"
+"""The code of alerts about the schedule: what starts in a moment, was missed, refused or held."""
+
+ControlEvent: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert, ScheduleChanged]
+"""What a subscriber gets: records and prompts in order, after they were committed, alerts and
+changes of the schedule at once."""
 
 
 class MissionControl(Protocol):
@@ -256,6 +260,57 @@ class MissionControl(Protocol):
             MissionError: with every finding, when it is not well or does not fit the fleet.
             BusyError: they have some, and that was not confirmed; it says who has what.
         """
+        ...
+
+    async def schedule(
+        self,
+        mission: MissionSource,
+        *,
+        when: When = WHEN_FREE,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        priority: int = 0,
+        by: str = "",
+    ) -> EntryId:
+        """Have a mission started later: at a time, by cron, after a run, when a condition holds,
+        or as soon as its vehicles are free. The journal has the entry, with the mission's files,
+        when this returns.
+
+        `priority`: of entries that wait for the same vehicles, that with the greatest starts first,
+        then that which was due first.
+
+        Raises:
+            MissionError: with every finding, when it is not well or does not fit the fleet.
+            ScheduleError: `when` makes no sense; or the fleet has real vehicles, and its file does
+                not say that they may start unattended.
+            OperatorError: this executive does not serve a schedule.
+        """
+        ...
+
+    async def scheduled(self) -> Schedule:
+        """The schedule of this executive's fleet: what starts when, and what it waits for."""
+        ...
+
+    async def unschedule(self, entry: EntryId, *, by: str = "") -> None:
+        """Cancel an entry: it starts nothing any more. A run that it has started goes on."""
+        ...
+
+    async def hold_schedule(
+        self, entry: EntryId | None = None, *, by: str = "", reason: str = ""
+    ) -> None:
+        """Let an entry, or (None) the whole schedule, start nothing until it is released.
+
+        It acts at once, whatever the journal does. Times that come meanwhile are missed when their
+        starting deadline passes.
+
+        Raises:
+            OperatorError: there is no such entry, or the journal has not written the hold within
+                1.5 s.
+        """
+        ...
+
+    async def release_schedule(self, entry: EntryId | None = None, *, by: str = "") -> None:
+        """Let an entry, or (None) the whole schedule, start missions again."""
         ...
 
     async def missions(self) -> Sequence[str]:
@@ -288,6 +343,8 @@ class MissionControl(Protocol):
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended, as `stop` does; returns them.
+
+        The schedule, if it has entries, is held from then on until an operator releases it.
 
         Raises:
             OperatorError: as for `stop`; names each run concerned. The others are stopped.

@@ -23,6 +23,7 @@ from m2pem.api.control import (
     StampedRecord,
 )
 from m2pem.api.run_view import RunView
+from m2pem.api.schedule import ScheduleChanged
 from m2pem.errors import JournalError, M2pemError, OperatorError
 
 BACKLOG = 100_000
@@ -69,6 +70,9 @@ class Listener:
 
     def alerted(self, alert: Alert) -> None:
         """The executive warns of something that is in no run's records."""
+
+    def schedule_changed(self) -> None:
+        """The schedule has changed; `MissionControl.scheduled` has it."""
 
 
 class Follower:
@@ -202,6 +206,8 @@ class Follower:
                 self._close(event)
             case Alert():
                 self.listener.alerted(event)
+            case ScheduleChanged():
+                self.listener.schedule_changed()
 
     async def _take_record(self, stamped: StampedRecord) -> None:
         view = self.views.get(stamped.run)

@@ -29,6 +29,7 @@ from m2pem.api.control import (
     WaitingTask,
 )
 from m2pem.api.health import HealthCheck
+from m2pem.api.schedule import EntryId, Schedule, ScheduleChanged, When
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import dump, restore
@@ -151,6 +152,39 @@ class Start(Params, frozen=True):
     even_if_busy: bool = False
 
 
+class ToSchedule(Params, frozen=True):
+    """As `MissionControl.schedule`; the caller has read the mission's files."""
+
+    mission: MissionFiles
+    when: When = When()
+    process: str | None = None
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
+    priority: int = 0
+    by: str = ""
+
+
+class OfEntry(Params, frozen=True):
+    """An entry of the schedule, and who asks."""
+
+    entry: str
+    by: str = ""
+
+
+class HoldSchedule(Params, frozen=True):
+    """As `MissionControl.hold_schedule`."""
+
+    entry: str | None = None
+    by: str = ""
+    reason: str = ""
+
+
+class ReleaseSchedule(Params, frozen=True):
+    """As `MissionControl.release_schedule`."""
+
+    entry: str | None = None
+    by: str = ""
+
+
 class Check(Params, frozen=True):
     """As `MissionControl.check` and `preview_start`; the caller has read the mission's files."""
 
@@ -192,7 +226,7 @@ class Operation:
         return method(**{name: getattr(params, name) for name in fields if name in accepted})
 
 
-Event = StampedRecord | OpenPrompt | PromptClosed | Alert
+Event = StampedRecord | OpenPrompt | PromptClosed | Alert | ScheduleChanged
 State = VehicleState | PayloadState | TeamState
 STREAMED: dict[str, type] = {kind.__name__: kind for kind in get_args(Event | State)}
 """What streams consist of, by the `kind` that a notification names."""
@@ -205,6 +239,11 @@ OPERATIONS: dict[str, Operation] = {
         Operation("answer", Answer),
         Operation("signal", Signal),
         Operation("message", Message),
+        Operation("schedule", ToSchedule, EntryId, alone=True),
+        Operation("scheduled", Nothing, Schedule),
+        Operation("unschedule", OfEntry),
+        Operation("hold_schedule", HoldSchedule, alone=True),
+        Operation("release_schedule", ReleaseSchedule),
         Operation("stop", Stop, alone=True),
         Operation("stop_all", StopAll, list[RunId], alone=True),
         Operation("pause", OfRun, alone=True),

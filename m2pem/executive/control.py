@@ -31,6 +31,7 @@ from m2pem.api.control import (
     WaitingTask,
 )
 from m2pem.api.health import HealthCheck
+from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When, host_time_zone
 from m2pem.api.telemetry import Telemetry
 from m2pem.bpmn.search_path import mission_files_in
 from m2pem.editing.editable import editable
@@ -38,18 +39,20 @@ from m2pem.editing.outline import outline
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
-from m2pem.errors import BusyError, MissionError, OperatorError
+from m2pem.errors import BusyError, MissionError, OperatorError, ScheduleError
 from m2pem.executive.ended_runs import describe_end, in_words
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
 from m2pem.executive.runner import Runner
+from m2pem.executive.scheduled_start import vehicles_of
+from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.findings import Finding
-from m2pem.fleet.allocation import resources_of, roles_of_mission
+from m2pem.fleet.allocation import resources_of, resources_of_mission, roles_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import mission_of
@@ -57,6 +60,9 @@ from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
+from m2pem.scheduling.entry import SchedulePlan
+from m2pem.scheduling.times import resolved
+from m2pem.suggestions import did_you_mean
 from m2pem.telemetry.bus import Bus
 
 
@@ -78,9 +84,11 @@ class Control:
         supervisor: Supervisor,
         bus: Bus,
         health: ExecutiveHealth,
+        scheduler: Scheduler,
         rehearse: Rehearse | None = None,
     ) -> None:
         self._supervisor = supervisor
+        self._scheduler = scheduler
         self._bus = bus
         self._health = health
         self._rehearse = rehearse
@@ -142,13 +150,98 @@ class Control:
         emergency = self._supervisor.emergency
         async with self._explain_end("stop", run):
             asked = emergency.stop(self._supervisor.runner(run), by, reason)
+            self._scheduler.run_stopping(run, by)
             await emergency.written("stop", {run: asked})
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
-        """Stop every run that has not ended."""
+        """Stop every run that has not ended, and hold the schedule."""
         asked = self._supervisor.emergency.stop_all(self._supervisor.runners.values(), by, reason)
+        hold = self._scheduler.hold_at_once(by, f"STOP of all{f': {reason}' if reason else ''}")
         await self._supervisor.emergency.written("stop", asked)
+        if hold is not None:
+            await self._scheduler.written(hold)
         return list(asked)
+
+    # --- the schedule ---------------------------------------------------------------------------
+
+    async def schedule(
+        self,
+        mission: MissionSource,
+        *,
+        when: When = WHEN_FREE,
+        process: str | None = None,
+        data: Mapping[str, Value] | None = None,
+        priority: int = 0,
+        by: str = "",
+    ) -> EntryId:
+        """Have a mission started later."""
+        supervisor, given = self._supervisor, _bounded(data)
+        if not self._scheduler.served:
+            raise OperatorError(
+                "this executive starts no scheduled missions: `m2pem serve` is one that does"
+            )
+        supervisor.refuse_unattended()
+        now_us = supervisor.clock.now_us()
+        when = resolved(when, now_us, host_time_zone())
+        loaded, process_id = await asyncio.to_thread(supervisor.load, mission, process, given)
+        named = resources_of_mission(loaded, supervisor.fleet)
+        await self._refuse_unknown(when, named)
+        plan = SchedulePlan(
+            loaded.file,
+            loaded.source,
+            process_id,
+            supervisor.fleet.name,
+            now_us,
+            when,
+            loaded.library,
+            given,
+            supervisor.arbiters.nothing_is_real,
+            priority,
+            by,
+        )
+        return await self._scheduler.schedule(plan, named)
+
+    async def _refuse_unknown(self, when: When, named: Sequence[ResourceId]) -> None:
+        """Check that the vehicles of a condition, and what it comes after, are there.
+
+        Raises:
+            ScheduleError: they are not.
+        """
+        vehicles = self._supervisor.fleet.vehicles
+        for name in when.vehicles:
+            if name not in vehicles:
+                hint = did_you_mean(name, vehicles) or f"it has {', '.join(vehicles)}"
+                raise ScheduleError(f"the fleet has no vehicle {name!r}; {hint}")
+        if when.condition and not when.vehicles and not vehicles_of(named):
+            raise ScheduleError(
+                "the mission names no vehicle: say of which the condition is to hold"
+            )
+        if when.after and not self._scheduler.has(when.after):
+            runs = await self._supervisor.journal.runs()
+            if when.after not in {line.run for line in runs}:
+                raise ScheduleError(
+                    f"there is no run and no entry of the schedule {when.after!r} to come after"
+                )
+
+    async def scheduled(self) -> Schedule:
+        """What starts when, and what it waits for."""
+        return self._scheduler.view()
+
+    async def unschedule(self, entry: EntryId, *, by: str = "") -> None:
+        """Cancel an entry."""
+        await self._scheduler.cancel(entry, by)
+
+    async def hold_schedule(
+        self, entry: EntryId | None = None, *, by: str = "", reason: str = ""
+    ) -> None:
+        """Let an entry, or the whole schedule, start nothing until it is released."""
+        await self._scheduler.hold(entry, by, reason)
+
+    async def release_schedule(self, entry: EntryId | None = None, *, by: str = "") -> None:
+        """Let an entry, or the whole schedule, start missions again."""
+        await self._scheduler.release(entry, by)
+
+    # --- what operators do in runs --------------------------------------------------------------
 
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""

@@ -25,6 +25,7 @@ from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
+from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.supervisor import RunSettings, Supervisor
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.findings import Finding
@@ -100,7 +101,15 @@ class Executive:
             self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
         )
         self.health = ExecutiveHealth(journal)
-        self.control = Control(self._supervisor, self.bus, self.health, rehearse)
+        self.scheduler = Scheduler(
+            self._supervisor,
+            self.events.publish,
+            self._supervisor.marks,
+            real=not self.arbiters.nothing_is_real,
+        )
+        self._supervisor.on_change = self.scheduler.changed
+        self.control = Control(self._supervisor, self.bus, self.health, self.scheduler, rehearse)
+        self._scheduling: asyncio.Task[None] | None = None
         self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file), journal.file)
         self._speed = speed
         self._watch_links = watch_links
@@ -144,6 +153,9 @@ class Executive:
     async def __aexit__(self, *reason: object) -> None:
         """Stop every run, let its vehicles be released, close the arbiters."""
         try:
+            if self._scheduling is not None:
+                self._scheduling.cancel()
+                await asyncio.wait([self._scheduling])
             await self.stop_all("the executive is shutting down")
             await self._supervisor.end_calls()
         finally:
@@ -159,6 +171,24 @@ class Executive:
             self.bus.close()
             self.events.end()
             await self._stack.aclose()
+
+    async def serve_schedule(self) -> None:
+        """Start what the journal has scheduled for this fleet, from now on.
+
+        It comes before runs are taken up: runs that were created for the schedule, and never began,
+        are deleted, and their times count again.
+
+        Raises:
+            JournalError: the schedule cannot be read.
+        """
+        await self.scheduler.load()
+        self._scheduling = asyncio.create_task(self.scheduler.serve(), name="schedule")
+        self._scheduling.add_done_callback(self._schedule_ended)
+
+    def _schedule_ended(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("the schedule broke off; nothing more starts by it", exc_info=error)
+            self.health.broke_off("schedule")
 
     def _listen(
         self, group: asyncio.TaskGroup, what: str, listening: Callable[[], Awaitable[None]]

@@ -7,22 +7,23 @@ they concern.
 import asyncio
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from m2pem.allocation.assignment import load_solver
+from m2pem.allocation.candidates import Candidates, Facts
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
-from m2pem.api.authoring import MissionSource
+from m2pem.api.authoring import MissionFiles, MissionSource
 from m2pem.api.clock import Clock
 from m2pem.api.control import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
-from m2pem.api.telemetry import TeamState, Telemetry
+from m2pem.api.telemetry import LinkState, TeamState, Telemetry
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
-from m2pem.errors import JournalError, NotDrivenError, OperatorError
+from m2pem.errors import JournalError, M2pemError, NotDrivenError, OperatorError, ScheduleError
 from m2pem.executive.allocator import Allocator
 from m2pem.executive.armed_vehicles import describe_armed_vehicles
 from m2pem.executive.battery_forecast import BatteryForecast
@@ -44,11 +45,12 @@ from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.recovery import replay, take_over
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
+from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.findings import Finding, Severity
-from m2pem.fleet.allocation import Availability
-from m2pem.fleet.fleet import Fleet, dump
+from m2pem.fleet.allocation import Availability, resources_of_mission
+from m2pem.fleet.fleet import Fleet, dump, real_resources
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal, RunHeader
@@ -59,6 +61,7 @@ from m2pem.mission.losses import LINK_LOST
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
+from m2pem.scheduling.entry import EntryChange, SchedulePlan
 from m2pem.telemetry.bus import Bus
 
 log = logging.getLogger("m2pem.executive")
@@ -122,7 +125,7 @@ class Supervisor:
         self._bus = bus
         self._observers = observers
         self._separation = separation_for(self.fleet, clock)
-        self._marks = StopMarks(journal.file, journal.identity)
+        self.marks = StopMarks(journal.file, journal.identity)
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
         # Of two starts at once the second must see what the first one takes.
         self._starting = asyncio.Lock()
@@ -143,8 +146,10 @@ class Supervisor:
             self.runners,
             events.publish,
         )
-        self.availability.on_change = self.allocator.resources_changed
-        self.emergency = EmergencyCommands(self.dispatcher, events, self._marks)
+        self.availability.on_change = self._resources_changed
+        self.on_change: Callable[[], None] = lambda: None
+        """Is called when a run has ended, or when resources may be free."""
+        self.emergency = EmergencyCommands(self.dispatcher, events, self.marks)
         self.handover = Handover(arbiters, self.availability)
         self.losses = JournalLossPrompts(
             journal,
@@ -198,7 +203,7 @@ class Supervisor:
 
     async def close(self) -> None:
         """Let the marks of stopped runs be written."""
-        await self._marks.close()
+        await self.marks.close()
 
     # --- starting and resuming ------------------------------------------------------------------
 
@@ -229,12 +234,17 @@ class Supervisor:
             load_solver()
         return loaded.process(process).id, findings
 
-    def _load(
+    def load(
         self,
         mission: MissionSource | Mission,
         process: str | None,
         data: Mapping[str, Value] | None,
     ) -> tuple[Mission, str]:
+        """Read and check a mission that is to start; returns it with its process. It blocks.
+
+        Raises:
+            MissionError: with every finding.
+        """
         loaded = (
             mission
             if isinstance(mission, Mission)
@@ -259,7 +269,7 @@ class Supervisor:
             BusyError: other runs or operators have what it names, unless `even_if_busy`.
         """
         # Reading and checking take a while, and a URL may take longer: not in the event loop.
-        loaded, process_id = await asyncio.to_thread(self._load, mission, process, data)
+        loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
         if even_if_busy:
             return await self.begin(loaded, process_id, data, by)
         async with self._starting:
@@ -278,9 +288,23 @@ class Supervisor:
         refuse_busy_resources(loaded, self.fleet, taken, holder, over)
 
     async def begin(
-        self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str
+        self,
+        loaded: Mission,
+        process_id: str,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        started: EntryChange | None = None,
+        still: Callable[[], bool] = lambda: True,
     ) -> RunId:
-        """Begin a run of a mission that was admitted. Returns when its beginning is durable."""
+        """Begin a run of a mission that was admitted. Returns when its beginning is durable.
+
+        `started`: the new state of the entry of the schedule that starts it. `still`: whether it
+        may begin, asked when the journal has created it.
+
+        Raises:
+            NotBegunError: a run that the schedule starts was created, and has not begun.
+        """
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -291,15 +315,105 @@ class Supervisor:
             self.clock.now_us() if self.settings.speed == 1.0 else time.time_ns() // 1000,
             loaded.library,
         )
-        number = await self.journal.create(header)
+        number = await self.journal.create(header, started)
+        # From here to `_drive` nothing is awaited: STOP of all finds the run, or was before it.
+        if not still():
+            await self.journal.release(number)
+            raise NotBegunError(number, "it was held as it was to begin")
         run = MissionRun(loaded, self.fleet, number, self.settings.steps_at_once)
         runner = self._runner(run, 1)
         begun = runner.submit(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
         for name, given in self.handed_over.items():
             runner.post(GeometrySet(name, dict(given.geometry), given.by))
         self._drive(runner)
-        await begun
+        try:
+            await begun
+        except M2pemError as error:
+            if started is None:
+                raise
+            await asyncio.wait([self._tasks[number]] if number in self._tasks else [])
+            self.runners.pop(number, None)
+            raise NotBegunError(number, str(error)) from error
         return number
+
+    # --- what the scheduler asks ------------------------------------------------------------------
+
+    def admitted(self, plan: SchedulePlan) -> tuple[Mission, str]:
+        """Read and check the mission of an entry of the schedule; it blocks.
+
+        Raises:
+            MissionError: with every finding.
+            ScheduleError: the fleet does not allow that it starts unattended.
+        """
+        self.refuse_unattended()
+        files = MissionFiles(plan.mission_name, plan.mission, plan.library)
+        loaded = load_source(files)
+        process, _ = self.admit(loaded, plan.process, plan.data)
+        return loaded, process
+
+    def refuse_unattended(self) -> None:
+        """Check that missions may start with no operator present.
+
+        Raises:
+            ScheduleError: the fleet has real vehicles, and its file does not say that they may.
+        """
+        real = real_resources(self.fleet)
+        if real and not self.fleet.unattended:
+            raise ScheduleError(
+                f"{', '.join(real)} of {self.fleet.file} would start with no operator present: say "
+                "`schedule: {unattended: true}` in the fleet file if they may"
+            )
+
+    async def begin_scheduled(
+        self,
+        loaded: Mission,
+        process: str,
+        plan: SchedulePlan,
+        by: str,
+        started: EntryChange,
+        still: Callable[[], bool],
+    ) -> RunId:
+        """Begin the run of an entry of the schedule; see `scheduler.Starter`."""
+        async with self._starting:
+            self.refuse_busy(loaded)
+            return await self.begin(loaded, process, plan.data, by, started=started, still=still)
+
+    def outcome_of(self, run: RunId) -> str | None:
+        """How a run has ended; "": it goes on; None: it is not driven here."""
+        runner = self.runners.get(run)
+        if runner is None:
+            return None
+        outcome = runner.run.state.outcome
+        return outcome.value if runner.done.is_set() and outcome is not None else ""
+
+    def users(self) -> dict[ResourceId, str]:
+        """What runs and operators use: all that a run names until it has ended."""
+        found: dict[ResourceId, str] = {}
+        for resource, holder in self.handover.holders().items():
+            if holder and resource not in self.handover.taken:
+                found[resource] = f"{holder} has it"
+        for runner in self.runners.values():
+            if not runner.done.is_set():
+                for resource in resources_of_mission(runner.run.state.mission, self.fleet):
+                    found[resource] = f"{runner.id} uses it"
+        for resource, operator in self.handover.taken.items():
+            found[resource] = f"{operator} has it"
+        return found
+
+    def unusable(self, resource: ResourceId) -> str:
+        """Why no mission gets a resource now; "": nothing is known against it."""
+        if reason := self.availability.reason(resource):
+            return reason
+        if resource not in self.fleet.vehicles:
+            return ""
+        state = self._bus.latest(resource)
+        if state is None:
+            return "nothing was received from it yet"
+        return "its link is lost" if state.link is LinkState.LOST else ""
+
+    def facts(self, vehicle: ResourceId) -> Facts:
+        """The facts of a vehicle now, as conditions of the schedule read them."""
+        return Candidates(self.fleet, self.arbiters.graph, self._bus.latest).facts(vehicle)
 
     async def resume(self, number: RunId) -> None:
         """Take up a run that its executive left without ending it.
@@ -333,7 +447,7 @@ class Supervisor:
         runner = self._runner(run, epoch)
         self.handover.take_up(run.state.taken)
         outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
-        mark = self._marks.get(number)
+        mark = self.marks.get(number)
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
@@ -376,9 +490,14 @@ class Supervisor:
         ]
         if not self.fleet.simulated and (text := describe_armed_vehicles(free, self._bus)):
             self.events.publish(Alert(runner.id, LEFT_ARMED, text))
+        self.on_change()
         over = [each for each in self.runners.values() if each.done.is_set()]
         for oldest in over[:-REMEMBERED_RUNS]:
             del self.runners[oldest.id]
+
+    def _resources_changed(self) -> None:
+        self.allocator.resources_changed()
+        self.on_change()
 
     def _is_held_by_another(self, run: RunId, vehicle: ResourceId) -> bool:
         """A vehicle whose link was lost is held by the behavior that it had then."""
@@ -399,7 +518,7 @@ class Supervisor:
         if self._observers is not None:
             self._observers.put(run, records)
         if any(isinstance(record, RunEnded) for record in records[-3:]):
-            self._marks.remove(run)
+            self.marks.remove(run)
 
     # --- what happens outside of the runs -------------------------------------------------------
 

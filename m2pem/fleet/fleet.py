@@ -91,7 +91,9 @@ class Fleet:
     `handed_over`: names of geometries that missions may use and operators hand over.
     `battery_cost_s`, `switching_cost_s`: travel time that an empty battery, and a vehicle which is
     new to a run, count as when vehicles are chosen for roles. `on_error`: what an error does that
-    no event of the mission catches, where the mission does not say.
+    no event of the mission catches, where the mission does not say. `unattended`: scheduled
+    missions may start real vehicles with no operator present; `start_warning_s`: how long before a
+    start operators are warned of it.
     """
 
     name: str
@@ -111,6 +113,8 @@ class Fleet:
     battery_cost_s: float = 60.0
     switching_cost_s: float = 10.0
     on_error: ErrorPolicy = ErrorPolicy.END
+    unattended: bool = False
+    start_warning_s: float = 10.0
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

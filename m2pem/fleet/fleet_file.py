@@ -8,7 +8,13 @@ from pydantic import ValidationError
 
 from m2pem.errors import FleetError
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
-from m2pem.fleet.fleet_schema import AllocationModel, DeconflictionModel, FleetModel, VehicleModel
+from m2pem.fleet.fleet_schema import (
+    AllocationModel,
+    DeconflictionModel,
+    FleetModel,
+    ScheduleModel,
+    VehicleModel,
+)
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
 from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.geo.local_frame import Origin
@@ -167,6 +173,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
     }
     apart = model.deconfliction
     costs = model.allocation or AllocationModel()
+    later = model.schedule or ScheduleModel()
     return Fleet(
         name=model.name or Path(source.file).stem,
         file=source.file,
@@ -185,6 +192,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         battery_cost_s=costs.battery,
         switching_cost_s=costs.switching,
         on_error=ErrorPolicy(model.on_error),
+        unattended=later.unattended,
+        start_warning_s=later.warning,
     )
 
 

@@ -171,6 +171,19 @@ class AllocationModel(_Model):
     ] = 10.0
 
 
+class ScheduleModel(_Model):
+    """Missions that start without an operator: at a time, or when their vehicles are free."""
+
+    unattended: Annotated[
+        bool,
+        Field(description="Real vehicles may start a scheduled mission with no operator present."),
+    ] = False
+    warning: Annotated[
+        DurationOrZero,
+        Field(description="How long before each start operators are warned of it."),
+    ] = 10.0
+
+
 class FleetModel(_Model):
     """A fleet of m2pem: vehicles, payloads, teams and named geometries."""
 
@@ -214,6 +227,7 @@ class FleetModel(_Model):
     ] = None
     deconfliction: DeconflictionModel | None = None
     allocation: AllocationModel | None = None
+    schedule: ScheduleModel | None = None
 
 
 def fleet_schema() -> dict[str, Any]:

@@ -13,6 +13,7 @@ from uuid import UUID
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
 from m2pem.mission.library import Source
+from m2pem.scheduling.entry import EntryChange, EntryState, Hold, ScheduleEntry, SchedulePlan
 from m2pem.units import US_PER_S
 
 
@@ -150,10 +151,14 @@ class Journal(Protocol):
         """The journal's path, for files beside it; None for a journal in memory."""
         ...
 
-    async def create(self, header: RunHeader) -> str:
+    async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """Create a run, durable on return and claimed with epoch 1; the id is r1, r2, ...
 
+        `started`: the new state of the entry of the schedule that starts it, whose last time gets
+        the run's id. Both are written, or neither.
+
         Raises:
+            StaleEntryError: the entry was changed since; nothing is written.
             JournalError: it cannot be written, there is too little free space, or a loss is open.
         """
         ...
@@ -214,6 +219,51 @@ class Journal(Protocol):
 
     async def deletions(self) -> Sequence[Deletion]:
         """Return the runs that were deleted, in order of their numbers."""
+        ...
+
+    # --- the schedule ---------------------------------------------------------------------------
+
+    async def schedule(self, plan: SchedulePlan, state: EntryState) -> ScheduleEntry:
+        """Add an entry to the schedule, durable on return; the id is s1, s2, ...
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        ...
+
+    async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
+        """Write the new state of an entry; durable on return.
+
+        `deletes`: a run that the entry started and that never began, which is deleted with it.
+
+        Raises:
+            StaleEntryError: the entry was changed since; nothing is written.
+            JournalError: it cannot be written, or the run has begun, or is driven.
+        """
+        ...
+
+    async def entries(self) -> Sequence[ScheduleEntry]:
+        """Return every entry of the schedule, of all fleets, in order of its number."""
+        ...
+
+    async def remove_entries(self, entries: Sequence[str]) -> None:
+        """Remove entries that can start nothing any more; their ids are not given again.
+
+        Raises:
+            JournalError: one is active, or there is none of that id; nothing is removed.
+        """
+        ...
+
+    async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
+        """Note that the whole schedule of a fleet is held; None: that it is not any more.
+
+        Raises:
+            JournalError: it cannot be written.
+        """
+        ...
+
+    async def schedule_hold(self, fleet: str) -> Hold | None:
+        """Return who holds the whole schedule of a fleet, and why; None: nobody."""
         ...
 
     async def close(self) -> None:

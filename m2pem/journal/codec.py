@@ -5,7 +5,7 @@ equal objects. It is JSON because a journal outlives the program that wrote it.
 """
 
 import re
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import msgspec
 
@@ -14,6 +14,7 @@ from m2pem.engine.records import Record
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.base import Entry
 from m2pem.mission.library import Source
+from m2pem.scheduling.entry import EntryState, Hold, SchedulePlan, entry_number
 
 # 18 digits: what the 64-bit keys of a database hold.
 _RUN_ID = re.compile(r"r[1-9][0-9]{0,17}")
@@ -74,6 +75,59 @@ def decode_library(text: str) -> tuple[Source, ...]:
         return msgspec.json.decode(text, type=tuple[Source, ...])
     except (msgspec.DecodeError, UnicodeError) as error:
         raise JournalError(f"damaged, or written by a newer m2pem: {error}") from error
+
+
+Part = TypeVar("Part", SchedulePlan, EntryState, Hold)
+
+
+def encode_part(part: SchedulePlan | EntryState | Hold) -> str:
+    """A part of an entry of the schedule as JSON.
+
+    Raises:
+        JournalError: JSON has no such value (NaN, infinity).
+    """
+    try:
+        text = _encoder.encode(part)
+        # msgspec writes NaN and infinities as null.
+        exact = b"null" not in text or msgspec.json.decode(text, type=type(part)) == part
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise JournalError(f"the schedule cannot be written: {error}") from error
+    if not exact:
+        raise JournalError("the schedule cannot be written: a value is not a finite number")
+    return text.decode()
+
+
+def decode_part(text: str, kind: type[Part]) -> Part:
+    """What `encode_part` wrote.
+
+    Raises:
+        JournalError: the text is damaged, or of a newer m2pem.
+    """
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except (msgspec.DecodeError, UnicodeError) as error:
+        raise JournalError(
+            f"the schedule is damaged, or written by a newer m2pem: {error}"
+        ) from error
+
+
+def known_entry(entry: str) -> int:
+    """Return the number of an entry's id.
+
+    Raises:
+        JournalError: it is not the id of an entry.
+    """
+    number = entry_number(entry)
+    if number is None:
+        raise unknown_entry(entry)
+    return number
+
+
+def unknown_entry(entry: str) -> JournalError:
+    """Return the error for an entry that the journal does not have."""
+    return JournalError(
+        f"the journal has no entry {entry!r} of a schedule; `m2pem schedule` lists what it has"
+    )
 
 
 def record_line(run: str, seq: int, t_us: int, record: Record) -> bytes:

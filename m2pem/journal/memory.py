@@ -9,10 +9,18 @@ from operator import attrgetter
 from pathlib import Path
 from uuid import UUID, uuid4
 
-from m2pem.errors import InternalError, JournalError
+from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
-from m2pem.journal.codec import run_id, run_number, unknown_run
+from m2pem.journal.codec import encode_part, run_id, run_number, unknown_entry, unknown_run
 from m2pem.journal.position import RunPosition
+from m2pem.scheduling.entry import (
+    EntryChange,
+    EntryState,
+    Hold,
+    ScheduleEntry,
+    SchedulePlan,
+    entry_id,
+)
 
 _BATCH_ENTRIES = 500
 
@@ -39,6 +47,9 @@ class MemoryJournal:
         self._runs: dict[int, _Run] = {}
         self._deletions: dict[int, Deletion] = {}
         self._last = 0
+        self._entries: dict[str, ScheduleEntry] = {}
+        self._holds: dict[str, Hold | None] = {}
+        self._last_entry = 0
         self._closed = False
 
     @property
@@ -51,13 +62,18 @@ class MemoryJournal:
         """See `Journal.file`: there is none."""
         return None
 
-    async def create(self, header: RunHeader) -> str:
+    async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """See `Journal.create`."""
         self._check_open()
+        if started is not None:
+            self._replaceable(started)
         position = RunPosition(epoch=1, pid=os.getpid(), started_us=header.created_us)
         self._last += 1
         self._runs[self._last] = _Run(header, position)
-        return run_id(self._last)
+        run = run_id(self._last)
+        if started is not None:
+            self._replace(started.with_run(run))
+        return run
 
     async def claim(self, run: str) -> int:
         """See `Journal.claim`."""
@@ -148,6 +164,64 @@ class MemoryJournal:
         """See `Journal.deletions`."""
         self._check_open()
         return [self._deletions[number] for number in sorted(self._deletions)]
+
+    # --- the schedule ---------------------------------------------------------------------------
+
+    async def schedule(self, plan: SchedulePlan, state: EntryState) -> ScheduleEntry:
+        """See `Journal.schedule`."""
+        self._check_open()
+        encode_part(plan)
+        self._last_entry += 1
+        entry = ScheduleEntry(entry_id(self._last_entry), plan, state)
+        self._entries[entry.id] = entry
+        return entry
+
+    async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
+        """See `Journal.change_entry`."""
+        self._check_open()
+        self._replaceable(change)
+        if deletes:
+            if self._find(deletes).position.last_seq:
+                raise JournalError(f"{deletes} is not deleted: it has begun")
+            await self.delete([deletes], by=f"the schedule ({change.entry})", unended=True)
+        self._replace(change)
+
+    def _replaceable(self, change: EntryChange) -> None:
+        found = self._entries.get(change.entry)
+        if found is None:
+            raise unknown_entry(change.entry)
+        if found.state.revision != change.state.revision - 1:
+            raise StaleEntryError(f"{change.entry} was changed by another executive")
+
+    def _replace(self, change: EntryChange) -> None:
+        before = self._entries[change.entry]
+        self._entries[change.entry] = ScheduleEntry(before.id, before.plan, change.state)
+
+    async def entries(self) -> Sequence[ScheduleEntry]:
+        """See `Journal.entries`."""
+        self._check_open()
+        return list(self._entries.values())
+
+    async def remove_entries(self, entries: Sequence[str]) -> None:
+        """See `Journal.remove_entries`."""
+        self._check_open()
+        for entry in entries:
+            if entry not in self._entries:
+                raise unknown_entry(entry)
+            if self._entries[entry].state.active:
+                raise JournalError(f"{entry} is not removed: it may still start a mission")
+        for entry in entries:
+            self._entries.pop(entry, None)
+
+    async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
+        """See `Journal.hold_schedule`."""
+        self._check_open()
+        self._holds[fleet] = hold
+
+    async def schedule_hold(self, fleet: str) -> Hold | None:
+        """See `Journal.schedule_hold`."""
+        self._check_open()
+        return self._holds.get(fleet)
 
     async def close(self) -> None:
         """See `Journal.close`."""

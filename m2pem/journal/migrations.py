@@ -96,12 +96,31 @@ def deletions(connection: sqlite3.Connection) -> None:
     )
 
 
+def schedule(connection: sqlite3.Connection) -> None:
+    """0.6: the missions that are to start later, and who holds them (`m2pem.scheduling.entry`).
+
+    `plan` never changes, `state` is replaced; both are JSON. `revision` is that of the state.
+    `schedule_holds` has a row for each fleet whose whole schedule is held.
+    """
+    connection.execute(
+        """CREATE TABLE schedule (
+            entry INTEGER PRIMARY KEY AUTOINCREMENT,
+            fleet TEXT NOT NULL,
+            plan TEXT NOT NULL,
+            state TEXT NOT NULL,
+            revision INTEGER NOT NULL
+        )"""
+    )
+    connection.execute("CREATE TABLE schedule_holds (fleet TEXT PRIMARY KEY, hold TEXT NOT NULL)")
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
     identity_of_the_journal,
     hash_chain,
     deletions,
+    schedule,
 )
 
 

@@ -18,7 +18,9 @@ from m2pem.journal.base import Deletion, Entry, Loss, RunHeader, RunInfo
 from m2pem.journal.codec import (
     decode_body,
     decode_library,
+    decode_part,
     encode_body,
+    encode_part,
     run_id,
     run_number,
 )
@@ -36,6 +38,14 @@ from m2pem.journal.transaction import (
     position_from,
 )
 from m2pem.journal.writer import GroupWriter
+from m2pem.scheduling.entry import (
+    EntryChange,
+    EntryState,
+    Hold,
+    ScheduleEntry,
+    SchedulePlan,
+    entry_id,
+)
 
 T = TypeVar("T")
 
@@ -127,9 +137,11 @@ class SqliteJournal:
         """How many transactions have been written since it was opened."""
         return self._writer.commits
 
-    async def create(self, header: RunHeader) -> str:
+    async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """See `Journal.create`."""
-        return await self._holding(lambda transaction: transaction.create(header), run_number)
+        return await self._holding(
+            lambda transaction: transaction.create(header, started), run_number
+        )
 
     async def claim(self, run: str) -> int:
         """See `Journal.claim`."""
@@ -332,6 +344,57 @@ class SqliteJournal:
     async def deletions(self) -> Sequence[Deletion]:
         """See `Journal.deletions`."""
         return await self._read(lambda: deletions_in(self._reading))
+
+    # --- the schedule ---------------------------------------------------------------------------
+
+    async def schedule(self, plan: SchedulePlan, state: EntryState) -> ScheduleEntry:
+        """See `Journal.schedule`."""
+        self._check_open()
+        text = encode_part(plan)
+        return await self._writer.submit(
+            lambda transaction: transaction.schedule(plan, text, state)
+        )
+
+    async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
+        """See `Journal.change_entry`."""
+        self._check_open()
+        now_us = time.time_ns() // 1000
+        await self._writer.submit(
+            lambda transaction: transaction.change_entry(change, deletes, now_us)
+        )
+
+    async def entries(self) -> Sequence[ScheduleEntry]:
+        """See `Journal.entries`."""
+        return await self._read(self._entries)
+
+    def _entries(self) -> list[ScheduleEntry]:
+        rows = self._reading.execute("SELECT entry, plan, state FROM schedule ORDER BY entry")
+        return [
+            ScheduleEntry(
+                entry_id(number), decode_part(plan, SchedulePlan), decode_part(state, EntryState)
+            )
+            for number, plan, state in rows
+        ]
+
+    async def remove_entries(self, entries: Sequence[str]) -> None:
+        """See `Journal.remove_entries`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.remove_entries(entries))
+
+    async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
+        """See `Journal.hold_schedule`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.hold_schedule(fleet, hold))
+
+    async def schedule_hold(self, fleet: str) -> Hold | None:
+        """See `Journal.schedule_hold`."""
+        return await self._read(lambda: self._schedule_hold(fleet))
+
+    def _schedule_hold(self, fleet: str) -> Hold | None:
+        row = self._reading.execute(
+            "SELECT hold FROM schedule_holds WHERE fleet = ?", (fleet,)
+        ).fetchone()
+        return None if row is None else decode_part(row[0], Hold)
 
     async def _read(self, work: Callable[[], T]) -> T:
         self._check_open()

@@ -14,14 +14,31 @@ from itertools import chain
 from typing import Any
 
 from m2pem.engine.records import RunOutcome
-from m2pem.errors import InternalError, JournalError
+from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.journal.base import Deletion, Entry, RunHeader
-from m2pem.journal.codec import encode_library, run_id, unknown_run
+from m2pem.journal.codec import (
+    decode_part,
+    encode_library,
+    encode_part,
+    known_entry,
+    run_id,
+    run_number,
+    unknown_entry,
+    unknown_run,
+)
 from m2pem.journal.hash_chain import entry_hash, header_hash, position_seal
 from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState, find_loss, find_losses
 from m2pem.journal.position import RunPosition
 from m2pem.journal.run_locks import RunLocks
 from m2pem.journal.storage_checks import OpenFiles, space_shortage
+from m2pem.scheduling.entry import (
+    EntryChange,
+    EntryState,
+    Hold,
+    ScheduleEntry,
+    SchedulePlan,
+    entry_id,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +93,7 @@ class WriteTransaction:
         self._locked: list[int] = []
         self._appended: set[int] = set()
         self._lossy: set[int] = set()
-        self._deleting = False
+        self._wrote = False
 
     def begin(self) -> None:
         """Start a transaction; it sees what another process has committed before."""
@@ -91,8 +108,10 @@ class WriteTransaction:
         self._presence.check()
         self._refuse_while_short()
 
-    def create(self, header: RunHeader) -> str:
+    def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """Add a run that is claimed with epoch 1, and return its id."""
+        if started is not None:
+            self._refuse_stale(started)
         self._refuse_while_short()
         marks = self._marks.read()
         self._refuse_while_lossy(marks)
@@ -117,6 +136,8 @@ class WriteTransaction:
         self._take(number, position)
         self._connection.execute("INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
         self._changed[number] = position
+        if started is not None:
+            self._replace_state(started.with_run(run_id(number)))
         return run_id(number)
 
     def _refuse_while_short(self) -> None:
@@ -177,7 +198,7 @@ class WriteTransaction:
             self._connection.execute("DELETE FROM standings WHERE run = ?", (number,))
             self._connection.execute("DELETE FROM runs WHERE run = ?", (number,))
             self._known.pop(number, None)
-        self._deleting = True
+        self._wrote = True
 
     def _refuse_deletion(self, number: int, *, unended: bool) -> None:
         run = run_id(number)
@@ -211,8 +232,72 @@ class WriteTransaction:
             self._connection.execute(
                 "DELETE FROM entries WHERE run = ? AND seq < ?", (number, *beyond)
             )
-        self._deleting = True
+        self._wrote = True
         return True
+
+    # --- the schedule ---------------------------------------------------------------------------
+
+    def schedule(self, plan: SchedulePlan, plan_text: str, state: EntryState) -> ScheduleEntry:
+        """Add an entry to the schedule."""
+        self._refuse_while_short()
+        added = self._connection.execute(
+            "INSERT INTO schedule (fleet, plan, state, revision) VALUES (?, ?, ?, ?)",
+            (plan.fleet, plan_text, encode_part(state), state.revision),
+        )
+        self._wrote = True
+        return ScheduleEntry(entry_id(added.lastrowid or 0), plan, state)
+
+    def change_entry(self, change: EntryChange, deletes: str, now_us: int) -> None:
+        """Replace the state of an entry; delete a run of it that never began."""
+        self._refuse_stale(change)
+        if deletes:
+            number = run_number(deletes)
+            if self._position(number).last_seq:
+                raise JournalError(f"{deletes} is not deleted: it has begun")
+            self.delete([number], f"the schedule ({change.entry})", now_us, unended=True)
+        self._replace_state(change)
+
+    def _refuse_stale(self, change: EntryChange) -> None:
+        row = self._connection.execute(
+            "SELECT revision FROM schedule WHERE entry = ?", (known_entry(change.entry),)
+        ).fetchone()
+        if row is None:
+            raise unknown_entry(change.entry)
+        if row[0] != change.state.revision - 1:
+            raise StaleEntryError(f"{change.entry} was changed by another executive")
+
+    def _replace_state(self, change: EntryChange) -> None:
+        self._connection.execute(
+            "UPDATE schedule SET state = ?, revision = ? WHERE entry = ?",
+            (encode_part(change.state), change.state.revision, known_entry(change.entry)),
+        )
+        self._wrote = True
+
+    def remove_entries(self, entries: Sequence[str]) -> None:
+        """Remove entries that are not active any more."""
+        numbers = [known_entry(entry) for entry in entries]
+        for entry, number in zip(entries, numbers, strict=True):
+            row = self._connection.execute(
+                "SELECT state FROM schedule WHERE entry = ?", (number,)
+            ).fetchone()
+            if row is None:
+                raise unknown_entry(entry)
+            if decode_part(row[0], EntryState).active:
+                raise JournalError(f"{entry} is not removed: it may still start a mission")
+        self._connection.executemany(
+            "DELETE FROM schedule WHERE entry = ?", [(number,) for number in numbers]
+        )
+        self._wrote = True
+
+    def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
+        """Note who holds the whole schedule of a fleet."""
+        if hold is None:
+            self._connection.execute("DELETE FROM schedule_holds WHERE fleet = ?", (fleet,))
+        else:
+            self._connection.execute(
+                "REPLACE INTO schedule_holds VALUES (?, ?)", (fleet, encode_part(hold))
+            )
+        self._wrote = True
 
     def append(self, rows: Sequence[EntryRow]) -> None:
         """Add entries."""
@@ -253,7 +338,7 @@ class WriteTransaction:
             "REPLACE INTO standings", [_columns(*changed) for changed in self._changed.items()]
         )
         self._connection.execute("COMMIT")
-        wrote = bool(self._changed) or self._deleting
+        wrote = bool(self._changed) or self._wrote
         if wrote:
             self._presence.check()
             self._mark()
@@ -328,7 +413,7 @@ class WriteTransaction:
         self._rows.clear()
         self._appended.clear()
         self._locked.clear()
-        self._deleting = False
+        self._wrote = False
 
 
 @cache

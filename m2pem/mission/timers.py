@@ -22,7 +22,7 @@ outage of the executive. The rounds of that time are caught up once, not one by 
 
 import re
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from typing import NoReturn
 
 import isodate
@@ -151,13 +151,13 @@ class Cron:
     fields: str
     years: tuple[int, ...] | None
 
-    def after_us(self, at_us: int) -> int | None:
+    def after_us(self, at_us: int, zone: tzinfo = UTC) -> int | None:
         """The first of its dates after an instant (both: microseconds since the Unix epoch).
 
-        None: there is none, at least for 50 years.
+        `zone`: in which its fields are read. None: there is none, at least for 50 years.
         """
         try:
-            moment = _EPOCH + timedelta(microseconds=at_us)
+            moment = (_EPOCH + timedelta(microseconds=at_us)).astimezone(zone)
             while True:
                 found = next(CronSim(self.fields, moment))
                 if self.years is None or found.year in self.years:
@@ -165,9 +165,22 @@ class Cron:
                 following = [year for year in self.years if year > found.year]
                 if not following:
                     return None
-                moment = datetime(following[0], 1, 1, tzinfo=UTC) - _SECOND
+                moment = datetime(following[0], 1, 1, tzinfo=zone) - _SECOND
         except (StopIteration, OverflowError, ValueError):  # the calendar ends
             return None
+
+    def before_us(self, at_us: int, zone: tzinfo = UTC) -> int | None:
+        """The last of its dates before an instant, as `after_us`; None: there is none."""
+        try:
+            moment = (_EPOCH + timedelta(microseconds=at_us)).astimezone(zone)
+            for found in CronSim(self.fields, moment, reverse=True):
+                if self.years is None or found.year in self.years:
+                    return (found - _EPOCH) // _MICROSECOND
+                if found.year < min(self.years):
+                    break
+        except (OverflowError, ValueError):  # the calendar begins
+            pass
+        return None
 
 
 def is_cron(text: str) -> bool:

@@ -149,14 +149,14 @@ async def test_a_vehicle_that_falls_silent_is_greyed(world: World) -> None:
         await terminal.until_shown("● scout")
         world.hand.now_s += 4
         await terminal.until_shown("✗ scout     silent for 4 s", "last at 38.10750")
+        world.fake.say(scout(0.70))
+        await terminal.until_shown("● scout      70%")
 
 
 def test_silence_counts_by_the_clock_of_the_executive(world: World) -> None:
     vehicles = Vehicles(world.control.fleet(), speed=10)
     vehicles.update(scout(0.75), now=1.0)
     assert "silent for 40 s" in vehicles.table(5.0, 40, str, {}).plain
-        world.fake.say(scout(0.70))
-        await terminal.until_shown("● scout      70%")
 
 
 async def test_a_second_run_is_told_and_can_be_looked_at(world: World) -> None:

@@ -1,0 +1,626 @@
+"""The scheduler: starts missions at times, after runs, on conditions, or when vehicles are free.
+
+The laws, in their order:
+
+1. No time of an entry starts two runs. A run and the mark that its time has started it are written
+   to the journal together, or neither is.
+2. No time is lost unsaid. Each ends as started, missed or refused, in the journal and as an alert.
+3. What is held does not start. A hold acts at once, before the journal has it; STOP of all runs is
+   one. It is looked at again between the journal's commit and a run's first input.
+4. `check` has the last word: a mission is checked when it is scheduled, and before each start.
+5. Operators are warned before each start, and can cancel it.
+
+When an entry is due says `m2pem.scheduling`; what its start waits for, `scheduled_start`.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator, Sequence
+
+import msgspec
+
+from m2pem.api.control import SCHEDULE, Alert, RunId
+from m2pem.api.schedule import (
+    Schedule,
+    ScheduleChanged,
+    ScheduledMission,
+    time_in,
+)
+from m2pem.errors import (
+    BusyError,
+    JournalError,
+    M2pemError,
+    OperatorError,
+    StaleEntryError,
+)
+from m2pem.executive.emergency import WRITTEN_WITHIN_S, StopMark, StopMarks
+from m2pem.executive.schedule_view import scheduled_mission
+from m2pem.executive.scheduled_start import (
+    ASK_AGAIN_S,
+    LOOK_AGAIN_S,
+    STARTING,
+    Look,
+    NotBegunError,
+    StartConditions,
+    Starter,
+    Wait,
+)
+from m2pem.fleet.allocation import resources_of_mission
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.mission import Mission
+from m2pem.scheduling import times
+from m2pem.scheduling.entry import (
+    EntryChange,
+    EntryId,
+    EntryState,
+    EntryStatus,
+    Hold,
+    ScheduleEntry,
+    SchedulePlan,
+    SettledTime,
+    Settlement,
+    entry_number,
+)
+from m2pem.scheduling.times import Due
+from m2pem.units import US_PER_S
+
+log = logging.getLogger("m2pem.schedule")
+
+LONGEST_SLEEP_S = 3600.0
+
+KEPT_ENTRIES = 200
+"""Entries that have ended and are kept; of more, the oldest are removed."""
+
+MARK = "schedule"
+"""The name of the mark that keeps a STOP of all until the journal has the hold."""
+
+
+class Scheduler:
+    """The schedule of one executive's fleet. `real`: whether something in the fleet is real.
+
+    `publish`: takes alerts for operators and says that the schedule has changed. `marks`: keep a
+    STOP of all until the journal has the hold.
+    """
+
+    def __init__(
+        self,
+        starter: Starter,
+        publish: Callable[[Alert | ScheduleChanged], None],
+        marks: StopMarks,
+        *,
+        real: bool,
+    ) -> None:
+        self._starter = starter
+        self._publish = publish
+        self._marks = marks
+        self._real = real
+        self._entries: dict[EntryId, ScheduleEntry] = {}
+        self._looks: dict[EntryId, Look] = {}
+        self._hold: Hold | None = None
+        self._stopped: set[EntryId] = set()
+        """Entries that an operator cancels or holds, before the journal has it."""
+        self._to_hold: dict[EntryId, Hold] = {}
+        """Entries whose run is stopped, before the journal has their hold."""
+        self._runs: dict[RunId, EntryId] = {}
+        self._conditions = StartConditions(starter, self._entries)
+        self._lock = asyncio.Lock()
+        self._wake = asyncio.Event()
+        self.served = False
+
+    # --- life -----------------------------------------------------------------------------------
+
+    async def load(self) -> None:
+        """Read the schedule, and take back starts whose runs never began: they come again.
+
+        It comes before runs are taken up.
+
+        Raises:
+            JournalError: the journal cannot be read or written.
+        """
+        journal, fleet = self._starter.journal, self._starter.fleet
+        mark = self._marks.get(MARK)
+        self._hold = await journal.schedule_hold(fleet.name)
+        if mark is not None and self._hold is None:
+            self._hold = Hold(mark.by, mark.reason, self._starter.clock.now_us())
+            await journal.hold_schedule(fleet.name, self._hold)
+        self._marks.remove(MARK)
+        lines = {line.run: line for line in await journal.runs()}
+        for entry in await journal.entries():
+            if self._is_ours(entry.plan):
+                started = [each.run for each in entry.state.times[-1:] if each.run]
+                line = lines.get(started[0]) if started else None
+                never_began = line and not (line.gone or line.last_seq or line.driven)
+                self._add(await self._take_back(entry) if never_began else entry)
+        self.served = True
+
+    async def _take_back(self, entry: ScheduleEntry) -> ScheduleEntry:
+        run = entry.state.times[-1].run
+        change = EntryChange(entry.id, times.withdrawn(entry.state))
+        await self._starter.journal.change_entry(change, deletes=run)
+        log.warning(
+            "%s: %s was created for it and never began: its time counts again", entry.id, run
+        )
+        return msgspec.structs.replace(entry, state=change.state)
+
+    def _is_ours(self, plan: SchedulePlan) -> bool:
+        # What was scheduled in a simulation must never start a real vehicle.
+        return plan.fleet == self._starter.fleet.name and plan.simulated is not self._real
+
+    def _add(self, entry: ScheduleEntry) -> None:
+        self._entries[entry.id] = entry
+        self._looks.setdefault(entry.id, Look())
+        if entry.state.run:
+            self._runs[entry.state.run] = entry.id
+
+    def foreign(self, entries: Sequence[ScheduleEntry]) -> Iterator[ScheduleEntry]:
+        """Yield the active entries that another fleet's executive is to start."""
+        yield from (each for each in entries if each.state.active and not self._is_ours(each.plan))
+
+    def latest_us(self) -> int:
+        """The latest moment that an entry knows of: a simulated clock may have run ahead."""
+        known = [
+            max(each.plan.scheduled_us, *(settled.at_us for settled in each.state.times), 0)
+            for each in self._entries.values()
+        ]
+        return max(known, default=0)
+
+    async def serve(self) -> None:
+        """Start what is due, for ever. `load` comes before."""
+        if self._hold is not None and self._active():
+            self._say(f"the schedule is {self._hold}; nothing starts until it is released")
+        try:
+            while True:
+                self._wake.clear()
+                async with self._lock:
+                    next_us = await self._look()
+                await self._sleep_until(next_us)
+        finally:
+            self.served = False
+
+    def changed(self) -> None:
+        """Look again: a run has ended, or vehicles are free."""
+        self._wake.set()
+
+    async def _sleep_until(self, next_us: int | None) -> None:
+        if next_us is None:
+            await self._wake.wait()
+            return
+        clock = self._starter.clock
+        latest_us = clock.now_us() + round(LONGEST_SLEEP_S * US_PER_S)
+        sleeping = asyncio.ensure_future(clock.sleep_until(min(next_us, latest_us)))
+        waking = asyncio.ensure_future(self._wake.wait())
+        try:
+            await asyncio.wait((sleeping, waking), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            sleeping.cancel()
+            waking.cancel()
+
+    # --- what operators do ----------------------------------------------------------------------
+
+    async def schedule(self, plan: SchedulePlan, resources: tuple[ResourceId, ...]) -> EntryId:
+        """Add an entry, of a mission that was checked and names `resources`."""
+        async with self._lock:
+            state = EntryState(plan.scheduled_us - 1 if not plan.when.cron else plan.scheduled_us)
+            entry = await self._starter.journal.schedule(plan, state)
+            self._add(entry)
+            self._looks[entry.id].resources = resources
+            await self._forget_old()
+        self._say(f"{entry.id} is scheduled by {plan.by or 'an operator'}: {self._named(entry)} ")
+        self._wake.set()
+        return entry.id
+
+    async def _forget_old(self) -> None:
+        over = [entry.id for entry in self._entries.values() if not entry.state.active]
+        if old := over[:-KEPT_ENTRIES]:
+            await self._starter.journal.remove_entries(old)
+            for each in old:
+                del self._entries[each], self._looks[each]
+
+    async def cancel(self, number: EntryId, by: str) -> None:
+        """Cancel an entry.
+
+        Raises:
+            OperatorError: there is none, or it is over.
+        """
+        entry, who = self._active_entry(number), by or "an operator"
+        self._stopped.add(number)
+        try:
+            async with self._lock:
+                cancelled = {"status": EntryStatus.CANCELLED, "detail": f"cancelled by {who}"}
+                await self._change(self._active_entry(number), owed_us=0, **cancelled)
+        finally:
+            self._stopped.discard(number)
+        self._say(f"{number} is cancelled by {who}: {entry.plan.mission_name} is not started")
+
+    def hold_at_once(self, by: str, reason: str) -> Hold | None:
+        """Hold the whole schedule, if it has anything; the journal follows with `written`."""
+        if not self._active():
+            return None
+        self._hold = Hold(by, reason, self._starter.clock.now_us())
+        self._marks.put(MARK, StopMark(by, reason))
+        self._say(f"the schedule is {self._hold}; nothing starts until it is released")
+        return self._hold
+
+    async def written(self, hold: Hold) -> None:
+        """Write a hold of the whole schedule to the journal.
+
+        Raises:
+            OperatorError: it has not written it within `WRITTEN_WITHIN_S`; the hold stands.
+        """
+        writing = self._starter.journal.hold_schedule(self._starter.fleet.name, hold)
+        try:
+            await asyncio.wait_for(asyncio.shield(asyncio.ensure_future(writing)), WRITTEN_WITHIN_S)
+        except (TimeoutError, JournalError) as error:
+            raise OperatorError(
+                "the schedule is held, but the journal does not write: it has not been recorded"
+                f"{f' ({error})' if str(error) else ''}"
+            ) from error
+        self._marks.remove(MARK)
+
+    async def hold(self, number: EntryId | None, by: str, reason: str) -> None:
+        """Hold an entry, or the whole schedule.
+
+        Raises:
+            OperatorError: there is no such entry, it is over; or the journal does not write.
+        """
+        if number is None:
+            hold = self.hold_at_once(by, reason)
+            if hold is None:
+                raise OperatorError("nothing is scheduled")
+            await self.written(hold)
+            return
+        self._active_entry(number)
+        self._stopped.add(number)
+        hold = Hold(by, reason, self._starter.clock.now_us())
+        try:
+            async with self._lock:
+                await self._change(self._active_entry(number), hold=hold)
+        finally:
+            self._stopped.discard(number)
+        self._say(f"{number} is {hold}; it starts nothing until it is released")
+
+    async def release(self, number: EntryId | None, by: str) -> None:
+        """Let an entry, or the whole schedule, start missions again.
+
+        Raises:
+            OperatorError: it is not held.
+        """
+        who = by or "an operator"
+        if number is None:
+            if self._hold is None:
+                raise OperatorError("the schedule is not held")
+            await self._starter.journal.hold_schedule(self._starter.fleet.name, None)
+            self._marks.remove(MARK)
+            self._hold = None
+            self._say(f"the schedule is released by {who}")
+        else:
+            async with self._lock:
+                entry = self._active_entry(number)
+                if entry.state.hold is None:
+                    raise OperatorError(f"{number} is not held")
+                await self._change(entry, hold=None)
+            self._say(f"{number} is released by {who}")
+        for look in self._looks.values():
+            look.warned_due_us = look.starts_us = None
+        self._wake.set()
+
+    def run_stopping(self, run: RunId, by: str) -> None:
+        """An operator stops a run: the entry that would start its mission again is held."""
+        number = self._runs.get(run)
+        if number is not None and self._entries[number].state.active:
+            now_us = self._starter.clock.now_us()
+            self._to_hold[number] = Hold(by, f"its run {run} was stopped", now_us)
+            self._wake.set()
+
+    def has(self, number: EntryId) -> bool:
+        """Whether there is such an entry."""
+        return number in self._entries
+
+    def _active(self) -> list[ScheduleEntry]:
+        return [entry for entry in self._entries.values() if entry.state.active]
+
+    def _active_entry(self, number: EntryId) -> ScheduleEntry:
+        entry = self._entries.get(number)
+        if entry is None:
+            known = ", ".join(each.id for each in self._active()) or "none"
+            raise OperatorError(f"there is no entry {number!r} in the schedule; it has {known}")
+        if not entry.state.active:
+            detail = entry.state.detail or f"it has started {entry.state.run}"
+            raise OperatorError(f"{number} is {entry.state.status.value}: {detail}")
+        return entry
+
+    async def _change(self, entry: ScheduleEntry, **fields: object) -> ScheduleEntry:
+        state = msgspec.structs.replace(entry.state, **fields, revision=entry.state.revision + 1)
+        return await self._write(entry, state)
+
+    async def _write(self, entry: ScheduleEntry, state: EntryState) -> ScheduleEntry:
+        await self._starter.journal.change_entry(EntryChange(entry.id, state))
+        changed = msgspec.structs.replace(entry, state=state)
+        self._entries[entry.id] = changed
+        self._publish(ScheduleChanged())
+        return changed
+
+    def _say(self, text: str) -> None:
+        log.info("%s", text)
+        self._publish(Alert("", SCHEDULE, text.strip()))
+        self._publish(ScheduleChanged())
+
+    # --- what is due ----------------------------------------------------------------------------
+
+    async def _look(self) -> int | None:
+        """Start what can start now; returns when to look again."""
+        try:
+            await self._conditions.ask_journal(self._active())
+            await self._judge_runs()
+        except StaleEntryError:
+            await self.load()
+        except JournalError as error:
+            log.warning("the schedule cannot be read or written: %s", error)
+            return self._in(ASK_AGAIN_S)
+        order = sorted(self._active(), key=self._rank)
+        kept: dict[ResourceId, EntryId] = {}
+        wakes: list[int] = []
+        for entry in order:
+            try:
+                again_us = await self._look_at(entry, kept)
+            except StaleEntryError:
+                await self._reload(entry.id)
+                again_us = self._starter.clock.now_us()
+            except JournalError as error:
+                look = self._looks[entry.id]
+                if look.reason != str(error):
+                    look.reason = str(error)
+                    self._say(f"{entry.id} cannot start {entry.plan.mission_name}: {error}")
+                again_us = self._in(ASK_AGAIN_S)
+            if again_us is not None:
+                wakes.append(again_us)
+        return min(wakes, default=None)
+
+    async def _judge_runs(self) -> None:
+        """Hold the entries whose run has failed or was stopped: what made it so may be there yet.
+
+        Of an entry that starts nothing any more there is nothing to hold.
+        """
+        for entry in self._active():
+            hold = self._to_hold.get(entry.id)
+            run, judged = entry.state.run, entry.state.judged_run
+            if hold is None and run and run != judged:
+                judged, outcome = run, self._conditions.outcome(run)
+                if outcome in ("failed", "stopped"):
+                    how = "has failed" if outcome == "failed" else "was stopped"
+                    now_us = self._starter.clock.now_us()
+                    hold = Hold("", f"its run {run} {how}", now_us)
+                elif not outcome:
+                    continue
+            elif hold is None:
+                continue
+            if entry.state.hold is None and hold is not None:
+                await self._change(entry, hold=hold, judged_run=run)
+                self._say(f"{entry.id} is {hold}; it starts nothing until it is released")
+            else:
+                await self._change(entry, judged_run=run)
+            self._to_hold.pop(entry.id, None)
+
+    def _rank(self, entry: ScheduleEntry) -> tuple[int, int, int]:
+        found = times.due(entry.plan, entry.state, self._starter.clock.now_us())
+        due_us = found.due_us or found.next_us or 0
+        return -entry.plan.priority, due_us, entry_number(entry.id) or 0
+
+    async def _reload(self, number: EntryId) -> None:
+        for entry in await self._starter.journal.entries():
+            if entry.id == number:
+                self._add(entry)
+                return
+        self._entries.pop(number, None)
+
+    def _in(self, seconds: float) -> int:
+        return self._starter.clock.now_us() + round(seconds * US_PER_S)
+
+    @property
+    def _warning_us(self) -> int:
+        return round(self._starter.fleet.start_warning_s * US_PER_S)
+
+    async def _look_at(self, entry: ScheduleEntry, kept: dict[ResourceId, EntryId]) -> int | None:
+        """Start an entry if it can start now; returns when to look again.
+
+        `kept`: what entries before it wait for.
+        """
+        now_us = self._starter.clock.now_us()
+        look = self._looks[entry.id]
+        found = times.due(entry.plan, entry.state, now_us)
+        if found.passed:
+            entry = await self._missed(entry, found.passed_us, found.passed)
+            found = times.due(entry.plan, entry.state, now_us)
+        if found.due_us is None:
+            return self._before(entry, look, found, now_us)
+        if found.deadline_us is not None and now_us > found.deadline_us:
+            ends = "its last moment has passed" if found.owed else ""
+            entry = await self._missed(entry, found.due_us, 1, ends=ends)
+            if not entry.state.active:
+                return None
+            found = times.due(entry.plan, entry.state, now_us)
+            if found.due_us is None:
+                return self._before(entry, look, found, now_us)
+        assert found.due_us is not None
+        if look.resources is None and not self._why_held(entry):
+            loaded = await self._admitted(entry, found.due_us)
+            if loaded is None:
+                return None
+            look.resources = resources_of_mission(loaded[0], self._starter.fleet)
+        held = self._why_held(entry)
+        wait = Wait(held) if held else self._conditions.wait(entry, look, now_us, kept)
+        if wait is None:
+            wait = await self._ready(entry, look, found, now_us)
+        if wait is None:
+            entry = self._entries[entry.id]
+            return now_us if entry.state.active else None
+        if wait.never:
+            await self._missed(entry, found.due_us, 1, ends=wait.reason)
+            return None
+        if wait.for_resources:
+            for resource in look.resources or ():
+                kept.setdefault(resource, entry.id)
+        self._note(entry, look, wait)
+        limits = [found.next_us, wait.again_us]
+        if found.deadline_us is not None:
+            limits.append(found.deadline_us + 1)
+        return min((each for each in limits if each is not None), default=None)
+
+    def _before(self, entry: ScheduleEntry, look: Look, found: Due, now_us: int) -> int | None:
+        """Warn operators of a time that comes; returns when to look again."""
+        look.reason, look.true_since_us, look.starts_us = "", None, None
+        if found.next_us is None:
+            return None
+        warn_us = found.next_us - self._warning_us
+        if now_us < warn_us:
+            return warn_us
+        if look.warned_due_us != found.next_us and not self._why_held(entry):
+            look.warned_due_us, look.warned_us = found.next_us, now_us
+            look.starts_us = found.next_us
+            self._warn(entry, found.next_us)
+        return found.next_us
+
+    def _warn(self, entry: ScheduleEntry, starts_us: int) -> None:
+        left_s = (starts_us - self._starter.clock.now_us()) / US_PER_S
+        who = f"{entry.id}, scheduled by {entry.plan.by or 'an operator'}"
+        self._say(
+            f"{entry.plan.mission_name} starts in {left_s:.0f} s ({who}); "
+            f"`m2pem schedule cancel {entry.id}` or hold keeps it from that"
+        )
+
+    def _note(self, entry: ScheduleEntry, look: Look, wait: Wait) -> None:
+        """Keep why an entry waits; tell operators when a start that they expect does not come."""
+        if look.reason == wait.reason:
+            return
+        if look.starts_us is not None and not wait.reason.startswith(STARTING):
+            look.starts_us = look.warned_due_us = None
+            self._say(f"{entry.id} does not start {entry.plan.mission_name} yet: {wait.reason}")
+        look.reason = wait.reason
+        self._publish(ScheduleChanged())
+
+    async def _missed(
+        self, entry: ScheduleEntry, due_us: int, number: int, *, ends: str = ""
+    ) -> ScheduleEntry:
+        """Settle times that were missed, and tell operators."""
+        look, plan = self._looks[entry.id], entry.plan
+        why = ends or self._why_held(entry) or look.reason or "it was not served at that time"
+        now_us = self._starter.clock.now_us()
+        settled = SettledTime(due_us, now_us, Settlement.MISSED, text=why, times=number)
+        changed = await self._write(entry, times.settle(plan, entry.state, settled, ends=ends))
+        look.warned_due_us = look.starts_us = None
+        at = time_in(due_us, plan.when.time_zone)
+        least = "at least " if number >= times.COUNTED_TIMES - 1 else ""
+        many = f"{least}{number} starts, the last at" if number > 1 else "the start at"
+        then = "; it starts once as soon as it can" if changed.state.owed_us else ""
+        self._say(f"{entry.id} missed {many} {at} of {plan.mission_name}: {why}{then}")
+        return changed
+
+    # --- what a start waits for -----------------------------------------------------------------
+
+    def _why_held(self, entry: ScheduleEntry) -> str:
+        if self._hold is not None:
+            return f"the schedule is {self._hold}"
+        hold = entry.state.hold or self._to_hold.get(entry.id)
+        if hold is not None:
+            return str(hold)
+        return "held" if entry.id in self._stopped else ""
+
+    # --- starting -------------------------------------------------------------------------------
+
+    async def _ready(
+        self, entry: ScheduleEntry, look: Look, found: Due, now_us: int
+    ) -> Wait | None:
+        """Warn operators, and start when the warning has been long enough."""
+        assert found.due_us is not None
+        if look.warned_due_us != found.due_us:
+            look.warned_due_us, look.warned_us = found.due_us, now_us
+            look.starts_us = now_us + self._warning_us
+            if self._warning_us:
+                self._warn(entry, look.starts_us)
+        starts_us = max(found.due_us, look.warned_us + self._warning_us)
+        look.starts_us = starts_us
+        if now_us < starts_us:
+            return Wait(STARTING, starts_us, for_resources=True)
+        return await self._start(entry, look, found, now_us)
+
+    async def _start(
+        self, entry: ScheduleEntry, look: Look, found: Due, now_us: int
+    ) -> Wait | None:
+        """Check the mission once more, and begin its run."""
+        plan = entry.plan
+        assert found.due_us is not None
+        admitted = await self._admitted(entry, found.due_us)
+        if admitted is None:
+            return None
+        loaded, process = admitted
+        look.resources = resources_of_mission(loaded, self._starter.fleet)
+        if why := await self._conditions.interrupted(look.resources):
+            return Wait(why, self._in(ASK_AGAIN_S), for_resources=True)
+        settled = SettledTime(found.due_us, now_us, Settlement.STARTED, owed=found.owed)
+        change = EntryChange(entry.id, times.settle(plan, entry.state, settled))
+        by = f"{entry.id}, scheduled by {plan.by or 'an operator'}"
+        try:
+            run = await self._starter.begin_scheduled(
+                loaded, process, plan, by, change, lambda: not self._why_held(entry)
+            )
+        except NotBegunError as error:
+            return await self._not_begun(entry, change.with_run(error.run), str(error))
+        except BusyError as error:
+            return Wait(str(error), self._in(LOOK_AGAIN_S), for_resources=True)
+        started = msgspec.structs.replace(entry, state=change.with_run(run).state)
+        self._add(started)
+        look.reason, look.starts_us, look.warned_due_us = "", None, None
+        look.true_since_us = None
+        self._say(f"{entry.id} has started {plan.mission_name} as {run}")
+        return None
+
+    async def _not_begun(self, entry: ScheduleEntry, change: EntryChange, why: str) -> Wait | None:
+        """Take a start back of which nothing has begun: its time counts again."""
+        created = msgspec.structs.replace(entry, state=change.state)
+        self._entries[entry.id] = created
+        try:
+            self._entries[entry.id] = await self._take_back(created)
+        except JournalError as error:
+            self._add(created)
+            text = (
+                f"{entry.id}: {created.state.run} was created and could not begin: {why}; {error}"
+            )
+            self._say(f"{text}. When the executive is started again, its time counts again")
+            return None
+        return Wait(why, self._in(ASK_AGAIN_S))
+
+    async def _admitted(self, entry: ScheduleEntry, due_us: int) -> tuple[Mission, str] | None:
+        """Read and check the mission of an entry; None: it is refused, and the entry has failed."""
+        try:
+            return await asyncio.to_thread(self._starter.admitted, entry.plan)
+        except M2pemError as error:
+            await self._refused(entry, due_us, str(error))
+            return None
+
+    async def _refused(self, entry: ScheduleEntry, due_us: int, why: str) -> None:
+        now_us = self._starter.clock.now_us()
+        settled = SettledTime(due_us, now_us, Settlement.REFUSED, text=why)
+        await self._write(entry, times.settle(entry.plan, entry.state, settled))
+        self._say(f"{entry.id} failed, and starts nothing any more: {why}")
+
+    # --- showing --------------------------------------------------------------------------------
+
+    def view(self) -> Schedule:
+        """Return the schedule as operators see it."""
+        active = sorted(self._active(), key=self._rank)
+        over = [entry for entry in self._entries.values() if not entry.state.active]
+        return Schedule(
+            tuple(self._seen(entry) for entry in (*active, *over)),
+            str(self._hold) if self._hold is not None else "",
+            self.served,
+            self._starter.fleet.start_warning_s,
+        )
+
+    def _seen(self, entry: ScheduleEntry) -> ScheduledMission:
+        held = self._why_held(entry) if entry.state.active else ""
+        now_us = self._starter.clock.now_us()
+        return scheduled_mission(entry, self._looks[entry.id], held, now_us)
+
+    @staticmethod
+    def _named(entry: ScheduleEntry) -> str:
+        return f"{entry.plan.mission_name} {times.described(entry.plan.when)}"
