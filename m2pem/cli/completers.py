@@ -10,7 +10,7 @@ import sqlite3
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import click
 from click.shell_completion import CompletionItem, split_arg_string
@@ -49,7 +49,38 @@ def runs_of_journal(*, ended: bool) -> Completer:
     return complete
 
 
+def entries_of_journal(
+    ctx: click.Context, _: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Complete the entries of the journal's schedule that may still start something."""
+    return [
+        CompletionItem(f"s{number}")
+        for (number,) in _rows(
+            ctx.params.get("journal"),
+            "SELECT entry FROM schedule WHERE json_extract(state, '$.status') IS NULL"
+            " ORDER BY entry DESC LIMIT 200",
+        )
+        if f"s{number}".startswith(incomplete)
+    ]
+
+
+def runs_and_entries(
+    ctx: click.Context, param: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Complete what a scheduled mission may come after."""
+    runs = runs_of_journal(ended=False)(ctx, param, incomplete)
+    return [*entries_of_journal(ctx, param, incomplete), *runs]
+
+
 def _runs(url: str | None) -> Sequence[tuple[int, str, str | None]]:
+    return _rows(
+        url,
+        "SELECT run, mission_name, outcome FROM runs JOIN standings USING (run)"
+        " ORDER BY run DESC LIMIT 200",
+    )
+
+
+def _rows(url: str | None, query: str) -> Sequence[tuple[Any, ...]]:
     from m2pem.journal import default_url, file_of
     from m2pem.journal.database import open_for_reading
 
@@ -58,10 +89,7 @@ def _runs(url: str | None) -> Sequence[tuple[int, str, str | None]]:
         if path is None or not path.exists():
             return ()
         with closing(open_for_reading(path)) as connection:
-            return connection.execute(
-                "SELECT run, mission_name, outcome FROM runs JOIN standings USING (run)"
-                " ORDER BY run DESC LIMIT 200"
-            ).fetchall()
+            return connection.execute(query).fetchall()
     except (M2pemError, sqlite3.Error):
         return ()
 

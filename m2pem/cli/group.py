@@ -27,6 +27,7 @@ COMMANDS = {
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",
     "start": "Start a mission in an executive that is running on this host.",
+    "schedule": "Show the missions that start later; cancel, hold or release them.",
     "check": "Check a mission file, alone or against a fleet.",
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",

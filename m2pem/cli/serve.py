@@ -112,13 +112,16 @@ async def _serve(
     fleet = with_shared_state(fleet, file_of(url), written)
     refuse_speed(fleet, speed)
     async with journal_at(url) as journal:
-        mine, others = await interrupted_runs(journal, fleet, speed)
-        clock = SystemClock(speed, await _start_us(journal, mine))
+        mine, _ = await interrupted_runs(journal, fleet, speed)
+        clock = SystemClock(speed, await _start_us(journal, mine, speed))
         executive = make_executive(fleet, journal, plugins, clock, search_path=search_path)
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:
                 who = ", ".join(operators.names) or "none"
                 note(f"m2pem: serving {fleet.name}; operators: {who}")
+                await executive.load_schedule()
+                # Again: runs that were created for the schedule and never began are gone.
+                mine, others = await interrupted_runs(journal, fleet, speed)
                 for line in others:
                     click.echo(
                         f"m2pem: {line.run} was interrupted with other vehicles, or at another "
@@ -126,6 +129,9 @@ async def _serve(
                         err=True,
                     )
                 await _take_up(executive, mine)
+                executive.serve_schedule()
+                for told in (await executive.control.scheduled()).lines():
+                    note(f"m2pem: schedule: {told}")
                 retention: asyncio.Task[None] | None = None
                 if keep_s is not None:
                     kept = keep_runs(journal, keep_s, clock, by=operator_name())
@@ -162,11 +168,17 @@ async def interrupted_runs(
     return mine, others
 
 
-async def _start_us(journal: "Journal", lines: "list[RunInfo]") -> int:
-    """Now, or when the last of these runs was, if simulated time has run ahead."""
+async def _start_us(journal: "Journal", lines: "list[RunInfo]", speed: float) -> int:
+    """Now, or when the last of these runs was, if simulated time has run ahead.
+
+    The schedule of a simulation counts, too: its times would come again.
+    """
     from m2pem.cli.journals import last_decided_us
 
     times = [await last_decided_us(journal, line) for line in lines]
+    if speed != 1.0:
+        for entry in await journal.entries():
+            times += [entry.plan.scheduled_us, *(each.at_us for each in entry.state.times)]
     return max([time.time_ns() // 1000, *times])
 
 

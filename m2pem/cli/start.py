@@ -1,10 +1,11 @@
 """`m2pem start`: a mission for an executive that is running on this host."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from m2pem.cli.later import later_options, scheduled_start
 from m2pem.cli.options import (
     data_option,
     example,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 @click.option(
     "--even-if-busy", is_flag=True, help="Start although other runs or operators have its vehicles."
 )
+@later_options
 @journal_option
 @by_option
 def start(
@@ -43,12 +45,16 @@ def start(
     even_if_busy: bool,
     journal: str | None,
     by: str | None,
+    **later: Any,
 ) -> None:
     """Start a mission in an executive that is running on this host.
 
     `m2pem serve` is one, with its fleet. Prints the id of the run, and before it, as notes, the
     warnings that `m2pem check` has of the mission with that fleet. The files of the mission are
     read here, and sent.
+
+    With one of the options from --when to --concurrency, the mission starts later: it is kept in
+    the schedule, and the id of its entry is printed. `m2pem schedule` lists what starts when.
     """
     import msgspec
 
@@ -59,6 +65,11 @@ def start(
     from m2pem.executive.loading import load_source
     from m2pem.findings import Finding, has_errors, lines
 
+    priority, when = scheduled_start(later)
+    if when is not None and even_if_busy:
+        raise click.UsageError(
+            "a mission that starts later waits for its vehicles: no --even-if-busy"
+        )
     path = choose_executive(journal_file(journal), run_on)
     loaded = load_source(mission, search_path)
     files = mission_files(loaded)
@@ -69,6 +80,20 @@ def start(
     if not has_errors(findings):  # else the refusal has them all
         for line in lines(findings):
             note(line)
+    if when is not None:
+        entry = ask(
+            path,
+            "schedule",
+            timeout_s=LONG_TIMEOUT_S,
+            mission=files,
+            when=msgspec.to_builtins(when),
+            process=process,
+            data=data,
+            priority=priority,
+            by=by or operator_name(),
+        )
+        click.echo(entry)
+        return
     run = ask(
         path,
         "start",

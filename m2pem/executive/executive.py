@@ -172,16 +172,20 @@ class Executive:
             self.events.end()
             await self._stack.aclose()
 
-    async def serve_schedule(self) -> None:
-        """Start what the journal has scheduled for this fleet, from now on.
+    async def load_schedule(self) -> None:
+        """Read what the journal has scheduled for this fleet, before runs are taken up.
 
-        It comes before runs are taken up: runs that were created for the schedule, and never began,
-        are deleted, and their times count again.
+        Runs that were created for the schedule, and never began, are deleted: their times count
+        again.
 
         Raises:
-            JournalError: the schedule cannot be read.
+            JournalError: the schedule cannot be read or written.
         """
         await self.scheduler.load()
+
+    def serve_schedule(self) -> None:
+        """Start what is scheduled, from now on, once interrupted runs are taken up."""
+        self.scheduler.served = True
         self._scheduling = asyncio.create_task(self.scheduler.serve(), name="schedule")
         self._scheduling.add_done_callback(self._schedule_ended)
 

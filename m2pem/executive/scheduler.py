@@ -15,7 +15,7 @@ When an entry is due says `m2pem.scheduling`; what its start waits for, `schedul
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 
 import msgspec
 
@@ -53,7 +53,6 @@ from m2pem.scheduling.entry import (
     EntryChange,
     EntryId,
     EntryState,
-    EntryStatus,
     Hold,
     ScheduleEntry,
     SchedulePlan,
@@ -131,7 +130,6 @@ class Scheduler:
                 line = lines.get(started[0]) if started else None
                 never_began = line and not (line.gone or line.last_seq or line.driven)
                 self._add(await self._take_back(entry) if never_began else entry)
-        self.served = True
 
     async def _take_back(self, entry: ScheduleEntry) -> ScheduleEntry:
         run = entry.state.times[-1].run
@@ -151,18 +149,6 @@ class Scheduler:
         self._looks.setdefault(entry.id, Look())
         if entry.state.run:
             self._runs[entry.state.run] = entry.id
-
-    def foreign(self, entries: Sequence[ScheduleEntry]) -> Iterator[ScheduleEntry]:
-        """Yield the active entries that another fleet's executive is to start."""
-        yield from (each for each in entries if each.state.active and not self._is_ours(each.plan))
-
-    def latest_us(self) -> int:
-        """The latest moment that an entry knows of: a simulated clock may have run ahead."""
-        known = [
-            max(each.plan.scheduled_us, *(settled.at_us for settled in each.state.times), 0)
-            for each in self._entries.values()
-        ]
-        return max(known, default=0)
 
     async def serve(self) -> None:
         """Start what is due, for ever. `load` comes before."""
@@ -226,8 +212,8 @@ class Scheduler:
         self._stopped.add(number)
         try:
             async with self._lock:
-                cancelled = {"status": EntryStatus.CANCELLED, "detail": f"cancelled by {who}"}
-                await self._change(self._active_entry(number), owed_us=0, **cancelled)
+                found = self._active_entry(number)
+                await self._write(found, found.state.cancelled(by))
         finally:
             self._stopped.discard(number)
         self._say(f"{number} is cancelled by {who}: {entry.plan.mission_name} is not started")
@@ -330,8 +316,7 @@ class Scheduler:
         return entry
 
     async def _change(self, entry: ScheduleEntry, **fields: object) -> ScheduleEntry:
-        state = msgspec.structs.replace(entry.state, **fields, revision=entry.state.revision + 1)
-        return await self._write(entry, state)
+        return await self._write(entry, entry.state.changed(**fields))
 
     async def _write(self, entry: ScheduleEntry, state: EntryState) -> ScheduleEntry:
         await self._starter.journal.change_entry(EntryChange(entry.id, state))
@@ -428,20 +413,16 @@ class Scheduler:
         now_us = self._starter.clock.now_us()
         look = self._looks[entry.id]
         found = times.due(entry.plan, entry.state, now_us)
-        if found.passed:
-            entry = await self._missed(entry, found.passed_us, found.passed)
-            found = times.due(entry.plan, entry.state, now_us)
-        if found.due_us is None:
-            return self._before(entry, look, found, now_us)
-        if found.deadline_us is not None and now_us > found.deadline_us:
-            ends = "its last moment has passed" if found.owed else ""
-            entry = await self._missed(entry, found.due_us, 1, ends=ends)
+        overdue = found.deadline_us is not None and now_us > found.deadline_us
+        if found.due_us is not None and (overdue or found.passed):
+            due_us = found.due_us if overdue else found.passed_us
+            ends = "its last moment has passed" if overdue and found.owed else ""
+            entry = await self._missed(entry, due_us, found.passed + overdue, ends=ends)
             if not entry.state.active:
                 return None
             found = times.due(entry.plan, entry.state, now_us)
-            if found.due_us is None:
-                return self._before(entry, look, found, now_us)
-        assert found.due_us is not None
+        if found.due_us is None:
+            return self._before(entry, look, found, now_us)
         if look.resources is None and not self._why_held(entry):
             loaded = await self._admitted(entry, found.due_us)
             if loaded is None:

@@ -7,7 +7,7 @@ CronJob, hold and release of batch queues.
 """
 
 from enum import StrEnum
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -149,6 +149,15 @@ class EntryState(msgspec.Struct, frozen=True, omit_defaults=True):
     def active(self) -> bool:
         """Whether it may still start something."""
         return self.status is EntryStatus.ACTIVE
+
+    def changed(self, **fields: Any) -> "EntryState":
+        """Return the next state, with other values of some fields."""
+        return msgspec.structs.replace(self, **fields, revision=self.revision + 1)
+
+    def cancelled(self, by: str) -> "EntryState":
+        """Return the state after someone has cancelled the entry."""
+        detail = f"cancelled by {by or 'an operator'}"
+        return self.changed(status=EntryStatus.CANCELLED, detail=detail, owed_us=0)
 
 
 class ScheduleEntry(msgspec.Struct, frozen=True):

@@ -5,8 +5,9 @@ forward, a time that does not exist comes at the next one that does; where they 
 comes once (cronsim, as Debian's cron has it). Instants are microseconds since the Unix epoch.
 """
 
+import re
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, time, timedelta
 from functools import lru_cache
 from zoneinfo import ZoneInfo
 
@@ -55,6 +56,8 @@ _MICROSECOND = timedelta(microseconds=1)
 def resolved(when: When, now_us: int, host_zone: str) -> When:
     """Check what an operator wants, and say it with the time zone and the offsets that it means.
 
+    A time without a date (08:00) is the next one of the time zone.
+
     `host_zone`: what stands for a time zone that is not named.
 
     Raises:
@@ -67,7 +70,8 @@ def resolved(when: When, now_us: int, host_zone: str) -> When:
         when = msgspec.structs.replace(when, time_zone=zone)
         zone_of(zone)
     if when.at:
-        when = msgspec.structs.replace(when, at=_with_offset("at", when.at, zone))
+        moment = _next(when.at, now_us, zone) or _with_offset("at", when.at, zone)
+        when = msgspec.structs.replace(when, at=moment)
         if instant_us(when.at) <= now_us:
             raise ScheduleError(f"{when.at} has passed: it is {local(now_us, zone)}")
     if when.until:
@@ -101,6 +105,31 @@ def _check_rest(when: When) -> None:
         raise ScheduleError("a duration cannot be negative")
 
 
+_TIME = re.compile(r"[0-9]{1,2}:[0-9]{2}(:[0-9]{2})?")
+
+
+def _next(text: str, now_us: int, zone: str) -> str:
+    """Return the next date with a time of day; "" if the text is none."""
+    if not _TIME.fullmatch(text.strip()):
+        return ""
+    try:
+        wanted = time.fromisoformat(text.strip().rjust(len("08:00"), "0"))
+    except ValueError:
+        raise ScheduleError(f"at: {text} is no time of a day") from None
+    now = (_EPOCH + timedelta(microseconds=now_us)).astimezone(zone_of(zone))
+    for days in (0, 1, 2):
+        moment = datetime.combine(now.date() + timedelta(days=days), wanted, now.tzinfo)
+        if moment.timestamp() > now.timestamp() and _exists(moment):
+            return moment.isoformat()
+    raise ScheduleError(f"at: {text} does not come within two days in {zone}")
+
+
+def _exists(moment: datetime) -> bool:
+    """Whether clocks do not skip a local time: it would come back from UTC as another one."""
+    again = moment.astimezone(UTC).astimezone(moment.tzinfo)
+    return again.replace(tzinfo=None, fold=0) == moment.replace(tzinfo=None, fold=0)
+
+
 def _with_offset(what: str, text: str, zone: str) -> str:
     try:
         moment = datetime.fromisoformat(text.strip())
@@ -111,10 +140,7 @@ def _with_offset(what: str, text: str, zone: str) -> str:
         ) from None
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=zone_of(zone))
-        # A time that clocks skip comes back from UTC as another one.
-        if moment.astimezone(UTC).astimezone(moment.tzinfo).replace(tzinfo=None) != moment.replace(
-            tzinfo=None, fold=0
-        ):
+        if not _exists(moment):
             raise ScheduleError(f"{what}: {text} does not exist in {zone}: clocks skip it")
     return moment.isoformat()
 

@@ -1,4 +1,4 @@
-"""An executive that serves a schedule in virtual time, with an arbiter that does what a test says."""
+"""An executive that serves a schedule in virtual time; a test says what its arbiter does."""
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping
@@ -140,6 +140,7 @@ async def serving(
             for name in of.vehicles:
                 world.say(name)
             await clock.sleep(0.000_001)
-        await executive.serve_schedule()
+        await executive.load_schedule()
+        executive.serve_schedule()
         yield world
         listening.cancel()
