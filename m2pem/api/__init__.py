@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.connection_reader import ConnectionReader
     from m2pem.api.control import (
+        SCHEDULE,
         Alert,
         ControlEvent,
         HandedOver,
@@ -76,6 +77,19 @@ if TYPE_CHECKING:
         Operation,
     )
     from m2pem.api.run_view import RunView
+    from m2pem.api.schedule import (
+        WHEN_FREE,
+        Concurrency,
+        EntryId,
+        Missed,
+        Schedule,
+        ScheduleChanged,
+        ScheduledMission,
+        ScheduledStatus,
+        SettledTime,
+        Settlement,
+        When,
+    )
     from m2pem.api.service import Service, ServiceContext, ServiceError
     from m2pem.api.telemetry import (
         Detection,
@@ -131,7 +145,7 @@ _MODULES = {
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": (
-        "Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
+        "SCHEDULE Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
         " RunSummary SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.description": "Description Importance Kind describe",
@@ -147,6 +161,10 @@ _MODULES = {
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
     ),
     "m2pem.api.run_view": "RunView",
+    "m2pem.api.schedule": (
+        "WHEN_FREE Concurrency EntryId Missed Schedule ScheduleChanged ScheduledMission"
+        " ScheduledStatus SettledTime Settlement When"
+    ),
     "m2pem.api.service": "Service ServiceContext ServiceError",
     "m2pem.api.telemetry": (
         "Detection GeoPosition LinkState PayloadState TeamMemberState TeamState Telemetry"
@@ -177,6 +195,18 @@ _MODULES = {
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
+    "SCHEDULE",
+    "WHEN_FREE",
+    "When",
+    "Settlement",
+    "SettledTime",
+    "ScheduledStatus",
+    "ScheduledMission",
+    "ScheduleChanged",
+    "Schedule",
+    "Missed",
+    "EntryId",
+    "Concurrency",
     "MAX_DATA_VALUES",
     "MAX_NAME_CHARACTERS",
     "MAX_REASON_CHARACTERS",

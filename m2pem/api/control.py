@@ -228,7 +228,11 @@ class Alert:
 
 
 SCHEDULE = "SCHEDULE"
-"""The code of alerts about the schedule: what starts in a moment, was missed, refused or held."""
+"""The code of alerts that say what operators, or the schedule itself, have done with it."""
+STARTS_SOON = "STARTS_SOON"
+"""The code of the alert before each start of a scheduled mission."""
+NOT_STARTED = "NOT_STARTED"
+"""The code of alerts about scheduled missions that did not start: missed, refused or held."""
 
 ControlEvent: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert, ScheduleChanged]
 """What a subscriber gets: records and prompts in order, after they were committed, alerts and

@@ -79,6 +79,19 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
         raise NotDrivenError(f"{error}{_left_behind(journal_url, path)}") from error
 
 
+def held_schedules(journal: Path) -> list[str]:
+    """Who holds the schedule of each executive on the journal; "": nobody."""
+    from m2pem.control_socket.client import ask
+    from m2pem.control_socket.paths import live_sockets
+    from m2pem.errors import M2pemError
+
+    found = []
+    for path in live_sockets(journal):
+        with suppress(M2pemError):  # the stop is what matters
+            found.append(str(ask(path, "scheduled")["hold"]))
+    return found
+
+
 def _ended(journal_url: str | None, path: Path, request: str, run: str) -> str:
     """How and when a run has ended, by the journal; "" if it has not, or is not known."""
     from m2pem.cli.journals import find_run, journal_to_read
@@ -195,3 +208,5 @@ def stop(run_id: str | None, every: bool, reason: str, journal: str | None, by: 
         return
     stopped = steer_all(journal, "stop_all", by, reason=reason)
     click.echo(f"stopped: {', '.join(stopped) or 'no run was running'}")
+    if any(hold for hold in held_schedules(journal_file(journal))):
+        click.echo("the schedule is held; `m2pem schedule release` lets it go on")

@@ -25,14 +25,19 @@ all_option = click.option("--all", "every", is_flag=True, help="Those that are o
 
 
 @click.group(invoke_without_command=True, epilog=example("m2pem schedule"))
+@all_option
+@journal_option
+@format_option
 @click.pass_context
-def schedule(ctx: click.Context) -> None:
+def schedule(ctx: click.Context, every: bool, journal: str | None, output: str) -> None:
     """Show the missions that start later; cancel, hold or release them.
 
-    `m2pem start MISSION --when ...` adds one. Without a word, the list is shown.
+    `m2pem start MISSION --when ...` adds one. Without a word it is `m2pem schedule list`.
     """
     if ctx.invoked_subcommand is None:
-        ctx.invoke(list_)
+        ctx.invoke(list_, every=every, journal=journal, output=output)
+    elif every or journal or output != "text":
+        raise click.UsageError(f"write the options after {ctx.invoked_subcommand}")
 
 
 @schedule.command("list", epilog=example("m2pem schedule list --all"))

@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from m2pem.api.control import SCHEDULE, Alert, RunId
+from m2pem.api.control import NOT_STARTED, SCHEDULE, STARTS_SOON, Alert, RunId
 from m2pem.api.schedule import (
     Schedule,
     ScheduleChanged,
@@ -153,7 +153,11 @@ class Scheduler:
     async def serve(self) -> None:
         """Start what is due, for ever. `load` comes before."""
         if self._hold is not None and self._active():
-            self._say(f"the schedule is {self._hold}; nothing starts until it is released")
+            self._say(
+                f"the schedule is {self._hold}; nothing starts until it is released",
+                NOT_STARTED,
+                NOT_STARTED,
+            )
         try:
             while True:
                 self._wake.clear()
@@ -191,7 +195,7 @@ class Scheduler:
             self._add(entry)
             self._looks[entry.id].resources = resources
             await self._forget_old()
-        self._say(f"{entry.id} is scheduled by {plan.by or 'an operator'}: {self._named(entry)} ")
+        self._say(f"{entry.id} is scheduled by {plan.by or 'an operator'}: {self._named(entry)}")
         self._wake.set()
         return entry.id
 
@@ -224,7 +228,7 @@ class Scheduler:
             return None
         self._hold = Hold(by, reason, self._starter.clock.now_us())
         self._marks.put(MARK, StopMark(by, reason))
-        self._say(f"the schedule is {self._hold}; nothing starts until it is released")
+        self._say(f"the schedule is {self._hold}; nothing starts until it is released", NOT_STARTED)
         return self._hold
 
     async def written(self, hold: Hold) -> None:
@@ -325,9 +329,9 @@ class Scheduler:
         self._publish(ScheduleChanged())
         return changed
 
-    def _say(self, text: str) -> None:
+    def _say(self, text: str, code: str = SCHEDULE) -> None:
         log.info("%s", text)
-        self._publish(Alert("", SCHEDULE, text.strip()))
+        self._publish(Alert("", code, text))
         self._publish(ScheduleChanged())
 
     # --- what is due ----------------------------------------------------------------------------
@@ -355,7 +359,9 @@ class Scheduler:
                 look = self._looks[entry.id]
                 if look.reason != str(error):
                     look.reason = str(error)
-                    self._say(f"{entry.id} cannot start {entry.plan.mission_name}: {error}")
+                    self._say(
+                        f"{entry.id} cannot start {entry.plan.mission_name}: {error}", NOT_STARTED
+                    )
                 again_us = self._in(ASK_AGAIN_S)
             if again_us is not None:
                 wakes.append(again_us)
@@ -466,7 +472,8 @@ class Scheduler:
         who = f"{entry.id}, scheduled by {entry.plan.by or 'an operator'}"
         self._say(
             f"{entry.plan.mission_name} starts in {left_s:.0f} s ({who}); "
-            f"`m2pem schedule cancel {entry.id}` or hold keeps it from that"
+            f"`m2pem schedule cancel {entry.id}` or hold keeps it from that",
+            STARTS_SOON,
         )
 
     def _note(self, entry: ScheduleEntry, look: Look, wait: Wait) -> None:
@@ -475,7 +482,10 @@ class Scheduler:
             return
         if look.starts_us is not None and not wait.reason.startswith(STARTING):
             look.starts_us = look.warned_due_us = None
-            self._say(f"{entry.id} does not start {entry.plan.mission_name} yet: {wait.reason}")
+            self._say(
+                f"{entry.id} does not start {entry.plan.mission_name} yet: {wait.reason}",
+                NOT_STARTED,
+            )
         look.reason = wait.reason
         self._publish(ScheduleChanged())
 
@@ -493,7 +503,7 @@ class Scheduler:
         least = "at least " if number >= times.COUNTED_TIMES - 1 else ""
         many = f"{least}{number} starts, the last at" if number > 1 else "the start at"
         then = "; it starts once as soon as it can" if changed.state.owed_us else ""
-        self._say(f"{entry.id} missed {many} {at} of {plan.mission_name}: {why}{then}")
+        self._say(f"{entry.id} missed {many} {at} of {plan.mission_name}: {why}{then}", NOT_STARTED)
         return changed
 
     # --- what a start waits for -----------------------------------------------------------------
@@ -582,7 +592,7 @@ class Scheduler:
         now_us = self._starter.clock.now_us()
         settled = SettledTime(due_us, now_us, Settlement.REFUSED, text=why)
         await self._write(entry, times.settle(entry.plan, entry.state, settled))
-        self._say(f"{entry.id} failed, and starts nothing any more: {why}")
+        self._say(f"{entry.id} failed, and starts nothing any more: {why}", NOT_STARTED)
 
     # --- showing --------------------------------------------------------------------------------
 

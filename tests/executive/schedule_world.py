@@ -8,7 +8,14 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from m2pem.api.clock import VirtualClock
-from m2pem.api.control import SCHEDULE, Alert, ControlEvent, RunId
+from m2pem.api.control import (
+    NOT_STARTED,
+    SCHEDULE,
+    STARTS_SOON,
+    Alert,
+    ControlEvent,
+    RunId,
+)
 from m2pem.api.schedule import ScheduledMission, When
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.executive.executive import Executive
@@ -132,7 +139,7 @@ async def serving(
 
         async def listen(events: AsyncIterator[ControlEvent]) -> None:
             async for event in events:
-                if isinstance(event, Alert) and event.code == SCHEDULE:
+                if isinstance(event, Alert) and event.code in (SCHEDULE, STARTS_SOON, NOT_STARTED):
                     world.alerts.append((world.now_s, event.text))
 
         listening = asyncio.create_task(listen(executive.control.subscribe()))

@@ -9,7 +9,7 @@ from rich.text import Text
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
-from m2pem.api import ResourceId, RunView
+from m2pem.api import ResourceId, RunView, ScheduledMission, ScheduledStatus
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
 from m2pem.errors import BusyError, M2pemError, OperatorError
@@ -25,6 +25,8 @@ from m2pem_plugin_terminal.handover import (
 )
 from m2pem_plugin_terminal.missions import NO_MISSIONS, ChooseMission, preview_text
 from m2pem_plugin_terminal.missions import TITLE as TITLE_MISSIONS
+from m2pem_plugin_terminal.schedule import ALL, NOTHING_SCHEDULED, entry_choices, schedule_choices
+from m2pem_plugin_terminal.schedule import TITLE as TITLE_SCHEDULE
 from m2pem_plugin_terminal.status_lines import STOP_ALL
 
 
@@ -44,6 +46,7 @@ class TerminalApp(Display):
         Binding("t", "take"),
         Binding("m", "missions"),
         Binding("r", "runs"),
+        Binding("c", "schedule"),
         Binding("slash", "filter"),
         Binding("question_mark", "help"),
         Binding("q", "leave"),
@@ -309,6 +312,47 @@ class TerminalApp(Display):
 
         await self.push_screen(Choose("Look at a run", choices), look)
         self.show()
+
+    async def action_schedule(self) -> None:
+        """Choose an entry of the schedule to hold, release or cancel."""
+        try:
+            schedule = await self.control.scheduled()
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+        active = {each.entry: each for each in schedule.entries if not each.status.over}
+        if not active and not schedule.hold:
+            await self.push_screen(Read(TITLE_SCHEDULE, Text(NOTHING_SCHEDULED)))
+            return
+
+        def chosen(entry: str | None) -> None:
+            if entry == ALL:
+                self._carry_out("Schedule", self._hold_or_release(None, held=bool(schedule.hold)))
+            elif entry is not None:
+                self.run_worker(self._ask_about(active[entry]), exit_on_error=False)
+
+        text = f"The schedule is {schedule.hold}." if schedule.hold else ""
+        await self.push_screen(Choose(TITLE_SCHEDULE, schedule_choices(schedule), text), chosen)
+        self.show()
+
+    async def _ask_about(self, mission: ScheduledMission) -> None:
+        """Let the operator choose what to do with an entry."""
+        held = mission.status is ScheduledStatus.HELD
+
+        def chosen(what: str | None) -> None:
+            if what == "cancel":
+                self._carry_out("Cancel", self.control.unschedule(mission.entry, by=self.by))
+            elif what is not None:
+                self._carry_out("Schedule", self._hold_or_release(mission.entry, held=held))
+
+        await self.push_screen(Choose(mission.entry, entry_choices(mission), str(mission)), chosen)
+        self.show()
+
+    async def _hold_or_release(self, entry: str | None, *, held: bool) -> None:
+        if held:
+            await self.control.release_schedule(entry, by=self.by)
+        else:
+            await self.control.hold_schedule(entry, by=self.by)
 
     async def _load_and_look(self, run: RunId) -> None:
         try:

@@ -134,6 +134,7 @@ KEYS = (
     ("m", "start a mission, chosen from the files there are"),
     ("t", "take a vehicle to steer by hand, or give it back"),
     ("r", "look at another run"),
+    ("c", "the schedule: hold, release or cancel what starts later"),
     ("/", "log: only lines with a text; Esc: all"),
     ("Up Down", "move through the mission"),
     ("PgUp PgDn", "move through the log"),

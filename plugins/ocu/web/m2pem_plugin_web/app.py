@@ -23,6 +23,7 @@ from m2pem_plugin_web.rest import (
     missions,
     rehearsals,
     runs,
+    schedule,
     session,
     steering,
     tracks,
@@ -45,6 +46,7 @@ def routers_of(
     return [
         session.router(control, settings, entry, tiles.pictured if tiles is not None else None),
         runs.router(control, folder),
+        schedule.router(control, folder),
         tracks.router(control, recorder),
         steering.router(control, hub),
         steering.prompt_router(control, hub),

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api import (
+    SCHEDULE,
     Alert,
     BehaviorState,
     Listener,
@@ -128,7 +129,12 @@ class Hub(Listener):
     def alerted(self, alert: Alert) -> None:
         """Send the alert at once."""
         text = f"{alert.run}: {alert.text}" if alert.run else alert.text
-        self._send_to_all(messages.fault(text))
+        is_news = alert.code == SCHEDULE
+        self._send_to_all(messages.notice(text) if is_news else messages.fault(text))
+
+    def schedule_changed(self) -> None:
+        """Send at once that the schedule is to be read again."""
+        self._send_to_all(messages.schedule_changed())
 
     def announce(self, text: str) -> None:
         """Send a text to all operators."""

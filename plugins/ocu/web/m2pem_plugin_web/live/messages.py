@@ -79,6 +79,16 @@ def fault(text: str) -> dict[str, Any]:
     return {"type": "fault", "text": text}
 
 
+def notice(text: str) -> dict[str, Any]:
+    """Return the message of something that is no fault."""
+    return {"type": "notice", "text": text}
+
+
+def schedule_changed() -> dict[str, Any]:
+    """Return the message that the schedule is to be read again: `GET /api/schedule`."""
+    return {"type": "schedule"}
+
+
 def alive() -> dict[str, Any]:
     """Return the message that an answer takes longer."""
     return {"type": "alive"}

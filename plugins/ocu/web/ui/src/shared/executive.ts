@@ -69,6 +69,9 @@ const client = new LiveClient(browser, {
   },
 });
 
+/** Rises when the schedule is to be read again. */
+export const scheduleChanges = signal(0);
+
 export const connect = (): void => client.start();
 export const disconnect = (): void => client.stop();
 export const watch = (run: string | null): void => client.watch(run);
@@ -89,6 +92,7 @@ function signedOut(): void {
 function take(message: ServerMessage): void {
   switch (message.type) {
     case "snapshot":
+      scheduleChanges.value += 1;
       runs.value = message.runs;
       prompts.value = message.prompts;
       holders.value = message.holders;
@@ -124,6 +128,12 @@ function take(message: ServerMessage): void {
       break;
     case "fault":
       toast(`${strings.shell.fault}: ${message.text}`, "bad");
+      break;
+    case "notice":
+      toast(message.text);
+      break;
+    case "schedule":
+      scheduleChanges.value += 1;
       break;
     case "alive":
     case "log":

@@ -149,6 +149,41 @@ export interface RunLine extends RunSummary {
   took_s: number | null;
 }
 
+export type ScheduledStatus =
+  | "scheduled"
+  | "waiting"
+  | "starting"
+  | "held"
+  | "ended"
+  | "cancelled"
+  | "failed";
+
+/** A mission that starts later. Times by the executive's clock; null: there is none. */
+export interface ScheduledMission {
+  entry: string;
+  mission: string;
+  process: string;
+  when: string;
+  time_zone: string;
+  status: ScheduledStatus;
+  priority: number;
+  by: string;
+  next_us: number | null;
+  due_us: number | null;
+  deadline_us: number | null;
+  starts_us: number | null;
+  reason: string;
+  run: string;
+}
+
+/** `hold`: who holds all of it, and why; "": nobody. */
+export interface Schedule {
+  hold: string;
+  served: boolean;
+  warning_s: number;
+  entries: ScheduledMission[];
+}
+
 export type LogKind = "run" | "tokens" | "behaviors" | "prompts" | "events" | "data" | "operators";
 
 /** What a record changes in the view of its run; null: it is there no more. */
@@ -276,5 +311,7 @@ export type ServerMessage =
   | { type: "prompt_closed"; seq: number; run: string; prompt: string; decision: string; by: string }
   | { type: "run"; seq: number; run: RunSummary }
   | { type: "fault"; seq: number; text: string }
+  | { type: "notice"; seq: number; text: string }
+  | { type: "schedule"; seq: number }
   | { type: "alive"; seq: number }
   | { type: "log"; seq: number; records: RunRecord[] };

@@ -1,0 +1,195 @@
+// What starts later: when, and what it waits for. Operators hold and cancel it.
+import { useEffect, useState } from "preact/hooks";
+import { get, post } from "../shared/api";
+import { Dialog } from "../shared/Dialog";
+import { scheduleChanges } from "../shared/executive";
+import { moment } from "../shared/moments";
+import { may } from "../shared/session";
+import { attempt } from "../shared/Toasts";
+import type { Schedule, ScheduledMission } from "../shared/types";
+import { fill, strings } from "../strings";
+import { Link } from "./Link";
+import { ScheduleDialog } from "./ScheduleDialog";
+
+const words = strings.home.schedule;
+const EVERY_MS = 5000;
+const OVER = new Set(["ended", "cancelled", "failed"]);
+const SHOWN_OVER = 3;
+
+export function ScheduleList() {
+  const { schedule, failed, refresh } = useSchedule();
+  const [adding, setAdding] = useState(false);
+  const [leaving, setLeaving] = useState<ScheduledMission | null>(null);
+  const act = async (path: string) => {
+    await attempt(() => post(`/schedule${path}`));
+    await refresh();
+  };
+  const entries = schedule?.entries ?? [];
+  const active = entries.filter(({ status }) => !OVER.has(status));
+  const over = entries.filter(({ status }) => OVER.has(status)).slice(-SHOWN_OVER);
+  if (schedule && !schedule.served && entries.length === 0) return null;
+  return (
+    <section class="home-wide" aria-labelledby="schedule-head">
+      <div class="home-head">
+        <h1 id="schedule-head">{words.title}</h1>
+        <span class="home-stretch" />
+        {may("commander") && schedule?.served && (
+          <button type="button" class="secondary" onClick={() => setAdding(true)}>
+            {words.add}
+          </button>
+        )}
+        {may("commander") && schedule?.hold && (
+          <button type="button" class="secondary" onClick={() => void act("/release")}>
+            {words.releaseAll}
+          </button>
+        )}
+        {may("operator") && active.length > 0 && !schedule?.hold && (
+          <button type="button" class="secondary" onClick={() => void act("/hold")}>
+            {words.holdAll}
+          </button>
+        )}
+      </div>
+      {failed && <p role="alert">{strings.home.failed}</p>}
+      {schedule?.hold && (
+        <p role="status" class="home-held">
+          {fill(words.held, { hold: schedule.hold })}
+        </p>
+      )}
+      {schedule && entries.length === 0 && <p class="home-none">{words.none}</p>}
+      {entries.length > 0 && (
+        <div class="home-scroll">
+          <table class="home-table">
+            <thead>
+              <tr>
+                <th scope="col">{words.entry}</th>
+                <th scope="col">{strings.home.mission}</th>
+                <th scope="col">{strings.home.status}</th>
+                <th scope="col">{words.next}</th>
+                <th scope="col">{words.when}</th>
+                <th scope="col">{words.reason}</th>
+                <th scope="col">{words.lastRun}</th>
+                <th scope="col">
+                  <span class="home-hidden">{words.actions}</span>
+                </th>
+              </tr>
+            </thead>
+            <tbody>
+              {[...active, ...over].map((each) => (
+                <EntryRow key={each.entry} each={each} act={act} leave={() => setLeaving(each)} />
+              ))}
+            </tbody>
+          </table>
+        </div>
+      )}
+      {adding && (
+        <ScheduleDialog
+          close={() => {
+            setAdding(false);
+            void refresh();
+          }}
+        />
+      )}
+      {leaving && (
+        <Dialog
+          title={fill(words.cancelTitle, { entry: leaving.entry })}
+          onClose={() => setLeaving(null)}
+          actions={
+            <>
+              <button type="button" class="secondary" onClick={() => setLeaving(null)}>
+                {words.keep}
+              </button>
+              <button
+                type="button"
+                class="primary"
+                onClick={() => {
+                  setLeaving(null);
+                  void act(`/${leaving.entry}/cancel`);
+                }}
+              >
+                {words.cancel}
+              </button>
+            </>
+          }
+        >
+          <p>{fill(words.cancelText, { mission: nameOf(leaving) })}</p>
+        </Dialog>
+      )}
+    </section>
+  );
+}
+
+interface EntryRowProps {
+  each: ScheduledMission;
+  act(path: string): Promise<void>;
+  leave(): void;
+}
+
+function EntryRow({ each, act, leave }: EntryRowProps) {
+  const { entry, status, run, reason } = each;
+  const isOver = OVER.has(status);
+  const next = each.starts_us ?? each.next_us;
+  const isHeld = status === "held";
+  const name = isHeld ? words.releaseLabel : words.holdLabel;
+  return (
+    <tr>
+      <td>{entry}</td>
+      <td>{nameOf(each)}</td>
+      <td>
+        <span class={`home-chip home-schedule-${status}`}>{words.status[status]}</span>
+      </td>
+      <td class="home-when">{next === null || isOver ? "–" : moment(next / 1000)}</td>
+      <td>{each.when}</td>
+      <td title={reason || undefined}>{reason.split("\n")[0]}</td>
+      <td>{run ? <Link to={`/runs/${encodeURIComponent(run)}`}>{run}</Link> : "–"}</td>
+      <td class="home-actions">
+        {!isOver && may(isHeld ? "commander" : "operator") && (
+          <button
+            type="button"
+            class="plain"
+            aria-label={fill(name, { entry })}
+            onClick={() => void act(`/${entry}/${isHeld ? "release" : "hold"}`)}
+          >
+            {isHeld ? words.release : words.hold}
+          </button>
+        )}
+        {!isOver && may("operator") && (
+          <button
+            type="button"
+            class="plain"
+            aria-label={fill(words.cancelLabel, { entry })}
+            onClick={leave}
+          >
+            {words.cancel}
+          </button>
+        )}
+      </td>
+    </tr>
+  );
+}
+
+const nameOf = ({ mission }: ScheduledMission): string =>
+  mission.replace(/^.*[\\/]/, "").replace(/\.bpmn$/, "");
+
+function useSchedule() {
+  const [schedule, setSchedule] = useState<Schedule | null>(null);
+  const [failed, setFailed] = useState(false);
+  const refresh = async () => {
+    try {
+      setSchedule(await get<Schedule>("/schedule"));
+      setFailed(false);
+    } catch {
+      setFailed(true);
+    }
+  };
+  useEffect(() => {
+    const timer = setInterval(() => {
+      if (!document.hidden) void refresh();
+    }, EVERY_MS);
+    const leave = scheduleChanges.subscribe(() => void refresh());
+    return () => {
+      clearInterval(timer);
+      leave();
+    };
+  }, []);
+  return { schedule, failed, refresh };
+}
