@@ -145,8 +145,8 @@ _MODULES = {
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": (
-        "SCHEDULE Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId RunStatus"
-        " RunSummary SimulationResult StampedRecord TelemetrySample"
+        "SCHEDULE Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId"
+        " RunStatus RunSummary SimulationResult StampedRecord TelemetrySample"
     ),
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.follower": "Follower Listener follow",

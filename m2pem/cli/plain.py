@@ -41,10 +41,11 @@ HELP = """\
   check FILE         print what speaks against a start of it, and what its roles run on
   start FILE         start another mission
   start! FILE        the same, even if other runs or operators have its vehicles
-  later TIME FILE    start it at that time: 08:00, 2026-05-01T08:00; or free: when its vehicles are
   schedule           list the missions that start later
-  cancel s1          start that entry of the schedule no more
-  hold, release      hold the whole schedule, or release it; hold s1: one entry of it
+  schedule TIME FILE start it at 08:00, or 2026-05-01T08:00; or free: when its vehicles are
+  schedule cancel s1 start that entry no more
+  schedule hold      hold all of it (hold s1: one entry)
+  schedule release   release it
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand
   handback evsg1     give it back
   who                print the holder of each vehicle and payload, and which tasks wait
@@ -81,11 +82,7 @@ class PlainOcu:
             "check": self._check,
             "start": self._start,
             "start!": partial(self._start, even_if_busy=True),
-            "later": self._later,
             "schedule": self._schedule,
-            "cancel": self._cancel,
-            "hold": self._hold,
-            "release": self._release,
             "takeover": self._take,
             "handback": self._give,
             "who": self._who,
@@ -294,27 +291,26 @@ class PlainOcu:
         except BusyError as error:
             raise OperatorError(f"{error}. start! {file} starts it all the same") from error
 
-    async def _later(self, words: list[str]) -> None:
-        if len(words) < 2:
-            raise OperatorError("say when, and which: later 08:00 FILE, or later free FILE")
-        when = When(at="" if words[0] == "free" else words[0])
-        entry = await self._control.schedule(" ".join(words[1:]), when=when, by=NAME)
-        self._say(f"{entry} is scheduled; cancel {entry} takes it back")
-
-    async def _schedule(self, _: list[str]) -> None:
-        for line in (await self._control.scheduled()).lines() or ["nothing is scheduled"]:
-            self._say(line)
-
-    async def _cancel(self, words: list[str]) -> None:
-        if len(words) != 1:
-            raise OperatorError("say which: cancel s1")
-        await self._control.unschedule(words[0], by=NAME)
-
-    async def _hold(self, words: list[str]) -> None:
-        await self._control.hold_schedule(words[0] if words else None, by=NAME)
-
-    async def _release(self, words: list[str]) -> None:
-        await self._control.release_schedule(words[0] if words else None, by=NAME)
+    async def _schedule(self, words: list[str]) -> None:
+        match words:
+            case []:
+                for line in (await self._control.scheduled()).lines() or ["nothing is scheduled"]:
+                    self._say(line)
+            case ["cancel", entry]:
+                await self._control.unschedule(entry, by=NAME)
+            case ["hold", *entry] if len(entry) <= 1:
+                await self._control.hold_schedule(entry[0] if entry else None, by=NAME)
+            case ["release", *entry] if len(entry) <= 1:
+                await self._control.release_schedule(entry[0] if entry else None, by=NAME)
+            case [time, *file] if file and time != "cancel":
+                when = When(at="" if time == "free" else time)
+                entry_id = await self._control.schedule(" ".join(file), when=when, by=NAME)
+                self._say(f"{entry_id} is scheduled; schedule cancel {entry_id} takes it back")
+            case _:
+                raise OperatorError(
+                    "say what: schedule 08:00 FILE, schedule free FILE, schedule cancel s1, "
+                    "schedule hold, or schedule release"
+                )
 
     async def _take(self, words: list[str]) -> None:
         if len(words) != 1:

@@ -12,6 +12,7 @@ import msgspec
 from m2pem.api.authoring import MissionFiles, MissionSource, file_of
 from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StartPreview
 from m2pem.api.operations import OPERATIONS, STREAMED, Operation, mission_files
+from m2pem.api.schedule import EntryId
 from m2pem.bpmn import parse_mission
 from m2pem.control_socket.client import LONG_TIMEOUT_S, ask
 from m2pem.control_socket.paths import ControlSocketError, address
@@ -81,6 +82,12 @@ class RemoteControl:
         files = await asyncio.to_thread(self._files, mission)
         run: RunId = await self._call(OPERATIONS["start"], mission=files, **options)
         return run
+
+    async def schedule(self, mission: MissionSource, **options: Any) -> EntryId:
+        """Send a mission's files to the executive, which starts it later."""
+        files = await asyncio.to_thread(self._files, mission)
+        entry: EntryId = await self._call(OPERATIONS["schedule"], mission=files, **options)
+        return entry
 
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()

@@ -15,10 +15,12 @@ When an entry is due says `m2pem.scheduling`; what its start waits for, `schedul
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable
 
 import msgspec
 
+from m2pem.api.clock import SystemClock
 from m2pem.api.control import NOT_STARTED, SCHEDULE, STARTS_SOON, Alert, RunId
 from m2pem.api.schedule import (
     Schedule,
@@ -65,7 +67,9 @@ from m2pem.units import US_PER_S
 
 log = logging.getLogger("m2pem.schedule")
 
-LONGEST_SLEEP_S = 3600.0
+LONGEST_SLEEP_S = 600.0
+
+CLOCKS_APART_S = 5.0
 
 KEPT_ENTRIES = 200
 """Entries that have ended and are kept; of more, the oldest are removed."""
@@ -104,6 +108,7 @@ class Scheduler:
         self._conditions = StartConditions(starter, self._entries)
         self._lock = asyncio.Lock()
         self._wake = asyncio.Event()
+        self._clocks_apart = False
         self.served = False
 
     # --- life -----------------------------------------------------------------------------------
@@ -153,11 +158,7 @@ class Scheduler:
     async def serve(self) -> None:
         """Start what is due, for ever. `load` comes before."""
         if self._hold is not None and self._active():
-            self._say(
-                f"the schedule is {self._hold}; nothing starts until it is released",
-                NOT_STARTED,
-                NOT_STARTED,
-            )
+            self._say_held()
         try:
             while True:
                 self._wake.clear()
@@ -228,8 +229,11 @@ class Scheduler:
             return None
         self._hold = Hold(by, reason, self._starter.clock.now_us())
         self._marks.put(MARK, StopMark(by, reason))
-        self._say(f"the schedule is {self._hold}; nothing starts until it is released", NOT_STARTED)
+        self._say_held()
         return self._hold
+
+    def _say_held(self) -> None:
+        self._say(f"the schedule is {self._hold}; nothing starts until it is released", NOT_STARTED)
 
     async def written(self, hold: Hold) -> None:
         """Write a hold of the whole schedule to the journal.
@@ -346,6 +350,7 @@ class Scheduler:
         except JournalError as error:
             log.warning("the schedule cannot be read or written: %s", error)
             return self._in(ASK_AGAIN_S)
+        self._compare_clocks()
         order = sorted(self._active(), key=self._rank)
         kept: dict[ResourceId, EntryId] = {}
         wakes: list[int] = []
@@ -366,6 +371,20 @@ class Scheduler:
             if again_us is not None:
                 wakes.append(again_us)
         return min(wakes, default=None)
+
+    def _compare_clocks(self) -> None:
+        """Say once when the computer's clock was set: dates do not mean what people read."""
+        clock = self._starter.clock
+        if not isinstance(clock, SystemClock) or clock.speed != 1.0 or not self._active():
+            return
+        apart_s = abs(time.time() - clock.now_us() / US_PER_S)
+        if apart_s > CLOCKS_APART_S and not self._clocks_apart:
+            self._say(
+                f"the computer's clock was set: it is {apart_s:.0f} s from that of the executive, "
+                "by which the schedule goes; start the executive again",
+                NOT_STARTED,
+            )
+        self._clocks_apart = apart_s > CLOCKS_APART_S
 
     async def _judge_runs(self) -> None:
         """Hold the entries whose run has failed or was stopped: what made it so may be there yet.

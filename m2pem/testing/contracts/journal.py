@@ -29,11 +29,21 @@ from m2pem.engine.records import (
     RunResumed,
     RunStarted,
 )
-from m2pem.errors import InternalError, JournalError, StaleEpochError
+from m2pem.errors import InternalError, JournalError, StaleEntryError, StaleEpochError
 from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.library import Source
 from m2pem.mission.values import Value
+from m2pem.scheduling.entry import (
+    EntryChange,
+    EntryState,
+    EntryStatus,
+    Hold,
+    SchedulePlan,
+    SettledTime,
+    Settlement,
+    When,
+)
 from m2pem.testing.contracts.contract import Contract, needs
 
 HEADER = RunHeader(
@@ -49,6 +59,22 @@ HEADER = RunHeader(
         Source("b.bpmn", b""),
     ),
 )
+
+PLAN = SchedulePlan(
+    "vignette1.bpmn",
+    HEADER.mission,
+    "PATROL",
+    "north",
+    1_767_225_600_000_001,
+    When(cron="0 8 * * *", time_zone="Europe/Berlin"),
+    HEADER.library,
+    {"a": [1, 2.5, None, "ü"]},
+    simulated=False,
+    priority=-3,
+    by="anna",
+)
+
+STARTED = SettledTime(9, 10, Settlement.STARTED)
 
 ENDED = (RunStarted("PATROL", 5), RunEnded(RunOutcome.COMPLETED, ""))
 """Records of a run that has ended."""
@@ -104,6 +130,99 @@ class JournalContract(Contract):
     def open_journal(self) -> OpenJournal:
         """Opens a journal; each call on the same storage, which is empty at first."""
         raise NotImplementedError("override this fixture")
+
+    # --- the schedule ---------------------------------------------------------------------------
+
+    async def test_an_entry_of_the_schedule_comes_back_as_it_was(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Also after the journal was closed, where it is durable; ids are given in their order."""
+        async with opened(open_journal) as journal:
+            first = await journal.schedule(PLAN, EntryState(5))
+            second = await journal.schedule(PLAN, EntryState(6))
+            assert (first.id, second.id) == ("s1", "s2")
+            assert await journal.entries() == [first, second]
+            changed = EntryState(7, hold=Hold("anna", "rain", 8), revision=1)
+            await journal.change_entry(EntryChange("s1", changed))
+            assert [each.state for each in await journal.entries()] == [changed, EntryState(6)]
+
+    async def test_a_run_and_its_entry_are_written_together_or_not_at_all(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """So that no time of an entry starts two runs."""
+        async with opened(open_journal) as journal:
+            await journal.schedule(PLAN, EntryState(5))
+            started = EntryState(9, times=(STARTED,), revision=1)
+            run = await journal.create(HEADER, EntryChange("s1", started))
+            (entry,) = await journal.entries()
+            assert (entry.state.run, entry.state.times[-1].run) == (run, run)
+            with pytest.raises(StaleEntryError):
+                await journal.create(HEADER, EntryChange("s1", started))
+            with pytest.raises(JournalError):
+                await journal.create(HEADER, EntryChange("s2", started))
+            assert [found.run for found in await journal.runs()] == [run]
+            assert await journal.entries() == [entry]
+
+    async def test_of_two_changes_at_once_the_second_is_refused(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """It would undo the first one."""
+        async with opened(open_journal) as journal:
+            await journal.schedule(PLAN, EntryState(5))
+            changes = [
+                journal.change_entry(EntryChange("s1", EntryState(number, revision=1)))
+                for number in (6, 7)
+            ]
+            failed = [type(each) for each in await outcomes(*changes) if each is not None]
+            assert failed == [StaleEntryError]
+            assert (await journal.entries())[0].state.settled_us in (6, 7)
+
+    async def test_a_run_that_never_began_is_deleted_with_the_start_of_its_entry(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """One that has begun stays, and so does the state of the entry."""
+        async with opened(open_journal) as journal:
+            await journal.schedule(PLAN, EntryState(5))
+            started = EntryChange("s1", EntryState(9, times=(STARTED,), revision=1))
+            run = await journal.create(HEADER, started)
+            back = EntryChange("s1", EntryState(5, revision=2))
+            with pytest.raises(JournalError, match="driven"):
+                await journal.change_entry(back, deletes=run)
+            await journal.release(run)
+            await journal.change_entry(back, deletes=run)
+            assert await journal.runs() == []
+            assert [each.run for each in await journal.deletions()] == [run]
+            again = EntryChange("s1", EntryState(9, times=(STARTED,), revision=3))
+            begun = await journal.create(HEADER, again)
+            await journal.append([entry(begun, 1)])
+            await journal.release(begun)
+            with pytest.raises(JournalError, match="has begun"):
+                await journal.change_entry(
+                    EntryChange("s1", EntryState(5, revision=4)), deletes=begun
+                )
+            assert (await journal.entries())[0].state.run == begun
+
+    async def test_only_entries_that_are_over_are_removed(self, open_journal: OpenJournal) -> None:
+        """And their ids are not given again."""
+        async with opened(open_journal) as journal:
+            for _ in range(2):
+                await journal.schedule(PLAN, EntryState(5))
+            cancelled = EntryState(5, status=EntryStatus.CANCELLED, revision=1)
+            await journal.change_entry(EntryChange("s2", cancelled))
+            with pytest.raises(JournalError, match="may still start"):
+                await journal.remove_entries(["s2", "s1"])
+            await journal.remove_entries(["s2"])
+            assert [each.id for each in await journal.entries()] == ["s1"]
+            assert (await journal.schedule(PLAN, EntryState(5))).id == "s3"
+
+    async def test_a_schedule_is_held_for_each_fleet(self, open_journal: OpenJournal) -> None:
+        """Until it is released."""
+        async with opened(open_journal) as journal:
+            await journal.hold_schedule("north", Hold("anna", "rain", 8))
+            assert await journal.schedule_hold("north") == Hold("anna", "rain", 8)
+            assert await journal.schedule_hold("south") is None
+            await journal.hold_schedule("north", None)
+            assert await journal.schedule_hold("north") is None
 
     # --- runs -----------------------------------------------------------------------------------
 

@@ -59,6 +59,11 @@ SERVED_OTHERWISE = {
 }
 NOT_SERVED = {
     "check": "start_mission answers with the findings",
+    "schedule": "the command line and the page schedule missions",
+    "scheduled": "m2pem schedule and the page list them",
+    "unschedule": "m2pem schedule and the page",
+    "hold_schedule": "control_run: STOP of all runs holds the schedule",
+    "release_schedule": "m2pem schedule and the page",
     "missions": "start_mission names a file, or brings one",
     "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",

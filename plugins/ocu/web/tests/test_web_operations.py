@@ -7,10 +7,19 @@ from unittest.mock import AsyncMock, Mock
 import httpx
 import pytest
 from fastapi import FastAPI
-from m2pem_plugin_web.rest import steering
+from m2pem_plugin_web.rest import schedule, steering
 from rest_world import As, app_of
 
-from m2pem.api import OPERATIONS, MissionControl, RunStatus, RunSummary
+from m2pem.api import (
+    OPERATIONS,
+    MissionControl,
+    RunStatus,
+    RunSummary,
+    Schedule,
+    ScheduledMission,
+    ScheduledStatus,
+    When,
+)
 
 COMMANDS: dict[str, tuple[str, str, Any]] = {
     "answer": ("POST", "/api/runs/r1/prompts/p1", {"decision": "go"}),
@@ -25,6 +34,9 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
         "/api/geometries/gate",
         {"geometry": {"type": "Point", "coordinates": [7.0, 51.0]}, "run": "r1"},
     ),
+    "unschedule": ("POST", "/api/schedule/s1/cancel", None),
+    "hold_schedule": ("POST", "/api/schedule/s1/hold", {"reason": "rain"}),
+    "release_schedule": ("POST", "/api/schedule/s1/release", None),
     "take": ("POST", "/api/resources/ugv1/camera/take", None),
     "give_back": ("POST", "/api/resources/ugv1/camera/give-back", None),
 }
@@ -39,11 +51,13 @@ SENT = {
     "name": "gate",
     "geometry": {"type": "Point", "coordinates": [7.0, 51.0]},
     "resource": "ugv1/camera",
+    "entry": "s1",
     "by": "a commander",
 }
 """What the requests of `COMMANDS` say, by the parameter of the operation."""
 
 QUERIES = {
+    "scheduled": "/api/schedule",
     "runs": "/api/runs",
     "records": "/api/runs/{run}/records",
     "mission": "/api/runs/{run}/mission",
@@ -57,6 +71,7 @@ QUERIES = {
 }
 NOT_SERVED = {
     "start": "POST /api/runs names a mission of the server's folder, or brings its BPMN",
+    "schedule": "POST /api/schedule names a mission of the server's folder",
     "check": "POST /api/checks brings the BPMN of a draft",
     "missions": "GET /api/missions lists the server's folder",
     "preview_start": "POST /api/checks has the findings",
@@ -77,6 +92,8 @@ def control() -> Mock:
     for name in COMMANDS:
         setattr(control, name, AsyncMock(spec=getattr(MissionControl, name), return_value=[]))
     control.waiting = AsyncMock(return_value=[])
+    entry = ScheduledMission(SENT["entry"], "M", "P", When(), "", ScheduledStatus.SCHEDULED)
+    control.scheduled = AsyncMock(return_value=Schedule((entry,)))
     control.holders = AsyncMock(return_value={SENT["resource"]: ""})
     control.runs = AsyncMock(return_value=[RunSummary("r1", "M", "P", RunStatus.RUNNING, 0)])
     return control
@@ -89,6 +106,7 @@ def app(control: Mock) -> FastAPI:
         steering.router(control, Mock()),
         steering.prompt_router(control, Mock()),
         steering.resource_router(control),
+        schedule.router(control, Mock()),
     ):
         app.include_router(router)
     return app
