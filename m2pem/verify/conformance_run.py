@@ -26,11 +26,11 @@ from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.expression import Expression
-from m2pem.mission.losses import UNAVAILABLE
+from m2pem.mission.losses import LINK_LOST, UNAVAILABLE
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import ReadValue, Value
 from m2pem.verify.net import choices
-from m2pem.verify.net.petri_net import Action, Trigger
+from m2pem.verify.net.petri_net import REASSIGNED, Action, Trigger
 from m2pem.verify.translate.domains import constants, representatives
 
 _SECOND_US = 1_000_000
@@ -181,9 +181,16 @@ class ConformanceRun:
             self._give(i.ServiceFailed(token.service, code))
         elif token.behavior:
             state = BehaviorState.FAILED if code else BehaviorState.SUCCEEDED
-            self._report(token.behavior, state, code)
+            self._report(token.behavior, state, LINK_LOST if code == REASSIGNED else code)
+            if code != REASSIGNED and (found := self.run.state.tokens.get(token.id)) is not None:
+                self._refuse_rest(found)
         else:
             self._time_is_up(element)  # a prompt fails only when its time is up
+
+    def _refuse_rest(self, token: Token) -> None:
+        """No other does what is left of a behavior that was lost: its error is thrown."""
+        if token.allocation and token.lost_work is not None:
+            self._give(i.ResourcesNotFree(token.allocation, "too few are free", {}, UNAVAILABLE))
 
     def _report(self, behavior: str, state: BehaviorState, code: str = "") -> None:
         self._reports[behavior] += 1

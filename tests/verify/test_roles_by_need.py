@@ -436,3 +436,41 @@ def test_what_the_static_check_says_of_tasks_that_compete_can_happen(seed: int) 
 
 
 COMPETING = tuple(each for each in NEEDS if "same" not in each and "count" not in each)
+
+# --- vehicles that are lost -----------------------------------------------------------------------
+
+LOSING = tuple(f"{each};onLoss=reassign" for each in NEEDS[:6])
+
+
+@pytest.mark.parametrize(
+    ("role", "answer"),
+    [(f"{AIR};onLoss=reassign", Answered.VIOLATED), (AIR, Answered.HOLDS)],
+)
+def test_another_may_do_the_rest_of_what_a_lost_vehicle_did(role: str, answer: Answered) -> None:
+    mission = notation(row(_task("A", role)))
+    vehicles = fleet(mission, uav1="red", uav2="red")
+    formula = "[](commanded(uav2) -> !once(commanded(uav1)))"
+    entry = f'requirements: [{{id: a, ltl: "{formula}"}}]'
+    requirements = parse_spec(entry.encode(), "spec.yaml", Names(mission, vehicles))
+    net = net_for(mission, vehicles, requirements, options=OPEN)
+    found = check_requirement(explore(net), mission, vehicles, requirements[0])
+    assert found.result is answer
+
+
+def test_it_is_said_that_one_loss_is_followed() -> None:
+    report = report_of(row(_task("A", f"{AIR};onLoss=reassign")), uav1="red", uav2="red")
+    (found,) = [each for each in report.net.approximations if "is reassigned" in each.what]
+    assert found.exactness is Exactness.BOUNDED
+    assert verdict(report, "no-deadlock") is Verdict.HOLDS
+    assert verdict(report, "failures-handled") is Verdict.VIOLATED
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_engine_follows_runs_in_which_vehicles_are_lost(seed: int) -> None:
+    mission = notation(branches_with_needs(Random(seed), LOSING))
+    fleet = fleet_of(mission)
+    report = check(mission, fleet, options=OPEN, limits=SMALL)
+    for violation in as_data(findings_of(mission, report))["violations"]:
+        ordered = violation["property"] == "one-behavior"
+        if not ordered and not any(step["trigger"] == "timer" for step in violation["steps"]):
+            play(mission, fleet, violation["steps"])

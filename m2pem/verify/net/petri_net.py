@@ -177,6 +177,9 @@ UNASKED = "unasked"
 """Detail of the success of a behavior that goes on until it is interrupted: nothing may count on
 it."""
 
+REASSIGNED = "LINK_LOST (reassigned)"
+"""Detail of the failure of a behavior that is lost: its task asks for resources again."""
+
 BEGINS = "begins"
 """Detail of the step in which an activity begins its work, after its boundary events are armed."""
 

@@ -15,6 +15,7 @@ from m2pem.verify.net.petri_net import (
     BEGINS,
     COMPENSATION_BEGINS,
     COMPENSATION_ENDS,
+    REASSIGNED,
     Action,
     Kind,
     PetriNet,
@@ -335,6 +336,8 @@ def _from_outside(transition: Transition, name: str, element_names: ElementNames
     match transition.trigger:
         case Trigger.SUCCEEDS:
             return f"{name} succeeds"
+        case Trigger.FAILS if transition.detail == REASSIGNED:
+            return f"what does {name} is lost, and another is to do the rest"
         case Trigger.FAILS:
             return f"{name} fails with {transition.detail or 'an error'}"
         case Trigger.ANSWER:

@@ -23,6 +23,7 @@ from m2pem.verify.translate import subprocesses
 from m2pem.verify.translate.allocations import (
     asking_place,
     choose_resources,
+    lose_resources,
     take_named_resources,
 )
 from m2pem.verify.translate.catching import boundaries, caught_before_work
@@ -188,6 +189,8 @@ def _behavior(
         return [instance.begin()]
     if instance.node in context.candidates:
         _outside_work(context, instance, asking_place(context, instance))
+        if context.options.failures:
+            lose_resources(context, instance)
         return choose_resources(context, instance, behavior)
     held = resources(context, behavior)
     if not held:

@@ -17,12 +17,21 @@ from dataclasses import dataclass
 
 from m2pem.fleet.facts import vehicle_of
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.behavior import Behavior
+from m2pem.mission.behavior import Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
 from m2pem.verify.net import choices
-from m2pem.verify.net.petri_net import Action, Exactness, Flag, Kind, Role, Step, Trigger
+from m2pem.verify.net.petri_net import (
+    REASSIGNED,
+    Action,
+    Exactness,
+    Flag,
+    Kind,
+    Role,
+    Step,
+    Trigger,
+)
 from m2pem.verify.translate.context import (
     ActivityInstance,
     Asking,
@@ -157,6 +166,32 @@ def choose_resources(
     begun = instance.begin().then(Effect(produce=(asks,)))
     assert begun is not None
     return [begun]
+
+
+def lose_resources(context: TranslationContext, instance: ActivityInstance) -> None:
+    """Translate the loss of a behavior whose rest another is to do: the task asks again.
+
+    Once for each time that the task is executed: what was lost is free at once in the net, so that
+    more would go on for ever. Errors of losses are translated as of all behaviors: that no other
+    could do the rest.
+    """
+    if not any(each.role.on_loss is OnLoss.REASSIGN for each in context.candidates[instance.node]):
+        return
+    asks = asking_place(context, instance)
+    once = context.net.place(instance.node, instance.inside, Role.CONTROL, ":reassigned")
+    effect = Effect(
+        steps=(Step(instance.node.id, Action.THROWN),),
+        read=frozenset({instance.active}),
+        inhibit=frozenset({asks, once}),
+        reset_scopes=frozenset({instance.inside.index}),
+        produce=(asks, once),
+    )
+    context.net.transition(effect, Kind.EXTERNAL, Trigger.FAILS, REASSIGNED)
+    context.net.approximate(
+        instance.node,
+        Exactness.BOUNDED,
+        "that what it lost is reassigned is followed once, to any that fills the role",
+    )
 
 
 def _asking(
