@@ -4,7 +4,7 @@ Several owners keep a part of a behavior's state, because each must act on its o
 replays it from the journal, the dispatcher bounds the calls of arbiters, the availability keeps
 runs from each other, the airspace keeps aircraft apart, the arbiter knows its requests, and the
 vehicle does what it does. `JOINT_STATES` names what they may say at the same moment, and
-`TRANSITIONS` what leads from one to the next. docs/architecture.md is made of both:
+`TRANSITIONS` what leads from one to the next. docs/architecture.md has the stages:
 
     python -m m2pem.executive.behavior_lifecycle docs/architecture.md
 
@@ -342,17 +342,13 @@ _BEGIN, _END = "<!-- begin: the life of a behavior -->", "<!-- end: the life of 
 
 
 def write_page(page: str) -> str:
-    """Return a page of the docs with the table and the list between their marks."""
+    """Return a page of the docs with the stages between their marks."""
     before, rest = page.split(_BEGIN)
     return f"{before}{_BEGIN}\n\n{_text()}\n{_END}{rest.split(_END)[1]}"
 
 
 def _text() -> str:
-    lines = [f"| stage | {' | '.join(OWNERS)} |", "|---" * (len(OWNERS) + 1) + "|"]
-    for state in JOINT_STATES:
-        cells = [", ".join(getattr(state, owner)) for owner in OWNERS]
-        lines.append(f"| **{state.name}** | {' | '.join(cells)} |")
-    lines.append("")
+    lines = []
     for state in JOINT_STATES:
         ways = [f"*{to.target}* ({to.when})" for to in TRANSITIONS if to.source == state.name]
         lines.append(f"- **{state.name}**: {state.meaning} Then {'; '.join(ways)}.")
