@@ -107,4 +107,4 @@ async def test_any_of_several_operators_can_stop(world: World) -> None:
         await bob.until_shown("RUNNING")
         await bob.press("ctrl+x")
         await bob.press("ctrl+x")
-        await anna.until_shown("STOPPED", "r1 stopped: by bob@gcs2")
+        await anna.until_shown("STOPPED", "r1 stopped: stopped by bob@gcs2")
