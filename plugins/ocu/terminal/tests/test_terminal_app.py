@@ -159,7 +159,6 @@ def test_silence_counts_by_the_clock_of_the_executive(world: World) -> None:
     assert "silent for 40 s" in vehicles.table(5.0, 40, str, {}).plain
 
 
-
 async def test_a_second_run_is_told_and_can_be_looked_at(world: World) -> None:
     async with world.terminal() as terminal:
         await world.start()

@@ -143,7 +143,7 @@ def test_stop_from_another_terminal_ends_the_command_with_130(tmux: Tmux) -> Non
     bob.press("C-x")
     bob.until_shown("STOP r1?")
     bob.press("C-x")
-    anna.until_shown("r1 stopped: by bob@gcs2", "status 130")
+    anna.until_shown("r1 stopped: stopped by bob@gcs2", "status 130")
 
 
 @pytest.mark.long
