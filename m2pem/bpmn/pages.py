@@ -109,7 +109,11 @@ def _element(element: OwnElement) -> str:
     if inside:
         where.append(f"{'inside' if where else 'Inside'} {_quoted(inside)}")
     lines = [f"- Its text: {element.text}\n"] if element.text else []
-    lines += [f"- {_attribute(each.name, each)}\n" for each in element.attributes]
+    first = next(each for each in ELEMENTS.values() if each.attributes == element.attributes)
+    if element.attributes and first is not element:
+        lines.append(f"- Attributes: those of `m2pem:{first.name}`\n")
+    else:
+        lines += [f"- {_attribute(each.name, each)}\n" for each in element.attributes]
     head = f"\n### `m2pem:{element.name}`\n\n{element.doc} {', '.join(where)}.\n"
     return "".join([head, "\n" if lines else "", *lines])
 

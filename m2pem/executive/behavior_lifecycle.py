@@ -4,9 +4,7 @@ Several owners keep a part of a behavior's state, because each must act on its o
 replays it from the journal, the dispatcher bounds the calls of arbiters, the availability keeps
 runs from each other, the airspace keeps aircraft apart, the arbiter knows its requests, and the
 vehicle does what it does. `JOINT_STATES` names what they may say at the same moment, and
-`TRANSITIONS` what leads from one to the next. docs/architecture.md has the stages:
-
-    python -m m2pem.executive.behavior_lifecycle docs/architecture.md
+`TRANSITIONS` what leads from one to the next.
 
 The laws behind the table:
 
@@ -17,11 +15,9 @@ The laws behind the table:
 * A behavior that waits for an operator does not move its vehicles.
 """
 
-import sys
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from pathlib import Path
 
 from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.fleet.allocation import Availability
@@ -336,25 +332,3 @@ TRANSITIONS = (
     Transition("lost", "ended", "its vehicle was received again, and has stopped"),
     Transition("ended", "out of reach", "the link of its vehicle is cut afterwards"),
 )
-
-
-_BEGIN, _END = "<!-- begin: the life of a behavior -->", "<!-- end: the life of a behavior -->"
-
-
-def write_page(page: str) -> str:
-    """Return a page of the docs with the stages between their marks."""
-    before, rest = page.split(_BEGIN)
-    return f"{before}{_BEGIN}\n\n{_text()}\n{_END}{rest.split(_END)[1]}"
-
-
-def _text() -> str:
-    lines = []
-    for state in JOINT_STATES:
-        ways = [f"*{to.target}* ({to.when})" for to in TRANSITIONS if to.source == state.name]
-        lines.append(f"- **{state.name}**: {state.meaning} Then {'; '.join(ways)}.")
-    return "\n".join([*lines, ""])
-
-
-if __name__ == "__main__":
-    _file = Path(sys.argv[1])
-    _file.write_text(write_page(_file.read_text(encoding="utf-8")), encoding="utf-8")

@@ -12,12 +12,10 @@ from m2pem.executive.behavior_lifecycle import (
     JOINT_STATES,
     TRANSITIONS,
     BehaviorViews,
-    write_page,
 )
 
 from .lifecycle_world import VEHICLES, follows, live
 
-PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"
 NAMES = [each.name for each in JOINT_STATES]
 
 UP = [("climb", "uav1"), ("climb", "uav2"), ("sleep", 30.0)]
@@ -163,10 +161,3 @@ def test_transitions_lead_from_each_stage_to_the_end() -> None:
         NAMES
     )
     assert [name for name in NAMES if not follows(name, "ended")] == []
-
-
-def test_the_page_has_the_table() -> None:
-    page = PAGE.read_text(encoding="utf-8")
-    assert page == write_page(page), (
-        "python -m m2pem.executive.behavior_lifecycle docs/architecture.md"
-    )
