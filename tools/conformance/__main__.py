@@ -1,4 +1,4 @@
-"""`python -m tools.conformance`: play each case with each engine, print the table, write the page.
+"""`python -m tools.conformance`: play each case with each engine; print and write the tables.
 
 `make conformance` installs the other engines first.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from tests.cases import Case, read_cases
 from tools.conformance import own
 from tools.conformance.peers import REPOSITORY, Peer, bpmn_elements, spiffworkflow
-from tools.conformance.table import PAGE, render, write
+from tools.conformance.table import PAGE, RESULTS, details, summary, write
 from tools.conformance.verdict import Verdict, judge, not_asked
 
 AT_ONCE = 2
@@ -34,10 +34,12 @@ def main() -> int:
     modules = REPOSITORY / "tests" / "js" / "node_modules"
     for peer in (spiffworkflow(asked.spiffworkflow), bpmn_elements(modules)):
         verdicts[f"{peer.name} {peer.version}"] = ask(peer, cases)
-    print(render(cases, verdicts, details=True))
+    table = details(cases, verdicts)
+    print(table)
     if not asked.only:
-        table = render(cases, verdicts, details=False)
-        PAGE.write_text(write(PAGE.read_text(encoding="utf-8"), table), encoding="utf-8")
+        RESULTS.write_text(table, encoding="utf-8")
+        page = write(PAGE.read_text(encoding="utf-8"), summary(cases, verdicts))
+        PAGE.write_text(page, encoding="utf-8")
     return 0
 
 
