@@ -9,7 +9,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from m2pem.bpmn.extensions import ELEMENTS, EXTENSIONS, Attribute, OwnElement
 from m2pem.bpmn.rules.registry import RULES
@@ -122,7 +122,7 @@ def _attribute(name: str, attribute: Attribute) -> str:
     return f"`{name}` ({attribute.type}): {attribute.doc}"
 
 
-def _quoted(names: Iterator[str] | tuple[str, ...]) -> str:
+def _quoted(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 

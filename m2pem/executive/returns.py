@@ -44,8 +44,9 @@ class Returns:
             match record:
                 case r.WorkReassigned():
                     lost = {BATTERY_LOW: self._low, LINK_LOST: self._lost}.get(record.code)
-                    for resource in record.excluded if lost is not None else ():
-                        lost.setdefault(resource, set()).add(run)
+                    if lost is not None:
+                        for resource in record.excluded:
+                            lost.setdefault(resource, set()).add(run)
                 case r.BehaviorEnded(state=BehaviorState.LOST):
                     for resource in self._runners[run].run.state.lost:
                         self.faulted(resource, run)

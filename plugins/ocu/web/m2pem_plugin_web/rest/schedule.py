@@ -26,9 +26,9 @@ class WhenModel(Body):
     time_zone: Annotated[str, Field(max_length=100)] = ""
     until: Annotated[str, Field(max_length=100)] = ""
     after: Annotated[str, Field(max_length=100)] = ""
-    outcomes: Annotated[list[str], Field(max_length=4, default=["completed"])]
+    outcomes: Annotated[tuple[str, ...], Field(max_length=4, strict=False)] = ("completed",)
     condition: Annotated[str, Field(max_length=10_000)] = ""
-    vehicles: Annotated[list[Name], Field(max_length=MOST_VEHICLES, default=[])]
+    vehicles: Annotated[tuple[Name, ...], Field(max_length=MOST_VEHICLES, strict=False)] = ()
     held_for_s: Seconds = 0.0
     starting_deadline_s: Seconds | None = None
     missed: Annotated[Missed, Field(strict=False)] = Missed.SKIP
