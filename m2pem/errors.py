@@ -86,6 +86,10 @@ class ScheduleError(OperatorError):
     right."""
 
 
+class StuckError(OperatorError):
+    """A choice about an incident after which the mission cannot complete, by the checker."""
+
+
 class NotDrivenError(OperatorError):
     """The run is not driven by this executive; another one may."""
 

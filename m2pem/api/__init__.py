@@ -53,7 +53,10 @@ if TYPE_CHECKING:
         Alert,
         ControlEvent,
         HandedOver,
+        IncidentPreview,
+        IncidentVerdict,
         MissionControl,
+        OpenIncident,
         OpenPrompt,
         PromptClosed,
         RunId,
@@ -145,8 +148,9 @@ _MODULES = {
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": (
-        "SCHEDULE Alert ControlEvent HandedOver MissionControl OpenPrompt PromptClosed RunId"
-        " RunStatus RunSummary SimulationResult StampedRecord TelemetrySample"
+        "SCHEDULE Alert ControlEvent HandedOver IncidentPreview IncidentVerdict MissionControl"
+        " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult"
+        " StampedRecord TelemetrySample"
     ),
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.follower": "Follower Listener follow",
@@ -261,6 +265,8 @@ __all__ = [
     "LocalFrame",
     "AsyncQueue",
     "Mission",
+    "IncidentPreview",
+    "IncidentVerdict",
     "MissionControl",
     "MissionFile",
     "MissionFiles",
@@ -268,6 +274,7 @@ __all__ = [
     "ControlEvent",
     "Ocu",
     "OcuCapabilities",
+    "OpenIncident",
     "OpenPrompt",
     "Operation",
     "Outline",

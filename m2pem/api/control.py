@@ -210,6 +210,61 @@ class WaitingTask:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class OpenIncident:
+    """An error that no event catches, about which an operator decides (docs/incidents.md).
+
+    `task`: the element's label. `choices`: what can be chosen, of `retry`, `retry_with`, `skip`,
+    `set_data`, `move` and `end`. `resources`: what is held for it. `roles`: those of the behavior,
+    with who had each. `targets`: where the token can move, by id, with labels.
+    """
+
+    run: RunId
+    incident: str
+    element: str
+    task: str
+    code: str
+    reason: str
+    choices: tuple[str, ...]
+    resources: tuple[str, ...] = ()
+    roles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    targets: Mapping[str, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        held = f"; held for it: {', '.join(self.resources)}" if self.resources else ""
+        reason = f": {self.reason}" if self.reason else ""
+        return f"{self.incident}: {self.task}: {self.code}{reason}{held}"
+
+
+class IncidentVerdict(StrEnum):
+    """What the checker says of a mission after a choice about an incident."""
+
+    COMPLETES = "completes"
+    MAY_NOT_COMPLETE = "may not complete"
+    CANNOT_COMPLETE = "cannot complete"
+    UNKNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True)
+class IncidentPreview:
+    """What follows a choice about an incident, explored from the run's present state."""
+
+    verdict: IncidentVerdict
+    reason: str = ""
+
+    def __str__(self) -> str:
+        reason = f": {self.reason}" if self.reason else ""
+        return f"the mission {_VERDICTS[self.verdict]}{reason}"
+
+
+_VERDICTS = {
+    IncidentVerdict.COMPLETES: "completes on all paths from there",
+    IncidentVerdict.MAY_NOT_COMPLETE: "may not complete from there",
+    IncidentVerdict.CANNOT_COMPLETE: "cannot complete from there",
+    IncidentVerdict.UNKNOWN: "may or may not complete from there, which is not known",
+}
+
+
 LOGGED = "LOGGED"
 """The code of alerts that are also logged: what an arbiter warns of, for instance. Who shows the
 log to an operator need not show them again."""
@@ -425,6 +480,50 @@ class MissionControl(Protocol):
 
     async def waiting(self) -> Sequence[WaitingTask]:
         """The tasks of all runs that wait for vehicles or payloads, in the order of service."""
+        ...
+
+    async def incidents(self) -> Sequence[OpenIncident]:
+        """The incidents of all runs that are open, in the order in which they opened."""
+        ...
+
+    async def preview_incident(
+        self,
+        run: RunId,
+        incident: str,
+        choice: str,
+        *,
+        data: Mapping[str, Value] | None = None,
+        to: str = "",
+        roles: Mapping[str, Sequence[str]] | None = None,
+    ) -> IncidentPreview:
+        """Whether the mission still completes after a choice about an incident.
+
+        Arguments as for `resolve_incident`. It is explored in a process of its own; no run waits.
+        """
+        ...
+
+    async def resolve_incident(
+        self,
+        run: RunId,
+        incident: str,
+        choice: str,
+        *,
+        data: Mapping[str, Value] | None = None,
+        to: str = "",
+        roles: Mapping[str, Sequence[str]] | None = None,
+        by: str = "",
+        even_if_stuck: bool = False,
+    ) -> None:
+        """Decide about an incident: one of its `choices`. The first one that ends it wins.
+
+        `data`: what `set_data` writes. `to`: the element or sequence flow that `move` goes to.
+        `roles`: who fills roles instead, by `retry_with`; a team stands for its members.
+        `even_if_stuck`: an operator has confirmed a choice after which the mission cannot complete.
+
+        Raises:
+            OperatorError: the choice is wrong or comes too late; it says what would be right.
+            StuckError: the mission cannot complete after it, and that was not confirmed.
+        """
         ...
 
     def subscribe(

@@ -18,7 +18,9 @@ import msgspec
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import (
     Alert,
+    IncidentPreview,
     MissionControl,
+    OpenIncident,
     OpenPrompt,
     PromptClosed,
     RunId,
@@ -79,6 +81,24 @@ class Answer(Params, frozen=True):
     prompt: str
     decision: str
     by: str = ""
+
+
+class Choice(Params, frozen=True):
+    """As `MissionControl.preview_incident`."""
+
+    run: str
+    incident: str
+    choice: str
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
+    to: str = ""
+    roles: dict[str, list[str]] = msgspec.field(default_factory=dict)
+
+
+class Resolve(Choice, frozen=True):
+    """As `MissionControl.resolve_incident`."""
+
+    by: str = ""
+    even_if_stuck: bool = False
 
 
 class Signal(Params, frozen=True):
@@ -237,6 +257,9 @@ OPERATIONS: dict[str, Operation] = {
         Operation("start", Start, RunId, alone=True),
         Operation("check", Check, list[Finding], alone=True, slow=True),
         Operation("answer", Answer),
+        Operation("incidents", Nothing, list[OpenIncident]),
+        Operation("preview_incident", Choice, IncidentPreview, alone=True),
+        Operation("resolve_incident", Resolve, alone=True),
         Operation("signal", Signal),
         Operation("message", Message),
         Operation("schedule", ToSchedule, EntryId, alone=True),

@@ -37,6 +37,8 @@ COMMANDS = {
     "explain": "Explain which vehicles a task got, and why.",
     "resume": "Take up a run that was interrupted.",
     "answer": "Answer a prompt of a run that is running on this host.",
+    "incidents": "List the errors about which operators must decide.",
+    "resolve": "Decide about an incident of a run that is running on this host.",
     "signal": "Send a signal to a run that is running on this host.",
     "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
@@ -52,11 +54,12 @@ COMMANDS = {
 
 
 _RUN_CONTROL = frozenset({"answer", "continue", "pause", "signal", "stop"})
+_MODULES = {**dict.fromkeys(_RUN_CONTROL, "run_control"), "resolve": "incidents"}
 
 
 def built_in(name: str) -> click.Command:
     """Return the built-in command of that name; the function `continue_` is `m2pem continue`."""
-    module = "run_control" if name in _RUN_CONTROL else name
+    module = _MODULES.get(name, name)
     function = f"{name}_" if iskeyword(name) else name
     command = getattr(import_module(f"m2pem.cli.{module}"), function)
     assert isinstance(command, click.Command)

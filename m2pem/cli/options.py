@@ -102,6 +102,8 @@ data_option = _data_option("the mission starts with")
 
 signal_data_option = _data_option("the signal brings")
 
+incident_data_option = _data_option("set_data writes")
+
 path_option = click.option(
     "--path",
     "search_path",

@@ -19,10 +19,11 @@ from m2pem.api.description import printable
 from m2pem.api.foreground import Lines
 from m2pem.api.schedule import When
 from m2pem.cli.standard_streams import writer_for
-from m2pem.engine.records import RunClaimed, RunEnded, RunStarted
-from m2pem.errors import BusyError, M2pemError, OperatorError
+from m2pem.engine.records import IncidentOpened, RunClaimed, RunEnded, RunStarted
+from m2pem.errors import BusyError, M2pemError, OperatorError, StuckError
 from m2pem.findings import lines
 from m2pem.mission.behavior import Decision
+from m2pem.mission.values import Value
 
 NAME = "plain"
 BACKLOG = 1_000_000
@@ -31,6 +32,9 @@ STOP_WAITS_S = 0.2
 HELP = """\
   2, or abort        answer the open prompt, by number or by decision
   p3 2               answer prompt p3, when several are open (r2 p3 2: of run r2)
+  incidents          list the errors about which you decide, and what can be chosen
+  resolve i1 retry   decide: skip, end, set_data NAME=VALUE, move ID, retry_with ROLE=uav2
+  resolve! i1 skip   the same, even if the mission cannot complete after it
   signal NAME        send a signal, by its name or its id
   pause, resume      hold the vehicles and the clock; go on
   stop               end the mission: its vehicles are sent the command to stop
@@ -74,6 +78,9 @@ class PlainOcu:
             "stop": self._stop,
             "pause": self._pause,
             "resume": self._resume,
+            "incidents": self._incidents,
+            "resolve": self._resolve,
+            "resolve!": partial(self._resolve, even_if_stuck=True),
             "signal": self._signal,
             "route": partial(self._hand_over, "route"),
             "area": partial(self._hand_over, "area"),
@@ -121,10 +128,18 @@ class PlainOcu:
             match notice:
                 case StampedRecord(run=run, record=record):
                     self._note(run, record)
+                    if isinstance(record, IncidentOpened):
+                        self._show_incident(record)
                 case OpenPrompt():
                     self._open(notice)
                 case PromptClosed():
                     self._close(notice)
+
+    def _show_incident(self, record: IncidentOpened) -> None:
+        """Say what can be chosen; the line of the record has said what failed."""
+        choices = ", ".join(record.choices)
+        self._say(f"[{record.incident}] {record.element}: {record.code}; decide: {choices}")
+        self._say(f"for instance: resolve {record.incident} {record.choices[0]}", indent=4)
 
     def _note(self, run: RunId, record: object) -> None:
         match record:
@@ -246,6 +261,49 @@ class PlainOcu:
         runs = await self._control.runs()
         return any(run.status is RunStatus.PAUSED and run.run in self._active for run in runs)
 
+    async def _incidents(self, _: list[str]) -> None:
+        found = await self._control.incidents()
+        for incident in found:
+            self._say(str(incident))
+            self._say(f"choices: {', '.join(incident.choices)}", indent=4)
+        if not found:
+            self._say("no incident is open")
+
+    async def _resolve(self, words: list[str], *, even_if_stuck: bool = False) -> None:
+        """Decide about an incident, "i1" of the only run that has one of that name, or "r2.i1"."""
+        if len(words) < 2:
+            raise OperatorError("say which, and what: resolve INCIDENT CHOICE")
+        name, choice, rest = words[0], words[1], words[2:]
+        known = {each.incident: each for each in await self._control.incidents()}
+        named = [id_ for id_ in known if name in (id_, id_.partition(".")[2])]
+        if len(named) != 1:
+            listed = ", ".join(known) or "none"
+            raise OperatorError(f"{name!r} is no open incident, or several; open are: {listed}")
+        data: dict[str, Value] = {}
+        roles: dict[str, list[str]] = {}
+        for word in rest if choice in ("set_data", "retry_with") else ():
+            key, equals, value = word.partition("=")
+            if not (key and equals):
+                raise OperatorError(f"{word!r} is not of the form NAME=VALUE")
+            if choice == "set_data":
+                data[key] = _read_value(value, key)
+            else:
+                roles[key] = value.split(",")
+        try:
+            await self._control.resolve_incident(
+                known[named[0]].run,
+                named[0],
+                choice,
+                data=data,
+                to=" ".join(rest) if choice == "move" else "",
+                roles=roles,
+                by=NAME,
+                even_if_stuck=even_if_stuck,
+            )
+        except StuckError as error:
+            again = " ".join(words)
+            raise OperatorError(f"{error}. resolve! {again} does it all the same") from error
+
     async def _signal(self, words: list[str]) -> None:
         if not words:
             raise OperatorError("say which: signal NAME")
@@ -339,6 +397,17 @@ class PlainOcu:
 
     async def _help(self, _: list[str]) -> None:
         self._out.put(HELP)
+
+
+def _read_value(text: str, name: str) -> Value:
+    """Read a value as YAML 1.2."""
+    from m2pem.fleet.yaml_source import parse_yaml
+
+    source = parse_yaml(text.encode(), name)
+    if source.findings:
+        raise OperatorError(f"the value of {name}: {source.findings[0].message}")
+    value: Value = source.data
+    return value
 
 
 def _decision(prompt: OpenPrompt, text: str) -> Decision:

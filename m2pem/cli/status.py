@@ -85,6 +85,17 @@ class RunStatusView:
                 {"prompt": prompt.id, "element": prompt.token.node.id, "text": prompt.text}
                 for prompt in state.prompts.values()
             ],
+            "incidents": [
+                {
+                    "incident": incident.id,
+                    "element": incident.token.node.id,
+                    "code": incident.code,
+                    "reason": incident.reason,
+                    "choices": list(incident.choices),
+                    "resources": list(incident.resources),
+                }
+                for incident in state.incidents.values()
+            ],
             "data": self._data,
         }
 
@@ -110,6 +121,12 @@ class RunStatusView:
                 (each.token.node.label, waiting(each.reason)) for each in state.allocations.values()
             ]
             parts.append(table(("TASK", "WAITS"), waits))
+        if state.incidents:
+            stopped = [
+                (each.id, each.token.node.label, each.code, ", ".join(each.resources))
+                for each in state.incidents.values()
+            ]
+            parts.append(table(("INCIDENT", "STOPS", "ERROR", "HOLDS"), stopped))
         if self._data:
             written = [
                 (key, msgspec.json.encode(value).decode())

@@ -6,7 +6,14 @@ from typing import Any
 import msgspec
 
 from m2pem.control_socket.paths import ControlSocketError
-from m2pem.errors import BusyError, M2pemError, MissionError, NotDrivenError, OperatorError
+from m2pem.errors import (
+    BusyError,
+    M2pemError,
+    MissionError,
+    NotDrivenError,
+    OperatorError,
+    StuckError,
+)
 from m2pem.findings import Finding
 
 LONGEST_LINE_BYTES = 64 << 20
@@ -29,6 +36,8 @@ class Code(IntEnum):
     """A `MissionError`; `data` has its findings."""
     BUSY = -32003
     """A `BusyError`; `data` has who has what."""
+    STUCK = -32004
+    """A `StuckError`: the choice must be confirmed."""
 
 
 class FaultData(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -80,6 +89,8 @@ def fault_of(error: M2pemError) -> Fault:
             return Fault(Code.BUSY, str(error), FaultData(holders=error.holders))
         case NotDrivenError():
             return Fault(Code.NOT_DRIVEN, str(error))
+        case StuckError():
+            return Fault(Code.STUCK, str(error))
     return Fault(Code.REFUSED, str(error))
 
 
@@ -92,6 +103,8 @@ def error_of(fault: Fault) -> M2pemError:
             return BusyError(fault.message, fault.data.holders)
         case Code.NOT_DRIVEN:
             return NotDrivenError(fault.message)
+        case Code.STUCK:
+            return StuckError(fault.message)
         case Code.REFUSED:
             return OperatorError(fault.message)
     return ControlSocketError(fault.message)

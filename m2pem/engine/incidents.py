@@ -159,19 +159,22 @@ def behavior_at(node: FlowNode) -> BehaviorOfTask | None:
 
 
 def move_targets(token: Token) -> list[FlowNode | SequenceFlow]:
-    """Return where a token with an incident can go: other elements of its scope.
+    """Return where a token with an incident can go.
 
-    A join must know by which of its flows the token comes, so these stand for it. An instance of a
-    loop or multi-instance activity, a token that compensates something, and one in an ad-hoc or on
-    an event subprocess cannot move.
+    An instance of a loop or multi-instance activity, and a token that compensates something, cannot
+    move.
     """
-    node = token.node
-    if (
-        token.instance is not None
-        or token.compensates is not None
-        or isinstance(node.container, AdHocSubProcess)
-        or _is_outside_the_flow(node)
-    ):
+    if token.instance is not None or token.compensates is not None:
+        return []
+    return targets_from(token.node)
+
+
+def targets_from(node: FlowNode) -> list[FlowNode | SequenceFlow]:
+    """Return the other elements of a node's scope; none from an ad-hoc or an event subprocess.
+
+    A join must know by which of its flows the token comes, so these stand for it.
+    """
+    if isinstance(node.container, AdHocSubProcess) or _is_outside_the_flow(node):
         return []
     found: list[FlowNode | SequenceFlow] = []
     for each in node.container.nodes:

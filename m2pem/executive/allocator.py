@@ -368,7 +368,7 @@ class Allocator:
         """Whether a run can go on only by getting what it asked for."""
         state = runner.run.state
         limits = {request.deadline for request in state.allocations.values()}
-        if limits != {0} or state.prompts or state.services or state.waits:
+        if limits != {0} or state.prompts or state.services or state.waits or state.incidents:
             return False
         return all(self._goes_on(behavior) for behavior in state.behaviors)
 

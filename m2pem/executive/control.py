@@ -19,6 +19,9 @@ from m2pem.api.authoring import (
 from m2pem.api.control import (
     ControlEvent,
     HandedOver,
+    IncidentPreview,
+    IncidentVerdict,
+    OpenIncident,
     OpenPrompt,
     RoleAssignment,
     RunId,
@@ -42,6 +45,7 @@ from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import BusyError, MissionError, OperatorError, ScheduleError
 from m2pem.executive.ended_runs import describe_end, in_words
 from m2pem.executive.health import ExecutiveHealth
+from m2pem.executive.incidents import choice_input, open_incidents, refuse_wrong_choice
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
@@ -351,6 +355,67 @@ class Control:
         """The tasks of all runs that wait for vehicles or payloads."""
         supervisor = self._supervisor
         return waiting_tasks(supervisor.runners.values(), supervisor.clock.now_us())
+
+    async def incidents(self) -> Sequence[OpenIncident]:
+        """The incidents of all runs that are open."""
+        return open_incidents(self._supervisor.runners.values(), self._supervisor.fleet)
+
+    async def preview_incident(
+        self,
+        run: RunId,
+        incident: str,
+        choice: str,
+        *,
+        data: Mapping[str, Value] | None = None,
+        to: str = "",
+        roles: Mapping[str, Sequence[str]] | None = None,
+    ) -> IncidentPreview:
+        """Whether the mission still completes after a choice about an incident."""
+        async with self._explain_end("preview_incident", run):
+            self._refuse_ended(run)
+            self._choice(run, incident, choice, data, to, roles, "")
+        return IncidentPreview(IncidentVerdict.UNKNOWN, "it is not explored")
+
+    async def resolve_incident(
+        self,
+        run: RunId,
+        incident: str,
+        choice: str,
+        *,
+        data: Mapping[str, Value] | None = None,
+        to: str = "",
+        roles: Mapping[str, Sequence[str]] | None = None,
+        by: str = "",
+        even_if_stuck: bool = False,
+    ) -> None:
+        """Decide about an incident."""
+        async with self._explain_end("resolve_incident", run):
+            self._refuse_ended(run)
+            item = self._choice(run, incident, choice, data, to, roles, by)
+        await self._ask("resolve_incident", run, item)
+
+    def _choice(
+        self,
+        run: RunId,
+        incident: str,
+        choice: str,
+        data: Mapping[str, Value] | None,
+        to: str,
+        roles: Mapping[str, Sequence[str]] | None,
+        by: str,
+    ) -> i.ResolveIncident:
+        """Return an operator's choice, which was checked.
+
+        Raises:
+            OperatorError: it is wrong.
+        """
+        supervisor = self._supervisor
+        given = _bounded(data)
+        incident = incident if "." in incident else f"{run}.{incident}"
+        item = choice_input(incident, choice, given, to, roles or {}, by, supervisor.fleet)
+        runner, arbiters = supervisor.runner(run), supervisor.arbiters
+        refuse_wrong_choice(runner, item, arbiters, supervisor.availability)
+        return item
 
     async def _ask(self, request: str, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know.

@@ -140,6 +140,23 @@ class Dispatcher:
             for resource in active.resources
         }
 
+    def hold_resources_at_once(self, resources: Iterable[str]) -> dict[str, Order]:
+        """Hold resources whose work has failed, by resource; out of turn as `stop_at_once` is."""
+        ids = _ids(resources)
+        return {each: self._order((each,), partial(self._hold_failed, each)) for each in ids}
+
+    async def _hold_failed(self, resource: ResourceId) -> str:
+        wrong = await self._turn("hold", resource)
+        return wrong or self._availability.reason(resource)
+
+    def keep(self, incident: str, resources: Iterable[str]) -> None:
+        """Keep resources for an incident: no behavior gets them."""
+        self._availability.adopt(_ids(resources), incident)
+
+    def release(self, incident: str) -> None:
+        """An incident is over: what was kept for it is free."""
+        self._availability.release(incident)
+
     def _active_of(self, run: str) -> list[tuple[str, _Active]]:
         return [each for each in self._active.items() if each[0].partition(".")[0] == run]
 

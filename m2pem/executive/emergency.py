@@ -92,6 +92,10 @@ class EmergencyCommands:
             return runner.submit_pause(i.PauseRun(by), frozenset(map(str, held)))
         return runner.submit(i.PauseRun(by))
 
+    def hold(self, run: RunId, resources: Iterable[str]) -> None:
+        """Hold what failed work of a run commanded, before the incident is journaled."""
+        self._watch("hold", run, self._dispatcher.hold_resources_at_once(resources))
+
     async def written(self, what: str, asked: "Mapping[RunId, asyncio.Future[Step]]") -> None:
         """Wait until the journal has what was asked of runs, within `WRITTEN_WITHIN_S`.
 

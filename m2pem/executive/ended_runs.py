@@ -14,6 +14,8 @@ NOTHING_TO_DO = {
     "pause": "there was nothing to pause",
     "resume": "there is nothing to go on with: m2pem start begins its mission anew",
     "answer": "no question of it is open",
+    "resolve_incident": "no incident of it is open",
+    "preview_incident": "no incident of it is open",
     "signal": "it takes no signals any more",
     "message": "it takes no messages any more",
     "set_geometry": "it takes no geometries any more",

@@ -19,7 +19,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
-from m2pem.fleet.allocation import Availability
+from m2pem.fleet.allocation import Availability, is_incident
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 log = logging.getLogger("m2pem.executive")
@@ -88,8 +88,9 @@ class LostResources:
         elif self._availability.reason(resource):
             return  # an operator has it, or it is manned: what it does is theirs
         holder = self._availability.holder(resource)
-        if holder is not None or resource not in self._lost:
-            self._lost[resource] = _Lost(holder)
+        commands = holder is not None and not is_incident(holder)
+        if commands or resource not in self._lost:
+            self._lost[resource] = _Lost(holder if commands else None)
         self._withdraw(resource, reason)
 
     def lost_before(

@@ -72,6 +72,8 @@ async def take_over(
     # The run's inputs are decided after this; a paused one defers what is restarted.
     paused = state.status is RunStatus.PAUSED
     known = list(state.behaviors.values())
+    for incident in state.incidents.values():
+        dispatcher.keep(incident.id, incident.resources)
     _recall(runner, arbiters, dispatcher)
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
     resend: set[str] = set()

@@ -89,6 +89,8 @@ class RunContext:
     services: Services
     events: ControlEvents
     observe: OnRecords
+    hold: Callable[[RunId, Sequence[str]], None]
+    """Holds what failed work commanded, at once, and warns of what may not have received it."""
     limit: RunLimit | None = None
 
 
@@ -280,8 +282,10 @@ class Runner:
             self._let_strays_go()
         for step in steps:
             self._publish(step)
+            early = isinstance(step.input, _EARLY)
             for command in step.commands:
-                self._dispatch(command, early_done=isinstance(step.input, _EARLY))
+                if not (isinstance(command, c.HoldResource) and _opens_incident(step)):
+                    self._dispatch(command, early_done=early)
             self._answer_asker(step)
             if len(step.records) > MANY_RECORDS:
                 await asyncio.sleep(0)  # subscribers keep up, and STOP does not wait
@@ -290,6 +294,9 @@ class Runner:
         step = self.run.receive(item, self._context.clock.now_us())
         if isinstance(item, _EARLY):
             self._dispatch_early(step)
+        elif _opens_incident(step):
+            holds = [each for each in step.commands if isinstance(each, c.HoldResource)]
+            self._context.hold(self.id, [each.resource for each in holds])
         if isinstance(item, PauseRun):
             self._settle_pause()
         return step
@@ -359,6 +366,10 @@ class Runner:
         for record in step.records:
             if type(record) is r.BehaviorEnded:
                 context.dispatcher.ended(record.behavior)
+            elif type(record) is r.IncidentOpened:
+                context.dispatcher.keep(record.incident, record.resources)
+            elif type(record) is r.IncidentResolved or type(record) is r.IncidentClosed:
+                context.dispatcher.release(record.incident)
         if context.events.has_subscribers:
             t_s = step.t_us / 1_000_000
             places = enumerate(step.records, step.seq)
@@ -455,6 +466,14 @@ class Runner:
             if isinstance(command, (c.StartBehavior, c.CancelBehavior)):
                 command = replace(command, epoch=self.epoch)  # noqa: PLW2901
             self._dispatch(command)
+
+
+def _opens_incident(step: Step) -> bool:
+    """Whether an incident opens, so that its holds go out before the commit."""
+    if isinstance(step.input, _EARLY):
+        return False
+    holds = any(isinstance(command, c.HoldResource) for command in step.commands)
+    return holds and any(isinstance(record, r.IncidentOpened) for record in step.records)
 
 
 _EARLY = (StopRun, PauseRun, GiveUp)

@@ -468,6 +468,7 @@ class Supervisor:
             self._services,
             self.events,
             self._observe,
+            self.emergency.hold,
             self.settings.limit,
         )
         runner = Runner(run, epoch, context, self.fleet.steps_between_waits)

@@ -82,6 +82,11 @@ def spelled_out(team: Team) -> tuple[ResourceId, ...]:
     return (team.lead, *(member for member in team.members if member != team.lead))
 
 
+def is_incident(holder: str) -> bool:
+    """Whether the id of what holds a resource is that of an incident ("r1.i2")."""
+    return holder.partition(".")[2].startswith("i")
+
+
 MANNED = "manned"
 
 
@@ -89,7 +94,8 @@ class Availability:
     """The one ledger of an executive, across all its runs. Behavior ids are unique in it.
 
     Requests for resources (`m2pem.executive.allocator`) hold what was chosen for them by their own
-    id. `on_change`: is called when a resource may be free, or is not available any more.
+    id, and incidents what their failed work commanded. `on_change`: is called when a resource may
+    be free, or is not available any more.
 
     A behavior that took a resource over from one which is being cancelled may end first: the
     resource is then held by the one before again.

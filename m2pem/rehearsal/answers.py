@@ -13,10 +13,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from m2pem.api.clock import Clock
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId
+from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StampedRecord
 from m2pem.engine.inputs import MessageReceived, SignalReceived
 from m2pem.engine.records import (
     BehaviorRequested,
+    IncidentOpened,
     InputDeferred,
     MessageThrown,
     PromptOpened,
@@ -32,6 +33,7 @@ from m2pem.mission.mission import Mission
 from m2pem.rehearsal.answers_file import (
     AnswersModel,
     BehaviorEntry,
+    IncidentEntry,
     ServiceEntry,
     TimedEntry,
     check,
@@ -45,7 +47,8 @@ BY_SCRIPT = "answers file"
 """Who the journal says has answered a prompt or sent a signal that is scripted."""
 
 BY_DEFAULT = "default"
-"""Who has taken the first decision of a prompt without a script."""
+"""Who has taken the first decision of a prompt without a script, or has ended the run at an
+incident without one."""
 
 
 class Answers:
@@ -61,6 +64,7 @@ class Answers:
         self._visits: dict[tuple[str, str, str], dict[str, int]] = {}
         self._sent: Counter[tuple[str, str, str]] = Counter()
         self._deferred: Counter[tuple[str, str, str]] = Counter()
+        self._resolving = 0
         self._to_send = len(self.model.signals) + len(self.model.messages)
 
     # --- visits ---------------------------------------------------------------------------------
@@ -71,6 +75,8 @@ class Answers:
             match record:
                 case PromptOpened():
                     self._visit(run, "answers", record.element, record.prompt)
+                case IncidentOpened():
+                    self._visit(run, "incidents", record.element, record.incident)
                 case ServiceRequested():
                     key = self._service(record.element, record.name)
                     self._visit(run, "services", key, record.service)
@@ -110,6 +116,11 @@ class Answers:
         place = self._visit(run, "answers", element, prompt)
         return None if place is None else self.model.answers[element][place]
 
+    def incident(self, run: str, element: str, incident: str) -> IncidentEntry | None:
+        """The choice about an incident of an element; None: nothing is scripted (any more)."""
+        place = self._visit(run, "incidents", element, incident)
+        return None if place is None else self.model.incidents[element][place]
+
     def _service(self, element: str, name: str) -> str:
         """A service is scripted by its element, else by its class."""
         return element if element in self.model.services else name
@@ -132,6 +143,11 @@ class Answers:
         """The number of signals and messages that are still to be sent."""
         return self._to_send
 
+    @property
+    def resolving(self) -> int:
+        """The number of incidents that will be resolved by script after a while."""
+        return self._resolving
+
     async def act(
         self,
         control: MissionControl,
@@ -142,24 +158,45 @@ class Answers:
     ) -> None:
         """Answer prompts and send what is to be sent, until cancelled or the executive ends.
 
-        `default_first_decision`: a prompt without a script takes its first decision; else it is
-        left to an operator.
+        `default_first_decision`: a prompt without a script takes its first decision, and an
+        incident without one ends the run; else they are left to an operator.
         """
         async with asyncio.TaskGroup() as group:
             group.create_task(self._send(control, run, clock), name="scripted signals")
             group.create_task(
-                self._answer_prompts(control, run, default_first_decision),
+                self._answer_prompts(control, run, clock, group, default_first_decision),
                 name="scripted answers",
             )
 
     async def _answer_prompts(
-        self, control: MissionControl, run: RunId, default_first_decision: bool
+        self,
+        control: MissionControl,
+        run: RunId,
+        clock: Clock,
+        group: asyncio.TaskGroup,
+        default_first_decision: bool,
     ) -> None:
         asked: set[str] = set()
+
+        def take(incident: str, element: str) -> None:
+            if incident not in asked:
+                asked.add(incident)
+                choosing = self._choose(
+                    control, clock, run, incident, element, default_first_decision
+                )
+                group.create_task(choosing, name="scripted choice")
+
         while True:
             notices = control.subscribe(run)
+            for each in await control.incidents():
+                if each.run == run:
+                    take(each.incident, each.element)
             try:
                 async for notice in notices:
+                    if isinstance(notice, StampedRecord):
+                        if isinstance(notice.record, IncidentOpened):
+                            take(notice.record.incident, notice.record.element)
+                        continue
                     if isinstance(notice, OpenPrompt) and notice.prompt not in asked:
                         asked.add(notice.prompt)
                         await self._answer(control, notice, default_first_decision)
@@ -185,6 +222,42 @@ class Answers:
             # The default decision is too late when another answer has ended the task.
             level = logging.DEBUG if by == BY_DEFAULT else logging.WARNING
             log.log(level, "%s: the answer %r: %s", prompt.element, decision, error)
+
+    async def _choose(
+        self,
+        control: MissionControl,
+        clock: Clock,
+        run: RunId,
+        incident: str,
+        element: str,
+        default_end: bool,
+    ) -> None:
+        """Resolve an incident as it is scripted; else, with `default_end`, end the run."""
+        entry = self.incident(run, element, incident)
+        by = BY_SCRIPT if entry is not None else BY_DEFAULT
+        if entry is None and default_end:
+            entry = IncidentEntry(choice="end")
+        if entry is None:
+            return
+        self._resolving += 1
+        try:
+            await clock.sleep(entry.after)
+            if entry.data:
+                await control.resolve_incident(run, incident, "set_data", data=entry.data, by=by)
+            await control.resolve_incident(
+                run,
+                incident,
+                entry.choice,
+                to=entry.to or "",
+                roles=entry.roles,
+                by=by,
+                even_if_stuck=True,
+            )
+        except OperatorError as error:
+            level = logging.DEBUG if by == BY_DEFAULT else logging.WARNING
+            log.log(level, "%s: %s about %s: %s", element, entry.choice, incident, error)
+        finally:
+            self._resolving -= 1
 
     async def _send(self, control: MissionControl, run: RunId, clock: Clock) -> None:
         summary = next(each for each in await control.runs() if each.run == run)

@@ -81,6 +81,24 @@ class BehaviorEntry(_Model):
         return self
 
 
+class IncidentEntry(_Model):
+    """The choice about one incident of an element; `data` is written before it."""
+
+    choice: Literal["retry", "retry_with", "skip", "move", "end"]
+    after: Seconds = 0.0
+    data: dict[Text, Any] = Field(default_factory=dict)
+    to: Text | None = None
+    roles: dict[Text, list[Text]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if (self.to is not None) != (self.choice == "move"):
+            raise ValueError("'to' goes with 'choice: move'")
+        if bool(self.roles) != (self.choice == "retry_with"):
+            raise ValueError("'roles' goes with 'choice: retry_with'")
+        return self
+
+
 class TimedEntry(_Model):
     """A signal or message from outside; `at` counts from the start of the run."""
 
@@ -97,6 +115,7 @@ class AnswersModel(_Model):
     messages: list[TimedEntry] = Field(default_factory=list)
     services: dict[Text, list[ServiceEntry]] = Field(default_factory=dict)
     behaviors: dict[Text, list[BehaviorEntry]] = Field(default_factory=dict)
+    incidents: dict[Text, list[IncidentEntry]] = Field(default_factory=dict)
 
 
 def read_answers(answers: Path | bytes) -> tuple[AnswersModel, YamlSource]:
@@ -123,6 +142,7 @@ def check(model: AnswersModel, source: YamlSource, mission: Mission) -> list[Fin
     findings.answers(model.answers)
     findings.services(model.services)
     findings.behaviors(model.behaviors)
+    findings.incidents(model.incidents)
     findings.events("signals", model.signals, mission.signals)
     findings.events("messages", model.messages, mission.messages)
     return findings.source.findings
@@ -175,6 +195,12 @@ class _Check:
             if element not in self._commanding:
                 what = "task with a behavior"
                 self._unknown(("behaviors", element), element, what, self._commanding)
+
+    def incidents(self, incidents: Collection[str]) -> None:
+        nodes = [node.id for node in self._mission.nodes]
+        for element in incidents:
+            if element not in nodes:
+                self._unknown(("incidents", element), element, "element with tokens", nodes)
 
     def events(self, kind: str, events: list[TimedEntry], known: Collection[str]) -> None:
         for place, event in enumerate(events):

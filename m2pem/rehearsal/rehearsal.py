@@ -329,6 +329,7 @@ class _Rehearsal:
         return (
             runner.run.next_due_us is not None
             or self._answers.to_send > 0
+            or self._answers.resolving > 0
             or self._scripted.ending > 0
             or any(
                 behavior.phase is BehaviorPhase.CANCELLING for behavior in state.behaviors.values()

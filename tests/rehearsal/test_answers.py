@@ -8,7 +8,14 @@ from typing import Any
 import pytest
 
 from m2pem.api.clock import VirtualClock, run_virtual
-from m2pem.api.control import OpenPrompt, PromptClosed, RunStatus, RunSummary, StampedRecord
+from m2pem.api.control import (
+    OpenIncident,
+    OpenPrompt,
+    PromptClosed,
+    RunStatus,
+    RunSummary,
+    StampedRecord,
+)
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import MessageReceived, SignalReceived
 from m2pem.engine.records import (
@@ -320,6 +327,9 @@ class FakeControl:
 
     async def runs(self) -> list[RunSummary]:
         return [RunSummary("r1", "m", "P", RunStatus.RUNNING, START_US)]
+
+    async def incidents(self) -> list[OpenIncident]:
+        return []
 
     async def subscribe(self, run: str) -> AsyncIterator[OpenPrompt | PromptClosed | StampedRecord]:
         for notice in self._notices:

@@ -90,6 +90,7 @@ export const m2pemDescriptor = {
       extends: ["bpmn:MultiInstanceLoopCharacteristics"],
       properties: ["collection", "elementVariable"].map(attribute),
     },
+    { name: "Errors", extends: ["bpmn:Process"], properties: [attribute("onError")] },
     {
       name: "Choice",
       extends: ["bpmn:AdHocSubProcess"],

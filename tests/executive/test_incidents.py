@@ -1,0 +1,228 @@
+"""Incidents on an executive: what is held, what is refused, and who decides first."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from m2pem.api.control import RunStatus
+from m2pem.api.telemetry import LinkState
+from m2pem.engine.inputs import BehaviorReported
+from m2pem.engine.records import IncidentOpened, IncidentResolved
+from m2pem.errors import BusyError, OperatorError
+from m2pem.mission.catalogue import BehaviorState
+
+from .conftest import World, behavior, flow, mission, question, sequence
+from .test_allocator import task
+from .test_emergency import StallingJournal, alerts
+from .test_lost_resources import says
+from .test_recovery import left_behind
+
+FAILED, SUCCEEDED = BehaviorState.FAILED, BehaviorState.SUCCEEDED
+
+
+def stopping(body: str) -> bytes:
+    """A mission whose errors open incidents."""
+    executable = 'isExecutable="true"'
+    return mission(body.replace(executable, f'{executable} m2pem:onError="incident"'))
+
+
+DRIVE = stopping(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
+
+
+WAITS = mission(sequence(("Go", task("Go", "requires='true' wait='PT9M'"))))
+
+
+async def failed(world: World, source: bytes = DRIVE, code: str = "ROUTE_BLOCKED") -> str:
+    """Start a mission, and let its first behavior fail."""
+    run = await world.executive.control.start(source)
+    await world.fake.until_called("start", f"{run}.b1")
+    world.fake.report(f"{run}.b1", FAILED, code)
+    while not world.executive.runner(run).run.state.incidents:
+        await world.clock.sleep(0.01)
+    return run
+
+
+def test_what_failed_is_held_and_no_other_run_gets_it(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world)
+        await world.fake.until_called("hold", "ugv1")
+        (incident,) = await control.incidents()
+        assert (incident.run, incident.element, incident.code) == (run, "Drive", "ROUTE_BLOCKED")
+        assert incident.roles == {"driver": ("ugv1",)}
+        assert (await control.holders())["ugv1"] == f"{run}.i1"
+        with pytest.raises(BusyError, match=f"run {run} uses ugv1"):
+            await control.start(DRIVE)
+        other = await control.start(WAITS)
+        while not (found := await control.waiting()):
+            await world.clock.sleep(0.01)
+        (waiting,) = found
+        assert waiting.holders == {"ugv1": f"{run}.i1"}
+        await control.resolve_incident(run, "i1", "skip", by="anna")
+        await control.wait(run)
+        await world.fake.until_called("start", f"{other}.b1")
+        world.fake.report(f"{other}.b1", SUCCEEDED)
+        await control.wait(other)
+        return [each for each in world.seen if isinstance(each, IncidentResolved)]
+
+    (resolved,) = play(story, "ugv1")
+    assert (resolved.choice, resolved.by) == ("skip", "anna")
+
+
+def test_a_retry_gets_its_vehicle_before_a_task_that_waits_for_it(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world)
+        other = await control.start(WAITS)
+        await control.resolve_incident(run, f"{run}.i1", "retry")
+        await world.fake.until_called("start", f"{run}.b2")
+        assert world.fake.count("start", f"{other}.b1") == 0
+        world.fake.report(f"{run}.b2", SUCCEEDED)
+        await world.fake.until_called("start", f"{other}.b1")
+        world.fake.report(f"{other}.b1", SUCCEEDED)
+        return (await control.wait(run)).status
+
+    assert play(story, "ugv1") is RunStatus.COMPLETED
+
+
+def test_the_hold_goes_out_while_the_commit_is_stalled(play):
+    journal = StallingJournal()
+
+    async def story(world: World):
+        run = await world.executive.control.start(DRIVE)
+        await world.fake.until_called("start")
+        journal.stall()
+        world.fake.report(f"{run}.b1", FAILED)
+        await world.fake.until_called("hold", "ugv1")
+        assert journal.waiting.is_set()
+        assert not any(isinstance(each, IncidentOpened) for each in world.seen)
+        journal.works.set()
+        while not any(isinstance(each, IncidentOpened) for each in world.seen):
+            await world.clock.sleep(0.01)
+        await world.executive.control.stop(run)
+        return world.fake.count("hold")
+
+    assert play(story, "ugv1", journal=journal) == 1
+
+
+def test_a_lost_vehicle_cannot_be_held_and_operators_are_warned_at_once(play):
+    async def story(world: World):
+        control = world.executive.control
+        warning = asyncio.create_task(alerts(world, "NOT_RECEIVED"))
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start")
+        says(world, LinkState.LOST)
+        alert = await warning
+        with pytest.raises(OperatorError, match="ugv1 is unavailable: lost"):
+            await control.resolve_incident(run, "i1", "retry_with", roles={"driver": ["ugv1"]})
+        await control.resolve_incident(run, "i1", "retry_with", roles={"driver": ["ugv2"]})
+        await world.fake.until_called("start", f"{run}.b2")
+        world.fake.report(f"{run}.b2", SUCCEEDED)
+        return alert, (await control.wait(run)).status
+
+    alert, status = play(story, "ugv1", "ugv2", watch_links=True)
+    assert "ugv1 may not have received the hold" in alert.text
+    assert "lost" in alert.text
+    assert status is RunStatus.COMPLETED
+
+
+@pytest.mark.parametrize(
+    ("choice", "options", "said"),
+    [
+        ("retri", {}, "did you mean 'retry'"),
+        ("move", {"to": "S"}, "cannot move to 'S'"),
+        ("retry_with", {"roles": {"driver": ["ugv9"]}}, "the fleet has no 'ugv9'"),
+        ("retry_with", {"roles": {"driver": ["ugv3"]}}, "ugv3 is held by r2.b1"),
+        ("set_data", {}, "set_data needs data"),
+    ],
+)
+def test_a_wrong_choice_is_refused_before_it_is_journaled(
+    play, choice: str, options: dict[str, Any], said: str
+):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world)
+        other = await control.start(mission(sequence(("D", behavior("D", "drive_stop", "ugv3")))))
+        await world.fake.until_called("start", f"{other}.b1")
+        before = world.executive.runner(run).run.state.seq
+        with pytest.raises(OperatorError) as refused:
+            await control.resolve_incident(run, "i1", choice, **options)
+        assert world.executive.runner(run).run.state.seq == before
+        return str(refused.value)
+
+    assert said in play(story, "ugv1", "ugv3")
+
+
+def test_the_first_of_two_operators_wins_and_the_other_is_told(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world)
+        both = await asyncio.gather(
+            control.resolve_incident(run, "i1", "skip", by="anna"),
+            control.resolve_incident(run, "i1", "end", by="ben"),
+            return_exceptions=True,
+        )
+        return both, (await control.wait(run)).status
+
+    (first, second), status = play(story, "ugv1")
+    assert first is None
+    assert "is not open" in str(second) or "has ended" in str(second)
+    assert status is RunStatus.COMPLETED
+
+
+def test_stop_and_pause_work_with_an_open_incident(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world)
+        await control.pause(run)
+        await control.resolve_incident(run, "i1", "retry", by="anna")
+        with pytest.raises(OperatorError, match="was resolved by anna"):
+            await control.resolve_incident(run, "i1", "skip", by="ben")
+        assert world.fake.count("start") == 1
+        await control.resume(run)
+        await world.fake.until_called("start", f"{run}.b2")
+        world.fake.report(f"{run}.b2", FAILED)
+        await world.fake.until_called("hold", times=2)
+        await control.stop(run, by="anna")
+        return (await control.wait(run)).status, await control.holders(), await control.incidents()
+
+    status, holders, incidents = play(story, "ugv1")
+    assert (status, holders, incidents) == (RunStatus.STOPPED, {"ugv1": ""}, [])
+
+
+def test_an_open_incident_is_taken_up_after_a_restart(play):
+    journal = left_behind(DRIVE, BehaviorReported("r1.b1", 1, FAILED, "ROUTE_BLOCKED"))
+
+    async def story(world: World):
+        control = world.executive.control
+        await world.executive.resume("r1")
+        await world.fake.until_called("hold", "ugv1")
+        (incident,) = await control.incidents()
+        assert (await control.holders())["ugv1"] == incident.incident == "r1.i1"
+        await control.resolve_incident("r1", "i1", "retry", by="anna")
+        await world.fake.until_called("start", "r1.b2")
+        world.fake.report("r1.b2", SUCCEEDED)
+        return (await control.wait("r1")).status
+
+    assert play(story, "ugv1", journal=journal) is RunStatus.COMPLETED
+
+
+def test_an_incident_is_not_an_idle_run_and_other_branches_go_on(play):
+    both = stopping(
+        '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'
+        f"{behavior('Drive', 'drive_stop', 'ugv1')}{question('Ask')}{flow('S', 'F')}"
+        f"{flow('F', 'Drive')}{flow('F', 'Ask')}</process>"
+    )
+
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world, both)
+        (prompt,) = control.prompts()
+        await control.answer(run, prompt.prompt, "yes")
+        await control.resolve_incident(run, "i1", "end", by="anna")
+        return await control.wait(run)
+
+    summary = play(story, "ugv1")
+    assert summary.status is RunStatus.FAILED
+    assert "error ROUTE_BLOCKED from Drive" in summary.detail
