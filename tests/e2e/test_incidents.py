@@ -1,0 +1,69 @@
+"""An incident outlives the executive: kill -9, resume, resolve, and replay to the same state."""
+
+from pathlib import Path
+
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
+from tests.command_line import ANSWERS, MISSION, CommandLine, Program, fleet_with_state
+
+
+def stopped(m2pem: CommandLine, folder: Path) -> tuple[Program, Path]:
+    """The mission, with an incident of its first drive, and the state file of its vehicles."""
+    fleet, state = fleet_with_state(folder)
+    fleet.write_text(fleet.read_text() + "\non_error: incident\n")
+    answers = folder / "answers.yaml"
+    answers.write_text(
+        (ANSWERS / "vignette1_detection.yaml").read_text()
+        + "\nbehaviors:\n  DriveRoute: [{after: 1 s, end: failed, error: ROUTE_BLOCKED}]\n"
+    )
+    program = m2pem.start(
+        "run", MISSION, "--fleet", fleet, "--simulate", "--speed", "20", "--format", "json",
+        "--answers", answers,
+    )  # fmt: skip
+    opened = program.until_record("IncidentOpened", element="DriveRoute")
+    assert (opened["code"], opened["resources"]) == ("ROUTE_BLOCKED", ["evsg1"])
+    return program, state
+
+
+def test_an_incident_is_resolved_after_kill_9_and_the_replay_is_equal(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    program, state = stopped(m2pem, tmp_path)
+    program.kill()
+    assert "INCIDENT" in m2pem.run("replay", "r1", "--state")[1]
+    resumed = m2pem.start("resume", "r1", "--format", "json")
+    resumed.until_record("RunClaimed")
+    status, listed, _ = m2pem.run("incidents")
+    assert status == 0
+    assert "r1.i1: " in listed
+    assert "held for it: evsg1" in listed
+    held = [each for each in recorded_effects(state) if each.kind is EffectKind.HOLD]
+    assert held
+    status, _, errors = m2pem.run("resolve", "r1", "i1", "move", "--to", "nowhere")
+    assert status == 1
+    assert "the token cannot move to 'nowhere'" in errors
+    assert m2pem.run("resolve", "r1", "i1", "retry", "--by", "anna")[0] == 0
+    assert m2pem.run("resolve", "r1", "i1", "skip", "--by", "ben")[0] == 1
+    again = resumed.until_record("BehaviorRequested", element="DriveRoute")
+    assert again["resources"] == ["evsg1"]
+    assert m2pem.run("stop", "r1")[0] == 0
+    assert resumed.rest()[0] == 130
+    assert m2pem.run("replay", "r1", "--verify")[0] == 0
+
+
+def test_an_operator_at_the_plain_unit_decides(m2pem: CommandLine, tmp_path: Path) -> None:
+    program, _ = stopped(m2pem, tmp_path)
+    program.type("incidents")
+    program.type("resolve i1 end")
+    ended = program.until_record("RunEnded", outcome="failed")
+    assert "error ROUTE_BLOCKED from DriveRoute" in ended["detail"]
+    resolved = [each for each in program.records if each["record"] == "IncidentResolved"]
+    assert [(each["choice"], each["by"]) for each in resolved] == [("end", "plain")]
+    assert program.rest()[0] == 1
+
+
+def test_stop_ends_a_run_with_an_open_incident(m2pem: CommandLine, tmp_path: Path) -> None:
+    program, _ = stopped(m2pem, tmp_path)
+    program.type("stop")
+    program.until_record("IncidentClosed")
+    assert program.rest()[0] == 130
