@@ -46,8 +46,8 @@ HELP = """\
   start FILE         start another mission
   start! FILE        the same, even if other runs or operators have its vehicles
   schedule           list the missions that start later
-  schedule TIME FILE start it at 08:00, or 2026-05-01T08:00; or free: when its vehicles are
-  schedule cancel s1 start that entry no more
+  schedule TIME FILE  start it at 08:00, or 2026-05-01T08:00; or free: when its vehicles are
+  schedule cancel s1  start that entry no more
   schedule hold      hold all of it (hold s1: one entry)
   schedule release   release it
   takeover evsg1     take a vehicle or payload from the missions, to steer it by hand

@@ -26,9 +26,9 @@ class WhenModel(Body):
     time_zone: Annotated[str, Field(max_length=100)] = ""
     until: Annotated[str, Field(max_length=100)] = ""
     after: Annotated[str, Field(max_length=100)] = ""
-    outcomes: Annotated[tuple[str, ...], Field(max_length=4, strict=False)] = ("completed",)
+    outcomes: list[str] = Field(default=["completed"], max_length=4)
     condition: Annotated[str, Field(max_length=10_000)] = ""
-    vehicles: Annotated[tuple[Name, ...], Field(max_length=MOST_VEHICLES, strict=False)] = ()
+    vehicles: list[Name] = Field(default=[], max_length=MOST_VEHICLES)
     held_for_s: Seconds = 0.0
     starting_deadline_s: Seconds | None = None
     missed: Annotated[Missed, Field(strict=False)] = Missed.SKIP

@@ -1,0 +1,163 @@
+"""The schedule of a real executive: kills, restarts, the queue, and the commands for it."""
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from m2pem.testing import scenarios
+from tests.command_line import FLEET, MISSION, CommandLine, Program, install_plugin
+
+JOURNAL = ("--journal", "journal.db")
+SPEED = "20"
+
+DYING = """
+import os, signal
+
+from m2pem.engine.inputs import StartRun
+from m2pem.journal.sqlite import SqliteJournal
+
+create, append = SqliteJournal.create, SqliteJournal.append
+
+def die_at(place):
+    if os.environ.get("DIE_AT") == place:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+async def creating(self, header, started=None):
+    die_at("before the run is created")
+    run = await create(self, header, started)
+    die_at("after the run is created")
+    return run
+
+async def appending(self, entries):
+    await append(self, entries)
+    if any(isinstance(each.input, StartRun) for each in entries):
+        die_at("after the run has begun")
+
+SqliteJournal.create, SqliteJournal.append = creating, appending
+"""
+
+
+def serving(m2pem: CommandLine, *more: str, **environment: str) -> Program:
+    program = m2pem.start(
+        "serve", "--fleet", FLEET, "--ocu", "none", *JOURNAL, *more, **environment
+    )
+    assert program.process.stderr is not None
+    while "serving" not in program.process.stderr.readline():
+        assert program.process.poll() is None
+    return program
+
+
+def told(program: Program, wanted: str) -> str:
+    """Wait until the executive says it."""
+    assert program.process.stderr is not None
+    for line in program.process.stderr:
+        if wanted in line:
+            return line
+    raise AssertionError(f"it ended before it said {wanted!r}")
+
+
+def entry(m2pem: CommandLine, number: str) -> dict[str, Any]:
+    status, printed, errors = m2pem.run("schedule", "show", number, *JOURNAL, "--format", "json")
+    assert status == 0, errors
+    found: dict[str, Any] = json.loads(printed)
+    return found
+
+
+def runs(m2pem: CommandLine) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads(m2pem.run("runs", *JOURNAL, "--format", "json")[1])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("place", "run"),
+    [
+        ("before the run is created", "r1"),
+        ("after the run is created", "r2"),
+        ("after the run has begun", "r1"),
+    ],
+)
+def test_an_executive_that_is_killed_as_it_starts_a_mission_starts_it_once(
+    m2pem: CommandLine, tmp_path: Path, place: str, run: str
+) -> None:
+    dying = install_plugin(tmp_path, "dying", DYING)
+    server = serving(m2pem, "--speed", SPEED, DIE_AT=place, **dying)
+    assert m2pem.run("start", MISSION, *JOURNAL, "--when", "free")[:2] == (0, "s1\n")
+    assert server.process.wait() == -9
+    again = serving(m2pem, "--speed", SPEED)
+    while "asks" not in m2pem.run("replay", run, *JOURNAL)[1]:
+        assert again.process.poll() is None
+    assert [each["run"] for each in runs(m2pem)] == [run]
+    found = entry(m2pem, "s1")
+    assert (found["status"], found["run"]) == ("ended", run)
+    assert [each["settlement"] for each in found["times"]] == ["started"]
+
+
+def test_two_entries_for_one_rover_run_one_after_the_other_by_priority(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    reverse = tmp_path / "reverse.bpmn"
+    reverse.write_bytes(scenarios.in_sequence("reverse", "evsg1", {"distance": "20 m"}))
+    server = serving(m2pem, "--speed", SPEED)
+    for number, priority in (("s1", "0"), ("s2", "5")):
+        started = m2pem.run(
+            "start", reverse, *JOURNAL, "--when", "free", "--priority", priority, "--by", "ada"
+        )
+        assert started == (0, f"{number}\n", "")
+    told(server, "s2 has started")
+    told(server, "s1 has started")
+    while [each["status"] for each in runs(m2pem)] != ["completed", "completed"]:
+        assert server.process.poll() is None
+    first, second = runs(m2pem)
+    assert "started by s2, scheduled by ada" in m2pem.run("replay", "r1", *JOURNAL)[1]
+    assert first["ended_us"] <= second["started_us"]
+
+
+def test_a_time_that_came_while_nothing_served_is_said_at_the_start(m2pem: CommandLine) -> None:
+    server = serving(m2pem)
+    soon = (datetime.now(UTC) + timedelta(seconds=3)).isoformat()
+    scheduled = ("--when", soon, "--starting-deadline", "0 s", "--by", "ada")
+    assert m2pem.run("start", MISSION, *JOURNAL, *scheduled)[:2] == (0, "s1\n")
+    server.kill()
+    while entry(m2pem, "s1")["status"] == "scheduled":
+        pass
+    again = serving(m2pem)
+    assert "missed the start" in told(again, "s1")
+    assert runs(m2pem) == []
+    assert entry(m2pem, "s1")["status"] == "ended"
+
+
+def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
+    m2pem: CommandLine,
+) -> None:
+    server = serving(m2pem)
+    for more in (("--cron", "0 8 * * *"), ("--when", "08:00"), ("--after", "s1")):
+        zone = () if "--after" in more else ("--time-zone", "UTC")
+        assert m2pem.run("start", MISSION, *JOURNAL, *more, *zone)[0] == 0
+    listed = m2pem.run("schedule", *JOURNAL)[1]
+    assert "by cron 0 8 * * * (UTC)" in listed
+    assert "after s1 has completed" in listed
+    refused = m2pem.run("start", MISSION, *JOURNAL, "--condition", "vehicle.batery > 0.9")
+    assert refused[0] == 1
+    assert "did you mean 'vehicle.battery'" in refused[2]
+    assert m2pem.run("start", MISSION, *JOURNAL, "--when", "free", "--even-if-busy")[0] == 2
+    assert m2pem.run("schedule", "hold", "s1", "--reason", "rain", "--by", "ada", *JOURNAL)[0] == 0
+    assert entry(m2pem, "s1")["reason"] == "held by ada: rain"
+    stopped = m2pem.run("stop", "--all", *JOURNAL)[1]
+    assert "the schedule is held; `m2pem schedule release` lets it go on" in stopped
+    server.kill()
+    listed, note = m2pem.run("schedule", *JOURNAL)[1:]
+    assert listed.startswith("the schedule is held by")
+    assert "no executive serves this schedule now" in note
+    for words in (("release",), ("release", "s1"), ("cancel", "s2"), ("hold", "s3")):
+        assert m2pem.run("schedule", *words, *JOURNAL)[0] == 0
+    found = json.loads(m2pem.run("schedule", "--all", "--format", "json", *JOURNAL)[1])
+    assert {each["entry"]: each["status"] for each in found[0]["entries"]} == {
+        "s1": "scheduled",
+        "s2": "cancelled",
+        "s3": "held",
+    }
+    assert m2pem.run("schedule", "cancel", "s2", *JOURNAL)[0] == 1
+    assert m2pem.run("schedule", "show", "s9", *JOURNAL)[0] == 2
