@@ -442,7 +442,8 @@ class Scheduler:
         if found.due_us is not None and (overdue or found.passed):
             due_us = found.due_us if overdue else found.passed_us
             ends = "its last moment has passed" if overdue and found.owed else ""
-            entry = await self._missed(entry, due_us, found.passed + overdue, ends=ends)
+            number = found.passed + overdue
+            entry = await self._missed(entry, due_us, number, owed=found.owed, ends=ends)
             if not entry.state.active:
                 return None
             found = times.due(entry.plan, entry.state, now_us)
@@ -461,7 +462,7 @@ class Scheduler:
             entry = self._entries[entry.id]
             return now_us if entry.state.active else None
         if wait.never:
-            await self._missed(entry, found.due_us, 1, ends=wait.reason)
+            await self._missed(entry, found.due_us, 1, owed=found.owed, ends=wait.reason)
             return None
         if wait.for_resources:
             for resource in look.resources or ():
@@ -509,13 +510,14 @@ class Scheduler:
         self._publish(ScheduleChanged())
 
     async def _missed(
-        self, entry: ScheduleEntry, due_us: int, number: int, *, ends: str = ""
+        self, entry: ScheduleEntry, due_us: int, number: int, *, owed: bool, ends: str = ""
     ) -> ScheduleEntry:
-        """Settle times that were missed, and tell operators."""
+        """Settle times that were missed, and tell operators. `owed`: it had been missed before, and
+        the start that stands for it does not come any more."""
         look, plan = self._looks[entry.id], entry.plan
         why = ends or self._why_held(entry) or look.reason or "it was not served at that time"
         now_us = self._starter.clock.now_us()
-        settled = SettledTime(due_us, now_us, Settlement.MISSED, text=why, times=number)
+        settled = SettledTime(due_us, now_us, Settlement.MISSED, text=why, times=number, owed=owed)
         changed = await self._write(entry, times.settle(plan, entry.state, settled, ends=ends))
         look.warned_due_us = look.starts_us = None
         at = time_in(due_us, plan.when.time_zone)

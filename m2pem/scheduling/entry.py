@@ -92,7 +92,7 @@ class SettledTime(msgspec.Struct, frozen=True, omit_defaults=True):
     """What became of a time: of several that were missed together, of the last of `times`.
 
     Times are microseconds since the Unix epoch by the executive's clock. `run`: what was started.
-    `owed`: the time had been missed before, and this start stands for it.
+    `owed`: the time had been missed before, and this start stands for it, or was given up.
     """
 
     due_us: int

@@ -101,17 +101,18 @@ def test_two_entries_for_one_rover_run_one_after_the_other_by_priority(
     reverse = tmp_path / "reverse.bpmn"
     reverse.write_bytes(scenarios.in_sequence("reverse", "evsg1", {"distance": "20 m"}))
     server = serving(m2pem, "--speed", SPEED)
+    assert m2pem.run("start", MISSION, *JOURNAL)[:2] == (0, "r1\n")
     for number, priority in (("s1", "0"), ("s2", "5")):
         started = m2pem.run(
             "start", reverse, *JOURNAL, "--when", "free", "--priority", priority, "--by", "ada"
         )
         assert started == (0, f"{number}\n", "")
-    told(server, "s2 has started")
-    told(server, "s1 has started")
-    while [each["status"] for each in runs(m2pem)] != ["completed", "completed"]:
+    assert "evsg1: r1 uses it" in m2pem.run("schedule", *JOURNAL)[1]
+    assert m2pem.run("stop", "r1", *JOURNAL)[0] == 0
+    while [each["status"] for each in runs(m2pem)] != ["stopped", "completed", "completed"]:
         assert server.process.poll() is None
-    first, second = runs(m2pem)
-    assert "started by s2, scheduled by ada" in m2pem.run("replay", "r1", *JOURNAL)[1]
+    _, first, second = runs(m2pem)
+    assert "started by s2, scheduled by ada" in m2pem.run("replay", "r2", *JOURNAL)[1]
     assert first["ended_us"] <= second["started_us"]
 
 

@@ -80,6 +80,7 @@ def fleet() -> Fleet:
             uav: Vehicle(uav, Domain.AIR, "fake", {}, payloads=(eye,), lost_after_s=5.0),
         },
         {eye: Payload(eye, uav, "fake", {})},
+        unattended=True,
     )
 
 
