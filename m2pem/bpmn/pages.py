@@ -105,7 +105,9 @@ def extensions_page() -> str:
 
 def _element(element: OwnElement) -> str:
     where = [f"In {_quoted(element.places)}"] if element.places else []
-    inside = [f"m2pem:{each.name}" for each in ELEMENTS.values() if element.name in each.children]
+    inside = tuple(
+        f"m2pem:{each.name}" for each in ELEMENTS.values() if element.name in each.children
+    )
     if inside:
         where.append(f"{'inside' if where else 'Inside'} {_quoted(inside)}")
     lines = [f"- Its text: {element.text}\n"] if element.text else []
