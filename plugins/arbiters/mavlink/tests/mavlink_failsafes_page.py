@@ -21,7 +21,9 @@ No boundary event catches an error, so that a behavior that fails ends the missi
 it and go on. When the mission is over, m2pem ends, and with it its heartbeats as a ground station:
 a vehicle that stays in the air then returns by its own ground station failsafe.
 
-Phases that went alike share a row, and failsafes their rows.
+Phases that went alike share a row, and failsafes their rows. Where "on the ground" or "standing" is
+missing (but for the terrain), it kept the vehicle from being armed: it stayed disarmed, and the behavior ended
+with `FAILED` and the reason, such as "not ready: prearm: Battery 1 low voltage failsafe".
 
 - *The vehicle*: its modes from the failsafe on, also after the mission, and where it ended ("away":
   not at home).
@@ -48,6 +50,9 @@ The fleet says `failsafe: {vehicle.failsafe}`, the vehicle has {parameters}.
 |---|---|---|---|
 """
 
+NOT_ARMED = "`FAILED` not ready: "
+"""How each behavior ended that a failsafe kept from arming its vehicle."""
+
 SHORTER = (
     (r"(a failsafe of its own|another ground station or a switch) has taken over: ", ""),
     (r"the mode changed from \S+ (to \w[^:,]*)(, which m2pem did not command)?", r"\1"),
@@ -72,7 +77,8 @@ def _page() -> Iterator[str]:
         for name, phases in kept[vehicle.name].items():
             rows = defaultdict(list)
             for phase in vehicle.phases_of(vehicle.failsafes[name]):
-                rows[_cells(phases[phase])].append(phase)
+                if NOT_ARMED not in (cells := _cells(phases[phase])):
+                    rows[cells].append(phase)
             alike[tuple(f"{', '.join(row)} | {cells}" for cells, row in rows.items())].append(name)
         for lines, names in alike.items():
             first = f"**{'; '.join(names)}**"
