@@ -22,8 +22,8 @@ it and go on. When the mission is over, m2pem ends, and with it its heartbeats a
 a vehicle that stays in the air then returns by its own ground station failsafe.
 
 Phases that went alike share a row, and failsafes their rows. Where "on the ground" or "standing" is
-missing (but for the terrain), it kept the vehicle from being armed: it stayed disarmed, and the behavior ended
-with `FAILED` and the reason, such as "not ready: prearm: Battery 1 low voltage failsafe".
+missing (but for the terrain), the vehicle was not armed, and the behavior ended with `FAILED` and
+the reason, such as "not ready: prearm: Battery 1 low voltage failsafe".
 
 - *The vehicle*: its modes from the failsafe on, also after the mission, and where it ended ("away":
   not at home).
