@@ -6,10 +6,13 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import Any, TextIO
+
+from tests.preloaded import Process, preloaded
 
 REPOSITORY = Path(__file__).parents[1]
 MISSION = REPOSITORY / "missions" / "vignette1.bpmn"
@@ -17,29 +20,30 @@ FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
 ANSWERS = REPOSITORY / "missions" / "answers"
 
 Record = dict[str, Any]
+AnyProcess = Process | subprocess.Popen[bytes]
 
 
 @dataclass
 class Program:
     """A running m2pem. What it has printed so far is in `lines`."""
 
-    process: subprocess.Popen[str]
+    process: AnyProcess
+    stdin: TextIO
+    stdout: TextIO
+    stderr: TextIO
     lines: list[str] = field(default_factory=list)
 
     def type(self, line: str) -> None:
         """What an operator types."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(f"{line}\n")
-        self.process.stdin.flush()
+        self.stdin.write(f"{line}\n")
+        self.stdin.flush()
 
     def end_input(self) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.close()
+        self.stdin.close()
 
     def until(self, wanted: Callable[[str], bool]) -> str:
         """Read until a line is printed that is wanted."""
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
+        for line in self.stdout:
             self.lines.append(line.rstrip("\n"))
             if wanted(self.lines[-1]):
                 return self.lines[-1]
@@ -68,11 +72,9 @@ class Program:
 
     def rest(self) -> tuple[int, str]:
         """Read to the end: its exit status, and what it said on standard error."""
-        assert self.process.stdout is not None
-        assert self.process.stderr is not None
         # Not `communicate`, which overlooks what `until` has read ahead.
-        self.lines += self.process.stdout.read().splitlines()
-        errors = self.process.stderr.read()
+        self.lines += self.stdout.read().splitlines()
+        errors = self.stderr.read()
         return self.process.wait(), errors
 
     @property
@@ -95,30 +97,43 @@ class CommandLine:
 
     def start(self, *words: str | Path, **environment: str) -> Program:
         """Start it, with pipes for everything."""
-        process = subprocess.Popen(
-            [sys.executable, "-m", "m2pem", *map(str, words)],
-            cwd=self.folder,
-            env={**self.environment, **environment},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self._started.append(Program(process))
+        (stdin, ours), (out, stdout), (err, stderr) = os.pipe(), os.pipe(), os.pipe()
+        process = self._start(words, environment, (stdin, stdout, stderr))
+        for theirs in (stdin, stdout, stderr):
+            os.close(theirs)
+        pipes = os.fdopen(ours, "w"), os.fdopen(out), os.fdopen(err)
+        self._started.append(Program(process, *pipes))
         return self._started[-1]
 
     def run(self, *words: str | Path, **environment: str) -> tuple[int, str, str]:
         """Run it to its end with no input: exit status, standard output, standard error."""
-        done = subprocess.run(
-            [sys.executable, "-m", "m2pem", *map(str, words)],
-            cwd=self.folder,
-            env={**self.environment, **environment},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        return done.returncode, done.stdout, done.stderr
+        with (
+            Path(os.devnull).open() as nothing,
+            TemporaryFile("w+") as output,
+            TemporaryFile("w+") as errors,
+        ):
+            streams = nothing.fileno(), output.fileno(), errors.fileno()
+            status = self._start(words, environment, streams).wait()
+            output.seek(0)
+            errors.seek(0)
+            return status, output.read(), errors.read()
+
+    def _start(
+        self,
+        words: Sequence[str | Path],
+        environment: dict[str, str],
+        streams: tuple[int, int, int],
+    ) -> AnyProcess:
+        variables = {**self.environment, **environment}
+        if any(name.startswith("PYTHON") and name != "PYTHONPATH" for name in environment):
+            # Python itself reads these when it starts.
+            return subprocess.Popen(
+                [sys.executable, "-m", "m2pem", *map(str, words)],
+                **dict(zip(("stdin", "stdout", "stderr"), streams, strict=True)),
+                cwd=self.folder,
+                env=variables,
+            )
+        return preloaded().start([*map(str, words)], self.folder, variables, streams)
 
     def end(self) -> None:
         """Leave nothing running."""
@@ -126,9 +141,8 @@ class CommandLine:
             if program.process.poll() is None:
                 program.process.kill()
             program.process.wait()
-            for pipe in (program.process.stdin, program.process.stdout, program.process.stderr):
-                if pipe is not None:
-                    pipe.close()
+            for pipe in (program.stdin, program.stdout, program.stderr):
+                pipe.close()
 
 
 def command_line(folder: Path) -> Iterator[CommandLine]:

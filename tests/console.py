@@ -20,6 +20,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
+from tempfile import TemporaryFile
+
+from tests.preloaded import preloaded
 
 REPOSITORY = Path(__file__).parents[1]
 WHAT_COMMANDS_READ = (
@@ -27,6 +30,7 @@ WHAT_COMMANDS_READ = (
 )
 INSTALLING = frozenset({"make", "pip", "python3", "source"})
 """Commands of a page that `follow` leaves out: the environment of the tests is what they make."""
+FOR_A_SHELL = frozenset("|&;<>()$`*?[]{}~!")
 BOUND_S = 100
 
 
@@ -113,17 +117,35 @@ def make_workspace(folder: Path) -> Path:
 def run(
     text: str, folder: Path, environment: Mapping[str, str]
 ) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        ["bash", "-o", "pipefail", "-c", text],
-        cwd=folder,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=BOUND_S,
-        check=False,
-    )
+    """Run a command in a shell, or without one where it is the m2pem of the tests and no more."""
+    if (words := _words_of_m2pem(text, environment)) is None:
+        return subprocess.run(
+            ["bash", "-o", "pipefail", "-c", text],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=BOUND_S,
+            check=False,
+        )
+    with Path(os.devnull).open() as nothing, TemporaryFile("w+") as said:
+        streams = nothing.fileno(), said.fileno(), said.fileno()
+        process = preloaded().start(words, folder, environment, streams)
+        try:
+            status = process.wait(BOUND_S)
+        finally:
+            process.kill()
+        said.seek(0)
+        return subprocess.CompletedProcess(words, status, said.read())
+
+
+def _words_of_m2pem(text: str, environment: Mapping[str, str]) -> list[str] | None:
+    program, *words = shlex.split(text, comments=True)
+    found = shutil.which(program, path=environment["PATH"])
+    ours = program == "m2pem" and found == str(Path(sys.executable).with_name("m2pem"))
+    return words if ours and not FOR_A_SHELL & set(text.partition(" # ")[0]) else None
 
 
 def assert_does_what_is_shown(

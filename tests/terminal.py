@@ -1,17 +1,14 @@
 """m2pem at a terminal, where keys are pressed: a pseudo-terminal that is its controlling one."""
 
-import fcntl
 import os
 import re
 import select
-import subprocess
-import sys
-import termios
 import time
 from pathlib import Path
 from typing import Self
 
 from tests.command_line import REPOSITORY
+from tests.preloaded import preloaded
 
 CTRL_C = b"\x03"
 PATIENCE_S = 60.0
@@ -36,22 +33,13 @@ class Terminal:
         self._ours, theirs = os.openpty()
         output = results.open("wb") if results is not None else None
         here = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "m2pem", *map(str, words)],
-            cwd=folder,
-            env={
-                **here,
-                "HOME": str(folder),
-                "TERM": "xterm",
-                "PYTHONPATH": str(REPOSITORY),
-                **environment,
-            },
-            stdin=theirs,
-            stdout=output or theirs,
-            stderr=theirs,
-            start_new_session=True,
-            # Only of the terminal that controls a program the keys are signals.
-            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # noqa: PLW1509
+        variables = {"HOME": str(folder), "TERM": "xterm", "PYTHONPATH": str(REPOSITORY)}
+        self.process = preloaded().start(
+            [*map(str, words)],
+            folder,
+            {**here, **variables, **environment},
+            (theirs, output.fileno() if output is not None else theirs, theirs),
+            at_terminal=True,
         )
         os.close(theirs)
         if output is not None:

@@ -83,8 +83,8 @@ def test_missions_and_fleets_are_files(m2pem: CommandLine) -> None:
 
 @pytest.mark.parametrize("words", ["replay ", "stop ", "run m.bpmn --process ", "runs --delete "])
 def test_completion_imports_nothing_slow(m2pem: CommandLine, words: str) -> None:
-    m2pem.environment["PYTHONPROFILEIMPORTTIME"] = "1"
     imported = m2pem.run(
+        PYTHONPROFILEIMPORTTIME="1",
         _M2PEM_COMPLETE="bash_complete",
         COMP_WORDS=f"m2pem {words}",
         COMP_CWORD=str(1 + words.count(" ")),

@@ -9,8 +9,7 @@ from tests.command_line import FLEET, MISSION, CommandLine, Program, fleet_with_
 
 def serving(m2pem: CommandLine, fleet: Path, journal: str) -> Program:
     program = m2pem.start("serve", "--fleet", fleet, "--ocu", "none", "--journal", journal)
-    assert program.process.stderr is not None
-    assert "serving" in program.process.stderr.readline()
+    assert "serving" in program.stderr.readline()
     return program
 
 

@@ -11,8 +11,7 @@ from tests.command_line import FLEET, MISSION, CommandLine, Program
 
 def serving(m2pem: CommandLine, *words: str) -> Program:
     program = m2pem.start("serve", "--fleet", FLEET, "--ocu", "plain", *words)
-    assert program.process.stderr is not None
-    assert "serving mehds-vignette-1; operators: plain" in program.process.stderr.readline()
+    assert "serving mehds-vignette-1; operators: plain" in program.stderr.readline()
     return program
 
 
@@ -119,8 +118,7 @@ def test_runs_that_ended_long_ago_are_deleted_and_named(m2pem: CommandLine, tmp_
 
     asyncio.run(old_run())
     program = serving(m2pem, "--journal", str(path), "--keep", "12h")
-    assert program.process.stderr is not None
-    assert "deleted what ended longer ago than is kept: r1" in program.process.stderr.readline()
+    assert "deleted what ended longer ago than is kept: r1" in program.stderr.readline()
     program.type(f"start {MISSION}")
     program.until_text("UserSendRoute")
     program.send(signal.SIGTERM)

@@ -53,9 +53,8 @@ def test_a_second_signal_says_what_is_waited_for_and_a_third_gives_up(
     program.send(signal.SIGINT)
     program.until_record("RunEnded", outcome="stopped")
     program.send(signal.SIGINT)
-    assert program.process.stderr is not None
-    assert "stopping; waiting for evsg1" in program.process.stderr.readline()
-    assert "still waiting for evsg1" in program.process.stderr.readline()
+    assert "stopping; waiting for evsg1" in program.stderr.readline()
+    assert "still waiting for evsg1" in program.stderr.readline()
     program.send(signal.SIGTERM)
     status, errors = program.rest()
     assert status == 130
@@ -65,12 +64,10 @@ def test_a_second_signal_says_what_is_waited_for_and_a_third_gives_up(
 def test_a_run_whose_reader_goes_away_is_stopped(m2pem: CommandLine, tmp_path: Path) -> None:
     fleet, state = fleet_with_state(tmp_path)
     program = driving(m2pem, fleet, "--speed", "20")
-    assert program.process.stdout is not None
-    program.process.stdout.close()
+    program.stdout.close()
     program.process.wait()
     assert program.process.returncode == 130
-    assert program.process.stderr is not None
-    assert program.process.stderr.read() == ""
+    assert program.stderr.read() == ""
     assert [each.kind.value for each in recorded_effects(state)][-1] == "end"
     assert "the reader of its output has ended" in m2pem.run("runs")[1]
 

@@ -11,8 +11,7 @@ JOURNAL = ("--journal", "journal.db")
 
 def serving(m2pem: CommandLine, *more: str | Path) -> Program:
     program = m2pem.start("serve", "--fleet", FLEET, "--ocu", "none", *JOURNAL, *more)
-    assert program.process.stderr is not None
-    assert "serving" in program.process.stderr.readline()
+    assert "serving" in program.stderr.readline()
     return program
 
 
