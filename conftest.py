@@ -1,5 +1,6 @@
 """What all tests here go by: none fails because a computer is busy with something else."""
 
+import gc
 import os
 import signal
 import sys
@@ -8,12 +9,16 @@ import tempfile
 import pytest
 from hypothesis import HealthCheck, settings
 
+from m2pem.cli import NEW_OBJECTS
+
 # What a change has broken fails, and fails again: `make test` tries the same examples every time.
-# The long tests try others (`--hypothesis-profile random`).
+# The long tests try others, and more (`--hypothesis-profile random`).
 settings.register_profile(
     "random", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
-settings.register_profile("repeatable", settings.get_profile("random"), derandomize=True)
+settings.register_profile(
+    "repeatable", settings.get_profile("random"), derandomize=True, max_examples=40
+)
 settings.load_profile("repeatable")
 
 # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
@@ -46,6 +51,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if absent:
         config.hook.pytest_deselected(items=absent)
         items[:] = [item for item in items if item not in set(absent)]
+
+
+def pytest_collection_finish() -> None:
+    """Let Python look for garbage as rarely as in m2pem, and not in what was imported for tests."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(NEW_OBJECTS)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -1,4 +1,4 @@
-"""Which random models a long test tries: others each time, for as long as it may take."""
+"""Which random models a test tries: a few, the same each time; a long one others, and many."""
 
 import os
 import tempfile
@@ -6,6 +6,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
+
+from hypothesis import settings
+
+
+def examples(few: int, many: int) -> int:
+    """How many examples of hypothesis to try: many where they are others each time."""
+    return many if settings.get_current_profile_name() == "random" else few
 
 
 def seeds_for(seconds: float) -> Iterator[int]:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+from tests.seeds import examples
 
 from .sky import FRAME, NOW_US, airspace, area, claim, point, request, route, state
 
@@ -119,7 +120,7 @@ def requests(task: tuple[str, dict[str, Any], Where], name: str) -> BehaviorRequ
     return request(task[0], name, **task[1])
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=examples(50, 200))
 @given(tasks(), tasks(), st.booleans(), st.booleans())
 def test_two_that_may_both_go_meet_at_no_speed_whatever(
     first: tuple[str, dict[str, Any], Where],
@@ -146,7 +147,7 @@ def test_two_that_may_both_go_meet_at_no_speed_whatever(
             assert not nearer_than_both(a, b), (a, b)
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=examples(100, 400))
 @given(
     st.lists(st.tuples(metres, metres), min_size=2, max_size=4),
     st.lists(st.tuples(metres, metres), min_size=2, max_size=4),

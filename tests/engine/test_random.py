@@ -18,12 +18,15 @@ from tests.engine.kit import Play
 from tests.engine.random_missions import graph, structured
 from tests.engine.random_play import RandomPlay
 from tests.engine.snapshot import snapshot
-from tests.seeds import seeds_for
+from tests.seeds import examples, seeds_for
 
 DICE = st.randoms(use_true_random=False)
 
 QUICK = settings(
-    max_examples=100, deadline=None, suppress_health_check=list(HealthCheck), database=None
+    max_examples=examples(30, 100),
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    database=None,
 )
 FEW = 150
 LONG_S = 600.0

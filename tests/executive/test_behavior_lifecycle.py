@@ -13,6 +13,7 @@ from m2pem.executive.behavior_lifecycle import (
     TRANSITIONS,
     BehaviorViews,
 )
+from tests.seeds import examples
 
 from .lifecycle_world import VEHICLES, follows, live
 
@@ -136,7 +137,9 @@ steps = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(
+    max_examples=examples(15, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 @given(st.booleans(), steps)
 def test_no_two_owners_disagree_whatever_happens(
     flying: bool, steps: list[tuple[Any, ...]]

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from m2pem.api import Area
 from m2pem.geo.fence import MARGIN_M, Fence
+from tests.seeds import examples
 
 HOME = (38.1, -77.3)
 
@@ -71,7 +72,7 @@ def test_a_vehicle_that_is_outside_may_come_back() -> None:
     assert Fence(FIELD).breach([at(10, 10)], at(-50, 10)) == ""
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(37, 150), deadline=None)
 @given(
     st.lists(st.floats(20, 100), min_size=3, max_size=8),
     st.tuples(st.floats(-110, 110), st.floats(-110, 110)),

@@ -28,6 +28,7 @@ from m2pem.mission.expression.tree import (
     Operation,
     Or,
 )
+from tests.seeds import examples
 
 NAMES = ("a", "b.c", "d_1", "größe")
 BIG = 2**63
@@ -287,19 +288,19 @@ def check_any_text(text, language, store):
 # --- the tests ----------------------------------------------------------------------------------
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(75, 300), deadline=None)
 @given(trees, stores)
 def test_random_expressions_have_the_value_of_the_reference(tree, store):
     check_against_reference(tree, store)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(50, 200), deadline=None)
 @given(trees_with_calls, stores)
 def test_evaluation_raises_nothing_but_expression_errors(tree, store):
     check_errors(tree, store)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=examples(125, 500), deadline=None)
 @given(any_text, languages, stores)
 def test_parsing_raises_nothing_but_syntax_errors(text, language, store):
     check_any_text(text, language, store)

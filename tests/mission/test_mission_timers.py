@@ -16,6 +16,7 @@ from m2pem.mission.timers import (
     next_round,
     parse_cron,
 )
+from tests.seeds import examples
 
 SECOND_US = 1_000_000
 DAY_US = 86_400 * SECOND_US
@@ -166,7 +167,7 @@ def test_a_time_beyond_the_calendar_is_refused(at_us):
         duration_us("PT1S", at_us)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(50, 200), deadline=None)
 @given(st.integers(0, 10**15), st.integers(-(10**16), 10**16))
 def test_durations_are_exact_to_the_microsecond(length_us, at_us):
     seconds, rest_us = divmod(length_us, SECOND_US)
@@ -174,7 +175,7 @@ def test_durations_are_exact_to_the_microsecond(length_us, at_us):
     assert duration_us(f"P{days}DT{seconds}.{rest_us:06}S", at_us) == length_us
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(75, 300), deadline=None)
 @given(
     st.text(st.sampled_from("R/P1203TYMWDHS:-+.,Z 9"), max_size=30) | st.text(max_size=20),
     st.integers(-(2**63), 2**63 - 1),
@@ -440,7 +441,7 @@ def test_bad_cycle_is_refused(text, message):
         cycle(text)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(75, 300), deadline=None)
 @given(
     st.text(st.sampled_from("R/P1203TYMWDHS:-+.,Z 9*?#L@"), max_size=30) | st.text(max_size=20),
     st.integers(-(10**16), 10**16),

@@ -9,6 +9,7 @@ from m2pem.simulation.course import Course, Craft
 from m2pem.simulation.kinematics import DEFAULTS
 from m2pem.simulation.segments import Pose, Vector
 from m2pem.simulation.trajectory import Plan
+from tests.seeds import examples
 
 GROUND, AIR = DEFAULTS["ground"], DEFAULTS["air"]
 
@@ -96,7 +97,7 @@ places = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(15, 60), deadline=None)
 @given(places, st.sampled_from(sorted(DEFAULTS)), st.floats(0.5, 40), st.floats(0, 15))
 def test_random_routes_are_continuous_and_never_too_fast(
     route: list[Vector], domain: str, speed: float, moving: float

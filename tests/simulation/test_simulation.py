@@ -14,6 +14,7 @@ from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.kinematics import DEFAULTS
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.seeds import examples
 from tests.simulation.conftest import START_US, Fleet, local, make, place, route
 
 STEP_S = 0.1
@@ -98,7 +99,7 @@ async def play(clock: Clock, script: list[tuple[float, str, str | int]]) -> None
             assert (await bench.ended(f"r2.{vehicle}", 30)).state is BehaviorState.SUCCEEDED
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(6, 25), deadline=None)
 @given(commands)
 def test_any_commands_at_any_time(script: list[tuple[float, str, str | int]]) -> None:
     run_virtual(lambda clock: play(clock, script), START_US)

@@ -16,6 +16,7 @@ from m2pem.simulation.kinematics import DEFAULTS
 from m2pem.simulation.segments import Pose, Stand, Travel, fit
 from m2pem.simulation.trajectory import Plan, Track, Warp, retimed
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness
+from tests.seeds import examples
 from tests.simulation.conftest import Fleet, Simulate, area, local, place, route
 
 S = 1_000_000
@@ -231,7 +232,7 @@ def test_all_members_of_a_survey_are_adjusted(simulate: Simulate) -> None:
 metres = st.integers(-200, 200).map(float)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=examples(50, 200))
 @given(
     st.lists(st.tuples(metres, metres, st.sampled_from([30.0, 60.0])), min_size=1, max_size=5),
     st.floats(0.0, 1.0),

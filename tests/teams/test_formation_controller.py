@@ -16,6 +16,7 @@ from m2pem.teams.behavior import PERIOD_S
 from m2pem.teams.columns import lane_mates, march
 from m2pem.teams.formation_controller import FormationController
 from m2pem.teams.plan import MOTIONS, March, MemberPose, Plan, PlanningContext
+from tests.seeds import examples
 
 from .carts import FRAME, Cart
 from .conftest import route
@@ -143,7 +144,9 @@ def roads(draw: st.DrawFn) -> list[tuple[float, float]]:
     return places
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(
+    max_examples=examples(10, 40), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
 @given(
     places=roads(),
     count=st.integers(2, 5),
@@ -176,7 +179,7 @@ def test_a_column_never_closes_up_to_less_than_half_of_its_spacing_and_always_ar
         assert least_m >= spacing / 2 - 0.5, (pair, least_m)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(6, 20))
 @given(
     places=roads(),
     count=st.integers(2, 4),
@@ -207,7 +210,7 @@ def test_nobody_drives_up_to_one_who_stops_dead(
 
 
 @given(places=roads(), steady=st.booleans(), slow=st.integers(0, 2))
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(6, 20))
 def test_who_is_abreast_stays_so_though_one_is_slow(
     places: list[tuple[float, float]], steady: bool, slow: int
 ) -> None:

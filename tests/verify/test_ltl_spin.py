@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from m2pem.verify.ltl import Observer
 from m2pem.verify.ltl.formula import Active, Always, And, Formula, Not
 from m2pem.verify.ltl.lasso import Moment
+from tests.seeds import examples
 from tests.verify import formulas, never_claim
 from tests.verify.acceptance import accepts
 
@@ -15,7 +16,7 @@ NEVER = And((Not(Active("a")), Always(Active("a"))))
 runs = st.lists(st.tuples(formulas.prefixes, formulas.cycles), min_size=10, max_size=30)
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(20, 80), deadline=None, suppress_health_check=list(HealthCheck))
 @given(formulas.future, runs)
 @example(NEVER, [([], [frozenset()]), ([], [frozenset({Active("a")})])])
 def test_spin_accepts_the_same_runs(

@@ -16,6 +16,7 @@ from m2pem.verify.ltl.model_check import (
     check,
 )
 from m2pem.verify.search.explore import Limits
+from tests.seeds import examples
 from tests.verify import formulas
 from tests.verify.small_systems import SmallSystem, is_fair, runs, systems
 
@@ -30,7 +31,7 @@ def chain(*of_states: int, back_to: int | None = None) -> SmallSystem:
     return SmallSystem(tuple(steps), of_states, (0,) * len(of_states))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(37, 150), deadline=None)
 @given(systems(), formulas.formulas)
 def test_a_formula_holds_just_when_no_run_breaks_it(system: SmallSystem, formula: Formula) -> None:
     verdict = check(system, formula)
@@ -40,7 +41,7 @@ def test_a_formula_holds_just_when_no_run_breaks_it(system: SmallSystem, formula
         assert breaks(system, formula, verdict.run, steps=False)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(37, 150), deadline=None)
 @given(systems(), formulas.formulas)
 def test_with_fairness_only_fair_runs_count(system: SmallSystem, formula: Formula) -> None:
     verdict = check(system, formula, fair={transition: transition for transition in range(3)})
@@ -51,7 +52,7 @@ def test_with_fairness_only_fair_runs_count(system: SmallSystem, formula: Formul
         assert is_fair(system, verdict.run)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(25, 100), deadline=None)
 @given(systems(), formulas.stepping)
 def test_single_steps_are_moments_for_formulas_that_look_at_them(
     system: SmallSystem, formula: Formula

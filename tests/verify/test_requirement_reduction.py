@@ -19,6 +19,7 @@ from m2pem.verify.search.explore import Exploration, explore
 from m2pem.verify.search.stubborn_sets import states_to_expand
 from m2pem.verify.translate import Options
 from tests.bpmn.bpmn_text import flow
+from tests.seeds import examples
 from tests.verify import formulas
 from tests.verify.answers import check_mission
 from tests.verify.branches import branches, shapes
@@ -35,7 +36,7 @@ def about(formula: Formula, atoms: dict[Proposition, Proposition]) -> Formula:
     return rebuilt(formula, lambda each: about(each, atoms))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(15, 60), deadline=None)
 @given(shapes, st.booleans(), formulas.formulas, st.data())
 def test_no_answer_changes(
     shape: list[tuple[int, bool]], interruptible: bool, formula: Formula, data: st.DataObject

@@ -38,7 +38,7 @@ from m2pem.verify.spin.trail import replay
 from m2pem.verify.translate import Options, translate
 from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
-from tests.seeds import seeds_for
+from tests.seeds import examples, seeds_for
 from tests.verify import formulas
 from tests.verify.missions import approval, pair
 from tests.verify.random_needs import OPEN, branches_with_needs, fleet_of, net_of
@@ -289,7 +289,12 @@ def _on_elements(formula: Formula, names: dict[str, str]) -> Formula:
 
 
 @given(formulas.formulas, st.integers(0, 10_000))
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@settings(
+    max_examples=examples(6, 25),
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    derandomize=True,
+)
 def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
     assume(not needs_steps(formula))
     dice = Random(seed)

@@ -12,6 +12,7 @@ from ptz_fake_camera import ORIGIN, Gimbal, rad
 from ptz_world import CAMERA, play, point
 
 from m2pem.api import BehaviorParameters, BehaviorState, VehiclePosition
+from tests.seeds import examples
 
 
 def on_ground(target):
@@ -61,7 +62,7 @@ def test_without_a_vehicle_that_is_heard_directions_still_work_but_places_do_not
     play(main, moves=None)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(3, 8), deadline=None)
 @given(
     speed=st.floats(0, 8),
     turn_deg_s=st.floats(-30, 30),
