@@ -94,7 +94,7 @@ def results(tmp_path: Path) -> str:
 def test_a_long_search_counts_up_on_a_terminal_and_wipes_its_line(
     tmp_path: Path, mission: Path
 ) -> None:
-    with at_terminal(tmp_path, mission, "--max-seconds", "6") as terminal:
+    with at_terminal(tmp_path, mission, "--max-seconds", "4") as terminal:
         first = terminal.until(r"searching for \d+ s, ([\d,]+) states found, [\d,]+ of them to be")
         terminal.until(r"searching for [2-9] s, ")
         assert terminal.rest() == 3
@@ -113,7 +113,7 @@ def test_a_long_search_counts_up_on_a_terminal_and_wipes_its_line(
 def test_without_a_terminal_nothing_is_shown_on_the_way(
     m2pem: CommandLine, mission: Path, engine: str
 ) -> None:
-    status, out, err = m2pem.run("verify", mission, "--max-seconds", "2", "--engine", engine)
+    status, out, err = m2pem.run("verify", mission, "--max-seconds", "1", "--engine", engine)
     assert (status, err) == (3, "")
     assert re.search(
         r"undecided  no-deadlock .* \([\d,]+ states, stopped by the limit of time\)", out

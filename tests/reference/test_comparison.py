@@ -22,7 +22,7 @@ from tests.reference.shrinking import shrunk
 from tests.reference.traces import drawn
 from tests.reference.xml_of import xml_of
 
-FEW = 250
+FEW = 80
 MANY = 2_000
 QUICK = Bounds()
 THOROUGH = Bounds(inputs=7, nodes=60, states=10, orders=500, budget=10_000)
@@ -86,7 +86,7 @@ def test_the_engine_has_the_traces_of_the_reference_on_many_models(generate: Gen
 
 @BOTH
 def test_random_models_have_all_kinds_of_elements(generate: Generate) -> None:
-    nodes = [node for seed in range(FEW) for node in all_nodes(generate(Random(seed)))]
+    nodes = [node for seed in range(250) for node in all_nodes(generate(Random(seed)))]
     kinds = {"user", "subprocess", "boundary", "start", "end", "throw", "catch"}
     kinds |= ELEMENTS & {"exclusive", "parallel", "inclusive", "complex", "event_gateway", "task"}
     kinds |= ELEMENTS & {"event_subprocess"}

@@ -115,12 +115,12 @@ def places(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize(
     ("make", "models"),
     [
-        (nets, 30),
-        (sound_nets, 25),
-        (failing_nets, 25),
+        (nets, 10),
+        (sound_nets, 10),
+        (failing_nets, 16),
         (transitions, 25),
         (missions, 10),
-        (needs, 10),
+        (needs, 5),
     ],
 )
 def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int) -> None:

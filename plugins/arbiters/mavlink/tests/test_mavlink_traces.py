@@ -14,8 +14,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 INSTANCE = 71
 REPOSITORY = Path(__file__).parents[4]
+ALWAYS = {"go_to", "mission", "return_to_launch"}
 PLAYED = [
-    pytest.param(vehicle, scenario, id=f"{vehicle}-{scenario.name}")
+    pytest.param(
+        vehicle,
+        scenario,
+        id=f"{vehicle}-{scenario.name}",
+        marks=() if vehicle == "arducopter" or scenario.name in ALWAYS else pytest.mark.long,
+    )
     for vehicle in VEHICLES
     for scenario in scenarios_of(vehicle)
 ]
