@@ -33,7 +33,29 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("package", ["m2pem", "m2pem.api", "m2pem.testing"])
+PACKAGES = ("m2pem", "m2pem.api", "m2pem.testing")
+INCLUDED = re.compile(r"^::: ([\w.]+)\n(?: +options:\n +members: \[([^]]*)\])?", re.M)
+"""A module that a page includes, and those of its names that it shows, if not all."""
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_pages_of_the_reference_include_every_public_name(package: str) -> None:
+    pages = sorted((REPOSITORY / "docs" / "reference").glob("*.md"))
+    included = [each for page in pages for each in INCLUDED.findall(page.read_text())]
+    shown = {module for module, members in included if not members}
+    shown |= {f"{module}.{name}" for module, names in included for name in names.split(", ")}
+    places = importlib.import_module(package)._LAZY
+    modules = {
+        name: module if module.startswith("m2pem") else f"{package}.{module}"
+        for name, module in places.items()
+    }
+    assert len(modules) > 10
+    left = {name for name, module in modules.items() if not {module, f"{module}.{name}"} & shown}
+    assert sorted(left) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("package", PACKAGES)
 def test_every_public_name_is_in_the_reference(package: str, site: Path) -> None:
     page = "".join(page.read_text() for page in (site / "reference").glob("*.html"))
     documented = {anchor.rpartition(".")[2] for anchor in re.findall(r'id="(m2pem\.[\w.]+)"', page)}
@@ -41,6 +63,7 @@ def test_every_public_name_is_in_the_reference(package: str, site: Path) -> None
     assert sorted(names - documented) == []
 
 
+@pytest.mark.long
 def test_hooks_and_fixtures_are_in_the_reference(site: Path) -> None:
     hooks = (site / "reference" / "hooks.html").read_text(encoding="utf-8")
     names = [name for name in vars(importlib.import_module("m2pem.hookspecs")) if "m2pem_" in name]
@@ -49,6 +72,7 @@ def test_hooks_and_fixtures_are_in_the_reference(site: Path) -> None:
     assert all(f'id="m2pem.testing.plugin.{name}"' in fixtures for name in FIXTURES)
 
 
+@pytest.mark.long
 def test_pages_load_nothing_from_other_hosts(site: Path) -> None:
     loads = re.compile(
         r"""<(?:script|img|iframe)[^>]+src="https?:|<link[^>]+stylesheet[^>]+https?:"""
@@ -66,6 +90,7 @@ def test_names_that_are_loaded_when_asked_for_are_all_there() -> None:
             _ = package.nothing
 
 
+@pytest.mark.long
 def test_links_to_files_of_the_repository_lead_to_them(site: Path) -> None:
     written = re.compile(r"\]\(\.\./(?!\.\.)([^)#]+)\)")
     count = 0
@@ -84,6 +109,7 @@ def test_links_to_files_of_the_repository_lead_to_them(site: Path) -> None:
     assert count > 20
 
 
+@pytest.mark.long
 def test_readmes_are_pages_whose_links_lead_somewhere(site: Path) -> None:
     readmes = [REPOSITORY / "README.md", *(REPOSITORY / "examples").rglob("README.md")]
     assert len(readmes) > 20

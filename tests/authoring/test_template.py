@@ -1,8 +1,10 @@
 """The template yields plugins that can be installed, and whose tests pass."""
 
+import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -24,10 +26,31 @@ def render(template: Path, folder: Path, **answers: str) -> subprocess.Completed
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(kind, marks=() if kind == "arbiter" else pytest.mark.long) for kind in KINDS],
-)
+def test_an_arbiter_of_the_template_passes_its_tests(tmp_path: Path) -> None:
+    """Found where it was rendered, without pip."""
+    boat = tmp_path / "boat"
+    assert render(REPOSITORY / "templates" / "plugin", boat, name="sea-boat").returncode == 0
+    project = tomllib.loads((boat / "pyproject.toml").read_text())["project"]
+    info = boat / f"{project['name'].replace('-', '_')}-0.1.0.dist-info"
+    info.mkdir()
+    said = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: 0.1.0\n"
+    (info / "METADATA").write_text(said)
+    ((name, module),) = project["entry-points"]["m2pem"].items()
+    (info / "entry_points.txt").write_text(f"[m2pem]\n{name} = {module}\n")
+    tested = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:schemathesis"],
+        cwd=boat,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(boat), str(REPOSITORY)])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert tested.returncode == 0, tested.stdout
+    assert re.search(KINDS["arbiter"][1], tested.stdout, re.M), tested.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.timeout(300)
 def test_a_plugin_of_the_template_is_installed_and_passes_its_tests(
     kind: str, author: Author

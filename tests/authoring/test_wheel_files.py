@@ -8,6 +8,7 @@ import pytest
 from tests.authoring.author import REPOSITORY, Author
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_folders_and_examples_are_made_from_the_wheel_alone(author: Author) -> None:
     author.do("python3 -m venv .venv")
@@ -27,6 +28,7 @@ def test_folders_and_examples_are_made_from_the_wheel_alone(author: Author) -> N
         assert (author.folder / kind / "mission.bpmn").exists()
 
 
+@pytest.mark.long
 def test_the_wheel_has_no_compiled_file(author: Author) -> None:
     with ZipFile(author.wheel) as wheel:
         assert [name for name in wheel.namelist() if "__pycache__" in name] == []

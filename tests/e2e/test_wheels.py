@@ -1,6 +1,6 @@
 """Wheels of m2pem in an environment that has nothing else: they have all that the docs show.
 
-The environment is made with `-m long`, on every supported Python of this machine.
+The environment is made on every supported Python of this machine.
 """
 
 import os
@@ -16,6 +16,8 @@ import pytest
 
 from tests.console import environment as shell_of
 from tests.console import follow, make_workspace
+
+pytestmark = pytest.mark.long
 
 REPOSITORY = Path(__file__).parents[2]
 PLUGINS = sorted(path.parent for path in REPOSITORY.glob("plugins/*/*/pyproject.toml"))
@@ -99,7 +101,6 @@ def cases() -> Iterator[str]:
             yield version
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("version", list(cases()))
 def test_wheels_alone_do_what_the_first_pages_show(
     version: str, wheels: Path, tmp_path: Path
