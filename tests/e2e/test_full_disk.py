@@ -23,7 +23,7 @@ DRIVE = mission(
     f'</boundaryEvent><endEvent id="Noted"/><endEvent id="E"/>{flow("S", "Drive")}'
     f"{flow('Often', 'Noted')}{flow('Drive', 'E')}</process>"
 )
-"""A drive of some 110 m, in which a timer has more written than a small disk takes."""
+"""A drive of some 80 m, in which a timer has more written than a small disk takes."""
 
 WITHIN_S = 60.0
 

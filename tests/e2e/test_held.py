@@ -7,7 +7,7 @@ from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import CommandLine, Program, fleet_with_state, install_plugin
 from tests.executive.conftest import behavior, flow, mission
 
-TARGET = '<m2pem:property name="target" value="[38.1085, -77.3192, 60]"/>'
+TARGET = '<m2pem:property name="target" value="[38.10822, -77.3192, 60]"/>'
 DRIVE = mission(
     '<process id="P" isExecutable="true"><startEvent id="S"/><intermediateCatchEvent id="Soon">'
     "<timerEventDefinition><timeDuration>PT1S</timeDuration></timerEventDefinition>"
@@ -15,7 +15,7 @@ DRIVE = mission(
     f'<endEvent id="E"/>{flow("S", "Soon")}{flow("S", "Drive")}{flow("Soon", "E")}'
     f"{flow('Drive', 'E')}</process>"
 )
-"""A drive of some 110 m, in which a timer has something written to the journal."""
+"""A drive of some 80 m, in which a timer has something written to the journal."""
 
 LOCKING = """
 import os, sqlite3

@@ -30,7 +30,8 @@ def test_of_no_contract(): pass
 
 def run_pytest(folder: Path, code: str, *options: str) -> str:
     (folder / "test_it.py").write_text(code)
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
+    without = ("-p", "no:cacheprovider", "-p", "no:schemathesis", "-p", "no:hypothesispytest")
+    command = [sys.executable, "-m", "pytest", "-q", *without, *options]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     return done.stdout + done.stderr
 

@@ -181,6 +181,7 @@ async def test_signing_in_has_no_violation(
         eyes.assert_well()
 
 
+@pytest.mark.long
 @LIGHT_AND_DARK
 async def test_runs_and_replays_have_no_violation(desk: Desk, dark: bool) -> None:
     eyes = await opened(desk, dark)

@@ -110,6 +110,7 @@ async def test_what_is_copied_keeps_its_behavior_in_another_mission(desk: Desk) 
     assert '<m2pem:property name="distance" value="10 m"' in saved
 
 
+@pytest.mark.long
 async def test_pictures_are_drawn(desk: Desk) -> None:
     page = await desk.edit()
     svg = await downloaded(page, "picture (SVG)")

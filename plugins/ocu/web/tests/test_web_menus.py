@@ -1,5 +1,6 @@
 """Every menu of the editor opens with its entries, on every kind of element."""
 
+import pytest
 from playwright.async_api import Page, expect
 from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import MENU, Drawing
@@ -29,6 +30,7 @@ PALETTE = 15
 TWO_FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
+@pytest.mark.long
 async def test_every_menu_has_its_entries_on_every_kind_of_element(desk: Desk) -> None:
     page = await desk.edit()
     drawing = Drawing(page)
