@@ -1,6 +1,7 @@
 """Reads the files of cases; says file, line and case of whatever is wrong with one."""
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from tests.cases.case import ENDS, Case, Expected, Step
 from tests.cases.when import read_when
 
 DATA = Path(__file__).parents[1] / "data"
+TOPICS = sorted(DATA.glob("[0-9]*/*.yaml"))
 
 _REQUIRED = ("file", "case", "clause", "element", "variant", "steps", "then")
 _OPTIONAL = ("given", "extension", "process")
@@ -24,10 +26,10 @@ class CaseError(Exception):
     """A case that cannot be read: `place: case: what is wrong`."""
 
 
+@cache
 def read_cases() -> list[Case]:
     """Every case of every chapter's folder."""
-    topics = sorted(DATA.glob("[0-9]*/*.yaml"))
-    return [case for topic in topics for case in read_topic(topic)]
+    return [case for topic in TOPICS for case in read_topic(topic)]
 
 
 def read_topic(path: Path) -> list[Case]:
