@@ -192,9 +192,21 @@ check: lint ## check style, types, layers and the core's unit tests: two minutes
 	@$(BIN)/pytest -n 2 -m "not long" $(UNITS)
 
 test: setup ## check all but the long tests
-	@$(MAKE) --silent --jobs 2 --output-sync=target lint bench-quick page-test
-	@$(BIN)/pytest -n $(WORKERS) -m "not long"
-	@$(MAKE) --silent test-ros
+	@$(MAKE) --silent --jobs 3 --output-sync=target lint bench-quick page-test collected
+	@$(MAKE) --silent --jobs 2 test-core test-ros-aside
+
+.PHONY: test-core test-ros-aside collected
+
+test-core:
+	@$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not long"
+
+# The tests of ROS wait more than they compute: they run beside the others, and are told of when they are through.
+test-ros-aside:
+	@status=0; told=$$($(MAKE) --silent test-ros 2>&1) || status=$$?; echo "$$told"; exit $$status
+
+# One process compiles the tests, which in a fresh clone each worker would do.
+collected: setup
+	@$(BIN)/pytest --collect-only -q -m "not long" >/dev/null || { $(BIN)/pytest --collect-only -qq; exit 1; }
 
 # The unit tests of the page's own code.
 page-test: setup
