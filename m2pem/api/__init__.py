@@ -79,6 +79,13 @@ if TYPE_CHECKING:
         OPERATIONS,
         Operation,
     )
+    from m2pem.api.remaining import (
+        RemainingRoute,
+        RemainingSurvey,
+        RemainingWork,
+        raw_parameters,
+        restored_work,
+    )
     from m2pem.api.run_view import RunView
     from m2pem.api.schedule import (
         WHEN_FREE,
@@ -111,10 +118,11 @@ if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
     from m2pem.geo.fence import Fence
     from m2pem.geo.geojson import as_geojson, parse_geojson
-    from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+    from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
     from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
     from m2pem.geo.polygon import edges_enclose, middle_of
     from m2pem.geo.polyline import Polyline, Segment
+    from m2pem.geo.survey_tracks import SurveyTracks
     from m2pem.mission.behavior import BehaviorType, Decision
     from m2pem.mission.catalogue import (
         BehaviorSpec,
@@ -164,6 +172,9 @@ _MODULES = {
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
     ),
+    "m2pem.api.remaining": (
+        "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
+    ),
     "m2pem.api.run_view": "RunView",
     "m2pem.api.schedule": (
         "WHEN_FREE Concurrency EntryId Missed Schedule ScheduleChanged ScheduledMission"
@@ -189,10 +200,11 @@ _MODULES = {
     "m2pem.geo.fence": "Fence",
     "m2pem.fleet.fleet": "Fleet",
     "m2pem.geo.geojson": "as_geojson parse_geojson",
-    "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw",
+    "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw strip_width_m",
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
     "m2pem.geo.polygon": "edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
+    "m2pem.geo.survey_tracks": "SurveyTracks",
     "m2pem.suggestions": "did_you_mean",
     "m2pem.units": "US_PER_S Dimension UnitError quantity",
 }
@@ -289,6 +301,9 @@ __all__ = [
     "PromptClosed",
     "Record",
     "ReclaimingArbiter",
+    "RemainingRoute",
+    "RemainingSurvey",
+    "RemainingWork",
     "ResolvedValue",
     "ResourceId",
     "ResumePolicy",
@@ -307,6 +322,7 @@ __all__ = [
     "SightedArbiter",
     "SimulationResult",
     "StampedRecord",
+    "SurveyTracks",
     "SystemClock",
     "TeamMemberState",
     "TeamState",
@@ -334,7 +350,10 @@ __all__ = [
     "parse_geojson",
     "parse_mission",
     "quantity",
+    "raw_parameters",
+    "restored_work",
     "simulator_group",
+    "strip_width_m",
 ]
 
 

@@ -55,6 +55,11 @@ class BehaviorParameters:
         """Return those of these names that are given, to pass them on."""
         return {name: self._values[name] for name in names if name in self}
 
+    @property
+    def given(self) -> Mapping[str, ResolvedValue]:
+        """All that are given."""
+        return {name: value for name, value in self._values.items() if value is not None}
+
     def number(self, name: str) -> float | None:
         """Return a number in SI; None if it is not given."""
         value = self._values.get(name)

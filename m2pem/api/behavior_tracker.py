@@ -247,7 +247,7 @@ class BehaviorTracker:
             reason,
             last.native_ref,
             outputs or {},
-            remaining=last.remaining,
+            remaining=None if state is BehaviorState.SUCCEEDED else last.remaining,
         )
         self._reports.put(entry.last)
 

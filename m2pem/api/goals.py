@@ -19,6 +19,7 @@ from m2pem.api.behavior_tracker import BehaviorTracker
 from m2pem.api.capabilities import ArbiterCapabilities
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
+from m2pem.mission.values import Value
 
 STATES_WAITING = 1000
 CONNECT_WITHIN_S = 2.0
@@ -94,11 +95,13 @@ class GoalArbiter:
         became: BehaviorState | None = None,
         code: str = "",
         reason: str = "",
+        remaining: Mapping[str, Value] | None = None,
     ) -> None:
         """Process a state of a resource, and its present or last goal.
 
         `became`: how the goal ended (SUCCEEDED, FAILED with a `code`, CANCELLED); None before its
-        end. The same values may be passed repeatedly.
+        end. `remaining`: what is left of it, as in `BehaviorReport`. The same values may be passed
+        repeatedly.
         """
         self._states.put(state)
         self._received_us[state.resource] = self.context.clock.now_us()
@@ -107,6 +110,8 @@ class GoalArbiter:
         self._goals[state.resource] = goal
         if behavior := self._behaviors.get(goal):
             self._ledger.progress(behavior)
+            if remaining is not None:
+                self._ledger.remains(behavior, remaining)
             if became is not None:
                 self._ledger.end(behavior, became, code, reason)
 

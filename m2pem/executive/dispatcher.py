@@ -7,7 +7,7 @@ vehicle: what comes of a command arrives as a report.
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
@@ -42,6 +42,7 @@ class _Active:
     arbiter: Arbiter
     resources: tuple[ResourceId, ...]
     last_number: int = 0
+    adopted: bool = False
     deadline: asyncio.Task[None] | None = None
 
 
@@ -201,6 +202,9 @@ class Dispatcher:
             return
         active = self._active.get(report.id)
         if active is not None:
+            if active.adopted and report.remaining is not None:
+                # Its arbiter counts from the start again; the journal has higher numbers.
+                report = replace(report, number=max(report.number, active.last_number + 1))
             active.last_number = max(active.last_number, report.number)
         self._post(report)
 
@@ -216,7 +220,7 @@ class Dispatcher:
     def adopt(self, behavior: str, resources: Iterable[str], number: int, arbiter: Arbiter) -> None:
         """After a restart: the arbiter has it already."""
         ids = [ResourceId(resource) for resource in resources]
-        self._active[behavior] = _Active(arbiter, tuple(ids), number)
+        self._active[behavior] = _Active(arbiter, tuple(ids), number, adopted=True)
         self._availability.adopt(ids, behavior)
 
     def occupy(self, command: StartBehavior) -> None:

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from m2pem.errors import M2pemError
 from m2pem.fleet.behaviors import ALTITUDE_FRAME, takes_altitude
-from m2pem.geo.geojson import GeometryError, coordinate, kind_of
+from m2pem.geo.geojson import GeometryError, coordinate, kind_of, parse_geojson
 from m2pem.geo.local_frame import Origin
 from m2pem.geo.positions import NO_ORIGIN, is_local, local_point, out_of_reach
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
@@ -88,7 +88,7 @@ def resolve(
 
     A null counts as not given. A position is the name of a point or vehicle, `[latitude,
     longitude, altitude]` as a list or as text, or the text `enu [east, north, up]`: metres in the
-    ENU frame (REP-103) at `origin`, the fleet's.
+    ENU frame (REP-103) at `origin`, the fleet's. Data may also hold a geometry itself, as GeoJSON.
 
     Raises:
         ParameterError: with all problems.
@@ -182,6 +182,8 @@ class _Reader:
                 return _bounded(spec, _number(spec.kind, value))
 
     def _named(self, kind: str, value: Value) -> Geometry:
+        if isinstance(value, dict):
+            return self._inline(kind, value)
         if not isinstance(value, str):
             raise _ProblemError("bad-value", f"{value!r} is not the name of {article(kind)}")
         found = self.geometry(value)
@@ -189,6 +191,17 @@ class _Reader:
             raise _ProblemError("unknown-geometry", f"there is no {kind} named '{value}'")
         if kind_of(found) != kind:
             message = f"'{value}' is {article(kind_of(found))}, not {article(kind)}"
+            raise _ProblemError("wrong-geometry", message)
+        return found
+
+    def _inline(self, kind: str, value: Mapping[str, Value]) -> Geometry:
+        """Read GeoJSON, as what is left of a behavior is given to another vehicle."""
+        try:
+            found = parse_geojson(value)
+        except GeometryError as error:
+            raise _ProblemError("bad-value", f"GeoJSON: {error}") from None
+        if kind_of(found) != kind:
+            message = f"the GeoJSON is {article(kind_of(found))}, not {article(kind)}"
             raise _ProblemError("wrong-geometry", message)
         return found
 
@@ -205,6 +218,8 @@ class _Reader:
                 ) from None
         if isinstance(value, list):
             return self._coordinates(value)
+        if isinstance(value, dict):
+            return self._inline("point", value)
         if isinstance(value, str) and value in self.vehicles and self.geometry(value) is None:
             return VehiclePosition(value)
         try:

@@ -49,15 +49,7 @@ def lawn_mower(
     """
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     turned = [[(e * cos + n * sin, n * cos - e * sin) for e, n in ring] for ring in rings]
-    low = min(y for _, y in turned[0])
-    height = max(y for _, y in turned[0]) - low
-    strips = max(1, math.ceil(height / spacing_m - 1e-9))
-    if strips > MAX_STRIPS:
-        raise ValueError(
-            f"spacing: {spacing_m:g} m makes {strips} passes over an area that is {height:.0f} m "
-            f"wide; at most {MAX_STRIPS} are flown or driven"
-        )
-    width = height / strips
+    low, strips, width = _strips(turned[0], spacing_m)
     points: list[tuple[float, float]] = []
     for strip in range(strips):
         bottom = low + strip * width
@@ -68,6 +60,25 @@ def lawn_mower(
             row = [(b, a) for a, b in reversed(row)]
         points.extend(point for pair in row for point in pair)
     return [(x * cos - y * sin, x * sin + y * cos) for x, y in points]
+
+
+def strip_width_m(ring: Ring, spacing_m: float, yaw_rad: float) -> float:
+    """Return the width of each strip of `lawn_mower` over an area with that outer ring."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    return _strips([(e * cos + n * sin, n * cos - e * sin) for e, n in ring], spacing_m)[2]
+
+
+def _strips(ring: Ring, spacing_m: float) -> tuple[float, int, float]:
+    """Return the least y of a turned ring, the number of strips over it and their width."""
+    low = min(y for _, y in ring)
+    height = max(y for _, y in ring) - low
+    strips = max(1, math.ceil(height / spacing_m - 1e-9))
+    if strips > MAX_STRIPS:
+        raise ValueError(
+            f"spacing: {spacing_m:g} m makes {strips} passes over an area that is {height:.0f} m "
+            f"wide; at most {MAX_STRIPS} are flown or driven"
+        )
+    return low, strips, height / strips
 
 
 def _passes(rings: Sequence[Ring], bottom: float, top: float) -> list[tuple[float, float]]:

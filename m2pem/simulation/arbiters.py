@@ -75,6 +75,7 @@ class RadioRange:
         """Cut the link to a vehicle; harmless when it is cut already."""
         if not self._links.up(vehicle):
             return
+        self._simulation.tell_progress(vehicle, now_us)
         self._links.cut(vehicle)
         cuts = self._links.cuts(vehicle)
         after_us = round(self._lost_after_s(vehicle) * US_PER_S)
@@ -454,7 +455,7 @@ class SimArbiter:
         for file in files.values():
             began_us = min(began_us, int(file.meta("began_us", str(now_us))))
             file.load_bodies(self._bodies)
-            executions += file.load_behaviors(self._bodies)
+            executions += file.load_behaviors(self._bodies, self._frame)
         for resource, file in by_resource.items():
             found[resource] = json.loads(file.meta(f"found {resource}", "[]"))
         self._memory.files = by_resource

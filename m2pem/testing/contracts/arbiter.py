@@ -6,8 +6,13 @@ The tests of queries, epochs, holds and links are in `m2pem.testing.contracts.ar
 from collections.abc import Callable
 from itertools import pairwise
 
+from m2pem.api.arbiter import ResolvedValue
+from m2pem.api.behavior_parameters import refusal
 from m2pem.api.capabilities import arbiter_problem
+from m2pem.fleet.parameters import resolve
+from m2pem.geo.local_frame import distance_m
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.geometry import Route
 from m2pem.testing.contracts.arbiter_harness import (
     ArbiterCase,
     ArbiterHarness,
@@ -23,6 +28,16 @@ from m2pem.testing.contracts.arbiter_links import ArbiterLinks
 from m2pem.testing.contracts.contract import needs, skip_unsupported
 
 __all__ = ["ArbiterCase", "ArbiterContract", "CutLink", "Effects", "MakeArbiter"]
+
+
+MOST_REPORTS = 30
+"""Of what is left of one route."""
+
+
+def length_m(route: ResolvedValue) -> float:
+    """Return the length of a route."""
+    assert isinstance(route, Route), route
+    return sum(distance_m(a[:2], b[:2]) for a, b in pairwise(route.waypoints))
 
 
 class ArbiterContract(ArbiterLinks):
@@ -89,9 +104,12 @@ class ArbiterContract(ArbiterLinks):
             await start(harness, "r1.b1", case.short, case.vehicle)
             await start(harness, "r1.b1", case.short, case.vehicle)
             await harness.ended("r1.b1", case.short_s)
+            before = harness.of("r1.b1")
             await start(harness, "r1.b1", case.short, case.vehicle)
             await harness.clock.sleep(case.short_s)
-            assert len(harness.of("r1.b1")) == 3, harness.of("r1.b1")
+            assert harness.of("r1.b1") == before
+            states = [BehaviorState.ACCEPTED, BehaviorState.RUNNING, BehaviorState.SUCCEEDED]
+            assert harness.states_of("r1.b1") == states
 
         with_harness(make_arbiter, run, main)
 
@@ -191,6 +209,32 @@ class ArbiterContract(ArbiterLinks):
             await start(harness, "r1.b2", case.long, case.vehicle, preempts=("r1.b1",))
             assert (await harness.ended("r1.b1", 10)).state is BehaviorState.CANCELLED
             await harness.running("r1.b2", 10)
+
+        with_harness(make_arbiter, run, main)
+
+    @needs("remaining")
+    def test_less_and_less_is_left_of_a_route(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """`remaining`: parameters of the same behavior, with the rest of its route."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            if case.route is None:
+                skip_unsupported("remaining", "the case has no `route`")
+            name, parameters = case.route
+            specs = {each.name: each for each in harness.arbiter.catalogue(case.vehicle)}
+            spec = specs[name]
+            await start(harness, "r1.b1", (name, parameters), case.vehicle)
+            await harness.ended("r1.b1", case.route_s)
+            said = [report.remaining for report in harness.of("r1.b1") if report.remaining]
+            assert len(said) > 1, harness.of("r1.b1")
+            assert len(said) <= MOST_REPORTS, f"each is a record of the journal: {len(said)}"
+            routes = [resolve(spec, each, lambda _: None, ())["route"] for each in said]
+            lengths = [length_m(route) for route in (parameters["route"], *routes)]
+            assert all(a > b for a, b in pairwise(lengths)), lengths
+            assert lengths[-1] < lengths[0] / 2, lengths
+            problem = refusal(spec, resolve(spec, said[-1], lambda _: None, ()))
+            assert not problem, problem
 
         with_harness(make_arbiter, run, main)
 

@@ -104,8 +104,14 @@ class ArbiterHarness:
         return [report for report in self.reports if report.id == id_]
 
     def states_of(self, id_: str) -> list[BehaviorState]:
-        """Return the reported states of one behavior."""
-        return [report.state for report in self.of(id_)]
+        """Return the reported states of one behavior, without the reports that say only what is
+        left of it."""
+        reports = self.of(id_)
+        return [
+            report.state
+            for last, report in zip([None, *reports], reports, strict=False)
+            if last is None or last.state is not report.state or last.remaining == report.remaining
+        ]
 
     def latest(self, resource: str) -> VehicleState | PayloadState | None:
         """Return the latest state of a resource."""
@@ -168,8 +174,9 @@ class ArbiterCase:
     not supported). `watch_s`: for how long a test watches that nothing forbidden happens. `long`: a
     behavior of both that moves for at least five times as long. `short`: one that ends well within
     `short_s`. `bad`: a parameter of `long` with a value that it cannot have. A vehicle slower than
-    `standing_m_s` is at rest (a boat drifts). Seconds are those of the clock of the arbiter's
-    context.
+    `standing_m_s` is at rest (a boat drifts). `route`: a behavior with the parameter `route` that
+    ends within `route_s`, of which the arbiter reports what is left; None: it offers none. Seconds
+    are those of the clock of the arbiter's context.
     """
 
     vehicle: ResourceId
@@ -180,6 +187,8 @@ class ArbiterCase:
     short_s: float = 60.0
     watch_s: float = 6.0
     standing_m_s: float = 0.1
+    route: tuple[str, Mapping[str, ResolvedValue]] | None = None
+    route_s: float = 300.0
 
 
 class ArbiterFixtures(Contract):
@@ -192,6 +201,7 @@ class ArbiterFixtures(Contract):
         "link": "the fixture `cut_link` cuts the link of a vehicle, and its behavior is LOST",
         "preempt": "a behavior takes a vehicle over from one that is being cancelled",
         "reconnect": "a behavior outlives the arbiter, and another one finds it again",
+        "remaining": "reports say what is left of a route, as parameters for another vehicle",
         "return": "the fixture `mend_link` restores the link of a vehicle that was lost",
         "second vehicle": "there are two vehicles",
         "telemetry": "vehicles report their position and velocity",

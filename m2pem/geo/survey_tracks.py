@@ -1,0 +1,171 @@
+"""A survey as the tracks that are flown or driven, and the area that a part of them covers.
+
+Each pass covers a strip along it. What a part of the passes covers is bounded by the strips' edges
+and by straight lines across them, so that lawn-mower tracks over it are again these passes, also a
+piece of one.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import TypeAlias
+
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polyline import Polyline
+
+Span: TypeAlias = tuple[float, float]
+"""From one x to a greater one."""
+
+Slab: TypeAlias = tuple[float, float, Sequence[Span]]
+"""From one y to a greater one, and the spans of x between them."""
+
+_SEAM = 0.1
+"""Share of a strip's width. Near its edges, a strip is no longer than where it meets the next one:
+else a small error of a corner would lengthen the pass beside it."""
+
+_SLACK = 0.05
+"""Share of a strip's width by which the height of all strips may seem greater than it is."""
+
+_SHORTEST_M = 0.01
+_DIGITS = 2
+"""Of the ends of spans: passes that end on one line get a straight side."""
+
+
+class SurveyTracks:
+    """`points`: in pairs, the ends of each pass, in the order in which they are passed.
+
+    `width_m`: of a strip. `overshoot_m`: how far a pass goes on beyond its strip at both ends. All
+    passes are parallel. Distances along the tracks are in metres and count the ways between passes.
+    """
+
+    def __init__(
+        self, points: Sequence[EastNorth], width_m: float, overshoot_m: float = 0.0
+    ) -> None:
+        self.line = Polyline(points)
+        self.width_m = width_m
+        self.overshoot_m = overshoot_m
+        first, second = points[:2]
+        self.yaw_rad = math.atan2(second[1] - first[1], second[0] - first[0])
+
+    def spacing_m(self, rings: Sequence[Sequence[EastNorth]]) -> float:
+        """Return the spacing with which tracks over a part are as these, in any local frame."""
+        norths = [self._turned(corner)[1] for corner in rings[0]]
+        count = max(1, round((max(norths) - min(norths)) / self.width_m))
+        return self.width_m * (1 + _SLACK / count)
+
+    def part(self, from_m: float, to_m: float = math.inf) -> list[list[EastNorth]]:
+        """Return the area that the tracks from one distance to another cover, as closed rings.
+
+        The first ring is the outer one, the others are holes. It is empty where there is nothing,
+        or where what they cover is not connected.
+        """
+        strips = self._strips(from_m, to_m)
+        rings = _outline(_slabs(strips, self.width_m))
+        outer = [ring for ring in rings if _area(ring) > 0]
+        if len(outer) != 1:
+            return []
+        holes = [ring for ring in rings if _area(ring) < 0]
+        return [[self._turned_back(corner) for corner in ring] for ring in (outer[0], *holes)]
+
+    def _strips(self, from_m: float, to_m: float) -> list[tuple[float, list[Span]]]:
+        """Return the middle of each strip and its spans, from the lowest strip to the highest."""
+        strips: list[tuple[float, list[Span]]] = []
+        for index in range(0, len(self.line.points) - 1, 2):
+            begin_m, end_m = self.line.marks_m[index], self.line.marks_m[index + 1]
+            low_m = max(from_m, begin_m + self.overshoot_m)
+            high_m = min(to_m, end_m - self.overshoot_m)
+            if high_m - low_m < _SHORTEST_M:
+                continue
+            segment = self.line.segments[index]
+            (ax, ay), (bx, _) = (
+                self._turned(segment.at(along_m - begin_m)) for along_m in (low_m, high_m)
+            )
+            span = round(min(ax, bx), _DIGITS), round(max(ax, bx), _DIGITS)
+            same = next((s for y, s in strips if abs(y - ay) < self.width_m / 2), None)
+            if same is None:
+                strips.append((ay, [span]))
+            else:
+                same.append(span)
+        return sorted((y, sorted(spans)) for y, spans in strips)
+
+    def _turned(self, point: EastNorth) -> EastNorth:
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return point[0] * cos + point[1] * sin, point[1] * cos - point[0] * sin
+
+    def _turned_back(self, point: EastNorth) -> EastNorth:
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return point[0] * cos - point[1] * sin, point[0] * sin + point[1] * cos
+
+
+def _slabs(strips: Sequence[tuple[float, Sequence[Span]]], width_m: float) -> list[Slab]:
+    """Return the strips, with what neighbours have in common along each seam between two."""
+    seam_m = _SEAM * width_m
+    slabs: list[Slab] = []
+    for index, (middle, spans) in enumerate(strips):
+        low, high = middle - width_m / 2, middle + width_m / 2
+        below = strips[index - 1] if index else None
+        above = strips[index + 1] if index + 1 < len(strips) else None
+        if below is not None and middle - below[0] < 1.5 * width_m:
+            low = (below[0] + middle) / 2 + seam_m
+        if above is not None and above[0] - middle < 1.5 * width_m:
+            edge = (middle + above[0]) / 2
+            slabs.append((low, edge - seam_m, spans))
+            slabs.append((edge - seam_m, edge + seam_m, _common(spans, above[1])))
+        else:
+            slabs.append((low, high, spans))
+    return slabs
+
+
+def _common(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:
+    found = (
+        (max(low, other_low), min(high, other_high))
+        for low, high in spans
+        for other_low, other_high in others
+    )
+    return sorted((low, high) for low, high in found if high - low >= _SHORTEST_M)
+
+
+def _outline(slabs: Iterable[Slab]) -> list[list[EastNorth]]:
+    """Return the closed rings around slabs: counter-clockwise outside, clockwise around holes."""
+    boxes = [(x0, y0, x1, y1) for y0, y1, spans in slabs for x0, x1 in spans]
+    breaks = sorted({x for x0, _, x1, _ in boxes for x in (x0, x1)})
+    edges: set[tuple[EastNorth, EastNorth]] = set()
+    for x0, y0, x1, y1 in boxes:
+        xs = [x for x in breaks if x0 <= x <= x1]
+        sides = [((a, y0), (b, y0)) for a, b in pairwise(xs)]
+        sides += [((b, y1), (a, y1)) for a, b in pairwise(xs)]
+        sides += [((x1, y0), (x1, y1)), ((x0, y1), (x0, y0))]
+        for a, b in sides:
+            if (b, a) in edges:  # two boxes meet there
+                edges.remove((b, a))
+            else:
+                edges.add((a, b))
+    following: dict[EastNorth, EastNorth] = dict(sorted(edges))
+    if len(following) < len(edges):
+        return []  # two parts meet in one corner alone
+    rings = []
+    while following:
+        start = at = next(iter(following))
+        ring = [start]
+        while (at := following.pop(at)) != start and at in following:
+            ring.append(at)
+        rings.append(_straightened(ring))
+    return rings
+
+
+def _straightened(ring: Sequence[EastNorth]) -> list[EastNorth]:
+    """Return a closed ring without the corners on a straight side."""
+    kept = [
+        corner
+        for index, corner in enumerate(ring)
+        if not _aligned(ring[index - 1], corner, ring[(index + 1) % len(ring)])
+    ]
+    return [*kept, kept[0]]
+
+
+def _aligned(a: EastNorth, b: EastNorth, c: EastNorth) -> bool:
+    return (a[0] == b[0] == c[0]) or (a[1] == b[1] == c[1])
+
+
+def _area(ring: Sequence[EastNorth]) -> float:
+    return sum(a[0] * b[1] - b[0] * a[1] for a, b in pairwise(ring)) / 2
