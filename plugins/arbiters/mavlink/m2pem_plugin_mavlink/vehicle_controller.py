@@ -26,6 +26,9 @@ from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 LOOK_EVERY_S = 0.2
 """The interval at which a behavior is checked for completion."""
 
+LEAST_PROGRESS_M = 1.0
+"""What is left of a behavior that fails or is lost is reported if so much was done since."""
+
 KNOWN_WITHIN_S = 5.0
 STOP_SHARE = 0.8
 """The share of the cancel timeout after which a stop has failed."""
@@ -145,7 +148,9 @@ class VehicleController:
             self._work.replace(lambda: self._run(active))
 
     def release(self) -> None:
-        """Forget the behavior of a vehicle that is lost."""
+        """Forget the behavior of a vehicle that is lost; what was seen of it last is reported."""
+        if self._active is not None:
+            self._report_left(self._active, LEAST_PROGRESS_M)
         self._active = None
         self._held = False
         self._work.cancel()
@@ -257,6 +262,7 @@ class VehicleController:
                     steps.result()
                 self._check_takeover(accepted_modes(active.behavior))
                 self._check_progress(active.behavior, stillness)
+                self._report_left(active)
                 await self.vehicle.sleep(LOOK_EVERY_S)
         finally:
             for task in (steps, speeds):
@@ -274,6 +280,11 @@ class VehicleController:
                 except ExchangeError as error:
                     self._logger.warning("%s keeps its speed: %s", self.vehicle.resource, error)
             await self.vehicle.sleep(LOOK_EVERY_S)
+
+    def _report_left(self, active: _ActiveBehavior, least_m: float | None = None) -> None:
+        left = active.behavior.left(least_m)
+        if left is not None:
+            self._tracker.remains(active.id, left)
 
     def _check_takeover(self, modes: frozenset[FlightMode]) -> None:
         if takeover := self._takeover_monitor.takeover(modes):
@@ -382,6 +393,8 @@ class VehicleController:
     ) -> None:
         if self._active is active:
             self._active = None
+        if state is BehaviorState.FAILED:
+            self._report_left(active, LEAST_PROGRESS_M)
         self._tracker.end(active.id, state, code, reason)
 
 

@@ -83,4 +83,5 @@ class TestCoptersOnARoute(_Doubles):
             long=("single_vehicle_routing", {"route": route((50, 0), (50, 600)), "speed": 5.0}),
             short=("single_vehicle_routing", {"route": route((20, 0), (20, 20)), "speed": 5.0}),
             bad=("speed", -1.0),
+            route=("single_vehicle_routing", {"route": route((9, 9), (9, 90), (80, 90))}),
         )

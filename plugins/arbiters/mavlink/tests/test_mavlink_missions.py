@@ -10,7 +10,17 @@ from m2pem_plugin_mavlink.vehicle.identity import Firmware
 from mavlink_double import HOME, Body, at
 from mavlink_play import after_a_restart, play
 
-from m2pem.api import Area, BehaviorState, LocalFrame, Point, Route
+from m2pem.api import (
+    SHARED,
+    Area,
+    BehaviorState,
+    BehaviorType,
+    LocalFrame,
+    Point,
+    Route,
+    lawn_mower,
+)
+from m2pem.fleet.parameters import resolve
 
 SUCCEEDED, RUNNING = BehaviorState.SUCCEEDED, BehaviorState.RUNNING
 WAYPOINT, CHANGE_SPEED = 16, 178
@@ -283,6 +293,74 @@ def test_a_mission_is_found_again_after_a_restart_and_goes_on(behavior, body, pa
         assert "upload" not in bench.told
 
     after_a_restart(body, behavior, main, **parameters)
+
+
+LONG_ROUTE = route((30, 0, 20.0), (130, 0, 20.0), (130, 100, 20.0))
+
+
+def left(report, behavior: str) -> dict:
+    spec = SHARED[behavior, BehaviorType.VEHICLE]
+    return resolve(spec, report.remaining, lambda _: None, ())
+
+
+def survey_left_m(report) -> float:
+    """Return the length of the passes over the area that is left."""
+    values, frame = left(report, "area_survey"), LocalFrame(HOME)
+    rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in values["area"].rings]
+    points = lawn_mower(rings, values["spacing"], math.pi / 2 - values["heading"])
+    return sum(math.dist(*points[index : index + 2]) for index in range(0, len(points), 2))
+
+
+def test_what_is_left_of_a_survey_is_told_on_the_way() -> None:
+    async def main(bench) -> None:
+        end = await bench.do("area_survey", area=FIELD, spacing=20.1, heading=0.0, altitude=30.0)
+        assert end.state is SUCCEEDED
+        said = [each for each in bench.of("r1.b1") if each.remaining]
+        assert 10 <= len(said) <= 20
+        lengths = [survey_left_m(each) for each in said]
+        assert all(a >= b for a, b in pairwise(lengths)), lengths
+        assert lengths[0] == pytest.approx(180.0 - 12.0, abs=12.0)
+        assert lengths[-1] < 30.0
+        assert left(said[-1], "area_survey")["altitude"] == 30.0
+
+    play(Body().fly(), main)
+
+
+@pytest.mark.parametrize("behavior", ["single_vehicle_routing", "area_survey"])
+def test_what_is_left_is_told_after_a_restart(behavior) -> None:
+    """The way is that of the stored mission: the reference has neither a route nor an area."""
+
+    async def main(bench, reference: str) -> None:
+        assert (await bench.arbiter.query("r1.b1", reference)).state is RUNNING
+        assert (await bench.ended("r1.b1", 600)).state is SUCCEEDED
+        said = [each for each in bench.of("r1.b1") if each.remaining]
+        assert len(said) > 10
+        rest = left(said[-1], behavior)
+        assert rest["speed"] == 5.0
+        if behavior == "area_survey":
+            assert survey_left_m(said[-1]) < 30.0
+        else:
+            assert rest["route"].waypoints[-1][:2] == pytest.approx(at(130, 100), abs=1e-6)
+            assert rest["route"].waypoints[-1][2] == pytest.approx(20.0, abs=0.01)
+
+    way = {"area": FIELD, "spacing": 20.1} if behavior == "area_survey" else {"route": LONG_ROUTE}
+    after_a_restart(Body().fly(), behavior, main, speed=5.0, **way)
+
+
+def test_what_is_left_of_a_lost_vehicle_is_where_it_was_seen_last() -> None:
+    async def main(bench) -> None:
+        await bench.start("r1.b1", "single_vehicle_routing", "v", route=LONG_ROUTE, speed=5.0)
+        assert await bench.until(lambda: bench.body.east > 90.0 and len(bench.of("r1.b1")) > 4, 100)
+        east = bench.body.east
+        bench.body.heard_by_us = False
+        end = await bench.ended("r1.b1", 100)
+        assert end.state is BehaviorState.LOST
+        place = LocalFrame(HOME).to_local(
+            left(end, "single_vehicle_routing")["route"].waypoints[0][:2]
+        )
+        assert place == pytest.approx((east, 0.0), abs=3.0)
+
+    play(Body().fly(), main)
 
 
 @pytest.mark.parametrize(

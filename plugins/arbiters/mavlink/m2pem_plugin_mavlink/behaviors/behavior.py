@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
-from m2pem.api import BehaviorState, Fence, FleetBus, ResolvedValue
+from m2pem.api import BehaviorState, Fence, FleetBus, ResolvedValue, Value
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
@@ -104,6 +104,11 @@ class Behavior(ABC):
         """Use this speed from now on; return False if the behavior has no speed to change. The
         controller sends the speed to the vehicle."""
         return False
+
+    def left(self, least_m: float | None = None) -> Mapping[str, Value] | None:
+        """Return what is left of the behavior, as in `BehaviorReport.remaining`, if it is worth a
+        report: when `least_m`, or else a few percent, were done since the last one."""
+        return None
 
     async def run_in_background(self) -> None:  # noqa: B027  # most have none
         """Repeat what must be repeated while the behavior is active and not held."""

@@ -3,12 +3,26 @@
 import math
 import zlib
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from m2pem.api import BehaviorState, LatLon, LocalFrame, lawn_mower, longest_edge_yaw
+from m2pem.api import (
+    BehaviorState,
+    LatLon,
+    LocalFrame,
+    RemainingRoute,
+    RemainingSurvey,
+    RemainingWork,
+    Route,
+    SurveyTracks,
+    Value,
+    lawn_mower,
+    longest_edge_yaw,
+    raw_parameters,
+    strip_width_m,
+)
 from m2pem_plugin_mavlink.behaviors.arrival import (
     StillnessTimer,
     arrival_radius_m,
@@ -118,6 +132,13 @@ class MissionFlight(Behavior):
         self._kept: Fingerprint | None = None
         self._end: tuple[int, LatLon] | None = None
         self._stillness = StillnessTimer(context)
+        self._work: RemainingWork | None = None
+        self._first = 0
+        self._counts = False
+
+    def work(self, way: Sequence[MissionItem]) -> RemainingWork | None:
+        """Return the account of what is left of the waypoints; None: parameters cannot say it."""
+        return None
 
     @abstractmethod
     def way(self) -> Sequence[MissionItem]:
@@ -140,6 +161,8 @@ class MissionFlight(Behavior):
             speed = self.parameters.speed_m_s
             items = way if speed is None else (speed_item(speed), *way)
             last = items[-1]
+            self._first = len(items) - len(way)
+            self._work = self.work(way)
             self._end = (len(items) - 1, (last.latitude_deg, last.longitude_deg))
             circles = self.vehicle.state.loiter_radius_m is not None
             self._items = (*items, circle_for_ever(last)) if circles else items
@@ -185,6 +208,27 @@ class MissionFlight(Behavior):
         self.parameters.adjusted_m_s = speed_m_s
         return True
 
+    def left(self, least_m: float | None = None) -> Mapping[str, Value] | None:
+        """Return the rest of the way, by the current item and the position. In a loop, all of it is
+        always left."""
+        work, driver = self._work, self.vehicle.driver
+        if work is None or self.loop:
+            return None
+        reached, current = driver.reached_item, driver.current_item
+        heading = -1 if reached is None else reached + 1 - self._first
+        if current is not None:
+            # At first the item of the mission before may still be reported.
+            self._counts = self._counts or reached is not None or current - self._first <= 1
+            heading = max(heading, current - self._first) if self._counts else heading
+        last = len(work.line.points) - 1
+        if heading > 0:
+            work.reached(min(heading - 1, last))
+        position = self.vehicle.state.position
+        if position is not None and 0 < heading <= last:
+            place = work.frame.to_local((position.latitude_deg, position.longitude_deg))
+            work.moved(place, heading)
+        return work.to_report(least_m)
+
     async def run_in_background(self) -> None:
         """Restart the mission at the end of each loop."""
         while self.loop:
@@ -226,6 +270,10 @@ class MissionFlight(Behavior):
         stored = await self.vehicle.driver.downloaded()
         if not fingerprint(remove_landing(stored)).fits(self._kept):
             return BehaviorState.UNKNOWN
+        if self._work is None:
+            moves = [index for index in range(self._end[0] + 1) if is_navigation(stored[index])]
+            self._first, self._counts = moves[0], True
+            self._work = self.work([stored[index] for index in moves])
         if self.finished() or await self._stands_at_the_end():
             return BehaviorState.SUCCEEDED
         flies = self.vehicle.state.mode is FlightMode.MISSION and self.vehicle.state.armed
@@ -255,6 +303,14 @@ class MissionFlight(Behavior):
             self._end = (int(end[0]), (end[1], end[2]))
 
 
+_FRAME_NAMES = {_SAME_FRAMES.get(frame, frame): name for name, frame in FRAMES.items()}
+
+
+def frame_name(item: MissionItem) -> str:
+    """Return the altitude frame of a waypoint, by its name in missions."""
+    return _FRAME_NAMES.get(_SAME_FRAMES.get(item.frame, item.frame), RELATIVE)
+
+
 class Routing(MissionFlight):
     """The behavior `single_vehicle_routing`: follow a route once, or in a loop."""
 
@@ -275,6 +331,16 @@ class Routing(MissionFlight):
             for latitude, longitude, own in route.waypoints
         ]
 
+    def work(self, way: Sequence[MissionItem]) -> RemainingWork:
+        """Return the account of the route; after a restart of the one that is stored."""
+        stored = Route(
+            tuple((item.latitude_deg, item.longitude_deg, item.altitude_m) for item in way),
+            frame_name(way[0]),
+        )
+        route = self.parameters.route or stored
+        frame = LocalFrame(route.waypoints[0][:2])
+        return RemainingRoute(raw_parameters(self.parameters.given), route, frame)
+
     def named(self, index: int) -> str:
         return f"waypoint {index + 1} of the route"
 
@@ -288,6 +354,10 @@ class Survey(MissionFlight):
 
     name = "area_survey"
 
+    def __init__(self, context: BehaviorContext) -> None:
+        super().__init__(context)
+        self._width_m = self.parameters.spacing_m or SPACING_M
+
     def way(self) -> Sequence[MissionItem]:
         """Return the ends of the tracks."""
         area = self.parameters.area
@@ -297,13 +367,10 @@ class Survey(MissionFlight):
         rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
         heading = self.parameters.heading_rad
         yaw = longest_edge_yaw(rings[0]) if heading is None else math.pi / 2 - heading
+        spacing = self.parameters.spacing_m or SPACING_M
         try:
-            points = lawn_mower(
-                rings,
-                self.parameters.spacing_m or SPACING_M,
-                yaw,
-                self.parameters.overshoot_m,
-            )
+            points = lawn_mower(rings, spacing, yaw, self.parameters.overshoot_m)
+            self._width_m = strip_width_m(rings[0], spacing, yaw)
         except ValueError as error:
             raise BehaviorFailedError(f"parameter 'spacing': {error}") from None
         places = [frame.to_latlon(point) for point in points]
@@ -311,6 +378,28 @@ class Survey(MissionFlight):
             places.reverse()
         height = self.parameters.altitude_to_fly(area.rings[0][0][2], area.altitude_frame)
         return [waypoint(place, *height) for place in places]
+
+    def work(self, way: Sequence[MissionItem]) -> RemainingWork:
+        """Return the account of the tracks; after a restart of those that are stored."""
+        places = [(item.latitude_deg, item.longitude_deg) for item in way]
+        frame = LocalFrame(places[0])
+        points = [frame.to_local(place) for place in places]
+        tracks = SurveyTracks(points, self._width_m, self.parameters.overshoot_m)
+        area = self.parameters.area
+        up_m, up_frame = way[0].altitude_m, frame_name(way[0])
+        if area is not None:
+            up_m, up_frame = area.rings[0][0][2], area.altitude_frame
+        given = raw_parameters(self.parameters.given)
+        return RemainingSurvey(given, tracks, frame, up_m, up_frame)
+
+    def checkpoint(self) -> CheckpointState:
+        return {**super().checkpoint(), "width": self._width_m}
+
+    def restore(self, checkpoint: CheckpointState) -> None:
+        super().restore(checkpoint)
+        width = checkpoint.get("width")
+        if isinstance(width, int | float):
+            self._width_m = float(width)
 
     def named(self, index: int) -> str:
         return f"{'end' if index % 2 else 'begin'} of pass {index // 2 + 1} of the survey"
