@@ -74,8 +74,13 @@ class RemainingWork(ABC):
         return self._reported_m + max(REPORTED_SHARE * self.line.length_m, REPORTED_M)
 
     @abstractmethod
+    def part(self, from_m: float, to_m: float = math.inf) -> Mapping[str, Value] | None:
+        """Return the parameters for what is between two distances along the way; None: they cannot
+        say it."""
+
     def left(self) -> Mapping[str, Value] | None:
         """Return the parameters of what is left now; None: they cannot say it."""
+        return self.part(self.mark_m)
 
     def to_report(self, least_m: float | None = None) -> Mapping[str, Value] | None:
         """Return what is left now if it is worth a report: when `next_report_m` is reached, or
@@ -130,10 +135,10 @@ class RemainingRoute(RemainingWork):
         super().__init__(parameters, frame, line)
         self._route = route
 
-    def left(self) -> Mapping[str, Value] | None:
-        """Return the parameters with the rest of the route."""
-        rest = part_of_route(self._route, self.line, self.frame, self.mark_m)
-        return {**self.parameters, "route": as_geojson(rest)}
+    def part(self, from_m: float, to_m: float = math.inf) -> Mapping[str, Value] | None:
+        """Return the parameters with that part of the route."""
+        part = part_of_route(self._route, self.line, self.frame, from_m, to_m)
+        return {**self.parameters, "route": as_geojson(part)}
 
     def state(self) -> dict[str, Any]:
         return {**super().state(), "route": as_geojson(self._route)}
@@ -187,12 +192,9 @@ class RemainingSurvey(RemainingWork):
         self._up_m = up_m
         self._altitude_frame = altitude_frame
 
-    def left(self) -> Mapping[str, Value] | None:
-        """Return the parameters with the rest of the area; None: it is not one area."""
-        return self.part(self.mark_m)
-
     def part(self, from_m: float, to_m: float = math.inf) -> Mapping[str, Value] | None:
-        """Return the parameters of what the tracks between two distances cover."""
+        """Return the parameters with what that part of the tracks covers; None: it is not one
+        area."""
         rings = self.tracks.part(from_m, to_m)
         if not rings:
             return None

@@ -263,6 +263,7 @@ class Teams:
             request,
             scheme.plan,
             members,
+            scheme.frame,
             self._context.clock,
             lambda member: self._situation.look(member, scheme.frame),
             report_state,

@@ -180,7 +180,8 @@ def survey(context: PlanningContext) -> Plan:
     takes = {
         member: frozenset(accepted(context.offered[member][behavior])) for member in context.members
     }
-    return Plan(tuple(legs), shared=True, takes=takes, split=tuple(shares))
+    speeds = {member: speed_m_s or context.motion(member).nominal_m_s for member in context.members}
+    return Plan(tuple(legs), shared=True, takes=takes, speeds_m_s=speeds, split=tuple(shares))
 
 
 def _shares(

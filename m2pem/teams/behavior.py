@@ -8,6 +8,7 @@ from dataclasses import replace
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import TeamMemberState
+from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.formation_controller import FormationController
 from m2pem.teams.member import Member
@@ -50,6 +51,7 @@ class TeamBehavior:
         request: BehaviorRequest,
         plan: Plan,
         members: Mapping[ResourceId, Member],
+        frame: LocalFrame,
         clock: Clock,
         look: Callable[[ResourceId], MemberPose | None],
         report_state: ReportState,
@@ -69,7 +71,7 @@ class TeamBehavior:
         self._refer = refer
         self._show = show
         self._goes_on = goes_on
-        self._shares = Partition(plan)
+        self._shares = Partition(plan, frame)
         steady = [each.id for each in members.values() if not each.adjustable]
         self._controller = FormationController(plan.march, steady) if plan.march else None
         self._reference = Reference()
@@ -154,8 +156,13 @@ class TeamBehavior:
             return
         member.state = report.state
         member.native_ref = report.native_ref or member.native_ref
+        part = member.part.removeprefix(f"{self.id}.")
+        left = report.remaining
+        unnoted = left is not None and self._goes_on and self._shares.note_left(part, left)
         if report.state.terminal:
             self._part_ended(member, report)
+        elif unnoted:
+            self._note()
         self._review()
 
     def lose(self, member: ResourceId, code: str, reason: str) -> None:
@@ -189,10 +196,10 @@ class TeamBehavior:
         """
         self._running_reported = True
         self._reference = kept
+        self._shares.restore(kept)
         for name, why in kept.lost.items():
             if name in self.members:
                 self.members[name].lost = why
-                self._drop(self.members[name])
         for part, report in reports.items():
             done = report.state is BehaviorState.SUCCEEDED
             member = self.members.get(self._shares.place(part, done=done))
@@ -203,12 +210,18 @@ class TeamBehavior:
                     as_before = replace(report, state=BehaviorState.RUNNING)
                 member.adopt(f"{self.id}.{part}", as_before, kept.begun.get(part))
                 member.halted = halts and report.held
+                if report.remaining is not None:
+                    self._shares.note_left(part, report.remaining)
+        for name in kept.lost:
+            if name in self.members:
+                self._drop(self.members[name])
 
     def take_up(self, reports: Mapping[str, BehaviorReport], kept: Reference) -> None:
         """As `found`, but some parts are missing: they start again, and the others resume."""
         self.found(reports, kept)
         self._running_reported = False
         self._shares.again = True
+        self._shares.begin_with_what_is_left()
         for member in self.members.values():
             member.let_go()
 
@@ -243,7 +256,11 @@ class TeamBehavior:
     def _drop(self, member: Member) -> None:
         if self._controller is not None:
             self._controller.drop(member.id)
-        self._shares.drop(member.id)
+        self._shares.drop(member.id, self.members, self._place)
+
+    def _place(self, member: ResourceId) -> EastNorth | None:
+        pose = self._look(member)
+        return None if pose is None else pose.place
 
     # --- next steps -----------------------------------------------------------------------------
 
@@ -293,7 +310,14 @@ class TeamBehavior:
             return
         lost = {member.id: member.lost for member in self.members.values() if member.lost}
         self._reference = Reference(
-            self._parts(), self._shares.done, lost, self._reference.version + 1, self._plan.split
+            self._parts(),
+            self._shares.done,
+            lost,
+            self._reference.version + 1,
+            self._plan.split,
+            self._shares.transfers,
+            self._shares.given_up if self._plan.shared else (),
+            self._shares.left,
         )
         self._refer(self._reference)
         self._report_state(BehaviorState.RUNNING, "", "")

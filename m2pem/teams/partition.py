@@ -1,23 +1,33 @@
-"""Which member carries out which share of a plan: its own, or that of a lost member."""
+"""Which member carries out which share of a plan: its own, or a piece of a lost member's."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from m2pem.api.remaining import RemainingWork, raw_parameters
+from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.values import Value
+from m2pem.teams.division import Taker, divide, read_parameters, work_of
 from m2pem.teams.member import Member
 from m2pem.teams.plan import Leg, Plan
+from m2pem.teams.restart import Reference, Transfer
+
+_OF = "~"
+"""Between a lost member and the number of a piece of its share, in the names of parts."""
 
 
 @dataclass(slots=True)
 class Share:
-    """The planned part of one member. `by`: the member that carries it out; None: no member yet.
-    `part`: the id of the part."""
+    """A planned part of one member, or a piece of a lost member's. `by`: the member that carries
+    it out; None: it has not begun. `part`: the id of the part. `left`: the parameters of what is
+    left of it, as last reported. `given_up`: nobody does it, or others do it in pieces."""
 
     leg: Leg
     by: ResourceId | None = None
     part: str = ""
     done: bool = False
     given_up: bool = False
+    left: Mapping[str, Value] | None = None
 
     @property
     def over(self) -> bool:
@@ -36,15 +46,17 @@ class Assignment:
 
 
 class Partition:
-    """The shares of a plan, by the member to which the plan gave each.
+    """The shares of a plan: by the member to which the plan gave each, and pieces of the shares of
+    lost members, by that member and a number.
 
     `again`: parts get new ids, because arbiters may know the old ones as ended.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, frame: LocalFrame) -> None:
         self.again = False
         self._plan = plan
-        self._shares = {leg.member: Share(leg) for leg in plan.legs}
+        self._frame = frame
+        self._shares = {str(leg.member): Share(leg) for leg in plan.legs}
 
     @property
     def all_over(self) -> bool:
@@ -54,12 +66,40 @@ class Partition:
     @property
     def arrived(self) -> Sequence[ResourceId]:
         """Members whose own share is done."""
-        return [origin for origin, share in self._shares.items() if share.done]
+        return [share.leg.member for key, share in self._shares.items() if share.done and _own(key)]
 
     @property
     def done(self) -> tuple[str, ...]:
         """The parts that have succeeded."""
         return tuple(each.part for each in self._shares.values() if each.done and each.part)
+
+    @property
+    def transfers(self) -> Mapping[str, Transfer]:
+        """The pieces of lost members' shares, for the journal."""
+        return {
+            key: Transfer(
+                share.leg.member, share.leg.behavior, raw_parameters(share.leg.parameters)
+            )
+            for key, share in self._shares.items()
+            if not _own(key)
+        }
+
+    @property
+    def left(self) -> Mapping[str, Mapping[str, Value]]:
+        """What is left of shares that go on, as last reported, for the journal."""
+        return {
+            key: share.left
+            for key, share in self._shares.items()
+            if share.left is not None and not share.over
+        }
+
+    def note_left(self, part: str, left: Mapping[str, Value]) -> bool:
+        """Note what is left of a part. Return whether the journal must have it."""
+        share = next((each for each in self._shares.values() if each.part == part), None)
+        if share is None or share.over or share.left == left:
+            return False
+        share.left = left
+        return self._plan.shared
 
     def finish(self, part: str) -> None:
         """Mark a part as succeeded."""
@@ -70,56 +110,123 @@ class Partition:
     def place(self, part: str, *, done: bool) -> ResourceId:
         """Assign a part that an arbiter knows after a restart; return its member."""
         doer, _, rest = part.partition("/")
-        share = self._shares.get(ResourceId(rest.partition("/")[0] or doer))
+        share = self._shares.get(rest.partition("/")[0] or doer)
         if share is not None:
             share.by, share.part, share.done = ResourceId(doer), part, done
         return ResourceId(doer)
 
-    def drop(self, member: ResourceId) -> None:
-        """Leave the unfinished shares of a lost member to the others, or give them up."""
+    def restore(self, kept: Reference) -> None:
+        """After a restart: take up the pieces of before, and what was left of each share."""
+        for key, transfer in kept.transfers.items():
+            parameters = read_parameters(transfer.behavior, transfer.parameters)
+            if parameters is not None:
+                self._shares[key] = Share(Leg(transfer.member, transfer.behavior, parameters))
+        for member in kept.lost:
+            share = self._shares.get(str(member))
+            if share is not None and not self._plan.shared:
+                share.given_up = True
+        for key in kept.given_up:
+            if key in self._shares:
+                self._shares[key].given_up = True
+        for key, left in kept.left.items():
+            if key in self._shares:
+                self._shares[key].left = left
+
+    def begin_with_what_is_left(self) -> None:
+        """Shares that begin again, after a restart, need only what was left of them."""
         for share in self._shares.values():
-            if (share.by or share.leg.member) == member and not share.over:
-                share.by, share.part = None, ""
-                share.given_up = not self._plan.shared
+            if share.by is None and not share.over:
+                share.leg = self._rest(share)
+
+    @property
+    def given_up(self) -> tuple[str, ...]:
+        """The shares that were given up, or given to others in pieces, for the journal."""
+        return tuple(key for key, share in self._shares.items() if share.given_up)
+
+    def drop(
+        self,
+        member: ResourceId,
+        members: Mapping[ResourceId, Member],
+        place_of: Callable[[ResourceId], EastNorth | None],
+    ) -> None:
+        """Divide the unfinished shares of a lost member among the others, or give them up."""
+        lost = [
+            (key, share)
+            for key, share in self._shares.items()
+            if (share.by or share.leg.member) == member and not share.over
+        ]
+        others = [each for each in members.values() if not each.lost and each.id != member]
+        for _, share in lost:
+            share.given_up = True
+        if not self._plan.shared or not others:
+            return
+        takers = [self._taker(each, place_of(each.id)) for each in others]
+        rests = [(key, self._rest(share)) for key, share in lost]
+        ways = [
+            (key, leg, work_of(leg.behavior, leg.parameters, self._frame)) for key, leg in rests
+        ]
+        pieces = divide([way for _, _, way in ways if way is not None], takers)
+        number = 0
+        for key, leg, way in ways:
+            if way is None:
+                self._give(min(takers, key=lambda taker: taker.free_s).member, key, leg)
+                continue
+            mine = [piece for piece in pieces if piece.work == number]
+            number += 1
+            parts = [way.part(piece.from_m, piece.to_m) for piece in mine] if mine[1:] else [None]
+            if None in parts:  # a single piece, or one that no parameters can say
+                self._give(mine[0].member, key, leg)
+                continue
+            for piece, raw in zip(mine, parts, strict=True):
+                parameters = read_parameters(leg.behavior, raw or {})
+                self._give(piece.member, key, replace(leg, parameters=parameters or leg.parameters))
+
+    def _give(self, taker: ResourceId, key: str, leg: Leg) -> None:
+        origin = key.partition(_OF)[0]
+        number = sum(other.startswith(f"{origin}{_OF}") for other in self._shares) + 1
+        takes = self._plan.takes.get(taker, frozenset())
+        kept = {name: value for name, value in leg.parameters.items() if name in takes}
+        self._shares[f"{origin}{_OF}{number}"] = Share(Leg(taker, leg.behavior, kept))
+
+    def _rest(self, share: Share) -> Leg:
+        """Return what is left of a share."""
+        if share.left is None:
+            return replace(share.leg, after=None)
+        parameters = read_parameters(share.leg.behavior, share.left)
+        return replace(share.leg, parameters=parameters or share.leg.parameters, after=None)
+
+    def _taker(self, member: Member, place: EastNorth | None) -> Taker:
+        """Return when and where a member will have done all that it has."""
+        speed_m_s = self._plan.speeds_m_s.get(member.id, 1.0)
+        free_s = 0.0
+        for share in self._shares.values():
+            if (share.by or share.leg.member) != member.id or share.over:
+                continue
+            leg = self._rest(share)
+            work: RemainingWork | None = work_of(leg.behavior, leg.parameters, self._frame)
+            if work is not None:
+                free_s += work.line.length_m / speed_m_s
+                place = work.line.points[-1]
+        return Taker(member.id, free_s, place, speed_m_s)
 
     def assignments(self, members: Mapping[ResourceId, Member], epoch: int) -> Iterator[Assignment]:
         """Yield the shares that can begin now, and mark each as begun."""
-        for origin, share in self._shares.items():
-            if share.over or share.by is not None:
+        for key, share in self._shares.items():
+            doer = members[share.leg.member]
+            if share.over or share.by is not None or doer.lost or doer.active:
                 continue
-            taker = self._taker(origin, share, members)
-            if taker is None:
+            before = self._shares.get(str(share.leg.after)) if share.leg.after else None
+            own = _own(key)
+            if (before is not None and not before.over) or not (own or self._has_done(doer.id)):
                 continue
-            own = taker.id == origin
-            part = f"{taker.id}/{origin}/{epoch}" if self.again else taker.id
-            if not own and not self.again:
-                part = f"{taker.id}/{origin}"
-            share.by, share.part = taker.id, part
-            yield Assignment(
-                taker, share.leg if own else self._fitted(share.leg, taker.id), part, own
-            )
+            part = f"{doer.id}/{key}/{epoch}" if self.again else f"{doer.id}/{key}"
+            share.by, share.part = doer.id, doer.id if own and not self.again else part
+            yield Assignment(doer, share.leg, share.part, own)
 
-    def _taker(
-        self, origin: ResourceId, share: Share, members: Mapping[ResourceId, Member]
-    ) -> Member | None:
-        """Return the member that begins a share now; None: no member can yet."""
-        before = self._shares.get(share.leg.after) if share.leg.after is not None else None
-        if before is not None and not before.over:
-            return None
-        if not members[origin].lost:
-            return members[origin]
-        free = (
-            each
-            for each in members.values()
-            if not each.lost and not each.active and self._has_done_its_own(each.id)
-        )
-        return next(free, None)
-
-    def _has_done_its_own(self, member: ResourceId) -> bool:
-        own = self._shares.get(member)
+    def _has_done(self, member: ResourceId) -> bool:
+        own = self._shares.get(str(member))
         return own is None or own.over
 
-    def _fitted(self, leg: Leg, taker: ResourceId) -> Leg:
-        takes = self._plan.takes.get(taker, frozenset())
-        kept = {name: value for name, value in leg.parameters.items() if name in takes}
-        return replace(leg, member=taker, parameters=kept)
+
+def _own(key: str) -> bool:
+    return _OF not in key

@@ -96,7 +96,8 @@ class Plan:
 
     `legs`: at most one for each member. `stays`: the behavior goes on when all have ended, for
     `duration_s` if that is given. `shared`: another member takes over what a lost member has not
-    done; `takes`: the parameters that each accepts then. `split`: each member's share.
+    done; `takes`: the parameters that each accepts then; `speeds_m_s`: the members' speeds.
+    `split`: each member's share.
     """
 
     legs: tuple[Leg, ...]
@@ -105,6 +106,7 @@ class Plan:
     duration_s: float | None = None
     shared: bool = False
     takes: Mapping[ResourceId, frozenset[str]] = field(default_factory=dict)
+    speeds_m_s: Mapping[ResourceId, float] = field(default_factory=dict)
     split: tuple[float, ...] = ()
 
 

@@ -4,18 +4,31 @@ import asyncio
 import json
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
 from m2pem.mission.catalogue import BehaviorState, ResourceId
+from m2pem.mission.values import Value
 from m2pem.teams.plan import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """A piece of a lost member's share: who does it, by which behavior with which parameters, as
+    missions give them."""
+
+    member: ResourceId
+    behavior: str
+    parameters: Mapping[str, Value]
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
     """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have
     succeeded. `lost`: members that the team goes on without, and why. `version`: the number of
-    changes. `split`: the members' shares, for a plan that divides its work.
+    changes. `split`: the members' shares, for a plan that divides its work. `transfers`: pieces of
+    lost members' shares, `given_up`: the shares that nobody does as a whole any more, `left`: the
+    parameters of what was left of others, all by the names of `Partition`.
     """
 
     begun: Mapping[str, str | None] = field(default_factory=dict)
@@ -23,9 +36,13 @@ class Reference:
     lost: Mapping[ResourceId, str] = field(default_factory=dict)
     version: int = 0
     split: tuple[float, ...] = ()
+    transfers: Mapping[str, Transfer] = field(default_factory=dict)
+    given_up: tuple[str, ...] = ()
+    left: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
     def text(self) -> str:
         """Return it as JSON, for the journal."""
+        moved = {key: asdict(transfer) for key, transfer in self.transfers.items()}
         return json.dumps(
             {
                 "begun": dict(self.begun),
@@ -33,6 +50,9 @@ class Reference:
                 "lost": dict(self.lost),
                 "version": self.version,
                 "split": list(self.split),
+                **({"transfers": moved} if moved else {}),
+                **({"given_up": list(self.given_up)} if self.given_up else {}),
+                **({"left": dict(self.left)} if self.left else {}),
             },
             separators=(",", ":"),
         )
@@ -48,8 +68,16 @@ def read_reference(text: str | None) -> Reference:
             {ResourceId(name): str(why) for name, why in data.get("lost", {}).items()},
             int(data.get("version", 0)),
             tuple(float(share) for share in data.get("split", ())),
+            {
+                str(key): Transfer(
+                    ResourceId(each["member"]), str(each["behavior"]), dict(each["parameters"])
+                )
+                for key, each in data.get("transfers", {}).items()
+            },
+            tuple(map(str, data.get("given_up", ()))),
+            {str(key): dict(left) for key, left in data.get("left", {}).items()},
         )
-    except (ValueError, TypeError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError):
         return Reference()
 
 
@@ -97,7 +125,8 @@ async def look_for_parts(
     not know it either, it has not.
     """
     planned = dict.fromkeys(leg.member for leg in plan.legs if leg.member not in kept.lost)
-    parts = dict.fromkeys([*kept.begun, *planned])
+    given = [f"{each.member}/{key}" for key, each in kept.transfers.items()]
+    parts = dict.fromkeys([*kept.begun, *planned, *given])
     asked = [part for part in parts if _doer(part) not in kept.lost and part not in kept.done]
     answers = await asyncio.gather(
         *(_ask(request.id, part, kept.begun.get(part), arbiter_of) for part in asked)
