@@ -183,11 +183,13 @@ class StartPreview:
 
 @dataclass(frozen=True, slots=True)
 class WaitingTask:
-    """A task that waits for vehicles or payloads that are not free (docs/allocation.md).
+    """A task that waits for vehicles or payloads that are not free, or for space
+    (docs/allocation.md).
 
     `allocation`: the id of its request. `task` is the task's label. Times are seconds: since it
     asked, and until it gives up (None: it waits without a limit, or its run is about to answer).
-    `holders`: the behaviors, requests and operators who have what it could use, by resource.
+    `holders`: the behaviors, requests and operators who have what it could use, by resource; or
+    who has the space that it needs, by the name of the shared space or of the vehicle in its way.
     """
 
     run: RunId

@@ -104,6 +104,14 @@ def _as_data(arbiters: "FleetArbiters") -> dict[str, Any]:
         "geometries": {
             name: type(geometry).__name__.lower() for name, geometry in fleet.geometries.items()
         },
+        "shared_space": {
+            space.name: {
+                "capacity": space.capacity,
+                "domains": [domain.value for domain in space.domains],
+                "on_conflict": space.on_conflict.value,
+            }
+            for space in fleet.shared_space.values()
+        },
     }
 
 
@@ -134,6 +142,12 @@ def _as_text(arbiters: "FleetArbiters") -> str:
         parts.append(table(("TEAM", "LEAD", "MEMBERS"), rows))
     if data["geometries"]:
         parts.append(table(("GEOMETRY", "IS A"), list(data["geometries"].items())))
+    if data["shared_space"]:
+        spaces = [
+            (name, str(space["capacity"]), ", ".join(space["domains"]), space["on_conflict"])
+            for name, space in data["shared_space"].items()
+        ]
+        parts.append(table(("SHARED SPACE", "CAPACITY", "DOMAINS", "ON CONFLICT"), spaces))
     offered: dict[str, list[str]] = {}
     for section in ("vehicles", "payloads", "teams"):
         for name, entry in data[section].items():

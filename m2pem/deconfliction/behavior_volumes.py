@@ -1,21 +1,24 @@
-"""The operational volume of a behavior of one aircraft, by its meaning in the shared catalogue.
+"""The operational volume of a behavior of one vehicle, by its meaning in the shared catalogue.
 
-Whichever arbiter executes the behavior, the aircraft stays in the volume. Each way is as wide as
+Whichever arbiter executes the behavior, the vehicle stays in the volume. Each way is as wide as
 its bends may be, and as high as from its beginning to its end. An aircraft on the ground is assumed
-to climb vertically first.
+to climb vertically first. A vehicle that does not fly is assumed to go straight to each place.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
-from m2pem.deconfliction.aircraft import FlightParameters, Span
 from m2pem.deconfliction.operational_volume import NOTHING_M, Piece, Volume
+from m2pem.deconfliction.participant import (
+    ANY_HEIGHT,
+    FlightParameters,
+    Span,
+    SurfaceParameters,
+)
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import Hull, buffered_hull, convex_hull, middle_of
-
-BEND_M = 4.0
-"""How far from a route's corner a bend may pass it."""
 
 RADIUS_M = 30.0
 SURVEY_SPACING_M = 20.0
@@ -36,24 +39,27 @@ def volume_of(
     """
     if timed and (scheduled := _scheduled(behavior, parameters, start_s)) is not None:
         return scheduled
-    return PLANS.get(behavior, _anything)(parameters)
+    plans = SURFACE_PLANS if isinstance(parameters, SurfaceParameters) else PLANS
+    return plans.get(behavior, _anything)(parameters)
 
 
 def ascent(parameters: FlightParameters, span: Span) -> tuple[list[Piece], Span]:
     """How it comes from where it is to its way at some height: the column in which it takes off, if
     it must, and at which heights the way to the first place is flown."""
-    aircraft = parameters.aircraft
-    column = aircraft.span.to(span) if not aircraft.flies else aircraft.span
-    pieces = [Piece(aircraft.stop, column.low_m, column.high_m)]
-    return pieces, span if not aircraft.flies else aircraft.span.to(span)
+    vehicle = parameters.vehicle
+    column = vehicle.span.to(span) if not vehicle.flies else vehicle.span
+    pieces = [Piece(vehicle.stop, column.low_m, column.high_m)]
+    return pieces, span if not vehicle.flies else vehicle.span.to(span)
 
 
 def way_to(parameters: FlightParameters, area: Hull | None, span: Span) -> Volume:
     """From where it is into an area, and anywhere in it."""
     pieces, flown = ascent(parameters, span)
-    there = None if area is None else convex_hull([*parameters.aircraft.stop, *area])
+    there = None if area is None else convex_hull([*parameters.vehicle.stop, *area])
     pieces.append(Piece(there, flown.low_m, flown.high_m))
-    return Volume(tuple(pieces), _end(span), parameters.unknown)
+    straight = area is not None and len(area) == 1
+    route = (parameters.vehicle.place, *area) if straight and area is not None else ()
+    return Volume(tuple(pieces), _end(span), parameters.unknown, route)
 
 
 def along(
@@ -63,14 +69,15 @@ def along(
     pieces, flown = ascent(parameters, spans[0])
     pieces.append(
         Piece(
-            buffered_hull([*parameters.aircraft.stop, places[0]], wide_m), flown.low_m, flown.high_m
+            buffered_hull([*parameters.vehicle.stop, places[0]], wide_m), flown.low_m, flown.high_m
         )
     )
     legs = zip(pairwise(places), pairwise(spans), strict=True)
     for (begin, end), (first, second) in legs:
         over = first.to(second)
         pieces.append(Piece(buffered_hull([begin, end], wide_m), over.low_m, over.high_m))
-    return Volume(tuple(pieces), _end(spans[-1]), parameters.unknown)
+    route = (parameters.vehicle.place, *places)
+    return Volume(tuple(pieces), _end(spans[-1]), parameters.unknown, route, wide_m)
 
 
 def _end(span: Span) -> float | None:
@@ -79,7 +86,7 @@ def _end(span: Span) -> float | None:
 
 def _scheduled(behavior: str, parameters: FlightParameters, start_s: float) -> Volume | None:
     """A route or a way at one height, at a speed that is given; None: it is not one."""
-    aircraft, speed_m_s = parameters.aircraft, parameters.speed_m_s
+    vehicle, speed_m_s = parameters.vehicle, parameters.speed_m_s
     if behavior == "single_vehicle_routing" and parameters.route is not None:
         places = [parameters.to_local(each) for each in parameters.route.waypoints]
         spans = parameters.waypoint_spans(parameters.route)
@@ -89,16 +96,16 @@ def _scheduled(behavior: str, parameters: FlightParameters, start_s: float) -> V
     else:
         return None
     level = all(
-        span.exact and aircraft.span.exact and abs(span.low_m - aircraft.span.low_m) <= NOTHING_M
+        span.exact and vehicle.span.exact and abs(span.low_m - vehicle.span.low_m) <= NOTHING_M
         for span in spans
     )
-    ready = aircraft.flies and aircraft.stands and not parameters.loop
+    ready = vehicle.flies and vehicle.stands and not parameters.loop
     if not (places and level and ready and speed_m_s and not parameters.unknown):
         return None
     height_m, now_s = spans[0].low_m, start_s
-    wide_m = BEND_M if len(places) > 1 else 0.0
-    pieces = [Piece((aircraft.place,), height_m, height_m, to_s=start_s)]
-    for begin, end in pairwise([aircraft.place, *places]):
+    wide_m = parameters.bend_m if len(places) > 1 else 0.0
+    pieces = [Piece((vehicle.place,), height_m, height_m, to_s=start_s)]
+    for begin, end in pairwise([vehicle.place, *places]):
         then_s = now_s + math.dist(begin, end) / speed_m_s
         area = buffered_hull([begin, end], wide_m)
         pieces.append(Piece(area, height_m, height_m, now_s, then_s, (begin, end), wide_m))
@@ -111,15 +118,15 @@ def _scheduled(behavior: str, parameters: FlightParameters, start_s: float) -> V
 
 
 def _anything(parameters: FlightParameters) -> Volume:
-    parameters.unknown = "where it flies is not known"
+    parameters.unknown = f"where it {parameters.moves} is not known"
     return Volume((Piece(None, -math.inf, math.inf),), unknown=parameters.unknown)
 
 
 def _stay(parameters: FlightParameters) -> Volume:
-    if not parameters.aircraft.flies:
+    if not parameters.vehicle.flies:
         return Volume()
-    span = parameters.aircraft.span
-    return Volume((Piece(parameters.aircraft.stop, span.low_m, span.high_m),), _end(span))
+    span = parameters.vehicle.span
+    return Volume((Piece(parameters.vehicle.stop, span.low_m, span.high_m),), _end(span))
 
 
 def _route(parameters: FlightParameters) -> Volume:
@@ -132,7 +139,8 @@ def _route(parameters: FlightParameters) -> Volume:
     )
     if parameters.loop:
         places, spans = [*places, places[0]], [*spans, spans[0]]
-    return along(parameters, places, spans, BEND_M if len(places) > 1 else 0.0)
+    volume = along(parameters, places, spans, parameters.bend_m if len(places) > 1 else 0.0)
+    return replace(volume, route=()) if parameters.loop else volume
 
 
 def _to_target(parameters: FlightParameters) -> Volume:
@@ -147,35 +155,51 @@ def _around(parameters: FlightParameters) -> Volume:
 
 
 def _climb(parameters: FlightParameters) -> Volume:
-    return way_to(parameters, parameters.aircraft.stop, parameters.span())
+    return way_to(parameters, parameters.vehicle.stop, parameters.span())
 
 
 def _land(parameters: FlightParameters) -> Volume:
-    if not parameters.aircraft.flies:
+    if not parameters.vehicle.flies:
         return Volume()
-    return Volume((Piece(parameters.aircraft.stop, -math.inf, parameters.aircraft.span.high_m),))
+    return Volume((Piece(parameters.vehicle.stop, -math.inf, parameters.vehicle.span.high_m),))
 
 
 def _return(parameters: FlightParameters) -> Volume:
-    aircraft = parameters.aircraft
-    away_m = [math.dist(aircraft.place, home) for home in aircraft.homes]
+    vehicle = parameters.vehicle
+    away_m = [math.dist(vehicle.place, home) for home in vehicle.homes]
     at_home = max(away_m, default=math.inf) <= AT_HOME_M
-    if at_home and not aircraft.flies:
+    if at_home and not vehicle.flies:
         return Volume()
-    top_m = aircraft.span.high_m
-    if aircraft.home_m is None:
+    top_m = vehicle.span.high_m
+    if vehicle.home_m is None:
         parameters.unknown, top_m = "the height of its home is not known", math.inf
     elif not at_home:
-        top_m = max(top_m, aircraft.home_m + RETURN_HEIGHT_M)
-    if not aircraft.homes:
+        top_m = max(top_m, vehicle.home_m + RETURN_HEIGHT_M)
+    if not vehicle.homes:
         parameters.unknown = "where its home is is not known"
         return Volume((Piece(None, -math.inf, top_m),), unknown=parameters.unknown)
-    low_m = aircraft.span.low_m if aircraft.flies else top_m
-    pieces = [Piece(aircraft.stop, aircraft.span.low_m, top_m)]
-    for home in aircraft.homes:
-        pieces.append(Piece(convex_hull([*aircraft.stop, home]), low_m, top_m))
+    low_m = vehicle.span.low_m if vehicle.flies else top_m
+    pieces = [Piece(vehicle.stop, vehicle.span.low_m, top_m)]
+    for home in vehicle.homes:
+        pieces.append(Piece(convex_hull([*vehicle.stop, home]), low_m, top_m))
         pieces.append(Piece((home,), -math.inf, top_m))
     return Volume(tuple(pieces), unknown=parameters.unknown)
+
+
+def _return_on_surface(parameters: FlightParameters) -> Volume:
+    vehicle = parameters.vehicle
+    if not vehicle.homes:
+        parameters.unknown = "where its home is is not known"
+        return way_to(parameters, None, ANY_HEIGHT)
+    ways = [way_to(parameters, (home,), ANY_HEIGHT) for home in vehicle.homes]
+    if len(ways) == 1:
+        return ways[0]
+    return Volume(tuple(piece for way in ways for piece in way.pieces))
+
+
+def _reverse(parameters: FlightParameters) -> Volume:
+    around = buffered_hull([parameters.vehicle.place], parameters.distance_m)
+    return way_to(parameters, around, ANY_HEIGHT)
 
 
 def survey_area(parameters: FlightParameters) -> tuple[Hull, Span] | None:
@@ -230,4 +254,13 @@ PLANS: Mapping[str, Callable[[FlightParameters], Volume]] = {
     "area_observe": _observe,
     "follow": _to_target,
 }
-"""By behavior's name. Others may be anywhere."""
+"""By behavior's name, of aircraft. Others may be anywhere."""
+
+SURFACE_PLANS: Mapping[str, Callable[[FlightParameters], Volume]] = {
+    **PLANS,
+    "land": _stay,
+    "takeoff": _stay,
+    "return_to_launch": _return_on_surface,
+    "reverse": _reverse,
+}
+"""The same of vehicles that do not fly."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from m2pem.deconfliction.operational_volume import NOTHING_M, Piece, Separation, Volume
+from m2pem.geo.local_frame import EastNorth
+from m2pem.geo.polygon import meeting_place
 from m2pem.mission.catalogue import ResourceId
 
 LOWEST_M = 2.0
@@ -34,35 +36,74 @@ class Occupant:
 class Conflict:
     """A vehicle would come too near to another one.
 
-    `piece`: the part of the other's volume to which it comes too near. `home_m`: the height of the
-    home of `vehicle`; None: not known.
+    `own`, `piece`: the parts of both volumes that come too near. `home_m`: the height of the home
+    of `vehicle`; None: not known. `policy`: what both must keep.
     """
 
     vehicle: ResourceId
     volume: Volume
     home_m: float | None
     other: Occupant
+    own: Piece
     piece: Piece
+    policy: Separation
+
+    @property
+    def place(self) -> EastNorth | None:
+        """Where they would meet; None: anywhere."""
+        return meeting_place(self.own.area, self.piece.area)
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a behavior may not start now.
+
+    `vehicle`: its vehicle that another one is in the way of. `blockers`: who is in the way;
+    `lacking` of them must go. `space`: the name of the shared space that is full; "": none is.
+    `wait_s`: how long its task may wait for that; None: the behavior is refused at once.
+    """
+
+    reason: str
+    vehicle: ResourceId
+    blockers: tuple[Occupant, ...] = ()
+    lacking: int = 1
+    space: str = ""
+    wait_s: float | None = None
 
 
 Again: TypeAlias = Callable[[float, bool], Conflict | None]
 """Return the conflict at another altitude above home in metres; True: it goes there first."""
 
 
-def refusal(conflict: Conflict, policy: Separation, again: Again | None) -> str:
-    """Return why the behavior is refused. `again` None: it takes no altitude."""
-    other, piece = conflict.other, conflict.piece
-    heights = _heights(piece, conflict.home_m)
-    does = f"does {other.behavior} ({other.name}){heights}" if other.behavior else f"flies{heights}"
-    if other.lost:
-        does = f"is lost, and did {other.behavior} ({other.name}){heights}"
+def conflict_text(conflict: Conflict, where: str, again: Again | None) -> str:
+    """Return why the behavior is refused. `where`: they would meet; "": anywhere. `again` None: it
+    takes no altitude."""
+    other, policy = conflict.other, conflict.policy
+    airborne = math.isfinite(policy.vertical_m)
+    does = does_what(other, _heights(conflict.piece, conflict.home_m) if airborne else None)
     why = "".join(f"; {who}: {what}" for who, what in _unknown(conflict))
-    near = f"nearer than {policy.horizontal_m:g} m and {policy.vertical_m:g} m in height"
+    near = f"nearer than {policy.horizontal_m:g} m"
+    if airborne:
+        near += f" and {policy.vertical_m:g} m in height"
     altitudes = [] if again is None else _altitudes(conflict, policy, again)
-    advice = ", or ".join([*altitudes, _way_out(conflict)])
+    advice = ", or ".join([*altitudes, way_out(other, "landed" if airborne else "")])
     if not altitudes:
         advice = f"start it {advice}"
-    return f"{conflict.vehicle} would come {near} to {other.vehicle}, which {does}{why}: {advice}"
+    at = f", {where}" if where else ""
+    return (
+        f"{conflict.vehicle} would come {near} to {other.vehicle}, which {does}{at}{why}: {advice}"
+    )
+
+
+def does_what(other: Occupant, heights: str | None = None) -> str:
+    """Say what a vehicle does that is in the way. `heights`: None: they do not matter."""
+    at = heights or ""
+    if other.lost:
+        did = f", and did {other.behavior} ({other.name}){at}" if other.behavior else ""
+        return f"is lost{did}"
+    if other.behavior:
+        return f"does {other.behavior} ({other.name}){at}"
+    return "stands there" if heights is None else f"flies{at}"
 
 
 def _unknown(conflict: Conflict) -> list[tuple[str, str]]:
@@ -71,13 +112,14 @@ def _unknown(conflict: Conflict) -> list[tuple[str, str]]:
     return [(who, what) for who, what in found if what]
 
 
-def _way_out(conflict: Conflict) -> str:
-    other = conflict.other
+def way_out(other: Occupant, or_has: str = "") -> str:
+    """Say when a vehicle is not in the way any more. `or_has`: what else it can do for that."""
     if other.lost:
         return f"when the link to {other.vehicle} is restored"
     if other.behavior:
         return f"after {other.behavior} has ended"
-    return f"after {other.vehicle} has landed or gone elsewhere"
+    done = f"{or_has} or gone" if or_has else "gone"
+    return f"after {other.vehicle} has {done} elsewhere"
 
 
 def _heights(piece: Piece, home_m: float | None) -> str:

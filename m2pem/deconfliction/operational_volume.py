@@ -1,4 +1,4 @@
-"""The operational volume of an aircraft: polygons with heights from and to, perhaps for a time.
+"""The operational volume of a vehicle: polygons with heights from and to, perhaps for a time.
 
 Heights are metres above mean sea level, times seconds since the Unix epoch.
 """
@@ -6,22 +6,26 @@ Heights are metres above mean sea level, times seconds since the Unix epoch.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from m2pem.geo.local_frame import EastNorth
-from m2pem.geo.polygon import Hull, hull_distance_m
+from m2pem.geo.polygon import Hull, buffered_hull, edge_distance_m, hull_distance_m
 
 NOTHING_M = 0.01
 """Two computations of one place may differ by this."""
 
 OFF_M = 3.0
-"""An aircraft that is nearer to its way than this keeps to it."""
+"""A vehicle that is nearer to its way than this keeps to it."""
+
+REACHED_M = 2.0
+"""A vehicle that is nearer to a place of its route than this has reached it."""
 
 _HALVINGS = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """Two aircraft are never nearer than both distances, or never within `time_s` of each other at
+    """Two vehicles are never nearer than both distances, or never within `time_s` of each other at
     places that are; None: time does not help."""
 
     vertical_m: float
@@ -47,11 +51,14 @@ class Piece:
 @dataclass(frozen=True, slots=True)
 class Volume:
     """`end_m`: the height that the vehicle keeps afterwards, if it is known. `unknown`: why some of
-    it is boundless; "" if nothing is."""
+    it is boundless; "" if nothing is. `route`: the vehicle goes from its first place to the next,
+    and so on, no more than `aside_m` beside; (): its way is not known."""
 
     pieces: tuple[Piece, ...] = ()
     end_m: float | None = None
     unknown: str = ""
+    route: tuple[EastNorth, ...] = ()
+    aside_m: float = 0.0
 
     @property
     def timed(self) -> bool:
@@ -62,6 +69,29 @@ class Volume:
         """The same, without saying when."""
         pieces = [replace(each, from_s=-math.inf, to_s=math.inf, way=None) for each in self.pieces]
         return replace(self, pieces=tuple(pieces))
+
+    def after(self, place: EastNorth, stop: Hull, leg: int) -> "Volume":
+        """What is left of it: from a place on a leg of its route to the end. `stop`: where the
+        vehicle may be by the time at which it has stopped."""
+        places = self.route[leg + 1 :]
+        ways = [(place, *stop, places[0]), *pairwise(places)]
+        pieces = [Piece(buffered_hull(way, self.aside_m), -math.inf, math.inf) for way in ways]
+        return replace(self, pieces=tuple(pieces), route=(place, *places))
+
+    def leg_at(self, place: EastNorth, leg: int) -> int:
+        """On which leg of the route a vehicle is that was on `leg` before; the first is 0.
+
+        It is on the next one when it has reached the end of its leg, or is past that end and nearer
+        to the next leg.
+        """
+        while leg + 2 < len(self.route):
+            begin, end, then = self.route[leg : leg + 3]
+            ahead = _dot(end, begin, end, place) >= 0
+            nearer = edge_distance_m(place, (end, then)) < edge_distance_m(place, (begin, end))
+            if math.dist(place, end) > REACHED_M and not (ahead and nearer):
+                break
+            leg += 1
+        return leg
 
     def passes(self, place: EastNorth, from_s: float, to_s: float) -> bool:
         """Whether the vehicle is at a place at some time from then to then, if it keeps to it."""
@@ -134,6 +164,13 @@ def _edge(off_m: Callable[[float], float], near: float, far: float, reach_m: flo
         else:
             far = middle
     return far
+
+
+def _dot(start: EastNorth, before: EastNorth, end: EastNorth, place: EastNorth) -> float:
+    """Above 0: `place`, seen from `start`, lies in the direction from `before` to `end`."""
+    return (end[0] - before[0]) * (place[0] - start[0]) + (end[1] - before[1]) * (
+        place[1] - start[1]
+    )
 
 
 def _on(way: tuple[EastNorth, EastNorth], share: float) -> EastNorth:

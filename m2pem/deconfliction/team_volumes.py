@@ -3,9 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from m2pem.deconfliction.aircraft import Aircraft, FlightParameters
 from m2pem.deconfliction.behavior_volumes import (
-    BEND_M,
     RADIUS_M,
     along,
     observed,
@@ -14,6 +12,7 @@ from m2pem.deconfliction.behavior_volumes import (
     way_to,
 )
 from m2pem.deconfliction.operational_volume import Piece, Volume
+from m2pem.deconfliction.participant import FlightParameters, Participant
 from m2pem.fleet.parameters import read_offsets
 from m2pem.geo.local_frame import EastNorth
 from m2pem.geo.polygon import buffered_hull, convex_hull
@@ -29,7 +28,11 @@ _SHAPES = {
 
 
 def member_volume(
-    behavior: str, parameters: FlightParameters, lead: Aircraft | None, index: int, start_s: float
+    behavior: str,
+    parameters: FlightParameters,
+    lead: Participant | None,
+    index: int,
+    start_s: float,
 ) -> Volume:
     """Return the volume of member `index` of a team (0 leads); the lead need not be an aircraft."""
     if behavior in _SHAPES:
@@ -39,7 +42,7 @@ def member_volume(
 
 
 def _march(
-    behavior: str, parameters: FlightParameters, lead: Aircraft | None, index: int
+    behavior: str, parameters: FlightParameters, lead: Participant | None, index: int
 ) -> Volume:
     spacing_m = parameters.spacing_m or SPACING_M
     back, left = slot(parameters.text("shape") or _SHAPES[behavior], index)
@@ -54,28 +57,28 @@ def _march(
             parameters.unknown = "the position of its lead is not known"
             return way_to(parameters, None, parameters.span())
         around = buffered_hull(lead.stop, math.hypot(back_m, left_m))
-        return way_to(parameters, around if index else parameters.aircraft.stop, parameters.span())
+        return way_to(parameters, around if index else parameters.vehicle.stop, parameters.span())
     places: list[EastNorthUp] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
     spans = parameters.waypoint_spans(route)
     if len({place[:2] for place in places}) == 1:
         reach_m = 2 * math.hypot(back_m, left_m)
         return way_to(parameters, buffered_hull([places[0][:2], *_stop(lead)], reach_m), spans[0])
     moved = [place[:2] for place in shifted(places, left_m)]
-    volume = along(parameters, moved, spans, BEND_M)
+    volume = along(parameters, moved, spans, parameters.bend_m)
     if back_m <= Polyline(moved).length_m:
         return volume
     # Its place is before the route's beginning: it goes there at once, or by way of the route.
     end = trimmed([(*place, 0.0) for place in moved], back_m)[-1][:2]
     over = spans[0]
-    for span in (*spans, parameters.aircraft.span):
+    for span in (*spans, parameters.vehicle.span):
         over = over.to(span)
-    detour = convex_hull([*parameters.aircraft.stop, *moved, end])
-    low_m = over.low_m if parameters.aircraft.flies else min(span.low_m for span in spans)
+    detour = convex_hull([*parameters.vehicle.stop, *moved, end])
+    low_m = over.low_m if parameters.vehicle.flies else min(span.low_m for span in spans)
     extra = Piece(detour, low_m, over.high_m)
     return Volume((*volume.pieces, extra), volume.end_m, volume.unknown)
 
 
-def _stop(lead: Aircraft | None) -> Sequence[EastNorth]:
+def _stop(lead: Participant | None) -> Sequence[EastNorth]:
     return () if lead is None else lead.stop
 
 

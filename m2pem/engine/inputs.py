@@ -136,12 +136,15 @@ class ResourcesChosen(_Input, frozen=True):
 
 class ResourcesNotFree(_Input, frozen=True):
     """What a request needs is not free. `code`: the error that its task throws; "": it waits.
-    `holders`: who has what could fill its roles, by resource."""
+    `holders`: who has what could fill its roles, by resource, or the space that its vehicles need,
+    by the name of that. `wait_s`: how long it waits from now on, if its roles do not say; None:
+    as before."""
 
     allocation: str
     reason: str
     holders: dict[str, str] = msgspec.field(default_factory=dict)
     code: str = ""
+    wait_s: float | None = None
 
 
 class PromptAnswer(_Input, frozen=True):

@@ -4,17 +4,22 @@ Requests that arrive in one turn of the event loop, and those that wait, are dec
 What is chosen is held for its request until the run has journaled the choice and requests the
 behavior. While a request waits, the allocator looks again when a resource is released, lost or
 received again, and at most every half second when telemetry arrives.
+
+In a fleet whose tasks wait for space, what is chosen must have its space as well: it is reserved
+together with the resources.
 """
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from m2pem.allocation.assignment import Request, assign
 from m2pem.allocation.candidates import Candidates, LatestState, Place
 from m2pem.allocation.circles import Waiting, circles
 from m2pem.allocation.explanation import reason, what_was_considered
 from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
+from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
 from m2pem.api.clock import Clock
 from m2pem.api.control import Alert, RunId
 from m2pem.engine import records as r
@@ -26,12 +31,25 @@ from m2pem.errors import ExpressionError
 from m2pem.executive.dispatcher import Geometries
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.runner import Runner
+from m2pem.executive.space_allocation import (
+    SpaceAllocation,
+    holders_of,
+    space_circle_text,
+    space_circles,
+)
 from m2pem.fleet.allocation import Availability, resources_of
 from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.parameters import ParameterError, resolve
+from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.losses import UNAVAILABLE, may_return
+
+if TYPE_CHECKING:
+    from m2pem.deconfliction.conflicts import Refusal
+
+REJECTED = "REJECTED"
+"""The error of a task whose behavior another vehicle is in the way of, and which does not wait."""
 
 LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
@@ -63,19 +81,22 @@ class _Considered:
     @property
     def priority(self) -> int:
         """The greatest priority of its roles."""
-        return max(each.role.need.priority for each in self.roles if each.role.need is not None)
+        needs = (each.role.need for each in self.roles)
+        return max((need.priority for need in needs if need is not None), default=0)
 
     @property
     def waits(self) -> bool:
-        """Whether its task waits until resources are free."""
-        return any(each.role.need is not None and each.role.need.waits for each in self.roles)
+        """Whether its task waits until resources are free; one that waits for space does."""
+        asked = any(each.role.need is not None and each.role.need.waits for each in self.roles)
+        return asked or self.request.deadline != 0
 
 
 class Allocator:
     """Chooses resources for the requests of all runs of an executive.
 
     `latest`: the newest telemetry of a resource. `runners`: the runs that are driven here.
-    `publish`: takes warnings for operators.
+    `publish`: takes warnings for operators. `space`: what tasks wait for beside their resources;
+    None: nothing.
     """
 
     def __init__(
@@ -87,6 +108,7 @@ class Allocator:
         geometries: Geometries,
         runners: Mapping[RunId, Runner],
         publish: Callable[[Alert], None],
+        space: SpaceAllocation | None = None,
     ) -> None:
         self._arbiters = arbiters
         self._availability = availability
@@ -95,6 +117,7 @@ class Allocator:
         self._geometries = geometries
         self._runners = runners
         self._publish = publish
+        self._space = space
         self._asked: dict[str, _Asked] = {}
         self._scheduled = False
         self._later: asyncio.Task[None] | None = None
@@ -113,13 +136,18 @@ class Allocator:
         asked = self._asked.setdefault(allocation, _Asked(runner))
         if again and asked.chosen:
             asked.chosen = False
-            self._availability.release(allocation)
+            self._release(allocation)
         self._decide_soon()
 
     def withdraw(self, allocation: str) -> None:
         """Forget a request: its task needs no resources any more."""
         if self._asked.pop(allocation, None) is not None:
-            self._availability.release(allocation)
+            self._release(allocation)
+
+    def _release(self, allocation: str) -> None:
+        if self._space is not None:
+            self._space.release(allocation)
+        self._availability.release(allocation)
 
     def on_records(self, run: RunId, records: Sequence[r.Record]) -> None:
         """Hand what is held for a request to the behavior that was requested for it."""
@@ -127,6 +155,8 @@ class Allocator:
             if isinstance(record, r.BehaviorRequested) and record.allocation:
                 if self._asked.pop(record.allocation, None) is not None:
                     self._availability.hand_on(record.allocation, record.behavior)
+                    if self._space is not None:
+                        self._space.hand_on(record.allocation, record.behavior)
             elif isinstance(record, _MAY_FREE):
                 self._decide_soon()
 
@@ -145,11 +175,15 @@ class Allocator:
 
     def on_telemetry(self) -> None:
         """Look again at what waits, `LOOK_AGAIN_US` after the last time."""
-        if self._later is None and any(not each.chosen for each in self._asked.values()):
-            self._later = asyncio.create_task(self._look_later())
+        if any(not each.chosen for each in self._asked.values()):
+            self._look_after(LOOK_AGAIN_US)
 
-    async def _look_later(self) -> None:
-        await self._clock.sleep_until(self._looked_us + LOOK_AGAIN_US)
+    def _look_after(self, wait_us: int) -> None:
+        if self._later is None:
+            self._later = asyncio.create_task(self._look_later(wait_us))
+
+    async def _look_later(self, wait_us: int) -> None:
+        await self._clock.sleep_until(self._looked_us + wait_us)
         self._later = None
         self.resources_changed()
 
@@ -168,15 +202,19 @@ class Allocator:
     def _decide(self) -> None:
         self._scheduled = False
         self._looked_us = self._clock.now_us()
+        if self._space is not None and self._asked and self._space.awaits_positions():
+            self._look_after(LOOK_AGAIN_US // 5)
+            return
         evaluator = RoleEvaluator(
             Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
         )
         waiting = self._consider(evaluator)
         waiting.sort(key=lambda each: (-each.priority, each.request.at_us, each.request.id))
-        requests = [
-            Request(each.request.id, tuple(role.options for role in each.roles)) for each in waiting
-        ]
-        chosen = assign(requests, self._order)
+        requests = {
+            each.request.id: Request(each.request.id, tuple(role.options for role in each.roles))
+            for each in waiting
+        }
+        chosen, refusals = self._assign(waiting, requests)
         served = [each.request.id for each in waiting if each.request.id in chosen]
         given = {
             resource: request
@@ -188,9 +226,66 @@ class Allocator:
             number = each.request.id
             if number in chosen:
                 self._give(each, chosen[number], [other for other in served if other != number])
+            elif number in refusals:
+                self._refuse_space(each, refusals[number])
             else:
                 self._refuse(each, given, evaluator)
-        self._tell_of_circles([each for each in waiting if each.request.id not in chosen])
+        left = [each for each in waiting if each.request.id not in chosen]
+        self._tell_of_circles(left, refusals)
+
+    def _assign(
+        self, waiting: Sequence[_Considered], requests: dict[str, Request]
+    ) -> tuple[dict[str, dict[str, tuple[ResourceId, ...]]], "dict[str, Refusal]"]:
+        """Choose for all requests that can be served, in their order. What is chosen has its space:
+        it is chosen again without a vehicle that has not.
+
+        Returns what is chosen, and why others have no space.
+        """
+        space = self._space
+        chosen = assign(list(requests.values()), self._order)
+        if space is None:
+            return chosen, {}
+        refusals: dict[str, Refusal] = {}
+        space.begin()
+        while True:
+            space.begin_round()
+            for each in waiting:
+                number = each.request.id
+                if number not in chosen:
+                    space.keep_back(number)
+                    continue
+                refusal = self._without_space(each, chosen[number])
+                if refusal is not None:
+                    refusals[number] = refusal
+                    requests[number] = _without(requests[number], refusal.vehicle)
+                    break
+            else:
+                for number in chosen:
+                    space.commit(number)
+                return chosen, {e: r for e, r in refusals.items() if e not in chosen}
+            chosen = assign(list(requests.values()), self._order)
+
+    def _without_space(
+        self, each: _Considered, chosen: Mapping[str, tuple[ResourceId, ...]]
+    ) -> "Refusal | None":
+        """Return why a request has no space with what is chosen for it; None: it has."""
+        assert self._space is not None
+        behavior = behavior_of(each.request)
+        roles = self._filled(each, chosen)
+        resources = tuple(dict.fromkeys(one for ids in roles.values() for one in ids))
+        fleet = self._arbiters.fleet
+        if not may_wait_for_space(fleet, behavior.type, behavior.name, resources):
+            return None
+        spec = self._spec(behavior)
+        if spec is None:
+            return None
+        try:
+            parameters = self._parameters(spec, each.asked.runner.id, each.request)
+        except ParameterError:
+            return None  # its behavior is refused later, with the reason
+        number = BehaviorId(each.request.id)
+        wanted = BehaviorRequest(number, 0, behavior.name, parameters, resources, roles)
+        return self._space.refusal(wanted, spec)
 
     def _consider(self, evaluator: RoleEvaluator) -> list[_Considered]:
         found: list[_Considered] = []
@@ -258,18 +353,22 @@ class Allocator:
         spec = self._spec(behavior)
         if spec is None:
             return Place()
-        fleet = self._arbiters.fleet
         try:
-            parameters = resolve(
-                spec,
-                request.parameters,
-                lambda name: self._geometries(run, name),
-                fleet.vehicles,
-                fleet.origin,
-            )
+            return candidates.place_of(self._parameters(spec, run, request))
         except ParameterError:
             return Place()
-        return candidates.place_of(parameters)
+
+    def _parameters(
+        self, spec: BehaviorSpec, run: RunId, request: AllocationRequest
+    ) -> dict[str, ResolvedValue]:
+        fleet = self._arbiters.fleet
+        return resolve(
+            spec,
+            request.parameters,
+            lambda name: self._geometries(run, name),
+            fleet.vehicles,
+            fleet.origin,
+        )
 
     def _spec(self, behavior: Behavior) -> BehaviorSpec | None:
         """Return how the behavior is taken by the first resource that offers it."""
@@ -283,20 +382,40 @@ class Allocator:
         chosen: Mapping[str, tuple[ResourceId, ...]],
         together_with: Sequence[str],
     ) -> None:
-        fleet = self._arbiters.fleet
-        roles = {
-            role.role.name: resources_of(role.role, fleet)
-            if role.role.resource
-            else chosen[role.role.name]
-            for role in each.roles
-            if role.role.name in chosen
-        }
+        roles = self._filled(each, chosen)
         resources = [resource for ids in roles.values() for resource in ids]
         each.asked.chosen = True
         self._availability.adopt(resources, each.request.id)
         each.asked.runner.post(
             ResourcesChosen(
                 each.request.id, dict(roles), what_was_considered(each.roles, roles, together_with)
+            )
+        )
+
+    def _filled(
+        self, each: _Considered, chosen: Mapping[str, tuple[ResourceId, ...]]
+    ) -> dict[str, tuple[ResourceId, ...]]:
+        """Return what fills each role, a named team with its lead first."""
+        fleet = self._arbiters.fleet
+        return {
+            role.role.name: resources_of(role.role, fleet)
+            if role.role.resource
+            else chosen[role.role.name]
+            for role in each.roles
+            if role.role.name in chosen
+        }
+
+    def _refuse_space(self, each: _Considered, refusal: "Refusal") -> None:
+        """Let a task wait for space, or throw its error."""
+        blockers = [(blocker.vehicle, blocker.behavior) for blocker in refusal.blockers]
+        lacks = (refusal.vehicle, refusal.space, blockers)
+        if refusal.wait_s is not None and each.asked.lacks == lacks:
+            return
+        each.asked.lacks = lacks
+        code = "" if refusal.wait_s is not None else REJECTED
+        each.asked.runner.post(
+            ResourcesNotFree(
+                each.request.id, refusal.reason, holders_of(refusal), code, refusal.wait_s
             )
         )
 
@@ -320,8 +439,27 @@ class Allocator:
 
     # --- circles of waiting -----------------------------------------------------------------------
 
-    def _tell_of_circles(self, waiting: Sequence[_Considered]) -> None:
-        """Warn operators of runs that wait for each other, once for each circle."""
+    def _tell_of_circles(
+        self,
+        left: Sequence[_Considered],
+        refusals: Mapping[str, "Refusal"],
+    ) -> None:
+        """Warn operators of runs and tasks that wait for each other, once for each circle.
+
+        `left`: all that waits. `refusals`: why some of it has no space; the rest waits for
+        resources.
+        """
+        waiting = [each for each in left if each.request.id not in refusals]
+        requests = {each.request.id: each for each in left}
+        vehicles = {number: _vehicles(each) for number, each in requests.items()}
+        in_space = space_circles(refusals, vehicles)
+        for circle in in_space:
+            if circle not in self._circles:
+                text = space_circle_text(
+                    {number: requests[number].request for number in sorted(circle)}, refusals
+                )
+                for run in sorted({requests[number].asked.runner.id for number in circle}):
+                    self._publish(Alert(run, "WAITING_CIRCLE", text))
         runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
         idle = {run for run, runner in runners.items() if self._is_idle(runner)}
         asked = [
@@ -339,7 +477,7 @@ class Allocator:
                 text = _circle_text([each for each in waiting if each.asked.runner.id in circle])
                 for run in sorted(circle):
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
-        self._circles = set(found)
+        self._circles = {*found, *in_space}
 
     def _needed(self, role: ConsideredRole) -> tuple[int, tuple[str | None, ...]]:
         """Return how many resources a role lacks, and the runs that hold one until they go on."""
@@ -405,6 +543,26 @@ def _is_hopeless(each: _Considered, evaluator: RoleEvaluator) -> bool:
         if len(able) < considered.options.least:
             return True
     return False
+
+
+def _vehicles(each: _Considered) -> frozenset[ResourceId]:
+    """Return the vehicles that the roles of a task name."""
+    return frozenset(one for role in each.roles if role.role.resource for one in role.resources)
+
+
+def _without(request: Request, vehicle: ResourceId) -> Request:
+    """Return a request for which a vehicle is not free."""
+    roles = tuple(
+        replace(
+            role,
+            costs_s={each: cost for each, cost in role.costs_s.items() if each != vehicle},
+            busy=[*role.busy, vehicle],
+        )
+        if vehicle in role.costs_s
+        else role
+        for role in request.roles
+    )
+    return Request(request.id, roles)
 
 
 def _withdrawn(role: ConsideredRole) -> frozenset[ResourceId]:

@@ -15,7 +15,7 @@ from m2pem.api.clock import Clock
 from m2pem.engine.commands import CancelBehavior, StartBehavior
 from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.fleet_connections import FleetArbiters
-from m2pem.executive.separation import AircraftSeparation
+from m2pem.executive.separation import VehicleSeparation
 from m2pem.fleet.allocation import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.mission.behavior import BehaviorType
@@ -57,7 +57,7 @@ class Order:
 
 class Dispatcher:
     """`post` takes every report, those of arbiters and those made here. `clearance`:
-    reserves volumes for aircraft; None: the fleet has no separation."""
+    reserves space for vehicles; None: the fleet does not say that they share it."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class Dispatcher:
         clock: Clock,
         geometries: Geometries,
         post: Callable[[BehaviorReport], None],
-        clearance: AircraftSeparation | None = None,
+        clearance: VehicleSeparation | None = None,
     ) -> None:
         self._arbiters = arbiters
         self._availability = availability
@@ -215,7 +215,7 @@ class Dispatcher:
             active.deadline.cancel()
         self._availability.release(behavior)
         if self._clearance is not None:
-            self._clearance.airspace.release(behavior)
+            self._clearance.reservations.release(behavior)
 
     def adopt(self, behavior: str, resources: Iterable[str], number: int, arbiter: Arbiter) -> None:
         """After a restart: the arbiter has it already."""
@@ -230,7 +230,7 @@ class Dispatcher:
         ids, kind = _ids(command.resources), BehaviorType(command.type)
         spec = self.spec(ids, command.name, kind)
         if spec is not None:
-            self._clearance.airspace.adopt(self.request(command, spec), kind)
+            self._clearance.reservations.adopt(self.request(command, spec), kind)
 
     def view(self, behavior: str) -> DispatcherView:
         """Return what is commanded of a behavior that has not ended."""
@@ -367,7 +367,7 @@ class Dispatcher:
         """Hold or resume; asked in its turn, as a team may have taken the resource meanwhile."""
         arbiter = self._arbiters.holding(resource)
         if self._clearance is not None and what == "hold":
-            self._clearance.airspace.delay(resource)
+            self._clearance.reservations.delay(resource)
         call = arbiter.hold(resource) if what == "hold" else arbiter.resume(resource)
         return await self._call(f"{what} {resource}", call)
 

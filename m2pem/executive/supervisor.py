@@ -48,9 +48,11 @@ from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
+from m2pem.executive.space_allocation import SpaceAllocation
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.fleet import Fleet, dump, real_resources
+from m2pem.fleet.space import waits_for_space
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
 from m2pem.journal.base import Journal, RunHeader
@@ -145,6 +147,7 @@ class Supervisor:
             self._geometry,
             self.runners,
             events.publish,
+            self._space(),
         )
         self.availability.on_change = self._resources_changed
         self.on_change: Callable[[], None] = lambda: None
@@ -177,6 +180,13 @@ class Supervisor:
             plugins.service,
             ServiceContext(clock, bus, logging.getLogger("m2pem.service"), arbiters.detectors),
         )
+
+    def _space(self) -> SpaceAllocation | None:
+        """None: no task waits for space."""
+        separation = self._separation
+        if separation is None or not waits_for_space(self.fleet):
+            return None
+        return SpaceAllocation(separation)
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -230,7 +240,7 @@ class Supervisor:
             handed_over=self.handed_over,
         )
         refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
-        if loaded.chooses_resources:
+        if loaded.chooses_resources or waits_for_space(self.fleet):
             load_solver()
         return loaded.process(process).id, findings
 
@@ -440,7 +450,7 @@ class Supervisor:
                 log.warning(
                     "%s goes on as it was begun, but would not begin now: %s", number, finding
                 )
-        if mission.chooses_resources:
+        if mission.chooses_resources or waits_for_space(self.fleet):
             await asyncio.to_thread(load_solver)
         run = MissionRun(mission, self.fleet, number, self.settings.steps_at_once)
         last_us = await replay(self.journal, run, self.settings.on_records)
@@ -564,7 +574,7 @@ class Supervisor:
     def _lost(self, resource: ResourceId, reason: str) -> None:
         self._lost_resources.lost(resource, reason)
         if self._separation:
-            self._separation.airspace.lost(resource)
+            self._separation.reservations.lost(resource)
 
     def unavailable(self) -> dict[ResourceId, str]:
         """Why missions get some resources not now; also which were lost and are held."""
@@ -612,7 +622,7 @@ class Supervisor:
         """Return what the owners of a behavior's state say of it now, whatever run it is of."""
         runner = self.runners.get(behavior.partition(".")[0])
         known = runner.run.state.behaviors.get(behavior) if runner is not None else None
-        reserved = self._separation and self._separation.airspace.has_reserved(behavior)
+        reserved = self._separation and self._separation.reservations.has_reserved(behavior)
         return ExecutiveViews(
             engine_view(known),
             self.dispatcher.view(behavior),

@@ -27,7 +27,7 @@ def waiting_tasks(runners: Iterable[Runner], now_us: int) -> list[WaitingTask]:
 def _priority(request: AllocationRequest) -> int:
     """Return the greatest priority of the roles that are chosen or waited for."""
     needs = (role.need for role in behavior_of(request).roles)
-    return max(need.priority for need in needs if need is not None)
+    return max((need.priority for need in needs if need is not None), default=0)
 
 
 def _task(state: RunState, request: AllocationRequest, now_us: int) -> WaitingTask:

@@ -11,6 +11,7 @@ from m2pem.fleet.graph import Catalogue, ResourceGraph
 from m2pem.fleet.need_check import KnownFits, check_needs, places_of
 from m2pem.fleet.parameters import ParameterProblem, examine
 from m2pem.fleet.shortage import Demand, check_shortages
+from m2pem.fleet.space_check import check_space
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind, ServiceCall
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ResourceId
@@ -275,6 +276,7 @@ class _Check:
         filled = check_roles(named, self.fleet, findings)
         matching = [role for role in filled if role.kind.value == behavior.type.value]
         possible = check_needs(behavior, self.mission, self.fleet, self.graph, findings, self.known)
+        check_space(behavior, self.fleet, findings)
         if len(named) == len(behavior.roles):
             self._check_role_kinds(behavior, filled, findings)
         takers: list[_Taker] = []

@@ -26,6 +26,13 @@ class Domain(StrEnum):
     SUBSURFACE = "subsurface"
 
 
+class OnConflict(StrEnum):
+    """What becomes of a task whose behavior another vehicle is in the way of."""
+
+    REFUSE = "refuse"
+    WAIT = "wait"
+
+
 class LostMemberPolicy(StrEnum):
     """What a team's behavior does when a member is lost."""
 
@@ -80,6 +87,29 @@ class Team:
     line: int = 0
 
 
+CONFLICT_WAIT_S = 600.0
+"""How long a task waits for space, if the fleet does not say."""
+
+
+@dataclass(frozen=True, slots=True)
+class SharedSpace:
+    """A named area, or a corridor of `width_m` along a named route, in which no more than
+    `capacity` vehicles of `domains` are at a time."""
+
+    name: str
+    capacity: int
+    domains: tuple[Domain, ...] = (Domain.GROUND, Domain.SURFACE)
+    width_m: float | None = None
+    on_conflict: OnConflict = OnConflict.WAIT
+    wait_s: float = CONFLICT_WAIT_S
+    line: int = 0
+
+    @property
+    def waits(self) -> bool:
+        """Whether a task waits for a place in it."""
+        return self.on_conflict is OnConflict.WAIT
+
+
 @dataclass(frozen=True, slots=True)
 class Fleet:
     """A whole fleet file, with the geometries that it names read in.
@@ -88,6 +118,9 @@ class Fleet:
     level). `fence`: name of an area that no vehicle may leave, or "". `vertical_separation_m`: of
     aircraft that are nearer than `horizontal_separation_m`; None: they are not kept apart.
     `time_separation_s`: between aircraft at a place of crossing routes; None: these conflict.
+    `surface_separation_m`: between two vehicles of a domain other than air; they are kept apart in
+    the domains that are named. `on_conflict`, `conflict_wait_s`: what becomes of a task whose
+    behavior would bring two vehicles too near, and how long it waits.
     `handed_over`: names of geometries that missions may use and operators hand over.
     `battery_cost_s`, `switching_cost_s`: travel time that an empty battery, and a vehicle which is
     new to a run, count as when vehicles are chosen for roles. `on_error`: what an error does that
@@ -109,6 +142,10 @@ class Fleet:
     vertical_separation_m: float | None = None
     horizontal_separation_m: float = 20.0
     time_separation_s: float | None = None
+    surface_separation_m: Mapping[Domain, float] = field(default_factory=dict)
+    on_conflict: OnConflict = OnConflict.REFUSE
+    conflict_wait_s: float = CONFLICT_WAIT_S
+    shared_space: Mapping[str, SharedSpace] = field(default_factory=dict)
     handed_over: tuple[str, ...] = ()
     battery_cost_s: float = 60.0
     switching_cost_s: float = 10.0

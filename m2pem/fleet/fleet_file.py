@@ -7,7 +7,16 @@ from typing import Any
 from pydantic import ValidationError
 
 from m2pem.errors import FleetError
-from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Payload, Team, Vehicle
+from m2pem.fleet.fleet import (
+    Domain,
+    Fleet,
+    LostMemberPolicy,
+    OnConflict,
+    Payload,
+    SharedSpace,
+    Team,
+    Vehicle,
+)
 from m2pem.fleet.fleet_schema import (
     AllocationModel,
     DeconflictionModel,
@@ -51,6 +60,7 @@ def load_fleet(path: str | Path) -> Fleet:
         _check_teams(source)
         geometries = _read_geometries(source, path.parent)
         _check_fence(source)
+        _check_shared_space(source)
         if model is not None:
             _check_distances(source, model, geometries)
     if source.findings or model is None:
@@ -114,6 +124,27 @@ def _check_fence(source: YamlSource) -> None:
         source.error(("fence",), "unknown-area", f"no area is named '{fence}'", hint)
 
 
+def _check_shared_space(source: YamlSource) -> None:
+    """Each names an area, or a route with the width of its corridor."""
+    areas, routes = source.mapping("areas"), source.mapping("routes")
+    for name, value in source.mapping("shared_space").items():
+        path = ("shared_space", name)
+        width = value.get("width") if isinstance(value, dict) else None
+        if name in areas:
+            if width is not None:
+                message = f"'{name}' is an area, which has no width"
+                source.error((*path, "width"), "corridor", message, "leave 'width' out")
+        elif name in routes:
+            if width is None:
+                message = f"'{name}' is a route, and the width of its corridor is not said"
+                remedy = f"write {name}: {{capacity: 1, width: 5 m}}"
+                source.error(path, "corridor", message, remedy)
+        else:
+            known = [*areas, *routes]
+            hint = suggest(name, known, "areas and routes")
+            source.error(path, "unknown-area", f"no area or route is named '{name}'", hint)
+
+
 def _check_distances(
     source: YamlSource, model: FleetModel, geometries: dict[str, Geometry]
 ) -> None:
@@ -172,6 +203,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         for name, team in model.teams.items()
     }
     apart = model.deconfliction
+    said = apart or DeconflictionModel()
     costs = model.allocation or AllocationModel()
     later = model.schedule or ScheduleModel()
     return Fleet(
@@ -186,8 +218,12 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         steps_between_waits=model.steps_between_waits,
         fence=model.fence or "",
         vertical_separation_m=apart.vertical if apart else None,
-        horizontal_separation_m=(apart or DeconflictionModel()).horizontal,
-        time_separation_s=apart.time if apart else None,
+        horizontal_separation_m=said.horizontal,
+        time_separation_s=said.time,
+        surface_separation_m=_surface_separation(said),
+        on_conflict=OnConflict(said.on_conflict),
+        conflict_wait_s=said.wait,
+        shared_space=_shared_space(source, model),
         handed_over=tuple(model.handed_over),
         battery_cost_s=costs.battery,
         switching_cost_s=costs.switching,
@@ -195,6 +231,31 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         unattended=later.unattended,
         start_warning_s=later.warning,
     )
+
+
+def _surface_separation(model: DeconflictionModel) -> dict[Domain, float]:
+    """The distances of the domains other than air."""
+    said = {
+        Domain.GROUND: model.ground,
+        Domain.SURFACE: model.surface,
+        Domain.SUBSURFACE: model.subsurface,
+    }
+    return {domain: each.horizontal for domain, each in said.items() if each is not None}
+
+
+def _shared_space(source: YamlSource, model: FleetModel) -> dict[str, SharedSpace]:
+    return {
+        name: SharedSpace(
+            name,
+            each.capacity,
+            tuple(map(Domain, each.domains)),
+            each.width,
+            OnConflict(each.on_conflict),
+            each.wait,
+            source.line(("shared_space", name)),
+        )
+        for name, each in model.shared_space.items()
+    }
 
 
 def _payloads(source: YamlSource, vehicle: str, model: VehicleModel) -> Iterator[Payload]:

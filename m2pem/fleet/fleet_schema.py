@@ -6,9 +6,17 @@ Unknown keys are refused. Names in one file that refer to each other are checked
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PositiveInt,
+    StringConstraints,
+)
 from pydantic.json_schema import WithJsonSchema
 
+from m2pem.fleet.fleet import CONFLICT_WAIT_S
 from m2pem.units import UNITS, Dimension, quantity
 
 
@@ -140,8 +148,22 @@ class TeamModel(_Model):
     on_lost_member: Literal["stop", "continue"] = "stop"
 
 
+class SurfaceSeparationModel(_Model):
+    """How far apart vehicles that do not fly are planned."""
+
+    horizontal: Annotated[
+        Distance, Field(gt=0, description="Least distance on the map between two of them.")
+    ]
+
+
+_ON_CONFLICT = Field(
+    description="refuse: the behavior ends as REJECTED; wait: its task waits until there is space."
+)
+_WAIT = Field(gt=0, description="How long a task waits for space at most.")
+
+
 class DeconflictionModel(_Model):
-    """How far apart aircraft are planned: one of the distances is always kept."""
+    """How far apart vehicles are planned. Of aircraft, one of the distances is always kept."""
 
     vertical: Annotated[
         Distance, Field(gt=0, description="Least difference of height between aircraft.")
@@ -156,6 +178,51 @@ class DeconflictionModel(_Model):
             "routes may not cross at one height.",
         ),
     ] = None
+    ground: Annotated[
+        SurfaceSeparationModel | None, Field(description="Of ground vehicles; none if left out.")
+    ] = None
+    surface: Annotated[
+        SurfaceSeparationModel | None, Field(description="Of surface vehicles; none if left out.")
+    ] = None
+    subsurface: Annotated[
+        SurfaceSeparationModel | None,
+        Field(description="Of subsurface vehicles, at any depth; none if left out."),
+    ] = None
+    on_conflict: Annotated[Literal["refuse", "wait"], _ON_CONFLICT] = "refuse"
+    wait: Annotated[Duration, _WAIT] = CONFLICT_WAIT_S
+
+
+def _capacity(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ValueError(f"{value!r} is no number of vehicles; write a whole number, 1 or more")
+    return value
+
+
+class SharedSpaceModel(_Model):
+    """How many vehicles may be in a named area, or in the corridor along a named route, at a
+    time."""
+
+    capacity: Annotated[
+        int,
+        Field(ge=1, description="How many vehicles at a time."),
+        BeforeValidator(_capacity, json_schema_input_type=PositiveInt),
+    ]
+    width: Annotated[
+        Annotated[Distance, Field(gt=0)] | None,
+        Field(description="Of the corridor along a route; an area has none."),
+    ] = None
+    domains: Annotated[
+        list[Literal["ground", "air", "surface", "subsurface"]],
+        Field(min_length=1, description="The vehicles that count; others may pass."),
+    ] = ["ground", "surface"]
+    on_conflict: Annotated[Literal["refuse", "wait"], _ON_CONFLICT] = "wait"
+    wait: Annotated[Duration, _WAIT] = CONFLICT_WAIT_S
+
+
+def _shared_space(value: object) -> object:
+    """A number alone is a capacity."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return {"capacity": value} if is_number else value
 
 
 class AllocationModel(_Model):
@@ -226,6 +293,18 @@ class FleetModel(_Model):
         Name | None, Field(description="Name of the area that no vehicle may leave.")
     ] = None
     deconfliction: DeconflictionModel | None = None
+    shared_space: Annotated[
+        dict[
+            Name,
+            Annotated[
+                SharedSpaceModel,
+                BeforeValidator(
+                    _shared_space, json_schema_input_type=SharedSpaceModel | PositiveInt
+                ),
+            ],
+        ],
+        Field(description="Areas and corridors that few vehicles may be in at a time."),
+    ] = {}
     allocation: AllocationModel | None = None
     schedule: ScheduleModel | None = None
 

@@ -12,6 +12,7 @@ from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.facts import Fit, fits
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.graph import ResourceGraph
+from m2pem.fleet.space import waits_for_space
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.mission.behavior import Behavior, BehaviorType, OnLoss, Role, RoleKind
 from m2pem.mission.candidate_facts import CANDIDATE_FACTS, is_fact
@@ -46,10 +47,11 @@ def check_needs(
     """
     known = {} if known is None else known
     by_need = [role for role in behavior.roles if role.need is not None]
-    if by_need and find_spec(SOLVER) is None:
+    if (by_need or waits_for_space(fleet)) and find_spec(SOLVER) is None:
         findings.add(
             "no-solver",
-            "choosing resources needs the package scipy, which is not installed",
+            "choosing resources, or waiting for space, needs the package scipy, which is not "
+            "installed",
             "pip install 'm2pem[allocation]'",
             line=behavior.line,
         )

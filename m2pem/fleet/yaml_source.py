@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import UnionType
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origin
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -275,7 +275,9 @@ def _is_model(here: Any) -> bool:
 
 
 def _unwrapped(annotation: Any) -> Any:
-    """`annotation` without an "or None"."""
+    """`annotation` without validators and without an "or None"."""
+    if get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
     if get_origin(annotation) is UnionType or isinstance(annotation, UnionType):
         return next(arg for arg in get_args(annotation) if arg is not type(None))
     return annotation

@@ -44,12 +44,17 @@ def edges_enclose(edges: Iterable[Edge], point: EastNorth) -> bool:
 
 def edge_distance_m(point: EastNorth, edge: Edge) -> float:
     """Return the distance from a point to the nearest one of an edge."""
+    return math.dist(point, nearest_on(edge, point))
+
+
+def nearest_on(edge: Edge, point: EastNorth) -> EastNorth:
+    """Return the place on an edge that is nearest to a point."""
     (ae, an), (be, bn) = edge
     de, dn = be - ae, bn - an
     length2 = de * de + dn * dn
     part = ((point[0] - ae) * de + (point[1] - an) * dn) / length2 if length2 else 0.0
     part = min(1.0, max(0.0, part))
-    return math.dist(point, (ae + de * part, an + dn * part))
+    return ae + de * part, an + dn * part
 
 
 def middle_of(corners: Sequence[EastNorth]) -> EastNorth:
@@ -85,6 +90,55 @@ def hull_distance_m(a: Hull | None, b: Hull | None) -> float:
     if a is None or b is None or _holds(a, b[0]) or _holds(b, a[0]):
         return 0.0
     return min(_edges_distance_m(first, other) for first in _edges(a) for other in _edges(b))
+
+
+def hull_meets_edges(hull: Hull | None, edges: Sequence[Edge]) -> bool:
+    """Whether a convex polygon and an area have a place in common. None is everywhere.
+
+    `edges`: of the closed rings of the area, which need not be convex and may have holes.
+    """
+    if hull is None or edges_enclose(edges, hull[0]):
+        return True
+    own = _edges(hull)
+    return any(
+        _holds(hull, edge[0]) or _edges_distance_m(mine, edge) == 0.0
+        for edge in edges
+        for mine in own
+    )
+
+
+def meeting_place(a: Hull | None, b: Hull | None) -> EastNorth | None:
+    """Return the middle of what two convex polygons have in common, or the middle between them if
+    they are apart. None is everywhere; if both are, there is no middle."""
+    if a is None or b is None:
+        known = a or b
+        return None if known is None else middle_of(known)
+    common = [corner for corner in a if _holds(b, corner)]
+    common += [corner for corner in b if _holds(a, corner)]
+    common += [
+        crossing
+        for mine in _edges(a)
+        for other in _edges(b)
+        if (crossing := _crossing(mine, other)) is not None
+    ]
+    return middle_of(common or _nearest(a, b))
+
+
+def _crossing(first: Edge, other: Edge) -> EastNorth | None:
+    """Return where two edges cross; None: they do not."""
+    (a, b), (c, d) = first, other
+    from_c, from_d = _turn(a, b, c), _turn(a, b, d)
+    if from_c * from_d >= 0 or _turn(c, d, a) * _turn(c, d, b) >= 0:
+        return None
+    part = from_c / (from_c - from_d)
+    return c[0] + (d[0] - c[0]) * part, c[1] + (d[1] - c[1]) * part
+
+
+def _nearest(a: Hull, b: Hull) -> tuple[EastNorth, EastNorth]:
+    """Return the nearest places of two convex polygons that are apart: one is a corner."""
+    pairs = [(corner, nearest_on(edge, corner)) for corner in a for edge in _edges(b)]
+    pairs += [(corner, nearest_on(edge, corner)) for corner in b for edge in _edges(a)]
+    return min(pairs, key=lambda pair: math.dist(*pair))
 
 
 def _chain(points: Sequence[EastNorth]) -> list[EastNorth]:

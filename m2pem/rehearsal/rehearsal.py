@@ -27,6 +27,7 @@ from m2pem.executive.runner import Runner
 from m2pem.findings import Finding, Severity, has_errors
 from m2pem.fleet.check import DETECTOR_SERVICE
 from m2pem.fleet.fleet import Fleet, simulated_fleet
+from m2pem.fleet.space import waits_for_space
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
 from m2pem.mission.behavior import Behavior, ServiceCall
@@ -135,6 +136,9 @@ SEARCH_US = 3600 * US_PER_S
 
 SETTINGS = {"telemetry_hz": 0, "state": ""}
 """Settings of every simulated resource: telemetry has changes only, and no state file."""
+
+SPACE_HZ = 1.0
+"""Telemetry of a fleet whose tasks wait for space: so often is looked who has left it."""
 
 EXIT_STATUS = {
     RunStatus.COMPLETED: 0,
@@ -247,8 +251,9 @@ class _Rehearsal:
         self, clock: VirtualClock, process: str | None, data: Mapping[str, Value] | None
     ) -> RunSummary:
         journal = _NotifyingJournal(self._on_record)
+        seen = {"telemetry_hz": SPACE_HZ} if waits_for_space(self._fleet) else {}
         executive = Executive(
-            simulated_fleet(self._fleet, SETTINGS),
+            simulated_fleet(self._fleet, {**SETTINGS, **seen}),
             journal,
             self._scripted,
             clock,

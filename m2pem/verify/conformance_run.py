@@ -24,6 +24,7 @@ from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
 from m2pem.engine.steps import Steps
 from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.space import without_space
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.expression import Expression
 from m2pem.mission.losses import LINK_LOST, UNAVAILABLE
@@ -86,7 +87,7 @@ class ConformanceRun:
         process: str,
         data: Mapping[str, Value] | None = None,
     ) -> None:
-        self.run = _Run(mission, fleet)
+        self.run = _Run(mission, without_space(fleet) if fleet is not None else None)
         self.steps: list[Step] = []
         self._now_us = _START_US
         self._reports: Counter[str] = Counter()

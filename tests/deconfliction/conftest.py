@@ -111,7 +111,7 @@ class _Plugins(PluginManager):
 
 class Play(Protocol):
     """Runs `story(world)` in virtual time; all but `others` are in the team
-    `crew`."""
+    `crew`. `settings`: of all connections; `own`: of that of each vehicle."""
 
     def __call__(
         self,
@@ -119,10 +119,12 @@ class Play(Protocol):
         homes: Homes,
         *,
         geometries: Mapping[str, Geometry] | None = None,
-        policy: Mapping[str, float | None] | None = None,
+        policy: Mapping[str, Any] | None = None,
         ground: tuple[str, ...] = (),
         others: tuple[str, ...] = (),
         settings: Mapping[str, Any] | None = None,
+        own: Mapping[str, Mapping[str, Any]] | None = None,
+        watch_links: bool = False,
         journal: MemoryJournal | None = None,
         start_us: int = START_US,
     ) -> Any: ...
@@ -137,10 +139,12 @@ def play(tmp_path: Path) -> Play:
         homes: Homes,
         *,
         geometries: Mapping[str, Geometry] | None = None,
-        policy: Mapping[str, float | None] | None = None,
+        policy: Mapping[str, Any] | None = None,
         ground: tuple[str, ...] = (),
         others: tuple[str, ...] = (),
         settings: Mapping[str, Any] | None = None,
+        own: Mapping[str, Mapping[str, Any]] | None = None,
+        watch_links: bool = False,
         journal: MemoryJournal | None = None,
         start_us: int = START_US,
     ) -> Any:
@@ -148,6 +152,7 @@ def play(tmp_path: Path) -> Play:
         for name, home in homes.items():
             domain = Domain.GROUND if name in ground else Domain.AIR
             given = {"home": [*FRAME.to_latlon(home)], **(settings or {})}
+            given |= (own or {}).get(name, {})
             vehicles[ResourceId(name)] = Vehicle(ResourceId(name), domain, "sim", given)
         members = tuple(name for name in vehicles if name not in others)
         fleet = Fleet(
@@ -158,13 +163,13 @@ def play(tmp_path: Path) -> Play:
             {"crew": Team("crew", members, members[0])},
             geometries or {},
             ORIGIN,
-            **{"vertical_separation_m": 10.0, **(policy or {})},  # type: ignore[arg-type]
+            **{"vertical_separation_m": 10.0, **(policy or {})},
         )
 
         async def main(clock: VirtualClock) -> Any:
             seen: list[Record] = []
             executive = Executive(
-                fleet, journal or MemoryJournal(), _Plugins(seen), clock, watch_links=False
+                fleet, journal or MemoryJournal(), _Plugins(seen), clock, watch_links=watch_links
             )
             async with executive:
                 return await story(World(clock, executive, seen))

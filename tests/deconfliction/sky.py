@@ -1,12 +1,12 @@
 """Aircraft over a frame, and requests for them, in metres east and north of one place."""
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.telemetry import GeoPosition, VehicleState
-from m2pem.deconfliction.operational_volume import Separation
-from m2pem.deconfliction.reservations import Airspace
+from m2pem.deconfliction.reservations import Reservations
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.behavior import BehaviorType
@@ -58,9 +58,16 @@ def airspace(
     horizontal: float = 20.0,
     time: float | None = None,
     ground: tuple[str, ...] = (),
-) -> Airspace:
+) -> Reservations:
     """Nobody is heard yet."""
-    return Airspace(fleet(*names, ground=ground), Separation(vertical, horizontal, time))
+    return Reservations(
+        replace(
+            fleet(*names, ground=ground),
+            vertical_separation_m=vertical,
+            horizontal_separation_m=horizontal,
+            time_separation_s=time,
+        )
+    )
 
 
 def state(
@@ -83,7 +90,7 @@ def request(behavior: str, *names: str, **parameters: Any) -> BehaviorRequest:
 
 
 def claim(
-    sky: Airspace,
+    sky: Reservations,
     wished: BehaviorRequest,
     kind: BehaviorType = BehaviorType.VEHICLE,
     now_us: int = NOW_US,

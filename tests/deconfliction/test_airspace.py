@@ -25,7 +25,8 @@ def test_an_advice_for_one_on_the_ground_is_an_altitude_to_fly_at() -> None:
     sky.received(state("one", 0, 0, 20))
     sky.received(state("two", 0, -200, 0))
     said = claim(sky, request("goto", "two", target=point(0, 0), altitude=22.0))
-    assert "one, which flies at 20 m: fly at 30 m or more, or fly at 10 m or less" in said
+    assert "one, which flies at 20 m, at [38.000000, -77.000000]: fly at 30 m or more" in said
+    assert "or fly at 10 m or less" in said
 
 
 def test_an_advice_regards_everybody() -> None:

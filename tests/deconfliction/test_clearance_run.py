@@ -40,8 +40,8 @@ def test_a_vehicle_in_the_way_is_named_with_what_it_does_and_what_would_be_right
     said = play(story, HOMES)
     assert said == (
         "two would come nearer than 20 m and 10 m in height to one, which does r1.b2 (orbit) at "
-        "20 m: climb to 30 m or more first, or descend to 10 m or less first, or after r1.b2 "
-        "has ended"
+        "20 m, at enu [0, 0]: climb to 30 m or more first, or descend to 10 m or less first, or "
+        "after r1.b2 has ended"
     )
 
 
@@ -101,7 +101,7 @@ def test_who_hovers_after_its_behavior_keeps_its_place_until_it_has_landed(play:
         return said
 
     said = play(story, HOMES)
-    assert "one, which flies at 20 m: climb to 30 m or more first, or descend to 10 m" in said
+    assert "one, which flies at 20 m, at enu [0, 0]: climb to 30 m or more first, or de" in said
     assert said.endswith("or after one has landed or gone elsewhere")
 
 

@@ -1,9 +1,13 @@
 """Tasks whose resources are chosen when they start: the engine's part (docs/allocation.md)."""
 
+from dataclasses import replace
+
+import pytest
+
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.commands import AllocateResources, StartBehavior, WithdrawAllocation
-from m2pem.fleet.fleet import Domain, Fleet, Vehicle
+from m2pem.fleet.fleet import Domain, Fleet, OnConflict, SharedSpace, Vehicle
 from m2pem.mission.catalogue import ResourceId
 from tests.engine.kit import CANCELLED, Play
 
@@ -152,3 +156,67 @@ def test_requests_are_outstanding_after_a_restart() -> None:
     assert AllocateResources("r1.a1") in world.run.outstanding()
     world.stop()
     assert not world.run.outstanding()
+
+
+SHARED = replace(
+    FLEET,
+    shared_space={"bridge": SharedSpace("bridge", 1)},
+)
+FULL = "ugv1 would enter bridge (capacity 1), which is taken by ugv2"
+
+
+def cross(name: str = "goto", role: str = "vehicle='ugv1'", fleet: Fleet = SHARED) -> Play:
+    """A task that names its vehicle, in a fleet whose vehicles share space."""
+    return Play(
+        f"""<startEvent id="start"/>
+        {task("go", role).replace("drive_stop", name)} <userTask id="then"/>
+        start -> go -> then
+        """,
+        fleet=fleet,
+    ).start()
+
+
+def test_a_task_that_may_wait_for_space_asks_before_its_behavior_is_requested() -> None:
+    world = cross()
+    assert commands(world) == [AllocateResources("r1.a1")]
+    choose(world, "ugv1")
+    assert isinstance(commands(world)[-1], StartBehavior)
+
+
+@pytest.mark.parametrize("name", ["hold", "drive_stop", "teleop"])
+def test_a_task_that_stops_its_vehicle_never_waits_for_space(name: str) -> None:
+    assert isinstance(commands(cross(name))[0], StartBehavior)
+
+
+def test_a_task_waits_for_no_space_in_a_fleet_that_refuses() -> None:
+    refusing = SharedSpace("bridge", 1, on_conflict=OnConflict.REFUSE)
+    world = cross(fleet=replace(FLEET, shared_space={"bridge": refusing}))
+    assert isinstance(commands(world)[0], StartBehavior)
+
+
+def test_a_wait_for_space_is_limited_from_when_it_begins() -> None:
+    world = cross()
+    full = i.ResourcesNotFree("r1.a1", FULL, {"bridge": "r2.b1"}, wait_s=30.0)
+    world.give(full)
+    delayed = world.steps[-1].records[-1]
+    assert isinstance(delayed, r.AllocationDelayed)
+    assert delayed.deadline == world.run.state.allocations["r1.a1"].deadline > 0
+    # The limit is that of what it waits for first.
+    world.give(i.ResourcesNotFree("r1.a1", "another reason", {"ford": "r3.b1"}, wait_s=90.0))
+    assert world.run.state.allocations["r1.a1"].deadline == delayed.deadline
+    world.advance(30)
+    thrown = next(each for each in world.records() if isinstance(each, r.ErrorThrown))
+    assert (thrown.code, "another reason" in thrown.reason) == ("RESOURCE_UNAVAILABLE", True)
+
+
+def test_the_roles_say_how_long_a_task_waits_if_they_do() -> None:
+    world = cross(role="vehicle='ugv1' wait='unlimited'")
+    world.give(i.ResourcesNotFree("r1.a1", FULL, {"bridge": "r2.b1"}, wait_s=30.0))
+    assert world.run.state.allocations["r1.a1"].deadline == 0
+
+
+def test_a_task_that_does_not_wait_for_space_is_rejected() -> None:
+    world = cross()
+    world.give(i.ResourcesNotFree("r1.a1", FULL, {"bridge": "r2.b1"}, "REJECTED"))
+    thrown = next(each for each in world.records() if isinstance(each, r.ErrorThrown))
+    assert (thrown.code, thrown.reason) == ("REJECTED", FULL)

@@ -6,7 +6,7 @@ import pytest
 
 import m2pem
 from m2pem.errors import FleetError
-from m2pem.fleet.fleet import Domain, LostMemberPolicy
+from m2pem.fleet.fleet import Domain, LostMemberPolicy, OnConflict, SharedSpace, dump, restore
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.mission.geometry import Area, Point, Route
 
@@ -239,3 +239,63 @@ def test_a_distance_to_be_kept_is_more_than_none(tmp_path: Path) -> None:
     with pytest.raises(FleetError) as refused:
         load_fleet(write_fleet(tmp_path, "version: 1\ndeconfliction: {vertical: 0 m}\n"))
     assert "deconfliction.vertical" in str(refused.value)
+
+
+SHARED = """\
+version: 1
+areas: {bridge: bridge.geojson}
+routes: {ford: ford.geojson}
+deconfliction: {ground: {horizontal: 3 m}, on_conflict: wait, wait: 5 min}
+shared_space:
+"""
+
+
+def shared(folder: Path, space: str) -> Path:
+    write_json(folder / "bridge.geojson", {"type": "Polygon", "coordinates": [TRIANGLE]})
+    write_json(folder / "ford.geojson", {"type": "LineString", "coordinates": TRIANGLE[:2]})
+    return write_fleet(folder, SHARED + space)
+
+
+TRIANGLE = [[-77.0, 38.0], [-76.99, 38.0], [-76.99, 38.01], [-77.0, 38.0]]
+
+
+def test_shared_space_and_distances_on_the_ground_arrive_in_si(tmp_path: Path) -> None:
+    fleet = load_fleet(
+        shared(
+            tmp_path,
+            "  bridge: 1\n"
+            "  ford: {capacity: 2, width: 600 cm, domains: [ground], on_conflict: refuse}\n",
+        )
+    )
+    assert fleet.surface_separation_m == {Domain.GROUND: 3.0}
+    assert (fleet.on_conflict, fleet.conflict_wait_s) == (OnConflict.WAIT, 300.0)
+    bridge, ford = fleet.shared_space.values()
+    assert bridge == SharedSpace("bridge", 1, line=6)
+    assert ford == SharedSpace(
+        "ford", 2, (Domain.GROUND,), 6.0, OnConflict.REFUSE, wait_s=600.0, line=7
+    )
+    assert restore(dump(fleet)) == fleet
+
+
+@pytest.mark.parametrize(
+    ("space", "said"),
+    [
+        ("  brigde: 1\n", "no area or route is named 'brigde'; did you mean 'bridge'?"),
+        ("  bridge: 0\n", "0 is no number of vehicles; write a whole number, 1 or more"),
+        ("  bridge: 1.5\n", "1.5 is no number of vehicles; write a whole number, 1 or more"),
+        ("  bridge: {capacity: true}\n", "True is no number of vehicles"),
+        ("  bridge: {}\n", "'capacity' is missing"),
+        ("  bridge: {capcity: 1}\n", "unknown key 'capcity'; did you mean 'capacity'?"),
+        ("  bridge: {capacity: 1, width: 3 m}\n", "'bridge' is an area, which has no width"),
+        ("  ford: 1\n", "the width of its corridor is not said; write ford: {capacity: 1, width"),
+        ("  bridge: {capacity: 1, domains: []}\n", "domains"),
+    ],
+)
+def test_shared_space_that_makes_no_sense_says_what_would(
+    tmp_path: Path, space: str, said: str
+) -> None:
+    with pytest.raises(FleetError) as refused:
+        load_fleet(shared(tmp_path, space))
+    (finding, *_) = refused.value.findings
+    assert finding.line == 6
+    assert any(said in str(each) for each in refused.value.findings)

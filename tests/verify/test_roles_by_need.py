@@ -10,7 +10,7 @@ import pytest
 from m2pem.engine.records import RunOutcome
 from m2pem.fleet.check import check_mission
 from m2pem.fleet.default_fleet import fleet_for
-from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.fleet import Fleet, SharedSpace
 from m2pem.mission.mission import Mission
 from m2pem.verify.check import Report, check
 from m2pem.verify.conformance_run import ConformanceRun
@@ -474,3 +474,18 @@ def test_the_engine_follows_runs_in_which_vehicles_are_lost(seed: int) -> None:
         ordered = violation["property"] == "one-behavior"
         if not ordered and not any(step["trigger"] == "timer" for step in violation["steps"]):
             play(mission, fleet, violation["steps"])
+
+
+def test_a_task_that_may_wait_for_space_is_said_to_have_it_at_once() -> None:
+    go = (
+        '<scriptTask id="go"><extensionElements><m2pem:behavior type="vehicle" name="goto">'
+        '<m2pem:properties><m2pem:property name="target" value="[0.01, 0.0, 0]"/>'
+        '</m2pem:properties><m2pem:resources><m2pem:role name="driver" vehicle="ugv1"/>'
+        "</m2pem:resources></m2pem:behavior></extensionElements></scriptTask>"
+    )
+    mission = notation(f'<startEvent id="s"/>{go}<endEvent id="e"/>\ns -> go -> e')
+    shared = replace(fleet_for(mission), shared_space={"bridge": SharedSpace("bridge", 1)})
+    report = check(mission, shared)
+    (rough,) = [each for each in report.net.approximations if "space" in each.what]
+    assert (rough.element, rough.exactness) == ("go", Exactness.BOUNDED)
+    assert report.states == check(mission, fleet_for(mission)).states

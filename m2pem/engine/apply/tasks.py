@@ -29,6 +29,8 @@ def allocation_delayed(state: RunState, record: r.AllocationDelayed) -> None:
     request = state.allocations[record.allocation]
     request.reason = record.reason
     request.holders = record.holders
+    if record.deadline:
+        request.deadline = record.deadline
 
 
 def allocation_ended(state: RunState, record: r.ResourcesAllocated | r.AllocationEnded) -> None:

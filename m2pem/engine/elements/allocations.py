@@ -1,7 +1,8 @@
 """Requests for resources that are chosen when a task starts (docs/allocation.md).
 
-A task whose roles say what they need, or wait, asks the allocator of its executive, which knows the
-telemetry and the other runs. Its choice is an input, so that a replay and a resume have the same.
+A task whose roles say what they need, or wait, or whose vehicles may have to wait for space, asks
+the allocator of its executive, which knows the telemetry and the other runs. Its choice is an
+input, so that a replay and a resume have the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,6 +20,7 @@ from m2pem.mission.behavior import Behavior, Role
 from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
+from m2pem.units import US_PER_S
 
 
 def request_allocation(
@@ -160,7 +162,19 @@ def resources_not_free(x: Execution, item: i.ResourcesNotFree) -> None:
     elif (request.reason, request.holders) == (item.reason, item.holders):
         x.ignore(f"it is known what {item.allocation} waits for")
     else:
-        x.emit(r.AllocationDelayed(request.id, item.reason, item.holders))
+        deadline = _limit(x, request, item.wait_s)
+        x.emit(r.AllocationDelayed(request.id, item.reason, item.holders, deadline=deadline))
+
+
+def _limit(x: Execution, request: AllocationRequest, wait_s: float | None) -> int:
+    """Limit the wait of a request whose roles do not say how long it waits. Returns the wait of its
+    timer; 0: none was armed."""
+    needs = (role.need for role in behavior_of(request).roles)
+    if wait_s is None or request.deadline or any(each and each.waits for each in needs):
+        return 0
+    due_us = x.state.mission_time_us(x.now_us) + round(wait_s * US_PER_S)
+    await_event(x, request.token, request.token.node, Trigger.TIMER, due_us=due_us)
+    return x.state.last_wait
 
 
 def allocation_timed_out(x: Execution, token: Token) -> None:

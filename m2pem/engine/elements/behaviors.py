@@ -32,6 +32,7 @@ from m2pem.engine.throwing import catcher_of_error, throw_error
 from m2pem.engine.triggering import throw_signal
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.fleet.allocation import AllocationError, allocate
+from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior as BehaviorOfTask
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.elements import Event
@@ -72,6 +73,8 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
         throw_error(x, token, UNAVAILABLE, f"no resource is allocated to {behavior.name}")
     elif refusal := refusal_of(x, allocation.resources):
         throw_error(x, token, UNAVAILABLE, refusal)
+    elif may_wait_for_space(x.fleet, behavior.type, behavior.name, allocation.resources):
+        request_allocation(x, token, behavior, parameters)
     else:
         emit_behavior(x, token, behavior, allocation.resources, allocation.roles, parameters)
 

@@ -27,13 +27,15 @@ class AllocationRequested(BaseRecord, frozen=True):
 
 class AllocationDelayed(BaseRecord, frozen=True):
     """The resources of a request are not free. `reason`: for people. `holders`: the behaviors and
-    operators who have what could fill its roles, by resource. `again`: what was chosen had been
-    taken meanwhile, so that the request is made again."""
+    operators who have what could fill its roles, by resource, or the space that its vehicles need,
+    by the name of that. `again`: what was chosen had been taken meanwhile, so that the request is
+    made again. `deadline`: the wait that ends the request from now on; 0: as before."""
 
     allocation: str
     reason: str
     holders: dict[str, str]
     again: bool = False
+    deadline: int = 0
 
 
 class ResourcesAllocated(BaseRecord, frozen=True):

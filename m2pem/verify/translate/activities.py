@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from m2pem.engine.execution import Waits, waits_when_entered
+from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior
 from m2pem.mission.catalogue import ResourceId
@@ -187,6 +188,11 @@ def _behavior(
         ]
         runs(context, instance.active, after_us, (instance.active,), made)
         return [instance.begin()]
+    roles = context.candidates.get(instance.node, ())
+    able = [each for role in roles for each in role.resources] or resources(context, behavior)
+    if may_wait_for_space(context.fleet, behavior.type, behavior.name, able or ()):
+        what = "that it may wait for space, and end without it, is not followed"
+        net.approximate(instance.node, Exactness.BOUNDED, what)
     if instance.node in context.candidates:
         _outside_work(context, instance, asking_place(context, instance))
         if context.options.failures:

@@ -1,4 +1,5 @@
-"""An aircraft as it is received, and the parameters of its behavior as places and heights."""
+"""A vehicle that takes part in deconfliction, as it is received, and the parameters of its behavior
+as places and heights."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -46,12 +47,16 @@ class Span:
         return Span(min(self.low_m, other.low_m), max(self.high_m, other.high_m))
 
 
+ANY_HEIGHT = Span(-math.inf, math.inf)
+
+
 @dataclass(frozen=True, slots=True)
-class Aircraft:
-    """The last state of an aircraft, in the local frame.
+class Participant:
+    """The last state of a vehicle, in the local frame.
 
     `stop`: where it may be by the time at which it has stopped, at the heights `span`. `home_m`:
-    the height of its home; None: not known. `homes`: where a return may lead to.
+    the height of its home; None: not known. `flies`: whether it is in the air; of a vehicle that
+    never flies: True, as it always is in the way of others. `homes`: where a return may lead to.
     """
 
     vehicle: ResourceId
@@ -68,42 +73,54 @@ def flies(state: VehicleState) -> bool:
     """Whether an aircraft is in the air, or may be in a moment."""
     height_m = state.altitude_above_home_m
     low = height_m is None or height_m < GROUNDED_BELOW_M
-    return not (low and not state.armed and _speed_m_s(state) < STANDS_BELOW_M_S)
+    return not (low and not state.armed and stands(state))
 
 
-def aircraft_of(
-    state: VehicleState, frame: LocalFrame, nominal_m: float | None, homes: tuple[EastNorth, ...]
-) -> Aircraft | None:
-    """None: its position is not known. `nominal_m`: the height that it was sent to last."""
+def participant_of(
+    state: VehicleState,
+    frame: LocalFrame,
+    nominal_m: float | None,
+    homes: tuple[EastNorth, ...],
+    *,
+    airborne: bool = True,
+) -> Participant | None:
+    """None: its position is not known. `nominal_m`: the height that it was sent to last.
+    `airborne`: whether it can fly; what cannot is at all heights."""
     if state.position is None:
         return None
     place = frame.to_local(state.position.latlon)
     east, north, up = state.velocity_enu_m_s or (0.0, 0.0, 0.0)
-    speed = _speed_m_s(state)
-    stands = speed < STANDS_BELOW_M_S
-    ahead_s = 0.0 if stands else REACTION_S + speed / (2 * BRAKING_M_S2)
+    speed, still = _speed_m_s(state), stands(state)
+    ahead_s = 0.0 if still else REACTION_S + speed / (2 * BRAKING_M_S2)
     height_m = state.position.altitude_m
     if nominal_m is not None and abs(up) < STANDS_BELOW_M_S and abs(height_m - nominal_m) <= SNAP_M:
         height_m, up = nominal_m, 0.0
     then_m = height_m + up * ahead_s
     above_m = state.altitude_above_home_m
-    return Aircraft(
+    stop = convex_hull([place, (place[0] + east * ahead_s, place[1] + north * ahead_s)])
+    if not airborne:
+        return Participant(
+            state.resource, place, stop, ANY_HEIGHT, None, flies=True, stands=still, homes=homes
+        )
+    return Participant(
         state.resource,
         place,
-        convex_hull([place, (place[0] + east * ahead_s, place[1] + north * ahead_s)]),
+        stop,
         Span(min(height_m, then_m), max(height_m, then_m)),
         None if above_m is None else state.position.altitude_m - above_m,
         flies(state),
-        stands,
+        still,
         homes,
     )
 
 
+def stands(state: VehicleState) -> bool:
+    """Whether a vehicle does not move."""
+    return _speed_m_s(state) < STANDS_BELOW_M_S
+
+
 def _speed_m_s(state: VehicleState) -> float:
     return math.hypot(*(state.velocity_enu_m_s or (0.0,)))
-
-
-ANY_HEIGHT = Span(-math.inf, math.inf)
 
 
 class FlightParameters(BehaviorParameters):
@@ -113,15 +130,20 @@ class FlightParameters(BehaviorParameters):
     one is made.
     """
 
+    bend_m = 4.0
+    """How far from a route's corner a bend may pass it."""
+
+    moves = "flies"
+
     def __init__(
         self,
         values: Mapping[str, ResolvedValue],
-        aircraft: Aircraft,
+        vehicle: Participant,
         frame: LocalFrame,
         height_of: Callable[[str], float | None],
     ) -> None:
         super().__init__(values)
-        self.aircraft = aircraft
+        self.vehicle = vehicle
         self.frame = frame
         self.unknown = ""
         self._height_of = height_of
@@ -160,13 +182,13 @@ class FlightParameters(BehaviorParameters):
             return self._lifted(altitude_m, self.altitude_frame)
         if own_m is not None:
             return self._lifted(own_m, own_frame)
-        if self.aircraft.flies:
-            return self.aircraft.span
+        if self.vehicle.flies:
+            return self.vehicle.span
         self.unknown = "how high it is to fly is not known: give it an altitude"
-        return Span(self.aircraft.span.low_m, math.inf)
+        return Span(self.vehicle.span.low_m, math.inf)
 
     def _lifted(self, altitude_m: float, frame: str) -> Span:
-        home_m = self.aircraft.home_m
+        home_m = self.vehicle.home_m
         if frame == "terrain":
             self.unknown = "its altitude is above the terrain, whose height is not known here"
             return ANY_HEIGHT
@@ -179,3 +201,14 @@ class FlightParameters(BehaviorParameters):
             up_m = home_m + altitude_m
         # What would be below its home is flown there, or at home's height.
         return Span(up_m, up_m if home_m is None else max(up_m, home_m))
+
+
+class SurfaceParameters(FlightParameters):
+    """The parameters of a behavior of one vehicle that does not fly: it may be at any height."""
+
+    bend_m = 2.0
+    moves = "goes"
+
+    def span(self, own_m: float | None = None, own_frame: str = "relative") -> Span:
+        """All heights."""
+        return ANY_HEIGHT

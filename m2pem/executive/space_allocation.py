@@ -1,0 +1,138 @@
+"""Reserves space for what the allocator chooses, and finds tasks that wait for each other's space.
+
+A task that waits for space holds none. Later tasks get nothing that it needs as long as behaviors
+that will end are in its way: so it is not overtaken for ever. A vehicle that stands in its way, or
+that is lost, may stay there: what the task needs is then free for others.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
+
+from m2pem.allocation.circles import Waiting, circles
+from m2pem.api.arbiter import BehaviorId, BehaviorRequest
+from m2pem.engine.state import AllocationRequest
+from m2pem.executive.separation import VehicleSeparation
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+
+if TYPE_CHECKING:
+    from m2pem.deconfliction.conflicts import Occupant, Refusal
+    from m2pem.deconfliction.reservations import Reservation
+
+
+class SpaceAllocation:
+    """The space that requests for resources need, while one decision is made.
+
+    A decision has rounds: each looks at all requests in their order, until all that are chosen have
+    their space.
+    """
+
+    def __init__(self, separation: VehicleSeparation) -> None:
+        self._separation = separation
+        self._proposed: dict[str, Reservation | None] = {}
+        self._kept_back: dict[str, Reservation] = {}
+        self._ahead: list[Reservation] = []
+
+    def awaits_positions(self) -> bool:
+        """Whether to decide later: a vehicle that has not said where it is may be in the way."""
+        return bool(self._separation.awaited())
+
+    def begin(self) -> None:
+        """Begin a decision."""
+        self._kept_back.clear()
+
+    def begin_round(self) -> None:
+        """Look at all requests again, from the first."""
+        self._ahead.clear()
+        self._proposed.clear()
+
+    def refusal(self, request: BehaviorRequest, spec: BehaviorSpec) -> "Refusal | None":
+        """Return why a request has no space now; None: it has, ahead of those that follow."""
+        wanted = self._separation.propose(request, spec)
+        if wanted is None:
+            return None
+        found = self._separation.conflict(wanted, self._ahead, spec)
+        if found is None:
+            self._proposed[request.id] = wanted
+            self._ahead.append(wanted)
+        elif found.wait_s is not None and found.blockers and all(map(_ends, found.blockers)):
+            self._kept_back[request.id] = wanted
+        else:
+            self._kept_back.pop(request.id, None)
+        return found
+
+    def keep_back(self, request: str) -> None:
+        """A request waits: what it needs is not for those that follow."""
+        if request in self._kept_back:
+            self._ahead.append(self._kept_back[request])
+
+    def commit(self, request: str) -> None:
+        """Reserve the space of a request that is served."""
+        wanted = self._proposed.get(request)
+        if wanted is not None:
+            self._separation.reservations.commit(wanted)
+
+    def hand_on(self, request: str, behavior: str) -> None:
+        """Give what is reserved for a request to the behavior that was requested for it."""
+        self._separation.reservations.hand_on(BehaviorId(request), BehaviorId(behavior))
+
+    def release(self, request: str) -> None:
+        """A request is served no more."""
+        self._separation.reservations.withdraw(BehaviorId(request))
+
+
+def _ends(blocker: "Occupant") -> bool:
+    """Whether a vehicle is in the way only as long as a behavior goes on."""
+    return bool(blocker.behavior) and not blocker.lost
+
+
+def holders_of(refusal: "Refusal") -> dict[str, str]:
+    """Return who has the space that a task waits for: behaviors, and vehicles that stand there.
+
+    The keys are the name of the shared space, or that of the vehicle which is in the way.
+    """
+    if not refusal.space:
+        return {each.vehicle: each.behavior or each.vehicle for each in refusal.blockers}
+    return {refusal.space: ", ".join(each.behavior or each.vehicle for each in refusal.blockers)}
+
+
+def space_circles(
+    refusals: Mapping[str, "Refusal"], vehicles: Mapping[str, Collection[ResourceId]]
+) -> list[frozenset[str]]:
+    """Return the sets of requests that wait for each other's vehicles to leave.
+
+    `refusals`: of the requests that wait for space. `vehicles`: by all requests that wait, those
+    that they name: a vehicle that stands is moved by the request that waits for it.
+    """
+
+    def holder(request: str, blocker: "Occupant") -> str | None:
+        if blocker.behavior or blocker.lost:
+            return blocker.behavior if blocker.behavior in refusals else None
+        movers = (other for other, named in vehicles.items() if blocker.vehicle in named)
+        return next((other for other in movers if other != request), None)
+
+    return circles(
+        [
+            Waiting(
+                request,
+                request,
+                ((refusal.lacking, tuple(holder(request, each) for each in refusal.blockers)),),
+            )
+            for request, refusal in refusals.items()
+            if refusal.wait_s is not None
+        ]
+    )
+
+
+def space_circle_text(
+    circle: Mapping[str, AllocationRequest], refusals: Mapping[str, "Refusal"]
+) -> str:
+    """Say which tasks wait for each other, for what, and the way out."""
+    said = [
+        f"{request.token.node.label} of {request.id.partition('.')[0]}: {refusals[number].reason}"
+        for number, request in circle.items()
+    ]
+    first = next(iter(circle))
+    return (
+        f"{'; '.join(said)}: none of them can go on by itself. Stop one of the runs, or take "
+        f"{refusals[first].vehicle}, drive it out of the way and give it back"
+    )
