@@ -9,11 +9,19 @@ from rich.text import Text
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 
-from m2pem.api import ResourceId, RunView, ScheduledMission, ScheduledStatus
+from m2pem.api import (
+    IncidentVerdict,
+    OpenIncident,
+    ResourceId,
+    RunView,
+    ScheduledMission,
+    ScheduledStatus,
+)
 from m2pem.api.control import MissionControl, RunId, RunStatus
 from m2pem.api.operator import operator_name
 from m2pem.errors import BusyError, M2pemError, OperatorError
-from m2pem_plugin_terminal.dialogs import Choice, Choose, Confirm, Read, help_text
+from m2pem_plugin_terminal import incidents
+from m2pem_plugin_terminal.dialogs import Ask, Choice, Choose, Confirm, Read, help_text
 from m2pem_plugin_terminal.display import Display
 from m2pem_plugin_terminal.handover import (
     RETURNED,
@@ -23,6 +31,7 @@ from m2pem_plugin_terminal.handover import (
     effects_text,
     with_operator,
 )
+from m2pem_plugin_terminal.incidents import Decision
 from m2pem_plugin_terminal.missions import NO_MISSIONS, ChooseMission, preview_text
 from m2pem_plugin_terminal.missions import TITLE as TITLE_MISSIONS
 from m2pem_plugin_terminal.schedule import ALL, NOTHING_SCHEDULED, entry_choices, schedule_choices
@@ -45,6 +54,7 @@ class TerminalApp(Display):
         Binding("s", "signals"),
         Binding("t", "take"),
         Binding("m", "missions"),
+        Binding("i", "incidents"),
         Binding("r", "runs"),
         Binding("c", "schedule"),
         Binding("slash", "filter"),
@@ -249,6 +259,72 @@ class TerminalApp(Display):
         if with_operator(holder) and holder != self.by:
             raise OperatorError(f"{resource} is with {holder}")
         await self.control.give_back(resource, by=self.by)
+
+    async def action_incidents(self) -> None:
+        """Choose an incident, and decide about it."""
+        try:
+            found = {each.incident: each for each in await self.control.incidents()}
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+        if not found:
+            self.say(incidents.NONE)
+            return
+
+        def chosen(incident: str | None) -> None:
+            if incident is not None:
+                self.run_worker(self._decide_about(found[incident]), exit_on_error=False)
+
+        listed = incidents.incident_choices(list(found.values()))
+        if len(listed) == 1:
+            chosen(listed[0].value)
+        else:
+            await self.push_screen(Choose(incidents.TITLE, listed), chosen)
+        self.show()
+
+    async def _decide_about(self, incident: OpenIncident) -> None:
+        """Ask for the choice and what it needs; `y` confirms, after a look at what follows."""
+        listed = incidents.decision_choices(incident)
+        choice = await self.push_screen_wait(Choose(incident.task, listed, str(incident)))
+        if choice is None:
+            return
+        try:
+            decision = await self._ask_for_details(incident, choice)
+            if decision is None:
+                return
+            place = (incident.run, incident.incident, choice)
+            needs = {"data": decision.data, "to": decision.to, "roles": decision.roles}
+            preview = await self.control.preview_incident(*place, **needs)
+            text = incidents.effect_text(incident, decision, preview)
+            if await self.push_screen_wait(Confirm(f"{choice} {incident.incident}?", text)):
+                stuck = preview.verdict is IncidentVerdict.CANNOT_COMPLETE
+                await self.control.resolve_incident(
+                    *place, **needs, by=self.by, even_if_stuck=stuck
+                )
+        except M2pemError as error:
+            self.say(f"Not taken: {error}", alarm=True)
+
+    async def _ask_for_details(self, incident: OpenIncident, choice: str) -> Decision | None:
+        """Ask for the data, target or resource of a choice; None: the operator gave up."""
+        title = incidents.LABELS[choice]
+        if choice == "set_data":
+            line = await self.push_screen_wait(Ask(title, "name=value"))
+            return None if line is None else Decision(choice, data=incidents.data_of(line))
+        if choice == "move":
+            listed = incidents.target_choices(incident)
+            to = await self.push_screen_wait(Choose(title, listed))
+            return None if to is None else Decision(choice, to=to)
+        if choice == "retry_with":
+            roles = incidents.role_choices(incident)
+            role: str | None = roles[0].value
+            if len(roles) > 1:
+                role = await self.push_screen_wait(Choose(title, roles))
+            if role is None:
+                return None
+            listed = incidents.resource_choices(self.control.fleet())
+            resource = await self.push_screen_wait(Choose(f"{title}: {role}", listed))
+            return None if resource is None else Decision(choice, roles={role: [resource]})
+        return Decision(choice)
 
     async def action_missions(self) -> None:
         """Choose a mission file to start."""

@@ -10,7 +10,7 @@ from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
-from textual.widgets import OptionList, Static
+from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from m2pem_plugin_terminal.formatting import shortened
@@ -123,6 +123,32 @@ class Read(_TextDialog[None]):
     HINT = "Esc: close"
 
 
+class Ask(ModalScreen[str | None]):
+    """A line to type; Enter returns it, Escape returns None."""
+
+    AUTO_FOCUS = "Input"
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(None)", "Close")]
+
+    def __init__(self, title: str, text: str) -> None:
+        super().__init__()
+        self._title = title
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """Compose the text and the field."""
+        with Vertical(classes="dialog") as box:
+            box.border_title = self._title
+            box.border_subtitle = "Enter: take it   Esc: close"
+            yield Static(Text(self._text), classes="dialog-text")
+            yield Input()
+        yield StopBar()
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Return the line."""
+        event.stop()
+        self.dismiss(event.value)
+
+
 KEYS = (
     ("1 ... 9", "answer the question"),
     ("Tab", "the next question, when there are several"),
@@ -133,11 +159,11 @@ KEYS = (
     ("s", "send a signal"),
     ("m", "start a mission, chosen from the files there are"),
     ("t", "take a vehicle to steer by hand, or give it back"),
+    ("i", "decide about an error that stops a task (!)"),
     ("r", "look at another run"),
     ("c", "the schedule: hold, release or cancel what starts later"),
     ("/", "log: only lines with a text; Esc: all"),
-    ("Up Down", "move through the mission"),
-    ("PgUp PgDn", "move through the log"),
+    ("Up, PgUp", "move through the mission, through the log"),
     ("q", "quit"),
 )
 

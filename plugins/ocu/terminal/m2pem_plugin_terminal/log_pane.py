@@ -39,6 +39,10 @@ LOGGED = frozenset(
         r.MessageThrown,
         r.EscalationThrown,
         r.ErrorThrown,
+        r.IncidentOpened,
+        r.IncidentUpdated,
+        r.IncidentResolved,
+        r.IncidentClosed,
     )
 )
 """Records that the log shows; the mission pane shows tokens."""

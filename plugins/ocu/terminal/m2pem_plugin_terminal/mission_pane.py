@@ -38,7 +38,12 @@ FADING = ("#8a929c", "#747c86", "#5f6771", "#4b525b")
 LINES = "#4b525b"
 DETAIL = "#9aa4af"
 
-SYMBOLS = {"doing": ("●", "#7fc8a9"), "asking": ("?", "bold #e8c468"), "waiting": ("○", "#8ab4d8")}
+SYMBOLS = {
+    "stopped": ("!", "bold #e07a6a"),
+    "doing": ("●", "#7fc8a9"),
+    "asking": ("?", "bold #e8c468"),
+    "waiting": ("○", "#8ab4d8"),
+}
 OUTCOMES = {
     TokenOutcome.COMPLETED: "✓",
     TokenOutcome.INTERRUPTED: "-",
@@ -139,6 +144,8 @@ def _active_lines(view: RunView, active: Token, time_s: float, width: int) -> li
     inside = any(scope.token == active.id for scope in view.scopes.values())
     works = any(not isinstance(each, Allocation) for each in active.work.values())
     kind = "asking" if active.prompts else "doing" if works or inside else "waiting"
+    if any(each.token == active.id for each in view.incidents.values()):
+        kind = "stopped"
     symbol, colour = SYMBOLS[kind]
     label = shortened(view.label(active.element), width - 2)
     first = Text.assemble((symbol, colour), " ", (label, "#e3e8ee"))
@@ -162,6 +169,9 @@ def _details(view: RunView, active: Token, time_s: float) -> list[str]:
             details.append(printable(waiting(work.reason)))
         else:
             details.append(work.name)
+    for incident in view.incidents.values():
+        if incident.token == active.id:
+            details.append(f"stopped by {incident.code}: press i")
     if active.prompts:
         details.append("asks the operator")
     for wait in active.waits.values():

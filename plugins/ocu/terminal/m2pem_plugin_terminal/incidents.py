@@ -1,0 +1,91 @@
+"""Deciding about incidents: the lists and texts of the dialogs (docs/incidents.md)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rich.text import Text
+
+from m2pem.api import IncidentPreview, IncidentVerdict, OpenIncident
+from m2pem.errors import OperatorError
+from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.yaml_source import parse_yaml
+from m2pem.mission.values import Value
+from m2pem_plugin_terminal.dialogs import Choice
+
+TITLE = "Errors that stop a task"
+NONE = "No error stops a task here"
+
+LABELS = {
+    "retry": "Retry: it begins anew",
+    "retry_with": "Retry with another vehicle or payload",
+    "skip": "Skip: it counts as done",
+    "set_data": "Set data, and decide afterwards",
+    "move": "Move the token to another element",
+    "end": "End the run with the error",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What an operator has chosen about an incident, with what it needs."""
+
+    choice: str
+    data: dict[str, Value] = field(default_factory=dict)
+    to: str = ""
+    roles: dict[str, list[str]] = field(default_factory=dict)
+
+
+def incident_choices(incidents: Sequence[OpenIncident]) -> list[Choice]:
+    """Return a line for each incident."""
+    return [Choice(each.incident, f"{each.run}: {each.task}", each.code) for each in incidents]
+
+
+def decision_choices(incident: OpenIncident) -> list[Choice]:
+    """Return a line for each choice about an incident."""
+    return [Choice(choice, LABELS.get(choice, choice)) for choice in incident.choices]
+
+
+def role_choices(incident: OpenIncident) -> list[Choice]:
+    """Return a line for each role of the failed behavior."""
+    return [Choice(role, role, ", ".join(ids)) for role, ids in incident.roles.items()]
+
+
+def resource_choices(fleet: Fleet) -> list[Choice]:
+    """Return a line for each vehicle, payload and team."""
+    return [Choice(name, name) for name in (*fleet.vehicles, *fleet.payloads, *fleet.teams)]
+
+
+def target_choices(incident: OpenIncident) -> list[Choice]:
+    """Return a line for each element to which the token can move."""
+    return [
+        Choice(id_, label, "" if label == id_ else id_) for id_, label in incident.targets.items()
+    ]
+
+
+def data_of(line: str) -> dict[str, Value]:
+    """Read "name=value"; the value is YAML 1.2.
+
+    Raises:
+        OperatorError: it is not of that form.
+    """
+    name, equals, text = (part.strip() for part in line.partition("="))
+    if not (name and equals):
+        raise OperatorError(f"{line!r} is not of the form name=value")
+    source = parse_yaml(text.encode(), name)
+    if source.findings:
+        raise OperatorError(f"the value of {name}: {source.findings[0].message}")
+    return {name: source.data}
+
+
+def effect_text(incident: OpenIncident, decision: Decision, preview: IncidentPreview) -> Text:
+    """Return what is confirmed: the incident, the choice, and what the checker says of it."""
+    text = Text(f"{incident}\n\n", "#c8d0d9")
+    text.append(f"{LABELS[decision.choice]}\n", "bold #e3e8ee")
+    for what in (decision.to, *(f"{k} = {v}" for k, v in decision.data.items())):
+        if what:
+            text.append(f"{what}\n", "#9aa4af")
+    for role, ids in decision.roles.items():
+        text.append(f"{role}: {', '.join(ids)}\n", "#9aa4af")
+    good = preview.verdict is IncidentVerdict.COMPLETES
+    text.append(str(preview), "#7fc8a9" if good else "#e8c468")
+    return text

@@ -1,0 +1,64 @@
+"""Deciding about an error that stops a task."""
+
+import pytest
+from m2pem_plugin_terminal.incidents import data_of
+from terminal_world import MISSION, World
+
+from m2pem.errors import OperatorError
+from m2pem.mission.catalogue import BehaviorState
+
+
+async def stopped(world: World) -> None:
+    """Start the patrol with incidents, and let its drive fail."""
+    source = MISSION.read_bytes()
+    marked = source.replace(b'isExecutable="true"', b'isExecutable="true" m2pem:onError="incident"')
+    await world.control.start(marked)
+    await world.fake.until_called("start", "r1.b1")
+    world.fake.report("r1.b1", BehaviorState.FAILED, "ROUTE_BLOCKED")
+
+
+async def test_the_task_is_marked_and_a_key_decides(world: World) -> None:
+    async with world.terminal() as terminal:
+        await stopped(world)
+        await terminal.until_shown("! DRIVE", "stopped by ROUTE_BLOCKED", "incident r1.i1")
+        await terminal.press("i")
+        await terminal.until_shown("1 Retry: it begins anew", "3 Skip: it counts as done")
+        await terminal.press("1")
+        await terminal.until_shown("retry r1.i1?")
+        await terminal.press("1", "enter")
+        await terminal.until_shown("retry r1.i1?")
+        await terminal.press("y")
+        await world.fake.until_called("start", "r1.b2")
+        await terminal.until_shown("begins anew", "● DRIVE")
+
+
+async def test_a_vehicle_is_replaced_and_data_is_written(world: World) -> None:
+    async with world.terminal() as terminal:
+        await stopped(world)
+        await terminal.until_shown("! DRIVE")
+        await terminal.press("i", "4")
+        await terminal.until_shown("name=value")
+        await terminal.press(*"speed=3", "enter")
+        await terminal.until_shown("set_data r1.i1?", "speed = 3")
+        await terminal.press("y")
+        await terminal.until_shown("data written for incident")
+        await terminal.press("i", "2")
+        await terminal.until_shown("1 scout", "2 uav")
+        await terminal.press("2")
+        await terminal.until_shown("retry_with r1.i1?")
+        await terminal.press("y")
+        await world.fake.until_called("start", "r1.b2")
+        assert world.fake.calls[-1].subject == "r1.b2"
+
+
+async def test_without_an_incident_there_is_nothing_to_decide(world: World) -> None:
+    async with world.terminal() as terminal:
+        await world.start()
+        await terminal.press("i")
+        await terminal.until_shown("No error stops a task here")
+
+
+def test_data_is_read_as_yaml() -> None:
+    assert data_of("a.b = 3.5") == {"a.b": 3.5}
+    with pytest.raises(OperatorError, match="name=value"):
+        data_of("3.5")
