@@ -293,7 +293,11 @@ class TerminalApp(Display):
             if decision is None:
                 return
             place = (incident.run, incident.incident, choice)
-            needs = {"data": decision.data, "to": decision.to, "roles": decision.roles}
+            needs: dict[str, Any] = {
+                "data": decision.data,
+                "to": decision.to,
+                "roles": decision.roles,
+            }
             preview = await self.control.preview_incident(*place, **needs)
             text = incidents.effect_text(incident, decision, preview)
             if await self.push_screen_wait(Confirm(f"{choice} {incident.incident}?", text)):
