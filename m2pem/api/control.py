@@ -118,7 +118,7 @@ class TakeEffect:
 
     `task` is the task's label. `caught_by`: the label of the event that catches the error, where
     the mission goes on; "": no event catches it, and the run fails. `reassigned`: the error comes
-    only if no other can do the rest of the task.
+    only if no other can do the rest of the task. `asks`: an incident opens in its place.
     """
 
     run: RunId
@@ -127,8 +127,11 @@ class TakeEffect:
     task: str
     caught_by: str = ""
     reassigned: bool = False
+    asks: bool = False
 
     def __str__(self) -> str:
+        if self.asks:
+            return f"{self.run}: an incident opens, which asks what is done with {self.task}"
         ends = f"{self.run}: {self.task} ends with error TAKEN_OVER"
         if self.reassigned:
             ends = f"{self.run}: another does the rest of {self.task}, or it"

@@ -274,7 +274,10 @@ def _work_reassigned(view: RunView, record: r.WorkReassigned) -> _Sentence:
     behavior = view.behavior(record.behavior)
     lost = ", ".join(behavior.resources if behavior is not None else record.excluded)
     why = f"{record.code}{_in_brackets(record.reason)}"
-    text = f"{view.label(record.element)}: another is to do what {lost} left, {why}"
+    who = "who does" if record.asks else "another is to do"
+    text = f"{view.label(record.element)}: {who} what {lost} left, {why}"
+    if record.asks:
+        text += ": an operator is asked"
     return text, Importance.WARNING
 
 

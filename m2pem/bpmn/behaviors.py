@@ -250,7 +250,7 @@ class BehaviorReader:
                 line,
                 ROLE_NEED,
                 f"role '{role}': onLoss='{text}' is none of {', '.join(OnLoss)}",
-                "write onLoss='reassign' to have another do the rest, or delete it",
+                "write onLoss='reassign' to have another do the rest, 'ask', or delete it",
             )
             return OnLoss.FAIL
         if text == OnLoss.REASSIGN and not by_need:
@@ -258,7 +258,7 @@ class BehaviorReader:
                 line,
                 ROLE_NEED,
                 f"role '{role}': onLoss='{text}' belongs to a role that says what it needs",
-                "write requires= in place of the name, so that there is another, or delete onLoss",
+                "write requires= in place of the name, so that there is another, or onLoss='ask'",
             )
         return OnLoss(text)
 

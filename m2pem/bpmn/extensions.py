@@ -131,7 +131,7 @@ _TABLE = (
             Attribute("store", Type.NAME, "the name under which the chosen ones are stored"),
             Attribute("wait", Type.DURATION, "how long the task waits for them, or `unlimited`"),
             Attribute("priority", Type.TEXT, "the greatest number is served first; 0"),
-            Attribute("onLoss", Type.TEXT, "when it is lost: `fail` or `reassign`; `fail`"),
+            Attribute("onLoss", Type.TEXT, "when it is lost: `fail`, `reassign` or `ask`; `fail`"),
         ),
         places=_SERVING,
     ),

@@ -147,12 +147,13 @@ class Join:
 class LostWork:
     """What a task has lost whose work goes on with other resources.
 
-    `behavior`, `loss`: the last one that was lost. `resources`: what the task does not get again,
-    until it has returned.
+    `behavior`, `loss`: the last one that was lost. `parameters`: of what was left then.
+    `resources`: what the task does not get again, until it has returned.
     """
 
     behavior: str
     loss: Loss
+    parameters: dict[str, Value]
     resources: dict[str, Loss] = field(default_factory=dict)
 
 

@@ -13,6 +13,7 @@ from m2pem.errors import BusyError, OperatorError
 from m2pem.executive.runner import Runner
 from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.fleet import Fleet
+from m2pem.mission.behavior import OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import did_you_mean
@@ -65,11 +66,12 @@ class Handover:
                 behavior.element,
                 state.mission.elements[behavior.element].label,
                 catcher.label if catcher is not None else "",
-                reassigned,
+                on_loss is OnLoss.REASSIGN,
+                on_loss is OnLoss.ASK,
             )
             for runner in runners
             if not runner.done.is_set() and (state := runner.run.state)
-            for behavior, catcher, reassigned in preview_control_taken(state, resource)
+            for behavior, catcher, on_loss in preview_control_taken(state, resource)
         ]
 
     async def give_back(self, name: str, by: str, runners: Iterable[Runner]) -> None:

@@ -24,10 +24,11 @@ class RoleKind(StrEnum):
 
 class OnLoss(StrEnum):
     """What becomes of the rest of a behavior whose vehicle or payload is lost: its task ends with
-    the error, or another one that fills the role does the rest."""
+    the error, another one that fills the role does the rest, or an operator is asked."""
 
     FAIL = "fail"
     REASSIGN = "reassign"
+    ASK = "ask"
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.commands import AllocateResources
 from m2pem.engine.elements.behaviors import preview_control_taken
+from m2pem.mission.behavior import OnLoss
 from m2pem.mission.catalogue import BehaviorState
 from tests.engine.kit import CANCELLED, FAILED, Play
 from tests.engine.test_allocations import FLEET, choose, commands
@@ -177,11 +178,11 @@ def test_a_vehicle_that_an_operator_gives_back_may_do_the_rest() -> None:
 
 
 def test_the_preview_of_a_takeover_says_that_another_is_looked_for() -> None:
-    ((_, catcher, is_reassigned),) = preview_control_taken(play().run.state, "ugv1")
+    ((_, catcher, on_loss),) = preview_control_taken(play().run.state, "ugv1")
     assert catcher is not None
-    assert is_reassigned
-    ((_, _, is_reassigned),) = preview_control_taken(play('requires="true"').run.state, "ugv1")
-    assert not is_reassigned
+    assert on_loss is OnLoss.REASSIGN
+    ((_, _, on_loss),) = preview_control_taken(play('requires="true"').run.state, "ugv1")
+    assert on_loss is OnLoss.FAIL
 
 
 def test_a_resource_that_ended_lost_is_known_until_it_returns_or_is_given_again() -> None:
@@ -207,3 +208,67 @@ def test_a_stopped_run_reassigns_nothing() -> None:
     world.stop().report("b1", LOST)
     assert not reassigned(world)
     assert world.ended == "stopped"
+
+
+# --- an operator is asked -------------------------------------------------------------------------
+
+ASK = 'requires="true" store="who" onLoss="ask"'
+
+
+def incident(world: Play) -> str:
+    (found,) = world.run.state.incidents
+    return found
+
+
+def test_an_operator_is_asked_though_an_event_would_catch_the_error() -> None:
+    world = running(play(ASK), {"route": "rest"}).fault("ugv1", reachable=False)
+    (record,) = reassigned(world)
+    assert record.asks
+    assert record.excluded == ()
+    assert world.at == "go"
+    assert incident(world) == "r1.i1"
+    assert not [each for each in world.records() if isinstance(each, r.ErrorThrown)]
+
+
+def test_to_retry_is_to_do_what_is_left() -> None:
+    world = running(play(ASK), {"route": "rest"}).fault("ugv1", reachable=False)
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.RETRY, "ops"))
+    choose(world, "ugv2", allocation="r1.a2")
+    assert world.run.state.behaviors["r1.b2"].parameters == {"route": "rest", "speed": "2 m/s"}
+    world.report("b2")
+    assert world.at == "then"
+
+
+def test_to_retry_with_another_is_to_have_that_do_what_is_left() -> None:
+    world = running(play(ASK), {"route": "rest"}).fault("ugv1", reachable=False)
+    roles = {"driver": ("ugv2",)}
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.RETRY_WITH, "ops", roles=roles))
+    behavior = world.run.state.behaviors["r1.b2"]
+    assert (behavior.resources, behavior.parameters["route"]) == (("ugv2",), "rest")
+
+
+def test_a_named_role_may_ask_too() -> None:
+    named = task('vehicle="ugv1" onLoss="ask"')
+    text = f'<startEvent id="start"/> {named}\nstart -> go'
+    world = Play(text, fleet=FLEET).start()
+    running(world, {"route": "rest"}).report("go", LOST)
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.RETRY, "ops"))
+    assert world.run.state.behaviors["r1.b2"].parameters["route"] == "rest"
+
+
+def test_who_is_asked_again_if_nothing_is_free_for_the_rest() -> None:
+    world = play(ASK).fault("ugv1", reachable=False)
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.RETRY, "ops"))
+    world.give(i.ResourcesNotFree("r1.a2", "ugv2 is held", code="RESOURCE_UNAVAILABLE"))
+    assert incident(world) == "r1.i2"
+
+
+def test_an_error_that_is_no_loss_asks_nobody() -> None:
+    world = play(ASK).report("go", FAILED, "ROUTE_BLOCKED")
+    assert world.at == "caught"
+    assert not world.run.state.incidents
+
+
+def test_the_preview_of_a_takeover_says_that_an_operator_is_asked() -> None:
+    ((_, _, on_loss),) = preview_control_taken(play(ASK).run.state, "ugv1")
+    assert on_loss is OnLoss.ASK

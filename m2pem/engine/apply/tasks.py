@@ -116,7 +116,7 @@ def work_reassigned(state: RunState, record: r.WorkReassigned) -> None:
     token, loss = state.tokens[record.token], Loss(record.code, record.reason)
     before = token.lost_work.resources if token.lost_work is not None else {}
     lost = dict.fromkeys(record.excluded, loss)
-    token.lost_work = LostWork(record.behavior, loss, {**before, **lost})
+    token.lost_work = LostWork(record.behavior, loss, record.parameters, {**before, **lost})
 
 
 def resource_returned(state: RunState, record: r.ResourceReturned) -> None:

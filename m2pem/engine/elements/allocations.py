@@ -11,12 +11,12 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import await_event, due_after
 from m2pem.engine.execution import Execution
-from m2pem.engine.incidents import incident_holding
+from m2pem.engine.incidents import incident_holding, open_incident
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, Token
 from m2pem.engine.throwing import throw_error
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
-from m2pem.mission.behavior import Behavior, Role
+from m2pem.mission.behavior import Behavior, OnLoss, Role
 from m2pem.mission.elements import ScriptTask, SendTask, ServiceTask
 from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
@@ -191,4 +191,8 @@ def _fail(x: Execution, request: AllocationRequest, code: str, reason: str) -> N
         code = lost.loss.code
         reason = f"{lost.loss.reason}; no other does what is left: {reason}"
     x.emit(r.AllocationEnded(request.id, code, reason))
-    throw_error(x, request.token, code, reason)
+    asks = any(role.on_loss is OnLoss.ASK for role in behavior_of(request).roles)
+    if lost is not None and asks:
+        open_incident(x, request.token, code, reason)
+    else:
+        throw_error(x, request.token, code, reason)

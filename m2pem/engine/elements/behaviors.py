@@ -23,7 +23,7 @@ from m2pem.engine.elements.allocations import (
     request_allocation,
     store_chosen,
 )
-from m2pem.engine.elements.losses import end_work, is_reassigned
+from m2pem.engine.elements.losses import end_work, what_is_done
 from m2pem.engine.execution import Execution
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.engine.scopes import end_run
@@ -34,6 +34,7 @@ from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior as BehaviorOfTask
+from m2pem.mission.behavior import OnLoss
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.elements import Event
 from m2pem.mission.expression import Expression
@@ -52,7 +53,8 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
     A resource that another behavior holds, and that is not being cancelled, is
     RESOURCE_UNAVAILABLE.
     """
-    parameters = _evaluate(x, token, behavior)
+    lost = token.lost_work  # an operator has it tried again: what was left is to be done
+    parameters = _evaluate(x, token, behavior) if lost is None else dict(lost.parameters)
     if parameters is None:
         return
     if not behavior.roles and behavior.name == "hold":
@@ -346,9 +348,9 @@ def control_taken(x: Execution, item: i.ControlTaken) -> None:
 
 def preview_control_taken(
     state: RunState, resource: str
-) -> list[tuple[Behavior, Event | None, bool]]:
+) -> list[tuple[Behavior, Event | None, OnLoss]]:
     """Return the behaviors that `control_taken` would end, each with the event that catches its
-    error, and whether another resource is looked for first to do the rest.
+    error, and whether another does the rest, or an operator is asked, before it is thrown.
 
     None instead of an event: none catches it, so the run would fail.
     """
@@ -356,7 +358,7 @@ def preview_control_taken(
         (
             behavior,
             catcher_of_error(state.tokens[behavior.token], TAKEN_OVER),
-            is_reassigned(state.tokens[behavior.token], behavior, TAKEN_OVER, (resource,)),
+            what_is_done(state.tokens[behavior.token], behavior, TAKEN_OVER, (resource,)),
         )
         for behavior in _commanding(state, resource)
     ]

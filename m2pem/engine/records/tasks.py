@@ -143,7 +143,8 @@ class WorkReassigned(BaseRecord, frozen=True):
     the token is for them.
 
     `code`, `reason`: why; the error of the task, if no other can do it. `parameters`: of what is
-    left. `excluded`: resources that the task does not get again until they have returned.
+    left. `excluded`: resources that the task does not get again until they have returned. `asks`:
+    an incident asks an operator first what is done.
     """
 
     token: int
@@ -155,6 +156,7 @@ class WorkReassigned(BaseRecord, frozen=True):
     reason: str
     parameters: dict[str, Value]
     excluded: tuple[str, ...]
+    asks: bool = False
 
 
 class ResourceReturned(BaseRecord, frozen=True):
