@@ -123,6 +123,9 @@ def test_another_copter_flies_the_rest_and_the_first_one_is_stopped_when_it_retu
     (reassigned,) = of_kind(records, "WorkReassigned")
     assert (reassigned["code"], reassigned["excluded"]) == ("LINK_LOST", ["uav1"])
     assert flown[1]["parameters"] == reassigned["parameters"]
+    left = reassigned["parameters"]["route"]["geometry"]["coordinates"]
+    assert 1 <= len(left) < len(AROUND["coordinates"])
+    assert left[-1][:2] == pytest.approx(AROUND["coordinates"][-1], abs=1e-6)
     (landed,) = of_kind(records, "BehaviorRequested", element="Down")
     assert landed["resources"] == ["uav2"]
     (returned,) = of_kind(records, "ResourceReturned")
