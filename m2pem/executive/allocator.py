@@ -43,7 +43,7 @@ from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.losses import UNAVAILABLE, may_return
+from m2pem.mission.losses import TAKEN_OVER, UNAVAILABLE, may_return
 
 if TYPE_CHECKING:
     from m2pem.deconfliction.conflicts import Refusal
@@ -529,8 +529,16 @@ def _circle_text(waiting: Sequence[_Considered]) -> str:
 
 
 def _is_hopeless(each: _Considered, evaluator: RoleEvaluator) -> bool:
-    """Whether what is left of a lost behavior will be done by no other, however long it waits."""
-    lost = each.task.lost
+    """Whether what is left of a lost behavior will be done by no other, however long it waits.
+
+    Of a vehicle that a pilot has taken, not an operator, it is not known when it is given back.
+    """
+    lost, taken = each.task.lost, each.asked.runner.run.state.taken
+    returns = {
+        name
+        for name, loss in lost.items()
+        if may_return(loss.code) and (loss.code != TAKEN_OVER or name in taken)
+    }
     if each.request.token.lost_work is None:
         return False
     for considered in each.roles:
@@ -538,7 +546,7 @@ def _is_hopeless(each: _Considered, evaluator: RoleEvaluator) -> bool:
         if role.resource:
             continue
         same = role.need is not None and role.need.same
-        gone = {name for name, loss in lost.items() if same or not may_return(loss.code)}
+        gone = lost.keys() if same else lost.keys() - returns
         able = [e for e in evaluator.ever(role, each.task) if e not in gone]
         if len(able) < considered.options.least:
             return True

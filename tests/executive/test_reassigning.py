@@ -144,6 +144,24 @@ def test_the_error_of_the_loss_is_thrown_if_no_other_will_ever_do_the_rest(play,
     assert error.reason.startswith("its airspace is refused; no other does what is left: role")
 
 
+@pytest.mark.parametrize("lose", [pilot_takes, take])
+def test_what_an_operator_took_is_waited_for_and_what_a_pilot_took_is_not(play, lose):
+    async def story(world: World):
+        run = await begin(world, goto(NEED + " wait='unlimited'"))
+        await lose(world)
+        await world.clock.sleep(60)
+        world.fake.report(f"{run}.b1", BehaviorState.CANCELLED)
+        if lose is take:
+            assert not seen(world, ErrorThrown)
+            await world.executive.control.give_back("ugv1", by="anna")
+            await world.fake.until_called("start", f"{run}.b2")
+            world.fake.report(f"{run}.b2", SUCCEEDED)
+        return (await world.executive.control.wait(run)).status
+
+    expected = RunStatus.COMPLETED if lose is take else RunStatus.FAILED
+    assert play(story, "ugv1") is expected
+
+
 def test_a_refusal_goes_through_all_vehicles_once(play):
     async def story(world: World):
         run = await begin(world, goto(NEED + " wait='unlimited'"))

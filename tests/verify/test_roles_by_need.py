@@ -489,3 +489,10 @@ def test_a_task_that_may_wait_for_space_is_said_to_have_it_at_once() -> None:
     (rough,) = [each for each in report.net.approximations if "space" in each.what]
     assert (rough.element, rough.exactness) == ("go", Exactness.BOUNDED)
     assert report.states == check(mission, fleet_for(mission)).states
+
+
+@pytest.mark.parametrize("role", [f"{AIR};onLoss=ask", "need:vehicle=uav1;onLoss=ask"])
+def test_it_is_said_that_no_operator_is_asked_about_a_loss(role: str) -> None:
+    report = report_of(row(_task("A", role)), uav1="red", uav2="red")
+    (found,) = [each for each in report.net.approximations if "operator is asked" in each.what]
+    assert (found.element, found.exactness) == ("A", Exactness.BOUNDED)

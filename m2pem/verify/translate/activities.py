@@ -5,7 +5,7 @@ from dataclasses import replace
 from m2pem.engine.execution import Waits, waits_when_entered
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission import elements as e
-from m2pem.mission.behavior import Assignment, Behavior
+from m2pem.mission.behavior import Assignment, Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.expression import literal
 from m2pem.units import Dimension, UnitError, quantity
@@ -192,6 +192,9 @@ def _behavior(
     able = [each for role in roles for each in role.resources] or resources(context, behavior)
     if may_wait_for_space(context.fleet, behavior.type, behavior.name, able or ()):
         what = "that it may wait for space, and end without it, is not followed"
+        net.approximate(instance.node, Exactness.BOUNDED, what)
+    if context.options.failures and any(role.on_loss is OnLoss.ASK for role in behavior.roles):
+        what = "that an operator is asked when it loses something is not followed"
         net.approximate(instance.node, Exactness.BOUNDED, what)
     if instance.node in context.candidates:
         _outside_work(context, instance, asking_place(context, instance))

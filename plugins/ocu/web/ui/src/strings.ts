@@ -324,7 +324,7 @@ export const strings = {
         priority: { label: "Priority", hint: "The greatest number is served first. Else 0." },
         onLoss: {
           label: "When it is lost",
-          hint: "reassign: another one does the rest. Else the task fails.",
+          hint: "reassign: another one does the rest. ask: an operator decides. Else it fails.",
         },
       },
     },

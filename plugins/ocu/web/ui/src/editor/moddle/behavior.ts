@@ -25,7 +25,7 @@ export const NEEDS = [
 ] as const;
 
 /** Those that a role which names its resource may have, too. */
-export const WAITS: readonly NeedName[] = ["wait", "priority"];
+export const WAITS: readonly NeedName[] = ["wait", "priority", "onLoss"];
 
 export type NeedName = (typeof NEEDS)[number];
 
