@@ -95,6 +95,9 @@ def next_step(part: Part, planner: Planner, now_us: int) -> None:
             body.take(Plan([aimed(gimbal, body.look(now_us), carrier, place)]), now_us)
 
 
+SOONEST_US = 500_000
+"""Between two looks at how far a vehicle has come."""
+
 LEAST_PROGRESS_M = 1.0
 """Less than this is not reported."""
 
@@ -452,8 +455,8 @@ class Simulation:
             self._changed(part.body, now_us)
         self._watch(execution)
 
-    def _expect_progress(self, execution: Execution, part: Part) -> None:
-        """Wait until so much more is done that it is worth a report."""
+    def _expect_progress(self, execution: Execution, part: Part, after_us: int = 0) -> None:
+        """Wait until so much more is done that it is worth a report, and until after `after_us`."""
         if part.work_timer is not None:
             part.work_timer.cancel()
             part.work_timer = None
@@ -464,14 +467,16 @@ class Simulation:
         due = track.warp.when(track.plan.when_level_m_left(work.line.length_m - due_m))
         if due is not None and due_m < work.line.length_m:
             part.work_timer = self._event_queue.at(
-                due, lambda at_us: self._progressed(execution, part, at_us), background=True
+                max(due, after_us),
+                lambda at_us: self._progressed(execution, part, at_us),
+                background=True,
             )
 
     def _progressed(self, execution: Execution, part: Part, now_us: int) -> None:
         part.work_timer = None
         if self._links.broken_of(execution) is None:
             self._tell_left(execution, now_us, worth_it=True)
-        self._expect_progress(execution, part)
+        self._expect_progress(execution, part, now_us + SOONEST_US)
 
     def _tell_left(self, execution: Execution, now_us: int, *, worth_it: bool = False) -> None:
         """Report what is left of a behavior, if it is any less. `worth_it`: if much less."""

@@ -6,8 +6,9 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from m2pem.fleet.parameters import accepted
-from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw
+from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
 from m2pem.geo.polygon import middle_of
+from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.geometry import Area, Route, VehiclePosition
 from m2pem.teams.paths import SPACING_M
 from m2pem.teams.plan import Leg, Plan, PlanningContext, TeamRefusedError
@@ -161,6 +162,8 @@ def survey(context: PlanningContext) -> Plan:
     behavior = "area_survey" if themselves else "single_vehicle_routing"
     legs: list[Leg] = []
     if themselves:
+        # With the spacing itself, rounding may give a band one pass more than it has here.
+        whole = SurveyTracks(tracks, strip_width_m(rings[0], spacing, yaw))
         parts = strips(rings, passes, yaw, shares)
         for member, ring in zip(context.members, parts, strict=True):
             if ring:
@@ -168,7 +171,7 @@ def survey(context: PlanningContext) -> Plan:
                     **context.parameters.only("speed", "overshoot"),
                     "area": _band_area(context, area, ring),
                     "heading": (math.pi / 2 - yaw) % math.tau,
-                    "spacing": spacing,
+                    "spacing": whole.spacing_m(ring),
                 }
                 legs.append(context.leg(member, behavior, own))
     else:

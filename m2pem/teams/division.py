@@ -14,6 +14,7 @@ from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.geometry import Route
 from m2pem.mission.values import Value
 
 SURVEY_SPACING_M = 20.0
@@ -60,6 +61,26 @@ def work_of(
     return RemainingSurvey(raw, tracks, frame, area.rings[0][0][2], area.altitude_frame)
 
 
+def from_nearer_end(
+    behavior: str,
+    parameters: Mapping[str, ResolvedValue],
+    frame: LocalFrame,
+    place: EastNorth | None,
+) -> Mapping[str, ResolvedValue]:
+    """Return the parameters of a part, turned round if it then begins nearer to a place."""
+    given = BehaviorParameters(parameters)
+    turned = dict(parameters)
+    if given.route is not None:
+        turned["route"] = Route(given.route.waypoints[::-1], given.route.altitude_frame)
+    if given.heading_rad is not None:
+        turned["heading"] = (given.heading_rad + math.pi) % math.tau
+    works = [(each, work_of(behavior, each, frame)) for each in (parameters, turned)]
+    return min(
+        (each for each in works),
+        key=lambda each: 0.0 if each[1] is None else _way_m(place, each[1].line.points[0]),
+    )[0]
+
+
 @dataclass(frozen=True, slots=True)
 class Taker:
     """A member that can take more. `free_s`: in how much time it has done what it has; `place`:
@@ -84,7 +105,8 @@ class Piece:
 def divide(works: Sequence[RemainingWork], takers: Sequence[Taker]) -> list[Piece]:
     """Return the pieces of ways, so that the last member ends as early as possible.
 
-    The ways are cut where the times are even: each member takes what is between two cuts.
+    The ways are cut where the times are even: each member takes what is between two cuts, and
+    begins at the end that is nearer.
     """
     if not works:
         return []
@@ -105,8 +127,8 @@ def _shared(
     for _ in range(_ROUNDS):
         begin_m = 0.0
         for index, (taker, length_m) in enumerate(zip(order, lengths, strict=True)):
-            place = _at(works, begin_m)
-            way_m = 0.0 if taker.place is None else math.dist(taker.place, place)
+            ends = _at(works, begin_m), _at(works, begin_m + length_m)
+            way_m = min(_way_m(taker.place, end) for end in ends)
             ready[index] = taker.free_s + way_m / taker.speed_m_s
             begin_m += length_m
         lengths = _even(ready, [taker.speed_m_s for taker in order], whole_m)
@@ -116,6 +138,10 @@ def _shared(
         if length_m > 0
     ]
     return max(ends, default=0.0), order, lengths
+
+
+def _way_m(place: EastNorth | None, end: EastNorth) -> float:
+    return 0.0 if place is None else math.dist(place, end)
 
 
 def _even(ready: Sequence[float], speeds: Sequence[float], whole_m: float) -> list[float]:

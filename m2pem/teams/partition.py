@@ -7,7 +7,7 @@ from m2pem.api.remaining import RemainingWork, raw_parameters
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
-from m2pem.teams.division import Taker, divide, read_parameters, work_of
+from m2pem.teams.division import Taker, divide, from_nearer_end, read_parameters, work_of
 from m2pem.teams.member import Member
 from m2pem.teams.plan import Leg, Plan
 from m2pem.teams.restart import Reference, Transfer
@@ -175,11 +175,17 @@ class Partition:
             number += 1
             parts = [way.part(piece.from_m, piece.to_m) for piece in mine] if mine[1:] else [None]
             if None in parts:  # a single piece, or one that no parameters can say
-                self._give(mine[0].member, key, leg)
+                self._give(mine[0].member, key, self._nearer(leg, mine[0].member, takers))
                 continue
             for piece, raw in zip(mine, parts, strict=True):
-                parameters = read_parameters(leg.behavior, raw or {})
-                self._give(piece.member, key, replace(leg, parameters=parameters or leg.parameters))
+                parameters = read_parameters(leg.behavior, raw or {}) or leg.parameters
+                cut = replace(leg, parameters=parameters)
+                self._give(piece.member, key, self._nearer(cut, piece.member, takers))
+
+    def _nearer(self, leg: Leg, member: ResourceId, takers: Sequence[Taker]) -> Leg:
+        place = next(taker.place for taker in takers if taker.member == member)
+        parameters = from_nearer_end(leg.behavior, leg.parameters, self._frame, place)
+        return replace(leg, parameters=parameters)
 
     def _give(self, taker: ResourceId, key: str, leg: Leg) -> None:
         origin = key.partition(_OF)[0]

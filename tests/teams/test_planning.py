@@ -180,7 +180,11 @@ def test_who_can_survey_itself_is_given_the_area_of_its_band() -> None:
     assert [leg.behavior for leg in plan.legs] == ["area_survey"] * 2
     for leg in plan.legs:
         given = {name: leg.parameters[name] for name in ("spacing", "overshoot", "heading")}
-        assert given == {"spacing": 5.0, "overshoot": 7.0, "heading": pytest.approx(math.pi / 2)}
+        assert given == {
+            "spacing": pytest.approx(5.0, rel=0.03),  # rounding must not add a pass to a band
+            "overshoot": 7.0,
+            "heading": pytest.approx(math.pi / 2),
+        }
     slow, fast = plan.legs
     assert "altitude" not in slow.parameters
     assert fast.parameters["altitude"] == 40.0

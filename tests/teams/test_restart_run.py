@@ -14,7 +14,7 @@ from m2pem.journal import MemoryJournal
 from m2pem.mission.catalogue import BehaviorState
 
 from .carts import Yard
-from .conftest import START_US, Play, World, one_task, route
+from .conftest import START_US, Play, World, area, one_task, route
 
 ROADS = {"road": route((50, 0), (450, 0)), "bridge": route((50, 0), (150, 0))}
 MARCH = one_task("road_following_formation", route="road", spacing="20 m", speed="5 m/s")
@@ -46,7 +46,7 @@ def crash(
         return left
 
     left: tuple[MemoryJournal, Yard] = play(
-        story, yard, geometries=ROADS, journal=journal, **options
+        story, yard, journal=journal, **{"geometries": ROADS, **options}
     )
     left[1].commands.clear()
     return left
@@ -62,7 +62,8 @@ def resume(
         return await then(world)
 
     start_us = START_US + 90_000_000
-    return play(story, left[1], geometries=ROADS, journal=left[0], start_us=start_us, **kw)
+    options = {"geometries": ROADS, **kw}
+    return play(story, left[1], journal=left[0], start_us=start_us, **options)
 
 
 async def to_the_end(world: World) -> tuple[RunStatus, list[BehaviorEnded]]:
@@ -239,6 +240,41 @@ def test_a_team_that_goes_on_without_lost_members_does_so_after_a_crash(play: Pl
     assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
     assert ended.reason.startswith("without b (ROUTE_BLOCKED")
     assert left[1].count("single_vehicle_routing") == 0
+
+
+@pytest.mark.parametrize("meanwhile", [False, True], ids=["lost before", "lost meanwhile"])
+def test_pieces_of_a_lost_members_band_are_those_of_before_the_crash(
+    play: Play, *, meanwhile: bool
+) -> None:
+    policy = LostMemberPolicy.CONTINUE
+    geometries = {"field": area((0, 0), (100, 0), (100, 90), (0, 90))}
+
+    async def before(world: World) -> None:
+        await world.clock.sleep(20)
+        if not meanwhile:
+            world.arbiter("carts").fail("b", "FAILED")
+            await world.clock.sleep(5)
+
+    async def then(world: World) -> Any:
+        east: set[int] = set()
+        while not world.ended():
+            for name in "ac":
+                if abs(world.yard[name].place[0] - 50) < 5:
+                    east.add(round(world.yard[name].place[1]))
+            await world.clock.sleep(0.2)
+        return east, await to_the_end(world)
+
+    yard = Yard(a=(-10, 20), b=(-10, 45), c=(-10, 80))
+    mission = one_task("area_survey", area="field", spacing="10 m")
+    left = crash(play, yard, mission, before, policy=policy, geometries=geometries)
+    if meanwhile:
+        fail(left[1], "b")
+    passes, (status, (ended,)) = resume(play, left, then, policy=policy, geometries=geometries)
+    assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
+    assert ended.reason.startswith("without b")
+    assert left[1].count("single_vehicle_routing") == 2, "a piece for each of the others"
+    for north in (35, 45, 55):
+        assert any(abs(north - each) < 2 for each in passes), passes
 
 
 def fail(yard: Yard, name: str) -> None:
