@@ -157,6 +157,7 @@ class Allocator:
                     self._availability.hand_on(record.allocation, record.behavior)
                     if self._space is not None:
                         self._space.hand_on(record.allocation, record.behavior)
+                        self.resources_changed()
             elif isinstance(record, _MAY_FREE):
                 self._decide_soon()
 
@@ -227,7 +228,11 @@ class Allocator:
             if number in chosen:
                 self._give(each, chosen[number], [other for other in served if other != number])
             elif number in refusals:
-                self._refuse_space(each, refusals[number])
+                refusal = refusals[number]
+                if refusal.wait_s is None or not any(
+                    blocker.behavior in chosen for blocker in refusal.blockers
+                ):  # else it is said when those behaviors are requested, by their names
+                    self._refuse_space(each, refusal)
             else:
                 self._refuse(each, given, evaluator)
         left = [each for each in waiting if each.request.id not in chosen]

@@ -125,6 +125,7 @@ class Play(Protocol):
         settings: Mapping[str, Any] | None = None,
         own: Mapping[str, Mapping[str, Any]] | None = None,
         watch_links: bool = False,
+        manned: tuple[str, ...] = (),
         journal: MemoryJournal | None = None,
         start_us: int = START_US,
     ) -> Any: ...
@@ -145,6 +146,7 @@ def play(tmp_path: Path) -> Play:
         settings: Mapping[str, Any] | None = None,
         own: Mapping[str, Mapping[str, Any]] | None = None,
         watch_links: bool = False,
+        manned: tuple[str, ...] = (),
         journal: MemoryJournal | None = None,
         start_us: int = START_US,
     ) -> Any:
@@ -153,8 +155,10 @@ def play(tmp_path: Path) -> Play:
             domain = Domain.GROUND if name in ground else Domain.AIR
             given = {"home": [*FRAME.to_latlon(home)], **(settings or {})}
             given |= (own or {}).get(name, {})
-            vehicles[ResourceId(name)] = Vehicle(ResourceId(name), domain, "sim", given)
-        members = tuple(name for name in vehicles if name not in others)
+            vehicles[ResourceId(name)] = Vehicle(
+                ResourceId(name), domain, "sim", given, manned=name in manned
+            )
+        members = tuple(name for name in vehicles if name not in (*others, *manned))
         fleet = Fleet(
             "test",
             "test.yaml",

@@ -341,3 +341,50 @@ def test_aircraft_wait_for_their_volumes_if_the_fleet_says_so(play: Play) -> Non
         assert [await status(world, run) for run in (first, second)] == [RunStatus.COMPLETED] * 2
 
     play(story, HOMES, policy={"on_conflict": OnConflict.WAIT})
+
+
+def by_need(element: str, target: str) -> tuple[str, str]:
+    """A task for whatever vehicle is best for it and has space."""
+    return element, task(element, "goto", "one", target=target, speed="2 m/s")[1].replace(
+        'vehicle="one"', 'requires="true"'
+    )
+
+
+def test_a_role_by_need_gets_the_next_vehicle_that_has_space(play: Play) -> None:
+    homes = {"one": (20.0, 0.0), "two": (140.0, 0.0)}
+
+    async def story(world: World) -> tuple[str, ...]:
+        await world.all_of(task("Hold", "hold", "one"))
+        run = await world.begin(by_need("Go", at(65, 0)))
+        await world.executive.control.wait(run)
+        assert not delays(world)
+        return [each for each in world.seen if isinstance(each, BehaviorRequested)][-1].resources
+
+    # One is nearer, but it would have to cross the bridge, where a vehicle stands that a person
+    # drives.
+    driven = {"three": (50.0, 0.0)}
+    aside = {"three": (50.0, 90.0)}
+    manned = ("three",)
+    assert rovers(play, story, homes={**homes, **aside}, manned=manned) == ("one",)
+    assert rovers(play, story, homes={**homes, **driven}, manned=manned) == ("two",)
+
+
+def test_a_later_task_does_not_overtake_one_that_waits_for_space(play: Play) -> None:
+    homes = {"one": (0.0, 0.0), "two": (100.0, 30.0), "three": (100.0, -30.0)}
+
+    async def story(world: World) -> list[str]:
+        first = await world.begin(OVER)
+        await world.under_way(first)
+        second = await world.begin(BACK)
+        await waits(world, second)
+        third = await world.begin(task("Too", "goto", "three", target=at(0, -20)))
+        # It passes beside the bridge, and nothing that two needs.
+        await world.under_way(third)
+        await world.executive.control.wait(third)
+        fourth = await world.begin(task("Four", "goto", "three", target=at(50, 0)))
+        for run in (first, second):
+            assert await status(world, run) is RunStatus.COMPLETED
+        await world.executive.control.wait(fourth)
+        return [each.behavior for each in world.seen if isinstance(each, BehaviorRequested)]
+
+    assert rovers(play, story, homes=homes) == ["r1.b1", "r3.b1", "r2.b1", "r4.b1"]

@@ -103,7 +103,7 @@ def test_a_robot_and_a_rover_cross_one_bridge_one_after_the_other(
         home = ",".join(map(str, (*at(110, 8), 60)))
         rover = made.m2pem(
             *("sim", "mavlink", "--rovers", 1, "--home", home, "--ekf", 1),
-            *("--to", f"127.0.0.1:{port}", "--speed", SPEED),
+            *("--to", f"udp://127.0.0.1:{port}", "--speed", SPEED),
         )
         rover.until_line("system 1")
         run = made.m2pem(
