@@ -80,9 +80,9 @@ async def test_a_mission_starts_when_the_battery_is_charged(tmp_path: Path) -> N
                 if text in (await control.scheduled()).entries[0].reason:
                     return
 
-        await reason("nothing was received from it yet")
+        await reason("its link is lost")
         async with autopilot(port, "battery 50 %"):
-            await reason("vehicle.battery is 0.5")
+            await reason("vehicle.battery is 0.")
             assert await control.runs() == []
         async with autopilot(port):
             async for event in changes:

@@ -16,7 +16,7 @@ async def test_entries_are_listed_held_released_and_cancelled(world: World) -> N
         await world.control.schedule(MISSION, when=when, by="bob@gcs2")
         await terminal.until_shown("s1 is scheduled by bob@gcs2")
         await terminal.press("c")
-        await terminal.until_shown("1 s1  patrol, by cron 0 8 * * * (UTC)  scheduled")
+        await terminal.until_shown("1 s1 patrol, by cron 0 8 * * * (UTC)  scheduled")
         await terminal.press("1")
         await terminal.until_shown("Hold it", "2 Cancel it")
         await terminal.press("1")

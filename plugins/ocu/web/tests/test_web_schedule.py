@@ -3,14 +3,14 @@
 import asyncio
 from collections.abc import AsyncIterator
 
-import pytest
+import pytest_asyncio
 from playwright.async_api import expect
 from web_desk import IN_ONE_LOOP, MISSION, Desk
 
 pytestmark = IN_ONE_LOOP
 
 
-@pytest.fixture
+@pytest_asyncio.fixture(loop_scope="session")
 async def page_desk(desk: Desk) -> AsyncIterator[Desk]:
     """A desk that leaves nothing scheduled."""
     yield desk
