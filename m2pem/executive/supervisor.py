@@ -411,14 +411,13 @@ class Supervisor:
         return found
 
     def unusable(self, resource: ResourceId) -> str:
-        """Why no mission gets a resource now; "": nothing is known against it."""
+        """Why no mission gets a resource now; "": nothing is known against it, nor its vehicle."""
         if reason := self.availability.reason(resource):
             return reason
-        if resource not in self.fleet.vehicles:
-            return ""
-        state = self._bus.latest(resource)
-        if state is None:
-            return "nothing was received from it yet"
+        vehicle = ResourceId(resource.partition("/")[0])
+        state = self._bus.latest(vehicle)
+        if state is None:  # what only carries payloads may say nothing itself
+            return "nothing was received from it yet" if resource == vehicle else ""
         return "its link is lost" if state.link is LinkState.LOST else ""
 
     def facts(self, vehicle: ResourceId) -> Facts:

@@ -3,6 +3,7 @@
 Each function raises `M2pemError` if the request is refused; its text is then the answer.
 """
 
+import re
 from typing import Any
 
 import msgspec
@@ -27,6 +28,11 @@ EXAMPLES = {
 """What a request may say in fields that it must fill."""
 
 ALL_RUNS = "all"
+
+SCHEDULE = "schedule"
+"""In place of a run: the whole schedule. An entry of it (s1) may take its place, too."""
+
+_ENTRY = re.compile(r"s[1-9][0-9]{0,16}")
 
 
 async def carry_out(
@@ -61,19 +67,30 @@ def _optional(sent: str, field: str) -> str | None:
 
 
 async def control_run(control: MissionControl, request: Any, _: Any) -> None:
-    """Pause or resume a run; `stop_run` stops one."""
+    """Pause or resume a run, or hold or release the schedule; `stop_run` stops a run."""
     verbs = srv.ControlRun.Request
     operation = {verbs.PAUSE: "pause", verbs.RESUME: "resume"}.get(request.verb)
+    if request.run == SCHEDULE or _ENTRY.fullmatch(request.run):
+        operation = {verbs.PAUSE: "hold_schedule", verbs.RESUME: "release_schedule"}.get(
+            request.verb
+        )
     if operation is None:
         raise OperatorError(
             f"verb {request.verb} is not known; give one of: STOP ({verbs.STOP}), "
             f"PAUSE ({verbs.PAUSE}), RESUME ({verbs.RESUME})"
         )
+    if operation in ("hold_schedule", "release_schedule"):
+        entry = None if request.run == SCHEDULE else request.run
+        await carry_out(control, operation, request, entry=entry)
+        return
     await carry_out(control, operation, request)
 
 
 async def stop_run(control: MissionControl, request: Any, _: Any) -> None:
-    """Stop a run, or all of them: a ControlRun request with this verb."""
+    """Stop a run, or all of them, or cancel an entry of the schedule: a ControlRun request."""
+    if _ENTRY.fullmatch(request.run):
+        await carry_out(control, "unschedule", request, entry=request.run)
+        return
     await carry_out(control, "stop_all" if request.run == ALL_RUNS else "stop", request)
 
 

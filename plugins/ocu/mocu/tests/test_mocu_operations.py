@@ -24,6 +24,9 @@ COMMANDS: dict[str, tuple[str, dict[str, Any]]] = {
     "stop_all": ("control_run", {"verb": CONTROL.STOP, "run": "all", "reason": "rain"}),
     "pause": ("control_run", {"verb": CONTROL.PAUSE, "run": "r1"}),
     "resume": ("control_run", {"verb": CONTROL.RESUME, "run": "r1"}),
+    "unschedule": ("control_run", {"verb": CONTROL.STOP, "run": "s1"}),
+    "hold_schedule": ("control_run", {"verb": CONTROL.PAUSE, "run": "s1", "reason": "rain"}),
+    "release_schedule": ("control_run", {"verb": CONTROL.RESUME, "run": "s1"}),
     "set_geometry": ("set_waypoints", {"name": "gate", "waypoints": [POINT], "run": "r1"}),
     "take": ("take_vehicle", {"vehicle": "ugv1/camera"}),
     "give_back": ("give_back_vehicle", {"vehicle": "ugv1/camera"}),
@@ -43,6 +46,7 @@ SENT = {
         "geometry": {"type": "Point", "coordinates": [7.0, 51.0, 2.0]},
     },
     "resource": "ugv1/camera",
+    "entry": "s1",
     "by": "anna",
 }
 """What the requests of `COMMANDS` say, by the parameter of the operation."""
@@ -61,9 +65,6 @@ NOT_SERVED = {
     "check": "start_mission answers with the findings",
     "schedule": "the command line and the page schedule missions",
     "scheduled": "m2pem schedule and the page list them",
-    "unschedule": "m2pem schedule and the page",
-    "hold_schedule": "control_run: STOP of all runs holds the schedule",
-    "release_schedule": "m2pem schedule and the page",
     "missions": "start_mission names a file, or brings one",
     "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",
@@ -103,3 +104,23 @@ async def test_a_service_passes_every_parameter_of_its_operation(operation: str)
     bound = signature(getattr(MissionControl, operation)).bind(None, *sent.args, **sent.kwargs)
     names = OPERATIONS[operation].parameters.__struct_fields__
     assert bound.arguments == {"self": None} | {name: SENT[name] for name in names}
+
+
+@pytest.mark.parametrize(
+    ("verb", "operation"),
+    [(CONTROL.PAUSE, "hold_schedule"), (CONTROL.RESUME, "release_schedule")],
+)
+async def test_the_whole_schedule_is_held_and_released(verb: int, operation: str) -> None:
+    services: dict[str, tuple[Any, Callable[[Any, Any], Awaitable[Any]]]] = {}
+
+    def serve(service_type: Any, name: str, handler: Any) -> None:
+        services[name] = service_type, handler
+
+    method = AsyncMock(spec=getattr(MissionControl, operation))
+    control = Mock(spec=MissionControl, **{operation: method})
+    Services(SimpleNamespace(serve=serve), control, Mock())
+    service_type, handler = services["control_run"]
+    request = service_type.Request(verb=verb, run="schedule", by="anna")
+    response = await handler(request, service_type.Response())
+    assert response.success, response.message
+    assert method.call_args.kwargs["entry"] is None

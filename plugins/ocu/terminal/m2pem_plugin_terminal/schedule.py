@@ -16,9 +16,7 @@ ALL = "all"
 def schedule_choices(schedule: Schedule) -> list[Choice]:
     """Return a line for each entry that may still start something, and one for all of them."""
     lines = [
-        Choice(
-            each.entry, f"{each.entry} {Path(each.mission).stem}, {each.when_text}", each.status
-        )
+        Choice(each.entry, f"{each.entry} {Path(each.mission).stem}, {each.when_text}", each.status)
         for each in schedule.entries
         if not each.status.over
     ]
