@@ -107,10 +107,10 @@ LOW = {"up": 30.0, "altitude_above_home_m": 30.0}
     [
         pytest.param(SQUARE, 1.0, {}, "ground", id="square"),
         pytest.param(SQUARE, 8.0, AIRBORNE, "air", id="zoomed in", marks=pytest.mark.long),
-        pytest.param(CONCAVE, 4.0, LOW, "air", id="concave"),
+        pytest.param(CONCAVE, 4.0, LOW, "air", id="concave", marks=pytest.mark.long),
         pytest.param(FIELD, 2.0, AIRBORNE, "air", id="field", marks=pytest.mark.long),
         pytest.param(AROUND, 1.0, AIRBORNE, "air", id="all around from above"),
-        pytest.param(AROUND, 1.0, {}, "ground", id="all around"),
+        pytest.param(AROUND, 1.0, {}, "ground", id="all around", marks=pytest.mark.long),
     ],
 )
 def test_at_least_99_percent_of_an_area_is_seen(ring, zoom, where, domain):
