@@ -24,7 +24,7 @@ def read(example: str) -> list[Requirement]:
     return parse_spec(text.encode(), "docs/requirements.md", NAMES)
 
 
-@pytest.mark.parametrize(("example", "after"), EXAMPLES, ids=lambda text: text.split("\n")[1])
+@pytest.mark.parametrize(("example", "after"), EXAMPLES, ids=lambda text: text.strip()[:40])
 def test_examples_mean_what_the_page_says(example: str, after: str) -> None:
     said = [line[2:].strip() for line in after.splitlines() if line.startswith("> ")]
     english = [each.english for each in read(example)]
