@@ -22,8 +22,9 @@ PRIVATE = re.compile(r"_(?!_)\w+")
 PUBLIC = {
     *("_asdict", "_fields", "_replace", "_exit", "_current_frames", "_Element"),
     *("_repr_html_", "_repr_svg_"),
+    *("_shutdown", "_run_exitfuncs"),
 }
-"""Of named tuples, `os`, `sys`, `lxml.etree` and IPython: public in spite of their names."""
+"""Of named tuples, `os`, `sys`, `lxml.etree`, IPython, and of Python's own end: not of the product."""
 
 EXCEPTIONS = {
     ("tests/verify/test_interrupted_search.py", "_Search"): "Ctrl-C comes at each line of the "

@@ -85,16 +85,16 @@ class ScheduledMission:
 
     def __str__(self) -> str:
         zone = self.when.time_zone
-        told = [f"{self.entry} {self.status.value}: {self.mission} {described(self.when)}"]
+        said = [f"{self.entry} {self.status.value}: {self.mission} {described(self.when)}"]
         if self.starts_us is not None:
-            told.append(f"starts {time_in(self.starts_us, zone)}")
+            said.append(f"starts {time_in(self.starts_us, zone)}")
         elif self.next_us is not None and not self.status.over:
-            told.append(f"next {time_in(self.next_us, zone)}")
+            said.append(f"next {time_in(self.next_us, zone)}")
         if self.priority:
-            told.append(f"priority {self.priority}")
+            said.append(f"priority {self.priority}")
         if self.run:
-            told.append(f"last run {self.run}")
-        return "; ".join(told) + (f": {self.reason}" if self.reason else "")
+            said.append(f"last run {self.run}")
+        return "; ".join(said) + (f": {self.reason}" if self.reason else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +112,8 @@ class Schedule:
 
     def lines(self, *, every: bool = False) -> Sequence[str]:
         """Return a line for each entry, of all or of those that may still start something."""
-        told = [f"the schedule is {self.hold}"] if self.hold else []
-        return [*told, *(str(each) for each in self.entries if every or not each.status.over)]
+        said = [f"the schedule is {self.hold}"] if self.hold else []
+        return [*said, *(str(each) for each in self.entries if every or not each.status.over)]
 
 
 @dataclass(frozen=True, slots=True)

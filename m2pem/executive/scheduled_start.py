@@ -280,11 +280,11 @@ def _named_in(header: RunHeader) -> frozenset[ResourceId]:
 
 def _values(names: Iterable[str], facts: Facts) -> str:
     """Say what a condition reads: `vehicle.battery` is 0.8."""
-    told = []
+    said = []
     for name in sorted(names):
         value = facts.get(name)
         shown = (
             "not known" if value is None else f"{value:.3g}" if isinstance(value, float) else value
         )
-        told.append(f"{name} is {shown}")
-    return ", ".join(told)
+        said.append(f"{name} is {shown}")
+    return ", ".join(said)

@@ -130,7 +130,7 @@ class Scheduler:
         self._marks.remove(MARK)
         lines = {line.run: line for line in await journal.runs()}
         for entry in await journal.entries():
-            if self._is_ours(entry.plan):
+            if self._belongs_here(entry.plan):
                 started = [each.run for each in entry.state.times[-1:] if each.run]
                 line = lines.get(started[0]) if started else None
                 never_began = line and not (line.gone or line.last_seq or line.driven)
@@ -145,7 +145,7 @@ class Scheduler:
         )
         return msgspec.structs.replace(entry, state=change.state)
 
-    def _is_ours(self, plan: SchedulePlan) -> bool:
+    def _belongs_here(self, plan: SchedulePlan) -> bool:
         # What was scheduled in a simulation must never start a real vehicle.
         return plan.fleet == self._starter.fleet.name and plan.simulated is not self._real
 

@@ -20,7 +20,7 @@ def complete(m2pem: CommandLine, words: str) -> str:
 
 
 def test_commands_and_options_are_completed(m2pem: CommandLine) -> None:
-    assert complete(m2pem, "m2pem re").split() == ["plain,replay", "plain,resume"]
+    assert complete(m2pem, "m2pem re").split() == ["plain,replay", "plain,resume", "plain,resolve"]
     assert "plain,--answers" in complete(m2pem, "m2pem run --a")
 
 
