@@ -26,6 +26,7 @@ from m2pem.cli.standard_streams import writer_for
 from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import PluginError
 from m2pem.executive.executive import Executive
+from m2pem.executive.outlook_worker import outlook_in_subprocess
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.fleet.fleet import Fleet, real_resources
 from m2pem.journal import file_of
@@ -270,6 +271,7 @@ def make_executive(
             search_path=search_path,
             on_records=None if answers is None else answers.seen,
             rehearse=_rehearse,
+            foresee=outlook_in_subprocess,
         )
     except PluginError as error:
         raise UnusableError(f"{fleet.file}: {error}") from error

@@ -42,7 +42,7 @@ from m2pem.editing.outline import outline
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
-from m2pem.errors import BusyError, MissionError, OperatorError, ScheduleError
+from m2pem.errors import BusyError, MissionError, OperatorError, ScheduleError, StuckError
 from m2pem.executive.ended_runs import describe_end, in_words
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import choice_input, open_incidents, refuse_wrong_choice
@@ -58,7 +58,7 @@ from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import resources_of, resources_of_mission, roles_of_mission
 from m2pem.fleet.fleet import Fleet
-from m2pem.journal.base import RunInfo
+from m2pem.journal.base import Entry, RunInfo
 from m2pem.journal.mission import mission_of
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
@@ -80,6 +80,23 @@ class Rehearse(Protocol):
         ...
 
 
+class Foresee(Protocol):
+    """Explores what follows a choice about an incident: `outlook_in_subprocess`."""
+
+    async def __call__(
+        self,
+        run: RunId,
+        mission: Mission,
+        fleet: Fleet,
+        entries: Sequence[Entry],
+        choice: i.ResolveIncident,
+        now_us: int,
+        writers: Sequence[str],
+    ) -> IncidentPreview:
+        """Return whether a run completes after a choice."""
+        ...
+
+
 class Control:
     """Implements `m2pem.api.control.MissionControl`; see there for every promise."""
 
@@ -90,7 +107,9 @@ class Control:
         health: ExecutiveHealth,
         scheduler: Scheduler,
         rehearse: Rehearse | None = None,
+        foresee: Foresee | None = None,
     ) -> None:
+        self._foresee = foresee
         self._supervisor = supervisor
         self._scheduler = scheduler
         self._bus = bus
@@ -373,8 +392,33 @@ class Control:
         """Whether the mission still completes after a choice about an incident."""
         async with self._explain_end("preview_incident", run):
             self._refuse_ended(run)
-            self._choice(run, incident, choice, data, to, roles, "")
-        return IncidentPreview(IncidentVerdict.UNKNOWN, "it is not explored")
+            item = self._choice(run, incident, choice, data, to, roles, "")
+        return await self._outlook(run, item)
+
+    async def _outlook(self, run: RunId, item: i.ResolveIncident) -> IncidentPreview:
+        """Explore what follows a choice, if this executive can."""
+        if self._foresee is None:
+            return IncidentPreview(IncidentVerdict.UNKNOWN, "it is not explored here")
+        supervisor = self._supervisor
+        state = supervisor.runner(run).run.state
+        entries = [entry async for entry in supervisor.journal.read(run)]
+        if sum(len(entry.records) for entry in entries) < state.seq:
+            return IncidentPreview(IncidentVerdict.UNKNOWN, "the journal does not have all of it")
+        writers = {
+            spec.name
+            for specs in supervisor.arbiters.catalogue().values()
+            for spec in specs
+            if spec.writes
+        }
+        return await self._foresee(
+            run,
+            state.mission,
+            supervisor.fleet,
+            entries,
+            item,
+            supervisor.clock.now_us(),
+            sorted(writers),
+        )
 
     async def resolve_incident(
         self,
@@ -392,6 +436,11 @@ class Control:
         async with self._explain_end("resolve_incident", run):
             self._refuse_ended(run)
             item = self._choice(run, incident, choice, data, to, roles, by)
+        ends_or_stays = item.choice in (i.IncidentChoice.END, i.IncidentChoice.SET_DATA)
+        if self._foresee is not None and not (even_if_stuck or ends_or_stays):
+            preview = await self._outlook(run, item)
+            if preview.verdict is IncidentVerdict.CANNOT_COMPLETE:
+                raise StuckError(f"{run}: {choice} was not done: {preview}")
         await self._ask("resolve_incident", run, item)
 
     def _choice(

@@ -19,7 +19,7 @@ from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.control import RunId
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
-from m2pem.executive.control import Control, Rehearse
+from m2pem.executive.control import Control, Foresee, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
@@ -48,7 +48,8 @@ class Executive:
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
     whether silence of a vehicle ends its behaviors. `observed`: whether plugins observe records.
     `search_path`, `limit`, `on_records`: as in `RunSettings`. `rehearse`: what
-    `MissionControl.simulate` awaits; None: it is refused.
+    `MissionControl.simulate` awaits; None: it is refused. `foresee`: what explores the choices
+    about incidents; None: what follows them is not known.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class Executive:
         limit: RunLimit | None = None,
         on_records: OnRecords | None = None,
         rehearse: Rehearse | None = None,
+        foresee: Foresee | None = None,
     ) -> None:
         self.fleet = fleet
         self.journal = journal
@@ -108,7 +110,9 @@ class Executive:
             real=not self.arbiters.nothing_is_real,
         )
         self._supervisor.on_change = self.scheduler.changed
-        self.control = Control(self._supervisor, self.bus, self.health, self.scheduler, rehearse)
+        self.control = Control(
+            self._supervisor, self.bus, self.health, self.scheduler, rehearse, foresee
+        )
         self._scheduling: asyncio.Task[None] | None = None
         self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file), journal.file)
         self._speed = speed

@@ -9,6 +9,7 @@ from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.loading import findings_for, refuse_errors
 from m2pem.fleet.default_fleet import fleet_for
 from m2pem.fleet.fleet import Fleet
+from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.verify.check import Report, check
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
 
 IN_ORDER = "timers that begin to run together come in the order of their times (--timers in-order)"
 """The note in reports whose answers assume that order."""
+
+
+ENDS_THE_RUN = (
+    "an error that no event catches ends the run, as if the operator chose `end` about its "
+    "incident (docs/incidents.md); what follows another choice is explored when there is an incident"
+)
+"""The note in reports of missions whose errors open incidents."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +109,16 @@ def search(
     )
     if request.options.timers_in_order:
         report = replace(report, notes=(*report.notes, IN_ORDER))
+    if _opens_incidents(request):
+        report = replace(report, notes=(*report.notes, ENDS_THE_RUN))
     return findings_of(request.mission, report, strict=strict, given=request.data)
+
+
+def _opens_incidents(request: SearchRequest) -> bool:
+    said = [process.on_error for process in request.mission.processes]
+    return ErrorPolicy.INCIDENT in said or (
+        None in said and request.fleet.on_error is ErrorPolicy.INCIDENT
+    )
 
 
 def _report(

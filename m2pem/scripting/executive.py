@@ -35,6 +35,7 @@ from m2pem.engine.records import RunEnded
 from m2pem.errors import FleetError, OperatorError, PluginError
 from m2pem.executive import executive as core
 from m2pem.executive.control import Control
+from m2pem.executive.outlook_worker import outlook_in_subprocess
 from m2pem.executive.process_monitors import LoopMonitor
 from m2pem.executive.simulated_state import tidy_up, with_own_state
 from m2pem.fleet.fleet import Fleet, real_resources, simulated_fleet
@@ -329,6 +330,7 @@ class Executive:
                 speed=self._speed,
                 search_path=self._search_path,
                 rehearse=_rehearse,
+                foresee=outlook_in_subprocess,
             )
         except PluginError as error:
             raise FleetError(f"{fleet.file}: {error}", ()) from error

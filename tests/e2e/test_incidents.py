@@ -42,6 +42,9 @@ def test_an_incident_is_resolved_after_kill_9_and_the_replay_is_equal(
     status, _, errors = m2pem.run("resolve", "r1", "i1", "move", "--to", "nowhere")
     assert status == 1
     assert "the token cannot move to 'nowhere'" in errors
+    status, foreseen, _ = m2pem.run("resolve", "r1", "i1", "skip", "--preview")
+    assert status == 0
+    assert "the mission" in foreseen
     assert m2pem.run("resolve", "r1", "i1", "retry", "--by", "anna")[0] == 0
     assert m2pem.run("resolve", "r1", "i1", "skip", "--by", "ben")[0] == 1
     again = resumed.until_record("BehaviorRequested", element="DriveRoute")
@@ -66,4 +69,43 @@ def test_stop_ends_a_run_with_an_open_incident(m2pem: CommandLine, tmp_path: Pat
     program, _ = stopped(m2pem, tmp_path)
     program.type("stop")
     program.until_record("IncidentClosed")
+    assert program.rest()[0] == 130
+
+
+JOINED = """<?xml version="1.0" encoding="UTF-8"?>
+<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL"
+             xmlns:m2pem="https://m2pem.org/schema/1" targetNamespace="test">
+  <process id="P" isExecutable="true" m2pem:onError="incident">
+    <startEvent id="S"/> <parallelGateway id="Fork"/> <parallelGateway id="Join"/>
+    <scriptTask id="Bad"><script>throw error BAD</script></scriptTask>
+    <userTask id="Ask"/> <task id="Home"/> <endEvent id="E"/>
+    <sequenceFlow id="a" sourceRef="S" targetRef="Fork"/>
+    <sequenceFlow id="b" sourceRef="Fork" targetRef="Bad"/>
+    <sequenceFlow id="c" sourceRef="Fork" targetRef="Ask"/>
+    <sequenceFlow id="d" sourceRef="Bad" targetRef="Join"/>
+    <sequenceFlow id="e" sourceRef="Ask" targetRef="Join"/>
+    <sequenceFlow id="f" sourceRef="Join" targetRef="Home"/>
+    <sequenceFlow id="g" sourceRef="Home" targetRef="E"/>
+  </process>
+</definitions>
+"""
+
+
+def test_a_choice_after_which_the_mission_cannot_complete_must_be_confirmed(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    mission = tmp_path / "joined.bpmn"
+    mission.write_text(JOINED)
+    program = m2pem.start("run", mission, "--fleet", "sim", "--format", "json")
+    program.until_record("IncidentOpened", element="Bad")
+    move = ("resolve", "r1", "i1", "move", "--to", "Home")
+    assert "cannot complete from there: stuck" in m2pem.run(*move, "--preview")[1]
+    assert "completes on all paths" in m2pem.run("resolve", "r1", "i1", "skip", "--preview")[1]
+    status, _, errors = m2pem.run(*move)
+    assert status == 1
+    assert "--even-if-stuck does it all the same" in errors
+    program.type("resolve i1 move Home")
+    program.type("resolve! i1 move Home")
+    program.until_record("IncidentResolved", choice="move", by="plain")
+    program.type("stop")
     assert program.rest()[0] == 130

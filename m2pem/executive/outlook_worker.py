@@ -1,0 +1,80 @@
+"""The subprocess that explores what follows a choice about an incident, for an executive."""
+
+from collections.abc import Sequence
+
+import msgspec
+
+from m2pem.api.control import IncidentPreview, IncidentVerdict
+from m2pem.engine.inputs import Input, ResolveIncident
+from m2pem.engine.run import MissionRun
+from m2pem.executive.subprocess_worker import SendProgress, run_in_subprocess, serve
+from m2pem.fleet.fleet import Fleet, dump, restore
+from m2pem.journal.base import Entry
+from m2pem.journal.codec import decode_body, encode_body
+from m2pem.mission.library import KeptLibrary, Source
+from m2pem.mission.mission import Mission
+
+
+class Order(msgspec.Struct):
+    """A run as its journal has it, and the choice. `bodies`: its entries, encoded. `now_us`:
+    microseconds since the Unix epoch. `writers`: names of behaviors that write data."""
+
+    run: str
+    file: str
+    source: bytes
+    library: tuple[Source, ...]
+    fleet: bytes
+    bodies: list[bytes]
+    choice: bytes
+    now_us: int
+    writers: list[str]
+
+
+async def outlook_in_subprocess(
+    run: str,
+    mission: Mission,
+    fleet: Fleet,
+    entries: Sequence[Entry],
+    choice: ResolveIncident,
+    now_us: int,
+    writers: Sequence[str],
+) -> IncidentPreview:
+    """Return what follows a choice about an incident of a run, explored in a subprocess.
+
+    `entries`: all of the run's, from its journal. Other arguments as in `Order`.
+    """
+    order = Order(
+        run,
+        mission.file,
+        mission.source,
+        mission.library,
+        dump(fleet),
+        [encode_body(entry) for entry in entries],
+        msgspec.json.encode(choice),
+        now_us,
+        list(writers),
+    )
+    answer = await run_in_subprocess(__name__, msgspec.msgpack.encode(order))
+    verdict, reason = msgspec.msgpack.decode(answer, type=tuple[str, str])
+    return IncidentPreview(IncidentVerdict(verdict), reason)
+
+
+def _work(content: bytes, _: SendProgress) -> bytes:
+    # What explores is loaded here: the executive has no use for it.
+    from m2pem.bpmn import parse_mission  # noqa: PLC0415
+    from m2pem.verify.outlook import outlook  # noqa: PLC0415
+
+    order = msgspec.msgpack.decode(content, type=Order)
+    library = KeptLibrary(order.library)
+    mission = parse_mission(order.source, order.file, library, accepted=True)
+    run = MissionRun(mission, restore(order.fleet), order.run)
+    for body in order.bodies:
+        run.replay(decode_body(body)[1])
+    choice = msgspec.json.decode(order.choice, type=Input)
+    assert isinstance(choice, ResolveIncident)
+    found = outlook(run, order.now_us, choice, writers=frozenset(order.writers))
+    return msgspec.msgpack.encode((found.verdict.value, found.reason))
+
+
+if __name__ == "__main__":
+    serve(_work)

@@ -1,0 +1,286 @@
+"""Whether a run completes from its present state: explored with the engine itself.
+
+A state of a run has more in it than the marking of its net: instances, data, timers that run
+already. So the engine is the transition relation here: each state is a copy of the run, and each
+step an input that may come. What is explored is what would happen, and nothing has to be
+translated. States that differ only in ids and in the time of day are one.
+
+Behaviors succeed, or fail with an error that some event catches; prompts get any answer; timers
+come in any order with the ends of behaviors; operators may send signals. Incidents that were open
+before are skipped; a new one ends its path.
+"""
+
+import copy
+import time
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, TypeAlias
+
+import msgspec
+
+from m2pem.engine import inputs as i
+from m2pem.engine.records import RunOutcome, Trigger
+from m2pem.engine.run import MissionRun
+from m2pem.engine.state import BehaviorPhase, RunState, RunStatus, Scope, Token, Wait
+from m2pem.engine.throwing import catcher_of_error
+from m2pem.mission.catalogue import BehaviorState
+
+Key: TypeAlias = tuple[Any, ...]
+
+MAX_CONTINUES = 100
+"""Batches of steps after which an input counts as one that never comes to an end."""
+
+
+class Verdict(StrEnum):
+    """What follows from a state. The values are those of `m2pem.api.IncidentVerdict`."""
+
+    COMPLETES = "completes"
+    MAY_NOT_COMPLETE = "may not complete"
+    CANNOT_COMPLETE = "cannot complete"
+    UNKNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """The verdict, and its reason for people."""
+
+    verdict: Verdict
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OutlookLimits:
+    """Bounds of the exploration: states, and seconds of the wall clock."""
+
+    states: int = 3000
+    seconds: float = 4.0
+
+
+class _NotKnownError(Exception):
+    """The exploration cannot say what follows; the text says why."""
+
+
+def outlook(
+    run: MissionRun,
+    now_us: int,
+    choice: i.ResolveIncident,
+    limits: OutlookLimits | None = None,
+    writers: frozenset[str] = frozenset(),
+) -> Outlook:
+    """Return whether a run completes after a choice about an incident.
+
+    `run` is changed. `now_us`: microseconds since the Unix epoch. `writers`: names of behaviors
+    that write data when they end.
+    """
+    explorer = _Explorer(run, limits or OutlookLimits(), writers)
+    try:
+        return explorer.explore(now_us, choice)
+    except _NotKnownError as error:
+        return Outlook(Verdict.UNKNOWN, str(error))
+
+
+class _Explorer:
+    def __init__(self, run: MissionRun, limits: OutlookLimits, writers: frozenset[str]) -> None:
+        self._first = run
+        self._limits = limits
+        self._writers = writers
+        self._open_before = frozenset(run.state.incidents)
+        mission = run.state.mission
+        shared = [mission, *mission.elements.values()]
+        self._shared = {id(each): each for each in shared}
+        self._codes = list(dict.fromkeys(["FAILED", *(e.code for e in mission.errors.values())]))
+
+    def explore(self, now_us: int, choice: i.ResolveIncident) -> Outlook:
+        """Explore all states, breadth first, and judge them."""
+        run = self._first
+        if run.state.status is RunStatus.PAUSED:
+            _receive(run, i.ResumeRun(), now_us)
+        _receive(run, choice, now_us)
+        until = time.monotonic() + self._limits.seconds
+        numbers: dict[Key, int] = {_key(run.state, now_us): 0}
+        before: list[list[int]] = [[]]
+        good: list[int] = []
+        bad: dict[int, str] = {}
+        waiting = deque([(0, run, now_us)])
+        while waiting:
+            number, run, now_us = waiting.popleft()
+            if time.monotonic() > until:
+                raise _NotKnownError(f"more than {self._limits.seconds:g} s are needed")
+            if run.state.status is RunStatus.ENDED:
+                if run.state.outcome in (RunOutcome.COMPLETED, RunOutcome.TERMINATED):
+                    good.append(number)
+                else:
+                    bad[number] = run.state.detail
+                continue
+            steps = self._steps(run, now_us)
+            if not steps:
+                bad[number] = _where_it_stops(run.state)
+            for item, at_us in steps:
+                following = copy.deepcopy(run, dict(self._shared)) if len(steps) > 1 else run
+                _receive(following, item, at_us)
+                key = _key(following.state, at_us)
+                known = numbers.setdefault(key, len(before))
+                if known == len(before):
+                    if known >= self._limits.states:
+                        raise _NotKnownError(f"there are more than {self._limits.states} states")
+                    before.append([])
+                    waiting.append((known, following, at_us))
+                before[known].append(number)
+        return _judge(before, good, bad)
+
+    def _steps(self, run: MissionRun, now_us: int) -> list[tuple[i.Input, int]]:
+        """Return the inputs that may come next, each with its time."""
+        state = run.state
+        if state.allocations:
+            raise _NotKnownError("a task chooses its vehicles or payloads when it starts")
+        for behavior in state.behaviors.values():
+            if behavior.phase is BehaviorPhase.CANCELLING:  # whatever else comes, this does
+                ended = BehaviorState.CANCELLED
+                return [(i.BehaviorReported(behavior.id, behavior.number + 1, ended), now_us)]
+        items: list[i.Input] = []
+        for behavior in state.behaviors.values():
+            if behavior.phase is BehaviorPhase.UNSETTLED:
+                continue  # its prompt is answered
+            if behavior.name in self._writers:
+                raise _NotKnownError(f"what {behavior.name} writes is not known")
+            number = behavior.number + 1
+            items.append(i.BehaviorReported(behavior.id, number, BehaviorState.SUCCEEDED))
+            items += [
+                i.BehaviorReported(behavior.id, number, BehaviorState.FAILED, code)
+                for code in self._caught_at(state.tokens[behavior.token])
+            ]
+        for prompt in state.prompts.values():
+            items += [i.PromptAnswer(prompt.id, each["value"]) for each in prompt.decisions]
+        for service in state.services.values():
+            raise _NotKnownError(f"what {service.name} writes is not known")
+        for trigger, ref in list(state.catchers):
+            if trigger is Trigger.MESSAGE:
+                raise _NotKnownError("what messages from outside bring is not known")
+            items.append(i.SignalReceived(ref))
+        for incident in state.incidents.values():
+            skip = i.IncidentChoice.SKIP
+            if incident.id in self._open_before and skip in incident.choices:
+                items.append(i.ResolveIncident(incident.id, skip))
+        found = [(item, now_us) for item in items]
+        due_us = run.next_due_us
+        if due_us is not None:
+            found.append((i.Tick(), max(now_us, due_us)))
+        return found
+
+    def _caught_at(self, token: Token) -> list[str]:
+        return [code for code in self._codes if catcher_of_error(token, code) is not None]
+
+
+def _receive(run: MissionRun, item: i.Input, at_us: int) -> None:
+    run.receive(item, at_us)
+    for _ in range(MAX_CONTINUES):
+        if not run.wants_continue:
+            return
+        run.receive(i.Continue(), at_us)
+    raise _NotKnownError("a loop of the mission does not wait")
+
+
+def _where_it_stops(state: RunState) -> str:
+    for incident in state.incidents.values():
+        return f"it stops at {incident.token.node.label}: {incident.code}"
+    nodes = dict.fromkeys(t.node.label for t in state.tokens.values() if t.inner is None)
+    return f"it waits at {', '.join(nodes)}"
+
+
+def _judge(before: list[list[int]], good: list[int], bad: dict[int, str]) -> Outlook:
+    reaches = set(good)
+    waiting = list(good)
+    while waiting:
+        for earlier in before[waiting.pop()]:
+            if earlier not in reaches:
+                reaches.add(earlier)
+                waiting.append(earlier)
+    reason = next(iter(bad.values()), "it goes round in a loop that it does not leave")
+    if 0 not in reaches:
+        return Outlook(Verdict.CANNOT_COMPLETE, reason)
+    if bad or len(reaches) < len(before):
+        return Outlook(Verdict.MAY_NOT_COMPLETE, reason)
+    return Outlook(Verdict.COMPLETES)
+
+
+# --- states ---------------------------------------------------------------------------------------
+
+
+def _key(state: RunState, now_us: int) -> Key:
+    """Return what distinguishes states: everything but ids and the time of day."""
+    if state.status is RunStatus.ENDED:
+        return ("ended", state.outcome, state.detail)
+    roots = [scope for scope in state.scopes.values() if scope.parent is None]
+    return (
+        state.status,
+        tuple(_scope(state, scope, now_us) for scope in roots),
+        _encoded(state.shared.data),
+        _encoded({ref: [m.data for m in kept] for ref, kept in state.kept_messages.items()}),
+        tuple(state.taken),
+        tuple(sorted((b.name, b.element, b.phase) for b in state.behaviors.values())),
+    )
+
+
+def _encoded(data: object) -> bytes:
+    return msgspec.json.encode(data, order="deterministic")
+
+
+def _scope(state: RunState, scope: Scope, now_us: int) -> Key:
+    if scope.compensations:
+        raise _NotKnownError("something is being compensated")
+    places = {token.id: place for place, token in enumerate(scope.tokens.values())}
+    loop = scope.loop
+    return (
+        scope.container.id,
+        _encoded(scope.data),
+        tuple(_token(state, token, now_us) for token in scope.tokens.values()),
+        tuple(
+            (node.id, flow.id, tuple(places[token.id] for token in tokens))
+            for node, join in scope.joins.items()
+            for flow, tokens in join.by_flow.items()
+        ),
+        _waits(state, scope.waits, now_us),
+        loop
+        and (loop.total, loop.started, loop.completed, loop.terminated, _encoded(loop.outputs)),
+        tuple((node.id, tuple(places[t.id] for t in ts)) for node, ts in scope.gathered.items()),
+        tuple((node.id, tuple(f.id for f in flows)) for node, flows in scope.activated.items()),
+        tuple(node.id for node in scope.chosen),
+        tuple(node.id for node in scope.begun),
+        (scope.completing, scope.interrupted, scope.cancelled, scope.reopened),
+        tuple((done.node.id, done.instance) for done in (scope.compensable or {}).values()),
+    )
+
+
+def _token(state: RunState, token: Token, now_us: int) -> Key:
+    behavior = state.behaviors.get(token.behavior)
+    return (
+        token.node.id,
+        token.flow.id if token.flow is not None else "",
+        token.instance,
+        _encoded(token.own),
+        (behavior.name, behavior.phase, behavior.resources) if behavior is not None else (),
+        bool(token.prompt),
+        bool(token.service),
+        state.incidents[token.incident].code if token.incident else "",
+        (token.armed, token.ended_early),
+        _waits(state, token.waits, now_us),
+        _scope(state, token.inner, now_us) if token.inner is not None else (),
+    )
+
+
+def _waits(state: RunState, waits: dict[int, Wait] | None, now_us: int) -> Key:
+    mission_time_us = state.mission_time_us(now_us)
+    return tuple(
+        (
+            wait.node.id,
+            wait.trigger,
+            wait.ref,
+            (wait.due_us - (now_us if wait.calendar else mission_time_us))
+            if wait.trigger is Trigger.TIMER
+            else 0,
+            wait.left,
+            state.conditions.get(wait.id, False),
+        )
+        for wait in (waits or {}).values()
+    )

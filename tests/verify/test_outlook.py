@@ -1,0 +1,118 @@
+"""Whether a run completes after a choice about an incident: explored from where it is."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from m2pem.engine import inputs as i
+from m2pem.fleet.default_fleet import fleet_for
+from m2pem.mission.elements import ErrorPolicy
+from m2pem.verify.outlook import Outlook, OutlookLimits, Verdict, outlook
+from tests.engine.kit import FAILED, Play
+from tests.engine.notation import mission
+
+JOINED = """
+    <startEvent id="start"/> <endEvent id="end"/> <endEvent id="away"/> <task id="home"/>
+    <parallelGateway id="fork"/> <parallelGateway id="join"/>
+    <scriptTask id="go">do goto uav1</scriptTask> <scriptTask id="spare">do goto uav2</scriptTask>
+    start -> fork -> go -> join -> end
+    back: fork -> spare -> join
+    home -> away
+"""
+
+
+def stopped(text: str, data: dict[str, Any] | None = None) -> Play:
+    parsed = mission(text)
+    fleet = replace(fleet_for(parsed), on_error=ErrorPolicy.INCIDENT)
+    return Play(parsed, fleet=fleet).start(data).report("go", FAILED)
+
+
+def seen(play: Play, choice: str, **options: Any) -> Outlook:
+    """The outlook of a choice about the first incident; the play itself is not changed."""
+    copied = Play(play.mission, fleet=play.fleet)
+    for step in play.steps:
+        copied.run.replay(step.records)
+    Play.made.remove(copied)
+    limits = options.pop("limits", None)
+    item = i.ResolveIncident("r1.i1", i.IncidentChoice(choice), "ops", **options)
+    return outlook(copied.run, play.now_us, item, limits)
+
+
+def test_a_join_that_misses_a_token_cannot_complete() -> None:
+    play = stopped(JOINED)
+    assert seen(play, "skip") == Outlook(Verdict.COMPLETES)
+    assert seen(play, "retry") == Outlook(Verdict.COMPLETES)
+    moved = seen(play, "move", to="home")
+    assert moved.verdict is Verdict.CANNOT_COMPLETE
+    assert "stuck: no token can move from join" in moved.reason
+    along = seen(play, "move", to="f3")
+    assert along == Outlook(Verdict.COMPLETES)
+    assert seen(play, "end").verdict is Verdict.CANNOT_COMPLETE
+
+
+def test_what_comes_true_for_real_is_what_was_foreseen() -> None:
+    play = stopped(JOINED)
+    play.resolve("move", to="home").report("spare")
+    assert (play.ended, play.detail) == ("failed", "stuck: no token can move from join")
+
+
+GATE = """
+    <startEvent id="start"/> <endEvent id="end"/> <exclusiveGateway id="gate"/>
+    <scriptTask id="go">do goto uav1</scriptTask> <userTask id="ask">ask yes no</userTask>
+    start -> go -> ask -> gate
+    gate -> end if user.decision == 'yes' and speed > 2
+"""
+
+
+def test_a_gateway_that_may_find_no_flow_may_not_complete() -> None:
+    found = seen(stopped(GATE, {"speed": 3}), "skip")
+    assert found == Outlook(Verdict.MAY_NOT_COMPLETE, "it stops at gate: NO_FLOW")
+    slow = seen(stopped(GATE, {"speed": 1}), "skip")
+    assert slow == Outlook(Verdict.CANNOT_COMPLETE, "it stops at gate: NO_FLOW")
+
+
+def test_loops_and_timers_have_few_states() -> None:
+    play = stopped("""
+        <startEvent id="start"/> <endEvent id="end"/> <exclusiveGateway id="again"/>
+        <scriptTask id="go">do goto uav1</scriptTask> <userTask id="ask">ask yes no</userTask>
+        <boundaryEvent id="tick" attachedToRef="ask" cancelActivity="false">
+          cycle R/PT5S</boundaryEvent>
+        <endEvent id="ticked"/>
+        start -> go -> ask -> again
+        again -> end if user.decision == 'yes'
+        again -> go if user.decision == 'no'
+        tick -> ticked
+    """)
+    assert seen(play, "retry") == Outlook(Verdict.COMPLETES)
+
+
+@pytest.mark.parametrize(
+    ("task", "why"),
+    [
+        ('<serviceTask id="next">call Detector</serviceTask>', "what Detector writes"),
+        (
+            '<scriptTask id="next">do goto need:requires=true</scriptTask>',
+            "chooses its vehicles",
+        ),
+        ('<receiveTask id="next" messageRef="M"/>', "what messages from outside bring"),
+    ],
+)
+def test_what_the_outside_brings_is_never_called_complete(task: str, why: str) -> None:
+    play = stopped(f"""
+        <startEvent id="start"/> <scriptTask id="go">do goto uav1</scriptTask> {task}
+        <endEvent id="end"/>
+        start -> go -> next -> end
+    """)
+    found = seen(play, "skip")
+    assert found.verdict is Verdict.UNKNOWN
+    assert why in found.reason
+
+
+def test_too_many_states_are_not_known() -> None:
+    found = seen(stopped(JOINED), "retry", limits=OutlookLimits(states=2))
+    assert found == Outlook(Verdict.UNKNOWN, "there are more than 2 states")
+
+
+def test_a_paused_run_is_looked_at_as_if_it_went_on() -> None:
+    assert seen(stopped(JOINED).pause(), "skip") == Outlook(Verdict.COMPLETES)
