@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.cli.conftest import Invoke
+from tests.command_line import CommandLine
 
 FLEET = """
 version: 1
@@ -65,3 +66,31 @@ def test_a_rehearsal_with_a_lost_vehicle_shows_another_one_that_flies_the_rest(
     drawn = chart.read_text()
     assert drawn.count("single_vehicle_routing") >= 2
     assert "uav2" in drawn
+
+
+def test_after_a_kill_between_the_loss_and_the_new_choice_the_rest_is_done(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    """The only vehicle is lost, and its executive is killed. The next one holds the vehicle first,
+    and has it do what it had left."""
+    mission, fleet = files(tmp_path)
+    alone = "\n".join(line for line in FLEET.splitlines() if "uav2" not in line)
+    fault = ", faults: ['single_vehicle_routing: cut link at 60 s']}, cruise"
+    fleet.write_text(alone.replace("}, cruise", fault))
+    mission.write_text(MISSION.replace("onLoss", 'wait="unlimited" onLoss'))
+    words = ("--speed", "20", "--ocu", "none", "--format", "json")
+    program = m2pem.start("run", mission, "--fleet", fleet, *words)
+    program.until_record("AllocationDelayed")
+    program.kill()
+    status, out, err = m2pem.run("resume", "r1", "--ocu", "none", "--format", "json")
+    assert status == 0, err
+    status, out, _ = m2pem.run("replay", "r1", "--format", "json")
+    records = [json.loads(line) for line in out.splitlines()]
+    names = [each["record"] for each in records]
+    first, again = (n for n, name in enumerate(names) if name == "BehaviorRequested")
+    assert first < names.index("RunClaimed") < names.index("ResourceReturned") < again
+    (lost,) = [each for each in records if each["record"] == "WorkReassigned"]
+    assert records[again]["parameters"] == lost["parameters"]
+    left = lost["parameters"]["route"]["geometry"]["coordinates"]
+    assert 1 < len(left) < len(ROUTE)
+    assert records[-1]["outcome"] == "completed"
