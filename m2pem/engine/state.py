@@ -147,13 +147,14 @@ class Join:
 class LostWork:
     """What a task has lost whose work goes on with other resources.
 
-    `behavior`, `loss`: the last one that was lost. `parameters`: of what was left then.
+    `behavior`, `loss`: the last one that was lost. `remaining`: the parameters of what was left
+    then that differ from those of the task.
     `resources`: what the task does not get again, until it has returned.
     """
 
     behavior: str
     loss: Loss
-    parameters: dict[str, Value]
+    remaining: dict[str, Value]
     resources: dict[str, Loss] = field(default_factory=dict)
 
 

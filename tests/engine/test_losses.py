@@ -239,6 +239,21 @@ def test_to_retry_is_to_do_what_is_left() -> None:
     assert world.at == "then"
 
 
+def test_to_retry_evaluates_the_other_parameters_again() -> None:
+    world = Play(
+        '<startEvent id="start"/>'
+        + task(ASK).replace('value="2 m/s"', 'value="${pace}"')
+        + "\nstart -> go",
+        fleet=FLEET,
+    ).start({"pace": 2.0})
+    running(choose(world, "ugv1"), {"route": "rest"}).fault("ugv1", reachable=False)
+    data = {"pace": 4.0}
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.SET_DATA, "ops", data=data))
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.RETRY, "ops"))
+    choose(world, "ugv2", allocation="r1.a2")
+    assert world.run.state.behaviors["r1.b2"].parameters == {"route": "rest", "speed": 4.0}
+
+
 def test_to_retry_with_another_is_to_have_that_do_what_is_left() -> None:
     world = running(play(ASK), {"route": "rest"}).fault("ugv1", reachable=False)
     roles = {"driver": ("ugv2",)}

@@ -114,9 +114,15 @@ def behavior_ended(state: RunState, record: r.BehaviorEnded) -> None:
 
 def work_reassigned(state: RunState, record: r.WorkReassigned) -> None:
     token, loss = state.tokens[record.token], Loss(record.code, record.reason)
-    before = token.lost_work.resources if token.lost_work is not None else {}
-    lost = dict.fromkeys(record.excluded, loss)
-    token.lost_work = LostWork(record.behavior, loss, record.parameters, {**before, **lost})
+    before = token.lost_work
+    lost = {} if before is None else before.resources
+    remaining = {} if before is None else before.remaining
+    token.lost_work = LostWork(
+        record.behavior,
+        loss,
+        {**remaining, **(record.remaining or {})},
+        {**lost, **dict.fromkeys(record.excluded, loss)},
+    )
 
 
 def resource_returned(state: RunState, record: r.ResourceReturned) -> None:

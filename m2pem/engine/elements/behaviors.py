@@ -53,10 +53,11 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
     A resource that another behavior holds, and that is not being cancelled, is
     RESOURCE_UNAVAILABLE.
     """
-    lost = token.lost_work  # an operator has it tried again: what was left is to be done
-    parameters = _evaluate(x, token, behavior) if lost is None else dict(lost.parameters)
+    parameters = _evaluate(x, token, behavior)
     if parameters is None:
         return
+    if token.lost_work is not None:  # an operator has it begin anew, with what was left
+        parameters |= token.lost_work.remaining
     if not behavior.roles and behavior.name == "hold":
         _hold_for(x, token, parameters.get("duration"))
         return

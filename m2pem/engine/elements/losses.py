@@ -56,6 +56,7 @@ def end_work(
             parameters,
             tuple(resources) if is_excluded(code) and not asks else (),
             asks,
+            behavior.remaining,
         )
     )
     if asks:

@@ -144,7 +144,8 @@ class WorkReassigned(BaseRecord, frozen=True):
 
     `code`, `reason`: why; the error of the task, if no other can do it. `parameters`: of what is
     left. `excluded`: resources that the task does not get again until they have returned. `asks`:
-    an incident asks an operator first what is done.
+    an incident asks an operator first what is done. `remaining`: the parameters of what is left
+    that differ from those of the task, as its arbiter reported them; None: it reported nothing.
     """
 
     token: int
@@ -157,6 +158,7 @@ class WorkReassigned(BaseRecord, frozen=True):
     parameters: dict[str, Value]
     excluded: tuple[str, ...]
     asks: bool = False
+    remaining: dict[str, Value] | None = None
 
 
 class ResourceReturned(BaseRecord, frozen=True):
