@@ -22,6 +22,10 @@ REPORTED_M = 10.0
 """Another report is worth its record when that much of the way was done since the last one."""
 
 _STRAY_M = 30.0
+_JOINS_M = 5.0
+_REACH = 1.2
+"""How much farther along the way a vehicle may come than it moves: it cuts corners."""
+
 _DOUBT = 0.2
 """A place of the way is taken for where the vehicle is if it is nearer than others by so much for
 each metre that it is farther from the expected one: a way may cross itself, or go back."""
@@ -67,6 +71,8 @@ class RemainingWork(ABC):
         self.line = line
         self.mark_m = 0.0
         self._reported_m = 0.0
+        self._followed: EastNorth | None = None
+        self._moved_m = 0.0
 
     @property
     def next_report_m(self) -> float:
@@ -117,6 +123,29 @@ class RemainingWork(ABC):
         )
         if found is not None:
             self.mark_m = max(self.mark_m, found[1])
+
+    def follow(self, place: EastNorth, *, anywhere: bool = False) -> None:
+        """The vehicle is at a place in `frame`, and all that is known are its places so far.
+
+        It is on its way from where it comes near the beginning, or (`anywhere`: after a restart)
+        near the way. It is never farther along than it may have moved since.
+        """
+        if self._followed is None:
+            near_m = math.dist(self.line.points[0], place)
+            if anywhere:
+                near_m = min((off_m for _, off_m, _ in self.line.feet(place)), default=near_m)
+            if near_m > _JOINS_M:
+                return
+            if anywhere:
+                self.find(place, 0.0, 0.0, self.line.length_m)
+            self._followed = place
+        self._moved_m += math.dist(self._followed, place)
+        self._followed = place
+        before_m = self.mark_m
+        reach_m = _REACH * self._moved_m + _JOINS_M
+        self.find(place, before_m + self._moved_m, before_m, before_m + reach_m)
+        if self.mark_m > before_m:
+            self._moved_m = 0.0
 
     def state(self) -> dict[str, Any]:
         """Return what `restored_work` reads, as JSON values."""

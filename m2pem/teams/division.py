@@ -127,8 +127,8 @@ def _shared(
     for _ in range(_ROUNDS):
         begin_m = 0.0
         for index, (taker, length_m) in enumerate(zip(order, lengths, strict=True)):
-            ends = _at(works, begin_m), _at(works, begin_m + length_m)
-            way_m = min(_way_m(taker.place, end) for end in ends)
+            corners = _at(works, begin_m), _at(works, begin_m + length_m)
+            way_m = min(_way_m(taker.place, corner) for corner in corners)
             ready[index] = taker.free_s + way_m / taker.speed_m_s
             begin_m += length_m
         lengths = _even(ready, [taker.speed_m_s for taker in order], whole_m)

@@ -95,6 +95,23 @@ def test_there_and_back_on_one_road_are_told_apart() -> None:
     assert length_m(left(work)) == pytest.approx(70.0, abs=0.01)
 
 
+@pytest.mark.parametrize("anywhere", [False, True])
+def test_a_way_is_followed_by_places_alone(*, anywhere: bool) -> None:
+    back = Route((*ROUTE.waypoints[:2], ROUTE.waypoints[0]))
+    work = RemainingRoute(raw_parameters(PARAMETERS), back, FRAME)
+    work.follow((150.0, 40.0), anywhere=anywhere)
+    assert length_m(left(work)) == pytest.approx(200.0, abs=0.01), "it is not on its way yet"
+    lengths = []
+    begin = 40.0 if anywhere else 0.0
+    for step in range(round(begin), 196, 5):
+        east = step if step <= 100 else 200 - step
+        work.follow((float(east), 0.5), anywhere=anywhere)
+        lengths.append(length_m(left(work)))
+    assert all(a > b for a, b in pairwise(lengths))
+    assert lengths[0] == pytest.approx(200.0 - begin, abs=1.0)
+    assert lengths[-1] == pytest.approx(5.0, abs=6.0)
+
+
 def test_reports_are_few() -> None:
     work = routing()
     said = 0

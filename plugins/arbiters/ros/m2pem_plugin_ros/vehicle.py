@@ -17,11 +17,15 @@ from m2pem.api import (
     Connection,
     Limits,
     LinkState,
+    LocalFrame,
     PayloadState,
+    RemainingRoute,
     ResolvedValue,
     ResourceId,
+    Route,
     VehiclePosition,
     VehicleState,
+    raw_parameters,
 )
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.checkpoint import goal_id, run_id
@@ -41,6 +45,9 @@ RECLAIM_WITHIN_S = 5.0
 """In real time. A vehicle that has not acknowledged a CANCEL by then is also sent HOLD."""
 
 CLOSE_WITHIN_S = 5.0
+LEAST_PROGRESS_M = 1.0
+"""What is left of a route that fails or is lost is reported if so much was driven since."""
+
 REMEMBERED = 1_000
 OTHERS_EVERY_S = 1.0
 """Period of the check for other publishers, in real time."""
@@ -81,6 +88,8 @@ class Vehicle:
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._order: Order | None = None
+        self._route: RemainingRoute | None = None
+        self._adopted = False
         self._cancelled: BehaviorId = ""
         self._broken = ""
         self._checked_s = 0.0
@@ -218,6 +227,7 @@ class Vehicle:
     def adopt(self, order: Order) -> None:
         """Take over an order that was found on the vehicle."""
         self._keep(order)
+        self._adopted = True
 
     def order_for(
         self,
@@ -286,6 +296,8 @@ class Vehicle:
             return
         if self._order is not None and self._order.goal == goal:
             self._order = None
+        if outcome.state is BehaviorState.FAILED:
+            self._report_left(behavior, LEAST_PROGRESS_M)
         if outcome.state is BehaviorState.SUCCEEDED:
             self._tracker.progress(behavior)  # a behavior that ends at once has run, too
         self._tracker.end(behavior, outcome.state, outcome.code, outcome.reason, outcome.outputs)
@@ -306,6 +318,8 @@ class Vehicle:
         bound_s = self._limits.lost_after_s
         is_silent = silent_s >= bound_s
         holder = self.doing
+        if holder is not None and not is_silent:
+            self._report_left(holder)
         if not self._contacts:
             self.link = LinkState.LOST
         elif may_lose or not is_silent:
@@ -351,7 +365,18 @@ class Vehicle:
             self._context.logger.warning("%s: can be commanded again", self.resource)
         self._refusal = wrong
 
+    def _report_left(self, behavior: BehaviorId, least_m: float | None = None) -> None:
+        """Report the rest of a route, by the position: so for every driver."""
+        position, route = self._ros_connection.sensors.localization.position, self._route
+        if route is None or position is None:
+            return
+        place = route.frame.to_local((position.latitude_deg, position.longitude_deg))
+        route.follow(place, anywhere=self._adopted)
+        if (left := route.to_report(least_m)) is not None:
+            self._tracker.remains(behavior, left)
+
     def _lose(self, holder: BehaviorId, silent_s: float) -> None:
+        self._report_left(holder, LEAST_PROGRESS_M)
         self._mark_unresolved(holder)
         self._call_driver("forget", self.driver.abandon)
         reason = f"no message for {silent_s:.1f} s"
@@ -382,6 +407,7 @@ class Vehicle:
 
     def _keep(self, order: Order) -> None:
         self._order = order
+        self._route, self._adopted = _route_of(order), False
         self._behaviors.pop(order.goal, None)
         self._behaviors[order.goal] = order.request.id
         if len(self._behaviors) > REMEMBERED:
@@ -429,6 +455,17 @@ class Vehicle:
             state = self._context.bus.latest(ResourceId(name))
             if isinstance(state, VehicleState):
                 self._ros_connection.publish_target(state)
+
+
+def _route_of(order: Order) -> RemainingRoute | None:
+    """Return the account of a route; None: it has none, or of a loop all is always left."""
+    parameters = order.request.parameters
+    route = parameters.get("route")
+    routing = order.request.behavior == "single_vehicle_routing"
+    if not routing or not isinstance(route, Route) or parameters.get("loop") is True:
+        return None
+    frame = LocalFrame(route.waypoints[0][:2])
+    return RemainingRoute(raw_parameters(parameters), route, frame)
 
 
 def _bug(error: Exception) -> str:

@@ -16,7 +16,7 @@ from ros_nav2_bench import ORIGIN, at
 from ros_sim_watch import COMMAND, switch, until
 from std_msgs.msg import UInt32
 
-from m2pem.api import Arbiter, ArbiterContext, Connection, ResourceId
+from m2pem.api import Arbiter, ArbiterContext, Connection, ResourceId, Route
 from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("ugv1"), ResourceId("ugv2")
@@ -74,6 +74,9 @@ class Witness:
         return lambda _: self._heard.add(vehicle)
 
 
+ROUTE = Route(tuple(at(*place).position for place in ((0.0, 5.0), (60.0, 5.0), (60.0, 45.0))))
+
+
 class OverDds(ArbiterContract):
     """Inherit, and say with which `driver` and other settings the vehicles are reached."""
 
@@ -89,6 +92,7 @@ class OverDds(ArbiterContract):
         "test_another_arbiter_finds_the_behavior_again",
         "test_hold_stops_the_vehicle_within_the_declared_bound",
         "test_a_cut_link_is_lost_within_the_declared_bound",
+        "test_less_and_less_is_left_of_a_route",
         "test_two_vehicles_do_not_mix",
         "test_nothing_leaks_after_close",
     )
@@ -148,6 +152,8 @@ class OverDds(ArbiterContract):
             short=("reverse", {"distance": 2.0}),
             bad=("speed", -1.0),
             short_s=15.0,
+            route=("single_vehicle_routing", {"route": ROUTE, "speed": 3.0}),
+            route_s=900.0,
         )
 
 

@@ -26,6 +26,7 @@ from m2pem.api import (
     Point,
     ResolvedValue,
     ResourceId,
+    Route,
     VehicleState,
 )
 
@@ -52,6 +53,7 @@ class Dynamics:
     stops: bool = True
     goal: UUID | None = None
     target: tuple[float, float] = (0.0, 0.0)
+    ahead: list[tuple[float, float]] = field(default_factory=list)
     wished: float = 5.0
     driven_us: int = 0
     outcomes: dict[UUID, Outcome] = field(default_factory=dict)
@@ -83,6 +85,9 @@ class Dynamics:
         step = min(distance, self.wished * passed_s)
         if distance - step < 0.01:
             self.east, self.north = self.target
+            if self.ahead:
+                self.target = self.ahead.pop(0)
+                return
             self.finish(Outcome(BehaviorState.SUCCEEDED))
         else:
             self.speed = self.wished
@@ -127,7 +132,11 @@ class DoubleDriver:
         target = order.request.parameters.get("target")
         if isinstance(target, Point):
             place = GeoPosition(target.position[0], target.position[1], ORIGIN[2])
-            self.body.target = to_local(place, ORIGIN)[:2]
+            self.body.target, self.body.ahead = to_local(place, ORIGIN)[:2], []
+        route = order.request.parameters.get("route")
+        if isinstance(route, Route):
+            places = [GeoPosition(*waypoint[:2], ORIGIN[2]) for waypoint in route.waypoints]
+            self.body.target, *self.body.ahead = [to_local(each, ORIGIN)[:2] for each in places]
         self.body.wished = float(order.request.parameters.get("speed") or 5.0)
         self.body.goal, self.body.held = order.goal, False
         self.body.begun += 1

@@ -6,10 +6,11 @@ from uuid import UUID
 import pytest
 from ros_double import Dynamics, arbiter, at
 
-from m2pem.api import ResourceId
+from m2pem.api import ResourceId, Route
 from m2pem.testing import ArbiterCase, ArbiterContract
 
 A, B = ResourceId("a"), ResourceId("b")
+ROUTE = Route(tuple(at(*place).position for place in ((5.0, 0.0), (105.0, 0.0), (105.0, 80.0))))
 JOURNAL = UUID("5a0cf3a8-1f5c-4b53-8f67-7c26a7f3b1d4")
 
 
@@ -48,4 +49,5 @@ class TestRosVehicles(ArbiterContract):
             long=("goto", {"target": at(600.0, 0.0), "speed": 5.0}),
             short=("goto", {"target": at(30.0, 20.0), "speed": 5.0}),
             bad=("speed", -1.0),
+            route=("single_vehicle_routing", {"route": ROUTE, "speed": 5.0}),
         )
