@@ -1,7 +1,8 @@
-"""python -m bench.lost_member [--arducopter PROGRAM] [--speed 5]
+"""python -m bench.lost_member [--vehicles mavlink,ros,mavlink] [--arducopter PROGRAM] [--speed 5]
 
-Three copters survey an area as a team, each a process of its own that is spoken to over UDP; one is
-killed when it has done two fifths of its band. Prints how much of the area was surveyed, how much
+Three vehicles survey an area as a team, each simulated by a process of its own: copters over
+MAVLink, ground vehicles over ROS. The second one's process is killed when it has done two fifths of
+its band. Prints how much of the area was surveyed, how much
 twice, and how long the others took against the least time. Ends with 1 if that is worse than
 docs/teams.md says.
 """
@@ -9,6 +10,7 @@ docs/teams.md says.
 import argparse
 import asyncio
 import json
+import os
 import socket
 import sys
 import tempfile
@@ -23,15 +25,16 @@ from m2pem_plugin_mavlink.sitl.programs import FRAMES, ardupilot_program
 
 from bench.coverage import Coverage, Sample
 from m2pem import load_fleet
-from m2pem.api import LocalFrame, SystemClock, VehicleState
+from m2pem.api import LatLon, LocalFrame, SystemClock, VehicleState
 from m2pem.executive.executive import Executive
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 
 ORIGIN = (38.1075, -77.3192, 60.0)
 FRAME = LocalFrame(ORIGIN)
-NAMES = ("uav1", "uav2", "uav3")
-LOST = "uav2"
+MAVLINK, ROS = "mavlink", "ros"
+NAMES = ("one", "two", "three")
+LOST = "two"
 CUT_SHARE = 0.4
 EAST_M, PASSES, WIDTH_M, OVERSHOOT_M = 200.0, 9, 19.5, 8.0
 SPEED_M_S = 5.0
@@ -53,8 +56,8 @@ MISSION = (
 )
 
 
-def mission() -> bytes:
-    """Return a mission: all take off, and survey the area."""
+def mission(kinds: Sequence[str]) -> bytes:
+    """Return a mission: all copters take off, and all survey the area."""
 
     def task(id_: str, type_: str, name: str, role: str, **parameters: str) -> str:
         given = "".join(
@@ -64,7 +67,7 @@ def mission() -> bytes:
 
     tasks = [
         task(f"Up_{name}", "vehicle", "takeoff", f'name="pilot" vehicle="{name}"', altitude="20 m")
-        for name in NAMES
+        for name in _flying(kinds)
     ]
     tasks.append(
         task(
@@ -80,7 +83,7 @@ def mission() -> bytes:
             altitude="20 m",
         )
     )
-    ids = ["S", *(f"Up_{name}" for name in NAMES), "Survey", "E"]
+    ids = ["S", *(f"Up_{name}" for name in _flying(kinds)), "Survey", "E"]
     flows = "".join(
         f'<sequenceFlow id="to_{after}" sourceRef="{before}" targetRef="{after}"/>'
         for before, after in pairwise(ids)
@@ -88,26 +91,39 @@ def mission() -> bytes:
     return MISSION.format(tasks="".join(tasks), flows=flows).encode()
 
 
-def fleet_text(ports: Sequence[int], homes: Sequence[tuple[float, float]]) -> str:
-    """Return the fleet file. `homes`: latitude and longitude, for people who read it."""
-    lines = [
-        "version: 1",
-        "name: bench",
-        f"origin: {{lat: {ORIGIN[0]}, lon: {ORIGIN[1]}, alt: 60}}",
-    ]
-    lines.append("vehicles:")
-    for number, (name, port) in enumerate(zip(NAMES, ports, strict=True), 1):
+def _flying(kinds: Sequence[str]) -> list[str]:
+    return [name for name, kind in zip(NAMES, kinds, strict=True) if kind == MAVLINK]
+
+
+def fleet_text(
+    kinds: Sequence[str], ports: Sequence[int], homes: Sequence[LatLon], only: str = ""
+) -> str:
+    """Return the fleet file; `only`: with that vehicle alone."""
+    origin = f"origin: {{lat: {ORIGIN[0]}, lon: {ORIGIN[1]}, alt: {ORIGIN[2]:g}}}"
+    lines = ["version: 1", "name: bench", origin, "vehicles:"]
+    for number, name in enumerate(NAMES, 1):
+        if only not in ("", name):
+            continue
+        kind, home = kinds[number - 1], list(homes[number - 1])
+        if kind == MAVLINK:
+            url = f"udpin://127.0.0.1:{ports[number - 1]}"
+            connection = f'{{url: "{url}", system_id: {number}}}'
+        else:
+            bounds = f"max_speed: {SPEED_M_S:g} m/s, acceleration: 1.5 m/s2"
+            connection = f"{{namespace: /{name}, sim: {{home: {home}, heading: 90 deg, {bounds}}}}}"
         lines += [
-            f"  {name}: # at {homes[number - 1]}",
-            "    domain: air",
-            "    arbiter: mavlink",
+            f"  {name}:",
+            f"    domain: {'air' if kind == MAVLINK else 'ground'}",
+            f"    arbiter: {kind}",
             "    sitl: true",
-            f'    connection: {{url: "udpin://127.0.0.1:{port}", system_id: {number}}}',
+            f"    connection: {connection}",
             "    lost_after: 10 s",
             f"    cruise_speed: {SPEED_M_S:g} m/s",
         ]
-    lines.append(f"teams: {{crew: {{members: [{', '.join(NAMES)}], on_lost_member: continue}}}}")
-    lines.append("areas: {field: field.geojson}")
+    if not only:
+        members = ", ".join(NAMES)
+        lines.append(f"teams: {{crew: {{members: [{members}], on_lost_member: continue}}}}")
+        lines.append("areas: {field: field.geojson}")
     return "\n".join(lines) + "\n"
 
 
@@ -128,8 +144,18 @@ def free_ports(count: int) -> list[int]:
         return [int(each.getsockname()[1]) for each in sockets]
 
 
+async def start_ros(fleet: Path, speed: float) -> asyncio.subprocess.Process:
+    """Start the process of a simulated ground vehicle."""
+    command = [sys.executable, "-m", "m2pem", "sim", "ros", "--fleet", str(fleet)]
+    return await asyncio.create_subprocess_exec(
+        *(*command, "--speed", f"{speed:g}"),
+        stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+
+
 async def start_copter(
-    number: int, port: int, home: tuple[float, float], speed: float, program: Path | None, to: Path
+    number: int, port: int, home: LatLon, speed: float, program: Path | None, to: Path
 ) -> asyncio.subprocess.Process:
     """Start the process of a simulated copter, or of a real ArduCopter."""
     if program is None:
@@ -145,7 +171,7 @@ async def start_copter(
         f"copter{number}",
         ardupilot_program(program, FRAMES["quad"]),
         FRAMES["quad"],
-        Start(*home, 60.0, 90.0, speed),
+        Start(home[0], home[1], 60.0, 90.0, speed),
         instance=number + 40,
         system_id=number,
         ports=[port],
@@ -165,7 +191,7 @@ async def start_copter(
 
 @dataclass
 class Watch:
-    """Where the copters were, by their own positions, from their first pass on."""
+    """Where the vehicles were, by their own positions, from their first pass on."""
 
     clock: SystemClock
     tracks: dict[str, list[Sample]] = field(default_factory=dict)
@@ -174,7 +200,7 @@ class Watch:
     async def listen(self, executive: Executive) -> None:
         async for state in executive.bus.subscribe():
             if isinstance(state, VehicleState) and state.position is not None:
-                if state.ready or state.armed:
+                if state.ready is not False or state.armed:
                     self.ready.add(state.resource)
                 place = FRAME.to_local(state.position.latlon)
                 track = self.tracks.setdefault(state.resource, [])
@@ -197,30 +223,34 @@ def _inside(east_m: float, north_m: float) -> bool:
     return 0 < east_m < EAST_M and 0 < north_m < PASSES * WIDTH_M
 
 
-async def measure(program: Path | None, speed: float) -> bool:
+async def measure(kinds: Sequence[str], program: Path | None, speed: float) -> bool:
     """Run the survey and print the figures. Return whether they are within the bounds."""
     homes = [FRAME.to_latlon((-20.0, 58.5 * index + 10.0)) for index in range(3)]
     async with AsyncExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         ports = free_ports(3)
-        (folder / "fleet.yaml").write_text(fleet_text(ports, homes), encoding="utf-8")
         (folder / "field.geojson").write_text(field_text(), encoding="utf-8")
+        (folder / "fleet.yaml").write_text(fleet_text(kinds, ports, homes), encoding="utf-8")
         fleet = load_fleet(folder / "fleet.yaml")
-        copters = {}
-        for number, name in enumerate(NAMES, 1):
-            copter = await start_copter(
-                number, ports[number - 1], homes[number - 1], speed, program, folder
-            )
-            copters[name] = copter
-            stack.push_async_callback(_end, copter)
+        vehicles = {}
+        for number, (name, kind) in enumerate(zip(NAMES, kinds, strict=True), 1):
+            port, home = ports[number - 1], homes[number - 1]
+            if kind == MAVLINK:
+                process = await start_copter(number, port, home, speed, program, folder)
+            else:
+                own = folder / f"{name}.yaml"
+                own.write_text(fleet_text(kinds, ports, homes, only=name), encoding="utf-8")
+                process = await start_ros(own, speed)
+            vehicles[name] = process
+            stack.push_async_callback(_end, process)
         clock = SystemClock(speed)
         executive = Executive(fleet, MemoryJournal(), PluginManager(), clock, speed=speed)
         await stack.enter_async_context(executive)
         watch = Watch(clock)
         listening = asyncio.create_task(watch.listen(executive))
         stack.callback(listening.cancel)
-        await _until(clock, lambda: len(watch.ready) == 3, READY_S, "not all copters are ready")
-        run = await executive.control.start(mission())
+        await _until(clock, lambda: len(watch.ready) == 3, READY_S, "not all vehicles are ready")
+        run = await executive.control.start(mission(kinds))
         band_m = EAST_M * PASSES / 3
         await _until(
             clock,
@@ -228,7 +258,7 @@ async def measure(program: Path | None, speed: float) -> bool:
             MOST_S,
             f"{LOST} does not survey",
         )
-        await _end(copters[LOST])
+        await _end(vehicles[LOST])
         cut_s = watch.tracks[LOST][-1][0]
         summary = await asyncio.wait_for(executive.control.wait(run), MOST_S)
         print(f"the mission ended {summary.status}")
@@ -287,9 +317,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--arducopter", type=Path, help="the program of a real ArduCopter")
     parser.add_argument("--speed", type=float, default=5.0, help="simulated seconds per second")
+    parser.add_argument(
+        "--vehicles", default="mavlink,mavlink,mavlink", help="mavlink or ros, each"
+    )
     options = parser.parse_args()
-    if not asyncio.run(measure(options.arducopter, options.speed)):
-        sys.exit(1)
+    kinds = options.vehicles.split(",")
+    if len(kinds) != len(NAMES) or not set(kinds) <= {MAVLINK, ROS}:
+        parser.error(f"--vehicles: {len(NAMES)} of {MAVLINK} and {ROS} are expected")
+    with ExitStack() as stack:
+        if ROS in kinds:
+            from m2pem_plugin_ros import loopback  # noqa: PLC0415  # needs ROS
+            from m2pem_plugin_ros.testing import reserved_domain  # noqa: PLC0415  # as above
+
+            domain = stack.enter_context(reserved_domain())
+            os.environ.update(loopback.environment(domain))
+        if not asyncio.run(measure(kinds, options.arducopter, options.speed)):
+            sys.exit(1)
 
 
 if __name__ == "__main__":
