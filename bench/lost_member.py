@@ -207,6 +207,7 @@ class Watch:
                 track.append((state.time_us / 1e6, *place))
 
     def surveyed_m(self, name: str) -> float:
+        """How much of the passes it has surveyed."""
         coverage = Coverage(EAST_M, PASSES * WIDTH_M, WIDTH_M)
         return coverage.add(self.tracks.get(name, ()))
 

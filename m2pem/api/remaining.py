@@ -23,6 +23,7 @@ REPORTED_M = 10.0
 
 _STRAY_M = 30.0
 _JOINS_M = 5.0
+_ALONG_RAD = math.radians(20)
 _REACH = 1.2
 """How much farther along the way a vehicle may come than it moves: it cuts corners."""
 
@@ -71,6 +72,7 @@ class RemainingWork(ABC):
         self.line = line
         self.mark_m = 0.0
         self._reported_m = 0.0
+        self._seen: EastNorth | None = None
         self._followed: EastNorth | None = None
         self._moved_m = 0.0
 
@@ -127,17 +129,20 @@ class RemainingWork(ABC):
     def follow(self, place: EastNorth, *, anywhere: bool = False) -> None:
         """The vehicle is at a place in `frame`, and all that is known are its places so far.
 
-        It is on its way from where it comes near the beginning, or (`anywhere`: after a restart)
-        near the way. It is never farther along than it may have moved since.
+        It is on its way from where it comes near the beginning or moves along the first leg, or
+        (`anywhere`: after a restart) near the way. It is never farther along than it may have moved
+        since.
         """
+        before, self._seen = self._seen, place
         if self._followed is None:
-            near_m = math.dist(self.line.points[0], place)
             if anywhere:
-                near_m = min((off_m for _, off_m, _ in self.line.feet(place)), default=near_m)
+                near_m = min((off_m for _, off_m, _ in self.line.feet(place)), default=math.inf)
+            else:
+                near_m = self._to_begin_m(before, place)
             if near_m > _JOINS_M:
                 return
-            if anywhere:
-                self.find(place, 0.0, 0.0, self.line.length_m)
+            first_m = next((mark_m for mark_m in self.line.marks_m if mark_m > 0), 0.0)
+            self.find(place, 0.0, 0.0, self.line.length_m if anywhere else first_m)
             self._followed = place
         self._moved_m += math.dist(self._followed, place)
         self._followed = place
@@ -146,6 +151,18 @@ class RemainingWork(ABC):
         self.find(place, before_m + self._moved_m, before_m, before_m + reach_m)
         if self.mark_m > before_m:
             self._moved_m = 0.0
+
+    def _to_begin_m(self, before: EastNorth | None, place: EastNorth) -> float:
+        """Return how far the vehicle is from the beginning, or from the first leg along which it
+        moves: who cuts the corner there does not come near the beginning."""
+        away_m = math.dist(self.line.points[0], place)
+        leg = next((each for each in self.line.segments if each.length_m > 0), None)
+        if leg is None or before is None or math.dist(before, place) < 1e-3:
+            return away_m
+        yaw_rad = math.atan2(place[1] - before[1], place[0] - before[0])
+        if abs(math.remainder(yaw_rad - leg.yaw_rad, math.tau)) > _ALONG_RAD:
+            return away_m
+        return min(away_m, leg.distance_m(place))
 
     def state(self) -> dict[str, Any]:
         """Return what `restored_work` reads, as JSON values."""

@@ -177,8 +177,12 @@ def survey(context: PlanningContext) -> Plan:
     else:
         for member, band in zip(context.members, lanes(passes, shares), strict=True):
             if band:
-                places = (context.coordinate(place, None) for each in band for place in each)
-                parameters = {"route": Route(tuple(places)), "speed": speed_m_s}
+                ends = [place for each in band for place in each]
+                here = context.poses[member].place
+                if math.dist(here, ends[-1]) < math.dist(here, ends[0]):
+                    ends.reverse()
+                places = tuple(context.coordinate(place, None) for place in ends)
+                parameters = {"route": Route(places), "speed": speed_m_s}
                 legs.append(context.leg(member, behavior, parameters))
     takes = {
         member: frozenset(accepted(context.offered[member][behavior])) for member in context.members

@@ -112,6 +112,15 @@ def test_a_way_is_followed_by_places_alone(*, anywhere: bool) -> None:
     assert lengths[-1] == pytest.approx(5.0, abs=6.0)
 
 
+def test_who_cuts_the_corner_at_the_beginning_is_on_the_way_all_the_same() -> None:
+    work = routing()
+    for place in ((30.0, -40.0), (16.0, -8.0), (25.0, -4.0)):
+        work.follow(place)
+        assert left(work) == ROUTE
+    work.follow((35.0, -3.0))
+    assert length_m(left(work)) == pytest.approx(215.0, abs=0.1)
+
+
 def test_reports_are_few() -> None:
     work = routing()
     said = 0
