@@ -1,7 +1,7 @@
 """How much of an area was surveyed, and how much twice, by where vehicles were."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TypeAlias
@@ -81,14 +81,10 @@ class Coverage:
         return sum(count > 1 for count in self.passes.values()) / self.cells
 
 
-def optimum_s(
-    left_m: Mapping[str, float], speeds_m_s: Mapping[str, float], ways_m: Mapping[str, float]
-) -> float:
-    """Return the time in which the members that are left can survey what is left.
+def optimum_s(left_m: float, speeds_m_s: Sequence[float], way_s: float) -> float:
+    """Return the least time in which members survey what is left.
 
-    `left_m`: the tracks that are left, with the ways between passes, also of the lost member.
-    `speeds_m_s`: of those that are left, along tracks. `ways_m`: from where each has done its own
-    band to what it takes over.
+    `left_m`: the passes that are left, of all members. `speeds_m_s`: of those that go on, with
+    their turns. `way_s`: from a member's band to what it takes over.
     """
-    whole_m = sum(left_m.values()) + sum(ways_m.values())
-    return whole_m / sum(speeds_m_s.values())
+    return left_m / sum(speeds_m_s) + way_s

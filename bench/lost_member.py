@@ -23,7 +23,7 @@ from pathlib import Path
 from m2pem_plugin_mavlink.sitl.launch import Start, ardupilot_launch
 from m2pem_plugin_mavlink.sitl.programs import FRAMES, ardupilot_program
 
-from bench.coverage import Coverage, Sample
+from bench.coverage import Coverage, Sample, optimum_s
 from m2pem import load_fleet
 from m2pem.api import LatLon, LocalFrame, SystemClock, VehicleState
 from m2pem.executive.executive import Executive
@@ -278,7 +278,7 @@ def report(watch: Watch, cut_s: float) -> bool:
     ]
     left_m = EAST_M * PASSES - done_m
     # From the end of its band to what is left of the one between: at least one width.
-    least_s = left_m / sum(speeds) + WIDTH_M / SPEED_M_S
+    least_s = optimum_s(left_m, speeds, WIDTH_M / SPEED_M_S)
     ends = [watch.ended_s(name) - cut_s for name in others]
     print(f"surveyed {coverage.covered:.1%}, twice {coverage.twice:.1%}")
     print(
