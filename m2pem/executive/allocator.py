@@ -215,7 +215,12 @@ class Allocator:
             each.request.id: Request(each.request.id, tuple(role.options for role in each.roles))
             for each in waiting
         }
-        chosen, refusals = self._assign(waiting, requests)
+        chosen, without_space = self._assign(waiting, requests)
+        refusals = {
+            number: _foremost(list(found.values()))
+            for number, found in without_space.items()
+            if number not in chosen
+        }
         served = [each.request.id for each in waiting if each.request.id in chosen]
         given = {
             resource: request
@@ -226,7 +231,8 @@ class Allocator:
         for each in waiting:
             number = each.request.id
             if number in chosen:
-                self._give(each, chosen[number], [other for other in served if other != number])
+                others = [other for other in served if other != number]
+                self._give(each, chosen[number], others, without_space.get(number, {}))
             elif number in refusals:
                 refusal = refusals[number]
                 if refusal.wait_s is None or not any(
@@ -240,17 +246,19 @@ class Allocator:
 
     def _assign(
         self, waiting: Sequence[_Considered], requests: dict[str, Request]
-    ) -> tuple[dict[str, dict[str, tuple[ResourceId, ...]]], "dict[str, Refusal]"]:
+    ) -> tuple[
+        dict[str, dict[str, tuple[ResourceId, ...]]], "dict[str, dict[ResourceId, Refusal]]"
+    ]:
         """Choose for all requests that can be served, in their order. What is chosen has its space:
         it is chosen again without a vehicle that has not.
 
-        Returns what is chosen, and why others have no space.
+        Returns what is chosen, and by request why vehicles have no space for it, the best first.
         """
         space = self._space
         chosen = assign(list(requests.values()), self._order)
         if space is None:
             return chosen, {}
-        refusals: dict[str, Refusal] = {}
+        refusals: dict[str, dict[ResourceId, Refusal]] = {}
         space.begin()
         while True:
             space.begin_round()
@@ -261,13 +269,13 @@ class Allocator:
                     continue
                 refusal = self._without_space(each, chosen[number])
                 if refusal is not None:
-                    refusals[number] = refusal
+                    refusals.setdefault(number, {})[refusal.vehicle] = refusal
                     requests[number] = _without(requests[number], refusal.vehicle)
                     break
             else:
                 for number in chosen:
                     space.commit(number)
-                return chosen, {e: r for e, r in refusals.items() if e not in chosen}
+                return chosen, refusals
             chosen = assign(list(requests.values()), self._order)
 
     def _without_space(
@@ -386,14 +394,16 @@ class Allocator:
         each: _Considered,
         chosen: Mapping[str, tuple[ResourceId, ...]],
         together_with: Sequence[str],
+        without_space: Mapping[ResourceId, "Refusal"],
     ) -> None:
         roles = self._filled(each, chosen)
+        considered = [_excluding(role, without_space) for role in each.roles]
         resources = [resource for ids in roles.values() for resource in ids]
         each.asked.chosen = True
         self._availability.adopt(resources, each.request.id)
         each.asked.runner.post(
             ResourcesChosen(
-                each.request.id, dict(roles), what_was_considered(each.roles, roles, together_with)
+                each.request.id, dict(roles), what_was_considered(considered, roles, together_with)
             )
         )
 
@@ -556,6 +566,19 @@ def _is_hopeless(each: _Considered, evaluator: RoleEvaluator) -> bool:
         if len(able) < considered.options.least:
             return True
     return False
+
+
+def _foremost(refusals: "Sequence[Refusal]") -> "Refusal":
+    """Return which refusal a task is told: of the best vehicle for which it may wait, if any."""
+    return next((each for each in refusals if each.wait_s is not None), refusals[0])
+
+
+def _excluding(
+    role: ConsideredRole, without_space: "Mapping[ResourceId, Refusal]"
+) -> ConsideredRole:
+    """Return a role whose candidates without space are excluded."""
+    reasons = {each: why.reason for each, why in without_space.items() if each in role.resources}
+    return replace(role, excluded={**role.excluded, **reasons}) if reasons else role
 
 
 def _vehicles(each: _Considered) -> frozenset[ResourceId]:

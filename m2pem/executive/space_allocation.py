@@ -55,9 +55,7 @@ class SpaceAllocation:
             self._proposed[request.id] = wanted
             self._ahead.append(wanted)
         elif found.wait_s is not None and found.blockers and all(map(_ends, found.blockers)):
-            self._kept_back[request.id] = wanted
-        else:
-            self._kept_back.pop(request.id, None)
+            self._kept_back.setdefault(request.id, wanted)
         return found
 
     def keep_back(self, request: str) -> None:

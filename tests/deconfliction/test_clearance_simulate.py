@@ -62,10 +62,9 @@ def write_rovers(folder: Path) -> Path:
     return folder / "fleet.yaml"
 
 
-def test_a_rehearsal_shows_who_waits_for_the_bridge_and_when_it_goes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    body = (
+def both_ways() -> bytes:
+    """A mission in which both cross the bridge, from both sides."""
+    return mission(
         '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'
         + task("East", "goto", "one", target="[38.0, -76.998]", speed="3 m/s")[1]
         + task("West", "goto", "two", target="[38.0002, -77.0005]", speed="3 m/s")[1]
@@ -74,7 +73,12 @@ def test_a_rehearsal_shows_who_waits_for_the_bridge_and_when_it_goes(
         + flow("F", "West")
         + "</process>"
     )
-    (tmp_path / "mission.bpmn").write_bytes(mission(body))
+
+
+def test_a_rehearsal_shows_who_waits_for_the_bridge_and_when_it_goes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mission.bpmn").write_bytes(both_ways())
     words = ["simulate", tmp_path / "mission.bpmn", "--fleet", write_rovers(tmp_path)]
     assert run_command_line([*map(str, words), "--format", "json"]) == 0
     records = [json.loads(line) for line in capsys.readouterr().out.splitlines()]

@@ -15,6 +15,7 @@ from m2pem.engine.records import (
     BehaviorEnded,
     BehaviorRequested,
     EventAwaited,
+    ResourcesAllocated,
 )
 from m2pem.fleet.fleet import Domain, OnConflict, SharedSpace
 from m2pem.journal import MemoryJournal
@@ -358,7 +359,11 @@ def test_a_role_by_need_gets_the_next_vehicle_that_has_space(play: Play) -> None
         run = await world.begin(by_need("Go", at(65, 0)))
         await world.executive.control.wait(run)
         assert not delays(world)
-        return [each for each in world.seen if isinstance(each, BehaviorRequested)][-1].resources
+        chosen = [each for each in world.seen if isinstance(each, ResourcesAllocated)][-1]
+        (role,) = chosen.considered["roles"].values()
+        excluded = {each["resource"]: each.get("excluded", "") for each in role["candidates"]}
+        assert ("bridge (capacity 1)" in excluded.get("one", "")) is (role["chosen"] == ["two"])
+        return chosen.roles["doer"]
 
     # One is nearer, but it would have to cross the bridge, where a vehicle stands that a person
     # drives.
