@@ -185,6 +185,33 @@ class StartPreview:
 
 
 @dataclass(frozen=True, slots=True)
+class SpaceHolder:
+    """A vehicle that has a place in a shared space. `behavior`: "" if it stands there; `lost`:
+    nothing is received from it."""
+
+    vehicle: ResourceId
+    behavior: str = ""
+    lost: bool = False
+
+    def __str__(self) -> str:
+        what = "lost" if self.lost else self.behavior or "stands there"
+        return f"{self.vehicle} ({what})"
+
+
+@dataclass(frozen=True, slots=True)
+class SharedSpaceState:
+    """A shared space of the fleet file now: how many vehicles may be in it, and who has a place."""
+
+    name: str
+    capacity: int
+    holders: tuple[SpaceHolder, ...] = ()
+
+    def __str__(self) -> str:
+        who = ", ".join(map(str, self.holders)) or "free"
+        return f"{self.name} ({len(self.holders)} of {self.capacity} taken): {who}"
+
+
+@dataclass(frozen=True, slots=True)
 class WaitingTask:
     """A task that waits for vehicles or payloads that are not free, or for space
     (docs/allocation.md).
@@ -484,7 +511,12 @@ class MissionControl(Protocol):
         ...
 
     async def waiting(self) -> Sequence[WaitingTask]:
-        """The tasks of all runs that wait for vehicles or payloads, in the order of service."""
+        """The tasks of all runs that wait for vehicles, payloads or space, in the order of
+        service."""
+        ...
+
+    async def shared_space(self) -> Sequence[SharedSpaceState]:
+        """Who has places in the shared spaces of the fleet file, in its order."""
         ...
 
     async def incidents(self) -> Sequence[OpenIncident]:

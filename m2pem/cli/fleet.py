@@ -11,7 +11,7 @@ from m2pem.cli.completers import file_or
 from m2pem.cli.options import as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
-    from m2pem.api.control import WaitingTask
+    from m2pem.api.control import SharedSpaceState, WaitingTask
     from m2pem.executive.fleet_connections import FleetArbiters
 
 
@@ -167,6 +167,7 @@ class Holding:
     fleet: str
     holders: Mapping[str, str]
     waiting: "Sequence[WaitingTask]"
+    shared_space: "Sequence[SharedSpaceState]"
     unavailable: Mapping[str, str] = field(default_factory=dict)
 
     def as_text(self) -> str:
@@ -178,6 +179,12 @@ class Holding:
             f"executive {self.executive} with fleet {self.fleet}",
             table(("RESOURCE", "HELD BY"), held),
         ]
+        if self.shared_space:
+            spaces = [
+                (each.name, str(each.capacity), ", ".join(map(str, each.holders)) or "free")
+                for each in self.shared_space
+            ]
+            parts.append(table(("SHARED SPACE", "CAPACITY", "TAKEN BY"), spaces))
         if self.waiting:
             rows = [
                 (
@@ -205,7 +212,7 @@ def _show_running(journal: str | None, output: str) -> None:
     """Print who holds what in the executives that serve a journal, and which tasks wait."""
     import msgspec
 
-    from m2pem.api.control import WaitingTask
+    from m2pem.api.control import SharedSpaceState, WaitingTask
     from m2pem.cli.run_control import journal_file
     from m2pem.control_socket.client import ask, executives, fleet_name
 
@@ -215,6 +222,7 @@ def _show_running(journal: str | None, output: str) -> None:
             fleet_name(socket),
             ask(socket, "holders"),
             msgspec.convert(ask(socket, "waiting"), list[WaitingTask]),
+            msgspec.convert(ask(socket, "shared_space"), list[SharedSpaceState]),
             ask(socket, "unavailable"),
         )
         for socket in executives(journal_file(journal))

@@ -387,6 +387,8 @@ class PlainOcu:
         unavailable = await self._control.unavailable()
         for resource, holder in (await self._control.holders()).items():
             self._say(f"{resource}: {holder or unavailable.get(resource) or 'free'}")
+        for space in await self._control.shared_space():
+            self._say(str(space))
         for task in await self._control.waiting():
             self._say(str(task))
 

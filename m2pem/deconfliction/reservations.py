@@ -31,7 +31,7 @@ from m2pem.deconfliction.participant import (
 from m2pem.deconfliction.places import PlaceNames
 from m2pem.deconfliction.shared_space import SharedRegion, SpaceConflict, occupants_of, regions_of
 from m2pem.deconfliction.team_volumes import member_volume
-from m2pem.fleet.fleet import Domain, Fleet, OnConflict
+from m2pem.fleet.fleet import Domain, Fleet, OnConflict, SharedSpace
 from m2pem.fleet.space import BY_HAND, ONE_BY_ONE, STOPS, participants_of, separated_vehicles
 from m2pem.geo.local_frame import EastNorth, LocalFrame
 from m2pem.geo.polygon import hull_distance_m
@@ -426,13 +426,25 @@ class Reservations:
                 ends = [volumes[each].route[-1:] for each in entering]
                 staying = sum(not end or region.meets(end) for end in ends)
                 needed = len(inside) + min(len(entering), staying + 1)
-            counting = [each for each in occupants if self._domains[each.vehicle] in space.domains]
+            counting = self._counting(space, occupants)
             others = occupants_of(shared, counting, wanted.request.resources)
             if needed + len(others) > space.capacity:
                 first = entering[0]
                 place = shared.entrance(volumes[first])
                 return SpaceConflict(space, first, place, needed, others)
         return None
+
+    def places(self, now_us: int) -> list[tuple[SharedSpace, tuple[Occupant, ...]]]:
+        """Return the shared spaces, and who has a place in each."""
+        occupants = list(self._occupants("", now_us, ()))
+        return [
+            (each.space, occupants_of(each, self._counting(each.space, occupants), ()))
+            for each in self._regions
+        ]
+
+    def _counting(self, space: SharedSpace, occupants: Sequence[Occupant]) -> list[Occupant]:
+        """Return those whose vehicles count in a shared space."""
+        return [each for each in occupants if self._domains[each.vehicle] in space.domains]
 
     # --- who is in the way ----------------------------------------------------------------------
 

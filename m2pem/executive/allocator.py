@@ -467,7 +467,12 @@ class Allocator:
         waiting = [each for each in left if each.request.id not in refusals]
         requests = {each.request.id: each for each in left}
         vehicles = {number: _vehicles(each) for number, each in requests.items()}
-        in_space = space_circles(refusals, vehicles)
+        certain = {  # a task that may get another vehicle need not wait for ever
+            number: refusal
+            for number, refusal in refusals.items()
+            if all(role.role.resource for role in requests[number].roles)
+        }
+        in_space = space_circles(certain, vehicles)
         for circle in in_space:
             if circle not in self._circles:
                 text = space_circle_text(

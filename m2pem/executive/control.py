@@ -27,6 +27,7 @@ from m2pem.api.control import (
     RunId,
     RunStatus,
     RunSummary,
+    SharedSpaceState,
     SimulationResult,
     StampedRecord,
     StartPreview,
@@ -374,6 +375,10 @@ class Control:
         """The tasks of all runs that wait for vehicles or payloads."""
         supervisor = self._supervisor
         return waiting_tasks(supervisor.runners.values(), supervisor.clock.now_us())
+
+    async def shared_space(self) -> Sequence[SharedSpaceState]:
+        """Who has places in the shared spaces of the fleet file."""
+        return self._supervisor.shared_space()
 
     async def incidents(self) -> Sequence[OpenIncident]:
         """The incidents of all runs that are open."""

@@ -16,7 +16,7 @@ from m2pem.allocation.candidates import Candidates, Facts
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.authoring import MissionFiles, MissionSource
 from m2pem.api.clock import Clock
-from m2pem.api.control import LEFT_ARMED, Alert, HandedOver, RunId
+from m2pem.api.control import LEFT_ARMED, Alert, HandedOver, RunId, SharedSpaceState
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState, Telemetry
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
@@ -187,6 +187,10 @@ class Supervisor:
         if separation is None or not waits_for_space(self.fleet):
             return None
         return SpaceAllocation(separation)
+
+    def shared_space(self) -> list[SharedSpaceState]:
+        """Return who has places in the shared spaces of the fleet."""
+        return [] if self._separation is None else self._separation.shared_space()
 
     # --- life -----------------------------------------------------------------------------------
 

@@ -42,6 +42,7 @@ OTHERWISE = {
     "give_back": "handback in m2pem attach",
     "holders": "m2pem fleet --running, and who in m2pem attach",
     "unavailable": "m2pem fleet --running, and who in m2pem attach",
+    "shared_space": "m2pem fleet --running, and who in m2pem attach",
     "waiting": "m2pem fleet --running, and who in m2pem attach",
     "incidents": "m2pem incidents, which tests/cli/test_incidents.py tries",
     "preview_incident": "m2pem resolve asks it first",

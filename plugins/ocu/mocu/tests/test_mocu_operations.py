@@ -70,6 +70,7 @@ NOT_SERVED = {
     "preview_take": "no message has its effects",
     "holders": "no message has them; a refused take_vehicle names the holder",
     "unavailable": "no message has it; diagnostics say why a vehicle is not ready",
+    "shared_space": "no message has them; topic events says what a task waits for",
     "waiting": "no message has them; topic events says what a task waits for",
     "records": "a client has them from topic events on; older ones are in the journal",
     "wait": "topic status shows that a run has ended",

@@ -66,6 +66,7 @@ QUERIES = {
     "holders": "/api/resources",
     "unavailable": "/api/resources",
     "waiting": "/api/resources",
+    "shared_space": "/api/resources",
     "fleet": "/api/fleet",
     "catalogue": "/api/behaviors",
 }

@@ -158,6 +158,7 @@ async def test_a_vehicle_is_taken_and_given_back(world: MakeWorld) -> None:
         assert found == {
             "holders": {VEHICLE: "otto"},
             "waiting": [],
+            "shared_space": [],
             "unavailable": {VEHICLE: "with otto"},
         }
         again = await otto.http.post(f"{path}/take")

@@ -142,12 +142,29 @@ class WaitingTaskModel(BaseModel):
     holders: dict[str, str]
 
 
+class SpaceHolderModel(BaseModel):
+    """A vehicle that has a place in a shared space. `behavior`: "" if it stands there."""
+
+    vehicle: str
+    behavior: str
+    lost: bool
+
+
+class SharedSpaceModel(BaseModel):
+    """A shared space of the fleet file: `MissionControl.shared_space`."""
+
+    name: str
+    capacity: int
+    holders: list[SpaceHolderModel]
+
+
 class HoldersModel(BaseModel):
     """Who has each resource: an operator, a behavior ("r1.b3"), a request ("r1.a2"), or "" when it
     is free. `waiting`: the tasks that wait for some, in the order in which they are served."""
 
     holders: dict[str, str]
     waiting: list[WaitingTaskModel]
+    shared_space: list[SharedSpaceModel]
     unavailable: dict[str, str]
 
 
@@ -168,6 +185,10 @@ def resource_router(control: MissionControl) -> APIRouter:
             waiting=[
                 WaitingTaskModel.model_validate(each, from_attributes=True)
                 for each in await control.waiting()
+            ],
+            shared_space=[
+                SharedSpaceModel.model_validate(each, from_attributes=True)
+                for each in await control.shared_space()
             ],
             unavailable={str(each): why for each, why in (await control.unavailable()).items()},
         )
