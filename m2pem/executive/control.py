@@ -205,7 +205,7 @@ class Control:
                 "this executive starts no scheduled missions: `m2pem serve` is one that does"
             )
         supervisor.refuse_unattended()
-        now_us = supervisor.clock.now_us()
+        now_us, holds = supervisor.clock.now_us(), self._scheduler.holds
         when = resolved(when, now_us, host_time_zone())
         loaded, process_id = await asyncio.to_thread(supervisor.load, mission, process, given)
         named = resources_of_mission(loaded, supervisor.fleet)
@@ -223,7 +223,7 @@ class Control:
             priority,
             by,
         )
-        return await self._scheduler.schedule(plan, named)
+        return await self._scheduler.schedule(plan, named, holds)
 
     async def _refuse_unknown(self, when: When, named: Sequence[ResourceId]) -> None:
         """Check that the vehicles of a condition, and what it comes after, are there.

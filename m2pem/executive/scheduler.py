@@ -109,6 +109,8 @@ class Scheduler:
         self._lock = asyncio.Lock()
         self._wake = asyncio.Event()
         self._clocks_apart = False
+        self.holds = 0
+        """How often all was stopped or held."""
         self.served = False
 
     # --- life -----------------------------------------------------------------------------------
@@ -188,9 +190,19 @@ class Scheduler:
 
     # --- what operators do ----------------------------------------------------------------------
 
-    async def schedule(self, plan: SchedulePlan, resources: tuple[ResourceId, ...]) -> EntryId:
-        """Add an entry, of a mission that was checked and names `resources`."""
+    async def schedule(
+        self, plan: SchedulePlan, resources: tuple[ResourceId, ...], holds: int = 0
+    ) -> EntryId:
+        """Add an entry, of a mission that was checked and names `resources`.
+
+        `holds`: the property `holds` as it was when the operator asked.
+
+        Raises:
+            OperatorError: all was stopped or held since: what was asked for before does not count.
+        """
         async with self._lock:
+            if holds != self.holds:
+                raise OperatorError("all was stopped or held meanwhile; schedule it again")
             state = EntryState(plan.scheduled_us - 1 if not plan.when.cron else plan.scheduled_us)
             entry = await self._starter.journal.schedule(plan, state)
             self._add(entry)
@@ -225,6 +237,7 @@ class Scheduler:
 
     def hold_at_once(self, by: str, reason: str) -> Hold | None:
         """Hold the whole schedule, if it has anything; the journal follows with `written`."""
+        self.holds += 1
         if not self._active():
             return None
         self._hold = Hold(by, reason, self._starter.clock.now_us())
@@ -281,9 +294,12 @@ class Scheduler:
         """
         who = by or "an operator"
         if number is None:
-            if self._hold is None:
+            held = self._hold
+            if held is None:
                 raise OperatorError("the schedule is not held")
             await self._starter.journal.hold_schedule(self._starter.fleet.name, None)
+            if self._hold is not held:  # by a STOP that came meanwhile, and is written after this
+                raise OperatorError(f"not released: the schedule is {self._hold}")
             self._marks.remove(MARK)
             self._hold = None
             self._say(f"the schedule is released by {who}")
@@ -345,8 +361,6 @@ class Scheduler:
         try:
             await self._conditions.ask_journal(self._active())
             await self._judge_runs()
-        except StaleEntryError:
-            await self.load()
         except JournalError as error:
             log.warning("the schedule cannot be read or written: %s", error)
             return self._in(ASK_AGAIN_S)
@@ -404,11 +418,16 @@ class Scheduler:
                     continue
             elif hold is None:
                 continue
+            fields: dict[str, object] = {"judged_run": run}
             if entry.state.hold is None and hold is not None:
-                await self._change(entry, hold=hold, judged_run=run)
+                fields["hold"] = hold
+            try:
+                await self._change(entry, **fields)
+            except StaleEntryError:
+                await self._reload(entry.id)
+                continue
+            if "hold" in fields:
                 self._say(f"{entry.id} is {hold}; it starts nothing until it is released")
-            else:
-                await self._change(entry, judged_run=run)
             self._to_hold.pop(entry.id, None)
 
     def _rank(self, entry: ScheduleEntry) -> tuple[int, int, int]:

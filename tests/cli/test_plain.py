@@ -200,6 +200,28 @@ async def test_a_start_with_busy_vehicles_is_confirmed_by_another_command(
     assert operator.control.calls == [("start", "a b.bpmn", "even_if_busy")]
 
 
+async def test_missions_are_scheduled_held_released_and_cancelled(operator: Operator) -> None:
+    await operator.type(
+        "schedule free a b.bpmn",
+        "schedule 08:00 c.bpmn",
+        "schedule hold",
+        "schedule hold s1",
+        "schedule release",
+        "schedule cancel s1",
+        "schedule cancel",
+        "schedule 08:00",
+    )
+    assert operator.control.calls == [
+        ("schedule", "a b.bpmn", "when"),
+        ("schedule", "c.bpmn", "when"),
+        ("hold_schedule", None),
+        ("hold_schedule", "s1"),
+        ("release_schedule", None),
+        ("unschedule", "s1"),
+    ]
+    assert operator.screen.count("say what: schedule 08:00 FILE") == 2
+
+
 async def test_of_several_runs_one_is_named(operator: Operator) -> None:
     await operator.hear(RunStarted("P", 0))
     await operator.hear(RunStarted("P", 0), run="r2")

@@ -149,6 +149,11 @@ def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
     stopped = m2pem.run("stop", "--all", *JOURNAL)[1]
     assert "the schedule is held; `m2pem schedule release` lets it go on" in stopped
     server.kill()
+    words = "m2pem schedule cancel --journal journal.db "
+    completed = m2pem.run(
+        _M2PEM_COMPLETE="bash_complete", COMP_WORDS=words, COMP_CWORD=str(words.count(" "))
+    )[1]
+    assert completed.split() == ["plain,s3", "plain,s2", "plain,s1"]
     listed, note = m2pem.run("schedule", *JOURNAL)[1:]
     assert listed.startswith("the schedule is held by")
     assert "no executive serves this schedule now" in note

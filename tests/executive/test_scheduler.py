@@ -370,6 +370,44 @@ def test_stop_of_all_comes_before_a_start_that_is_under_way():
     assert list(after) == ["r2"]
 
 
+def test_what_was_asked_for_before_stop_of_all_is_not_scheduled_after_it():
+    async def story(world):
+        control = world.executive.control
+        asked = asyncio.create_task(world.schedule(drive("ugv1")))
+        await asyncio.sleep(0)  # it reads and checks the mission in a thread
+        await control.stop_all(by="bob")
+        with pytest.raises(OperatorError, match="all was stopped or held meanwhile"):
+            await asked
+        return (await control.scheduled()).entries
+
+    assert play(story) == ()
+
+
+def test_a_stop_that_comes_during_a_release_holds_the_schedule():
+    async def story(world):
+        control, journal = world.executive.control, world.journal
+        await world.schedule(drive("ugv1"), at=at(60))
+        await control.hold_schedule(by="bob")
+        write = journal.hold_schedule
+
+        async def slow(*args):
+            await write(*args)
+            await world.clock.sleep(1.0)
+
+        journal.hold_schedule = slow
+        releasing = asyncio.create_task(control.release_schedule(by="ada"))
+        await world.clock.sleep(0.5)
+        await control.stop_all(by="bob")
+        with pytest.raises(OperatorError, match="not released: the schedule is held by bob"):
+            await releasing
+        await world.at(100)
+        return await world.begun(), await journal.schedule_hold("test")
+
+    begun, hold = play(story)
+    assert begun == {}
+    assert str(hold) == "held by bob: STOP of all"
+
+
 def test_a_stopped_or_failed_run_holds_the_entry_that_would_start_it_again():
     async def story(world):
         await world.schedule(drive("ugv1"), cron="* * * * *", time_zone="UTC")
