@@ -59,6 +59,11 @@ class Choice(msgspec.Struct, frozen=True):
     together_with: tuple[str, ...] = ()
 
 
+def how_chosen(candidate: Candidate, name: "NameHolder") -> str:
+    """Say how a chosen resource came to the task: it was free, or was taken from a lower one."""
+    return f"taken from {name(candidate.held_by)}" if candidate.held_by else "chosen"
+
+
 NameHolder = Callable[[str], str]
 """Returns words for who holds a resource, given the id of a behavior or request, or a name."""
 
@@ -129,6 +134,8 @@ def _role_sentence(choice: Choice, role: str, name: NameHolder) -> str:
     verb = "is" if len(found.chosen) == 1 else "are"
     first = next((each for each in found.candidates if each.resource in found.chosen), None)
     reasons = [] if first is None or not first.travel_s else [f"{first.travel_s:.0f} s away"]
+    taken = [each for each in found.candidates if each.resource in found.chosen and each.held_by]
+    reasons += [f"{each.resource}: {how_chosen(each, name)}" for each in taken]
     others = found.others
     for each in others[:MAX_NAMED]:
         why = why_not(each, choice, role, name).removeprefix("excluded, ").removeprefix(NOT_MET)

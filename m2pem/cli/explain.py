@@ -323,7 +323,7 @@ class Explanation:
         return "\n".join([*parts, *(self._role_text(choice, name) for name in choice.roles)])
 
     def _role_text(self, choice: "Choice", name: str) -> str:
-        from m2pem.api.choices import why_not
+        from m2pem.api.choices import how_chosen, why_not
         from m2pem.cli.table import table
 
         role = choice.roles[name]
@@ -331,7 +331,7 @@ class Explanation:
             (
                 each.resource,
                 *_costs(each),
-                "chosen"
+                how_chosen(each, self.view.holder)
                 if each.resource in role.chosen
                 else why_not(each, choice, name, self.view.holder),
             )

@@ -16,6 +16,7 @@ from m2pem.engine.elements.activities import complete
 from m2pem.engine.elements.allocations import resources_chosen, resources_not_free
 from m2pem.engine.elements.behaviors import (
     behavior_missing,
+    behavior_preempted,
     behavior_reported,
     control_returned,
     control_taken,
@@ -262,6 +263,7 @@ def _remember_id(x: Steps, number: str) -> None:
 
 _DECIDERS: dict[type, Callable[[Steps, Any], None]] = {
     i.ResourceReturned: resource_returned,
+    i.BehaviorPreempted: behavior_preempted,
     i.ControlTaken: control_taken,
     i.ControlReturned: control_returned,
     i.StartRun: _start,

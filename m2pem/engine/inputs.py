@@ -224,6 +224,16 @@ class ResourceReturned(_Input, frozen=True):
     reason: str = ""
 
 
+class BehaviorPreempted(_Input, frozen=True):
+    """A task of another run with a greater priority gets a resource of a behavior. `by`: its
+    request."""
+
+    behavior: str
+    resource: str
+    by: str
+    reason: str = ""
+
+
 class ControlTaken(_Input, frozen=True):
     """An operator has acquired control of a vehicle or payload; `by` keeps it until
     `ControlReturned`."""
@@ -268,6 +278,7 @@ Input: TypeAlias = Union[
     MessageReceived,
     ResourceFault,
     ResourceReturned,
+    BehaviorPreempted,
     ControlTaken,
     ControlReturned,
     GeometrySet,

@@ -12,6 +12,7 @@ together with the resources.
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.assignment import Request, assign
@@ -25,11 +26,12 @@ from m2pem.api.control import Alert, RunId
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
 from m2pem.engine.elements.allocations import behavior_of
-from m2pem.engine.inputs import ResourcesChosen, ResourcesNotFree
+from m2pem.engine.inputs import BehaviorPreempted, ResourcesChosen, ResourcesNotFree
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus
 from m2pem.errors import ExpressionError
 from m2pem.executive.dispatcher import Geometries
 from m2pem.executive.fleet_connections import FleetArbiters
+from m2pem.executive.preemption import Holder, choose, preemptible, priority_of
 from m2pem.executive.runner import Runner
 from m2pem.executive.space_allocation import (
     SpaceAllocation,
@@ -43,7 +45,7 @@ from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior, BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.losses import TAKEN_OVER, UNAVAILABLE, may_return
+from m2pem.mission.losses import PREEMPTED, TAKEN_OVER, UNAVAILABLE, may_return
 
 if TYPE_CHECKING:
     from m2pem.deconfliction.conflicts import Refusal
@@ -62,11 +64,22 @@ _MAY_FREE = (r.RunResumed, r.ResourceReturned, r.OperatorGaveControlBack)
 @dataclass(slots=True)
 class _Asked:
     """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what
-    its run knows that it lacks, without the values of telemetry, which change all the time."""
+    its run knows that it lacks, without the values of telemetry, which change all the time.
+    `preempts`: what is taken from other runs for it, and given when their behaviors have ended."""
 
     runner: Runner
     chosen: bool = False
     lacks: object = None
+    preempts: "_Preempting | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Preempting:
+    """What was chosen for a request, and the behaviors that have to end first."""
+
+    answer: ResourcesChosen
+    resources: tuple[ResourceId, ...]
+    behaviors: frozenset[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +94,7 @@ class _Considered:
     @property
     def priority(self) -> int:
         """The greatest priority of its roles."""
-        needs = (each.role.need for each in self.roles)
-        return max((need.priority for need in needs if need is not None), default=0)
+        return priority_of(each.role for each in self.roles)
 
     @property
     def waits(self) -> bool:
@@ -135,7 +147,7 @@ class Allocator:
         """
         asked = self._asked.setdefault(allocation, _Asked(runner))
         if again and asked.chosen:
-            asked.chosen = False
+            asked.chosen, asked.preempts = False, None
             self._release(allocation)
         self._decide_soon()
 
@@ -152,12 +164,14 @@ class Allocator:
     def on_records(self, run: RunId, records: Sequence[r.Record]) -> None:
         """Hand what is held for a request to the behavior that was requested for it."""
         for record in records:
-            if isinstance(record, r.BehaviorRequested) and record.allocation:
+            if isinstance(record, r.BehaviorRequested):
                 if self._asked.pop(record.allocation, None) is not None:
                     self._availability.hand_on(record.allocation, record.behavior)
                     if self._space is not None:
                         self._space.hand_on(record.allocation, record.behavior)
                         self.resources_changed()
+                if self._arbiters.fleet.preemption:
+                    self.resources_changed()  # what it has may be taken for a task that waits
             elif isinstance(record, _MAY_FREE):
                 self._decide_soon()
 
@@ -171,7 +185,7 @@ class Allocator:
 
     def resources_changed(self) -> None:
         """Look again at what waits: a resource is free, or is not available any more."""
-        if any(not each.chosen for each in self._asked.values()):
+        if any(not each.chosen or each.preempts for each in self._asked.values()):
             self._decide_soon()
 
     def on_telemetry(self) -> None:
@@ -206,6 +220,7 @@ class Allocator:
         if self._space is not None and self._asked and self._space.awaits_positions():
             self._look_after(LOOK_AGAIN_US // 5)
             return
+        self._give_preempted()
         evaluator = RoleEvaluator(
             Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
         )
@@ -239,9 +254,10 @@ class Allocator:
                     blocker.behavior in chosen for blocker in refusal.blockers
                 ):  # else it is said when those behaviors are requested, by their names
                     self._refuse_space(each, refusal)
-            else:
-                self._refuse(each, given, evaluator)
         left = [each for each in waiting if each.request.id not in chosen]
+        lacking = [each for each in left if each.request.id not in refusals]
+        for each in self._preempt(lacking, set(given)):
+            self._refuse(each, given, evaluator)
         self._tell_of_circles(left, refusals)
 
     def _assign(
@@ -396,16 +412,24 @@ class Allocator:
         together_with: Sequence[str],
         without_space: Mapping[ResourceId, "Refusal"],
     ) -> None:
+        answer, _ = self._hold_for(each, chosen, together_with, without_space)
+        each.asked.runner.post(answer)
+
+    def _hold_for(
+        self,
+        each: _Considered,
+        chosen: Mapping[str, tuple[ResourceId, ...]],
+        together_with: Sequence[str] = (),
+        without_space: Mapping[ResourceId, "Refusal"] = MappingProxyType({}),
+    ) -> tuple[ResourcesChosen, tuple[ResourceId, ...]]:
+        """Hold what was chosen for a request; return the answer to it, and the resources."""
         roles = self._filled(each, chosen)
-        considered = [_excluding(role, without_space) for role in each.roles]
-        resources = [resource for ids in roles.values() for resource in ids]
+        resources = tuple(resource for ids in roles.values() for resource in ids)
         each.asked.chosen = True
         self._availability.adopt(resources, each.request.id)
-        each.asked.runner.post(
-            ResourcesChosen(
-                each.request.id, dict(roles), what_was_considered(considered, roles, together_with)
-            )
-        )
+        seen = [_excluding(role, without_space) for role in each.roles]
+        considered = what_was_considered(seen, roles, together_with)
+        return ResourcesChosen(each.request.id, dict(roles), considered), resources
 
     def _filled(
         self, each: _Considered, chosen: Mapping[str, tuple[ResourceId, ...]]
@@ -451,6 +475,78 @@ class Allocator:
         each.asked.lacks = lacks
         code = "" if waits else UNAVAILABLE
         each.asked.runner.post(ResourcesNotFree(each.request.id, why, holders, code))
+
+    # --- preemption -------------------------------------------------------------------------------
+
+    def _preempt(self, left: Sequence[_Considered], given: set[ResourceId]) -> list[_Considered]:
+        """Take resources from other runs for requests that get none. Returns the requests for which
+        that is not possible.
+
+        `given`: what others were given at the same moment.
+        """
+        if not self._arbiters.fleet.preemption:
+            return list(left)
+        without: list[_Considered] = []
+        behaviors = preemptible(self._runners.values(), self._latest)
+        kept = set(given)
+        for each in left:
+            holders = {
+                resource: holder
+                for holder in behaviors
+                if holder.runner is not each.asked.runner and holder.priority < each.priority
+                for resource in holder.resources
+                if self._availability.holder(resource) in (None, holder.behavior.id)
+            }
+            chosen = choose(each.request.id, each.roles, holders, kept, self._order)
+            taken = [e for ids in (chosen or {}).values() for e in ids if e in holders]
+            if chosen is None or not taken:
+                kept.update(able for role in each.roles for able in role.options.costs_s)
+                without.append(each)
+                continue
+            answer, resources = self._hold_for(each, chosen)
+            kept.update(resources)
+            self._take(each, {resource: holders[resource] for resource in taken})
+            victims = frozenset(holders[resource].behavior.id for resource in taken)
+            each.asked.preempts = _Preempting(answer, resources, victims)
+        return without
+
+    def _take(self, each: _Considered, taken: Mapping[ResourceId, Holder]) -> None:
+        """End the behaviors that have what a request gets, and tell the operators of both runs."""
+        names = ", ".join(f"{name} is taken from {holder.label}" for name, holder in taken.items())
+        has = {str(resource): holder.behavior.id for resource, holder in taken.items()}
+        reason = f"{names}, whose priority is lower and which ends first"
+        each.asked.lacks = None
+        each.asked.runner.post(ResourcesNotFree(each.request.id, reason, has))
+        ending: set[str] = set()
+        for resource, holder in taken.items():
+            behavior = holder.behavior.id
+            if behavior in ending or holder.behavior.phase is not BehaviorPhase.ACTIVE:
+                continue  # it ends already
+            ending.add(behavior)
+            reason = (
+                f"{resource} goes to {each.request.token.node.label} of {each.asked.runner.id}, "
+                f"whose priority {each.priority} is greater than {holder.priority}"
+            )
+            holder.runner.post(BehaviorPreempted(behavior, resource, each.request.id, reason))
+            text = f"{holder.task} is preempted: {reason}"
+            self._publish(Alert(holder.runner.id, PREEMPTED, text))
+
+    def _give_preempted(self) -> None:
+        """Give requests what was taken for them if the behaviors that had it have ended."""
+        for allocation, asked in self._asked.items():
+            preempts = asked.preempts
+            if preempts is None:
+                continue
+            ended = not any(map(self._availability.is_held, preempts.behaviors))
+            gone = any(self._availability.reason(each) for each in preempts.resources)
+            if gone or (ended and self._space is not None):
+                # Lost, or taken by an operator, meanwhile; or it has to have space, too: it is
+                # chosen again, among all that asks.
+                asked.chosen, asked.preempts = False, None
+                self._release(allocation)
+            elif ended:
+                asked.preempts = None
+                asked.runner.post(preempts.answer)
 
     # --- circles of waiting -----------------------------------------------------------------------
 

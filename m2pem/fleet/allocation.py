@@ -134,6 +134,10 @@ class Availability:
         holders = self._holders.get(resource)
         return holders[-1] if holders else None
 
+    def is_held(self, behavior: str) -> bool:
+        """Whether a behavior has not ended, even if what it held has passed on to another one."""
+        return any(behavior in holders for holders in self._holders.values())
+
     def held_by(self, behavior: str) -> tuple[ResourceId, ...]:
         """What a behavior holds."""
         return tuple(r for r, holders in self._holders.items() if holders[-1] == behavior)

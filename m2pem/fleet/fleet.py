@@ -126,7 +126,8 @@ class Fleet:
     new to a run, count as when vehicles are chosen for roles. `on_error`: what an error does that
     no event of the mission catches, where the mission does not say. `unattended`: scheduled
     missions may start real vehicles with no operator present; `start_warning_s`: how long before a
-    start operators are warned of it.
+    start operators are warned of it. `preemption`: whether a task may take vehicles from tasks of
+    other runs with a lower priority.
     """
 
     name: str
@@ -152,6 +153,7 @@ class Fleet:
     on_error: ErrorPolicy = ErrorPolicy.END
     unattended: bool = False
     start_warning_s: float = 10.0
+    preemption: bool = False
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -230,6 +230,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         on_error=ErrorPolicy(model.on_error),
         unattended=later.unattended,
         start_warning_s=later.warning,
+        preemption=costs.preemption,
     )
 
 

@@ -236,6 +236,10 @@ class AllocationModel(_Model):
         DurationOrZero,
         Field(description="Travel time that a vehicle which is new to the run counts as."),
     ] = 10.0
+    preemption: Annotated[
+        bool,
+        Field(description="Whether a task takes vehicles from other runs with a lower priority."),
+    ] = False
 
 
 class ScheduleModel(_Model):

@@ -11,6 +11,7 @@ from m2pem.mission.catalogue import BehaviorState
 LINK_LOST = "LINK_LOST"
 BATTERY_LOW = "BATTERY_LOW"
 TAKEN_OVER = "TAKEN_OVER"
+PREEMPTED = "PREEMPTED"
 FAILED = "FAILED"
 REJECTED = "REJECTED"
 UNAVAILABLE = "RESOURCE_UNAVAILABLE"
@@ -19,6 +20,7 @@ LOSSES = {
     LINK_LOST: "the link is lost, or its arbiter knows the behavior no more",
     BATTERY_LOW: "the battery is low, or will be too low for the rest",
     TAKEN_OVER: "an operator, or a pilot, has taken it",
+    PREEMPTED: "a task of another run with a greater priority has taken it",
     REJECTED: "it refuses the behavior, or its airspace is refused",
     UNAVAILABLE: "it was lost or taken before the behavior began",
     FAILED: "of a payload: it has failed",
@@ -42,15 +44,15 @@ def is_loss(kind: BehaviorType, state: BehaviorState | None, code: str) -> bool:
     all vehicles."""
     if code == FAILED and kind is BehaviorType.PAYLOAD:
         return True
-    return state in _STATES or code in (LINK_LOST, BATTERY_LOW, TAKEN_OVER)
+    return state in _STATES or code in (LINK_LOST, BATTERY_LOW, TAKEN_OVER, PREEMPTED)
 
 
 def is_excluded(code: str) -> bool:
     """Whether a task does not get what it lost again. Of what is only not free now, the fleet's
     availability says when it is."""
-    return code != UNAVAILABLE
+    return code not in (UNAVAILABLE, PREEMPTED)
 
 
 def may_return(code: str) -> bool:
     """Whether what was lost may do the rest later: one that failed or refused it will not."""
-    return code in (LINK_LOST, BATTERY_LOW, TAKEN_OVER, UNAVAILABLE)
+    return code in (LINK_LOST, BATTERY_LOW, TAKEN_OVER, PREEMPTED, UNAVAILABLE)

@@ -132,9 +132,8 @@ def play() -> Callable[..., Any]:
             seen: list[Record] = []
             journal = options.pop("journal", None) or MemoryJournal()
             options.setdefault("watch_links", False)
-            executive = Executive(
-                fleet(*vehicles), journal, FakePlugins(fakes, seen), clock, **options
-            )
+            given = options.pop("fleet", None) or fleet(*vehicles)
+            executive = Executive(given, journal, FakePlugins(fakes, seen), clock, **options)
             async with executive:
                 fake = fakes.made[0] if fakes.made else None
                 return await story(World(clock, executive, fake, journal, seen))

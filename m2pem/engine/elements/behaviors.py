@@ -38,7 +38,7 @@ from m2pem.mission.behavior import OnLoss
 from m2pem.mission.catalogue import BehaviorState, ResumePolicy
 from m2pem.mission.elements import Event
 from m2pem.mission.expression import Expression
-from m2pem.mission.losses import BATTERY_LOW, TAKEN_OVER, UNAVAILABLE
+from m2pem.mission.losses import BATTERY_LOW, PREEMPTED, TAKEN_OVER, UNAVAILABLE
 from m2pem.mission.timers import duration_us
 from m2pem.mission.values import Value
 from m2pem.units import Dimension, UnitError, quantity
@@ -321,6 +321,15 @@ def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str, reso
         x.emit(r.PromptWithdrawn(token.prompt))
     x.emit(r.BehaviorCancelRequested(behavior.id, code, reason))
     end_work(x, token, behavior, code, reason, (resource,))
+
+
+def behavior_preempted(x: Execution, item: i.BehaviorPreempted) -> None:
+    """End a behavior with PREEMPTED: a task with a greater priority gets one of its resources."""
+    behavior = x.state.behaviors.get(item.behavior)
+    if behavior is None or behavior.phase is not BehaviorPhase.ACTIVE:
+        x.ignore(f"{item.behavior} is not active: {item.by} need not take {item.resource} from it")
+        return
+    fail_behavior(x, behavior, PREEMPTED, item.reason, item.resource)
 
 
 def resource_returned(x: Execution, item: i.ResourceReturned) -> None:

@@ -432,6 +432,7 @@ export const strings = {
         ROUTE_BLOCKED: "the route is blocked",
         RESOURCE_UNAVAILABLE: "it is in use",
         TAKEN_OVER: "an operator took over",
+        PREEMPTED: "another mission with a greater priority took it",
         PROMPT_TIMEOUT: "no operator answered",
         EXPRESSION: "an expression failed",
         NO_FLOW: "no condition was true",
