@@ -82,7 +82,7 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else round(value, DIGITS)
 
 
-def reason(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, str]) -> str:
+def reason(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, Occupancy]) -> str:
     """Say why a task has no resources now, role by role.
 
     `given`: resources that were given to other requests at the same moment, and to which.
@@ -92,7 +92,7 @@ def reason(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, str]) -> 
     return "; ".join(missing or ["what is free is kept for tasks that asked before"])
 
 
-def _why(considered: ConsideredRole, given: Mapping[ResourceId, str]) -> str:
+def _why(considered: ConsideredRole, given: Mapping[ResourceId, Occupancy]) -> str:
     options = considered.options
     free = [each for each in options.costs_s if each not in given]
     if len(free) >= options.least:
@@ -114,11 +114,13 @@ MAX_NAMED = 6
 
 
 def _state(
-    considered: ConsideredRole, resource: ResourceId, given: Mapping[ResourceId, str]
+    considered: ConsideredRole, resource: ResourceId, given: Mapping[ResourceId, Occupancy]
 ) -> str:
     if resource in considered.excluded:
         return f"is excluded ({considered.excluded[resource]})"
-    occupancy = considered.occupied.get(resource, Occupancy(given.get(resource, "")))
+    held = given.get(resource, Occupancy())
+    occupancy = considered.occupied.get(resource, held)
     if occupancy.withdrawn:
         return f"is unavailable ({occupancy.withdrawn})"
-    return f"is held by {occupancy.holder}" if occupancy.holder else "is free"
+    holder = occupancy.label or occupancy.holder
+    return f"is held by {holder}" if holder else "is free"

@@ -33,10 +33,11 @@ _OF_PLACE = frozenset({"vehicle.distance", "vehicle.travel_time"})
 @dataclass(frozen=True, slots=True)
 class Occupancy:
     """Why a resource is not free. `holder`: who has it now; `withdrawn`: why no mission gets it
-    (it is lost, or with an operator)."""
+    (it is lost, or with an operator). `label`: the holder in words; "": its id says it."""
 
     holder: str = ""
     withdrawn: str = ""
+    label: str = ""
 
 
 @dataclass(frozen=True, slots=True)

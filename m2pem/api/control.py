@@ -504,6 +504,12 @@ class MissionControl(Protocol):
         """
         ...
 
+    async def holder_labels(self) -> Mapping[str, str]:
+        """The task and run of each behavior and request that has a resource, in words, by its id:
+        "Survey of r1". Operators are not among them.
+        """
+        ...
+
     async def unavailable(self) -> Mapping[ResourceId, str]:
         """Why missions get some resources not now: manned, with an operator, lost, or returned and
         not stopped yet. "returned: held": it was lost, is free again, and has done nothing since.

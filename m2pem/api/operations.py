@@ -279,6 +279,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("holders", Nothing, dict[ResourceId, str]),
         Operation("missions", Nothing, list[str], alone=True),
         Operation("preview_start", Check, StartPreview, alone=True),
+        Operation("holder_labels", Nothing, dict[str, str]),
         Operation("unavailable", Nothing, dict[ResourceId, str]),
         Operation("waiting", Nothing, list[WaitingTask]),
         Operation("shared_space", Nothing, list[SharedSpaceState]),

@@ -161,7 +161,8 @@ def _as_text(arbiters: "FleetArbiters") -> str:
 @dataclass(frozen=True, slots=True)
 class Holding:
     """What an executive says of its fleet. `holders`: by resource, "" if it is free. `unavailable`:
-    why missions do not get some, or that one has returned and is held."""
+    why missions do not get some, or that one has returned and is held. `labels`: the task and run
+    of each holder, by its id."""
 
     executive: str
     fleet: str
@@ -169,6 +170,7 @@ class Holding:
     waiting: "Sequence[WaitingTask]"
     shared_space: "Sequence[SharedSpaceState]"
     unavailable: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     def as_text(self) -> str:
         """Return it as text."""
@@ -203,6 +205,8 @@ class Holding:
 
     def _state(self, name: str, holder: str) -> str:
         why = self.unavailable.get(name, "")
+        if label := self.labels.get(holder):
+            holder = f"{label} ({holder})"
         if holder and why and not why.startswith("with "):
             return f"{holder} ({why})"
         return holder or why or "free"
@@ -224,6 +228,7 @@ def _show_running(journal: str | None, output: str) -> None:
             msgspec.convert(ask(socket, "waiting"), list[WaitingTask]),
             msgspec.convert(ask(socket, "shared_space"), list[SharedSpaceState]),
             ask(socket, "unavailable"),
+            ask(socket, "holder_labels"),
         )
         for socket in executives(journal_file(journal))
     ]

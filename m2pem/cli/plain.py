@@ -385,7 +385,10 @@ class PlainOcu:
 
     async def _who(self, _: list[str]) -> None:
         unavailable = await self._control.unavailable()
+        labels = await self._control.holder_labels()
         for resource, holder in (await self._control.holders()).items():
+            if label := labels.get(holder):
+                holder = f"{label} ({holder})"  # noqa: PLW2901
             self._say(f"{resource}: {holder or unavailable.get(resource) or 'free'}")
         for space in await self._control.shared_space():
             self._say(str(space))

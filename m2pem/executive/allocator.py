@@ -10,6 +10,7 @@ together with the resources.
 """
 
 import asyncio
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -39,6 +40,7 @@ from m2pem.executive.space_allocation import (
     space_circle_text,
     space_circles,
 )
+from m2pem.executive.waiting_tasks import holder_label
 from m2pem.fleet.allocation import Availability, resources_of
 from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.parameters import ParameterError, resolve
@@ -52,6 +54,8 @@ if TYPE_CHECKING:
 
 REJECTED = "REJECTED"
 """The error of a task whose behavior another vehicle is in the way of, and which does not wait."""
+
+log = logging.getLogger("m2pem.executive")
 
 LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
@@ -217,6 +221,15 @@ class Allocator:
     def _decide(self) -> None:
         self._scheduled = False
         self._looked_us = self._clock.now_us()
+        try:
+            self._decide_all()
+        except Exception as error:  # a bug in m2pem: what waits would wait for ever
+            log.exception("the choice of resources: a bug in m2pem")
+            for asked in self._asked.values():
+                if not asked.chosen or asked.preempts:
+                    asked.runner.fail(error)
+
+    def _decide_all(self) -> None:
         if self._space is not None and self._asked and self._space.awaits_positions():
             self._look_after(LOOK_AGAIN_US // 5)
             return
@@ -238,7 +251,7 @@ class Allocator:
         }
         served = [each.request.id for each in waiting if each.request.id in chosen]
         given = {
-            resource: request
+            resource: Occupancy(request, label=self._label(request))
             for request, roles in chosen.items()
             for ids in roles.values()
             for resource in ids
@@ -324,11 +337,15 @@ class Allocator:
             request = state.allocations.get(allocation)
             if asked.chosen or request is None or state.status is not RunStatus.RUNNING:
                 continue
-            task = self._task(evaluator, asked.runner, request, occupied)
             try:
+                task = self._task(evaluator, asked.runner, request, occupied)
                 roles = tuple(evaluator.role(role, task) for role in task.behavior.roles)
             except ExpressionError as error:
                 asked.runner.post(ResourcesNotFree(allocation, str(error), code="EXPRESSION"))
+                continue
+            except Exception as error:
+                log.exception("%s: a bug in m2pem", allocation)
+                asked.runner.fail(error)
                 continue
             found.append(_Considered(asked, request, task, roles))
         return found
@@ -371,8 +388,13 @@ class Allocator:
             if withdrawn := self._availability.reason(resource):
                 found[resource] = Occupancy(withdrawn=withdrawn)
             elif holder := self._availability.holder(resource) or requested.get(resource):
-                found[resource] = Occupancy(holder)
+                found[resource] = Occupancy(holder, label=self._label(holder))
         return found
+
+    def _label(self, holder: str) -> str:
+        """Return words for a behavior or request; "" if it is not known."""
+        label = holder_label(self._runners, holder)
+        return f"{label} ({holder})" if label else ""
 
     def _place(
         self, candidates: Candidates, run: RunId, behavior: Behavior, request: AllocationRequest
@@ -459,13 +481,13 @@ class Allocator:
         )
 
     def _refuse(
-        self, each: _Considered, given: Mapping[ResourceId, str], evaluator: RoleEvaluator
+        self, each: _Considered, given: Mapping[ResourceId, Occupancy], evaluator: RoleEvaluator
     ) -> None:
         holders = {
             str(resource): holder
             for role in each.roles
             for resource in (*role.options.busy, *role.options.costs_s)
-            if (holder := _holder(role, resource) or given.get(resource, ""))
+            if (holder := _holder(role, resource) or given.get(resource, Occupancy()).holder)
         }
         why = reason(each.roles, given)
         lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])

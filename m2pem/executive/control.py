@@ -55,7 +55,7 @@ from m2pem.executive.scheduled_start import vehicles_of
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
-from m2pem.executive.waiting_tasks import waiting_tasks
+from m2pem.executive.waiting_tasks import holder_label, waiting_tasks
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import resources_of, resources_of_mission, roles_of_mission
 from m2pem.fleet.fleet import Fleet
@@ -366,6 +366,13 @@ class Control:
     async def holders(self) -> Mapping[ResourceId, str]:
         """Who has each resource."""
         return self._supervisor.handover.holders()
+
+    async def holder_labels(self) -> Mapping[str, str]:
+        """The task and run of each behavior and request that has a resource, by its id."""
+        supervisor = self._supervisor
+        holders = supervisor.handover.holders().values()
+        labels = {holder: holder_label(supervisor.runners, holder) for holder in holders}
+        return {holder: label for holder, label in labels.items() if label}
 
     async def unavailable(self) -> Mapping[ResourceId, str]:
         """Why missions get some resources not now, by resource; see `MissionControl`."""

@@ -112,6 +112,7 @@ class Runner:
         self.id: RunId = run.state.run
         self.epoch = epoch
         self.failure: M2pemError | None = None
+        self._broken: Exception | None = None
         self.prompts: dict[str, OpenPrompt] = {}
         self._context = context
         self._steps_between_waits = steps_between_waits
@@ -179,6 +180,11 @@ class Runner:
         self._held_at_once |= held
         return self.submit(item)
 
+    def fail(self, error: Exception) -> None:
+        """Hold what the run commands and end its task, as after an exception of the engine."""
+        self._broken = error
+        self._wake.set()
+
     # --- the loop -------------------------------------------------------------------------------
 
     async def drive(self) -> None:
@@ -217,6 +223,8 @@ class Runner:
         Waits when there is none.
         """
         while True:
+            if self._broken is not None:
+                raise self._broken
             if why := self._exceeds_limit():
                 return [GiveUp(why)]
             if self._inbox:

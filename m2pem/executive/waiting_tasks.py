@@ -1,8 +1,9 @@
-"""Which tasks of all runs wait for vehicles and payloads, in the order in which they are served."""
+"""Which tasks of all runs wait for vehicles and payloads, in the order in which they are served,
+and which task has what they wait for."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
-from m2pem.api.control import WaitingTask
+from m2pem.api.control import RunId, WaitingTask
 from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.state import AllocationRequest, RunState
 from m2pem.executive.runner import Runner
@@ -22,6 +23,20 @@ def waiting_tasks(runners: Iterable[Runner], now_us: int) -> list[WaitingTask]:
     ]
     requests.sort(key=lambda found: (-_priority(found[1]), found[1].at_us, found[1].id))
     return [_task(state, request, now_us) for state, request in requests]
+
+
+def holder_label(runners: Mapping[RunId, Runner], holder: str) -> str:
+    """Return the task and run of a behavior or request, in words; "" if it is not known."""
+    run = RunId(holder.partition(".")[0])
+    runner = runners.get(run)
+    if runner is None:
+        return ""
+    state = runner.run.state
+    if (behavior := state.behaviors.get(holder)) is not None:
+        return f"{state.mission.elements[behavior.element].label} of {run}"
+    if (request := state.allocations.get(holder)) is not None:
+        return f"{request.token.node.label} of {run}"
+    return ""
 
 
 def _priority(request: AllocationRequest) -> int:

@@ -166,7 +166,7 @@ def test_a_task_that_waits_says_for_what_and_who_has_it(
     waiting.kill()
     status, out, _ = m2pem.run("explain", "r1", "Wait")
     assert status == 0
-    assert ": waits for role 'scout': uav1 is held by r1.b1\n" in out
+    assert ": waits for role 'scout': uav1 is held by Far it of r1 (r1.b1)\n" in out
     assert "the last record, and until 600.0 s at the latest\n" in out
     assert out.endswith("RESOURCE  HELD BY\nuav1      goto of Far it (r1.b1)\n")
     found = json.loads(m2pem.run("explain", "r1", "Wait", "--format", "json")[1])
@@ -176,7 +176,8 @@ def test_a_task_that_waits_says_for_what_and_who_has_it(
         ("Wait", {"uav1": "r1.b1"})
     ]
     out = m2pem.run("replay", "r1", "--state")[1]
-    assert re.search(r"^Wait it +waits for role 'scout': uav1 is held by r1.b1$", out, re.M)
+    waits = r"^Wait it +waits for role 'scout': uav1 is held by Far it of r1 \(r1.b1\)$"
+    assert re.search(waits, out, re.M)
 
 
 def test_the_fleet_of_a_running_executive_has_holders_and_the_tasks_that_wait(
@@ -192,7 +193,7 @@ def test_the_fleet_of_a_running_executive_has_holders_and_the_tasks_that_wait(
     assert task_["holders"] == {"uav1": "r1.b1"}
     assert 0 < task_["left_s"] <= 600.0
     out = m2pem.run("fleet", "--running")[1]
-    assert re.search(r"^uav1 +r1\.b1$", out, re.M)
+    assert re.search(r"^uav1 +Far it of r1 \(r1\.b1\)$", out, re.M)
     assert re.search(r"^uav2 +free$", out, re.M)
     assert re.search(r"^r1 +Wait it +\d+ s +\d+ s +2 +role 'scout': uav1 is held by", out, re.M)
     waiting.kill()

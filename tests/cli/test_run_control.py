@@ -41,6 +41,7 @@ OTHERWISE = {
     "preview_take": "takeover in m2pem attach",
     "give_back": "handback in m2pem attach",
     "holders": "m2pem fleet --running, and who in m2pem attach",
+    "holder_labels": "m2pem fleet --running, and who in m2pem attach",
     "unavailable": "m2pem fleet --running, and who in m2pem attach",
     "shared_space": "m2pem fleet --running, and who in m2pem attach",
     "waiting": "m2pem fleet --running, and who in m2pem attach",

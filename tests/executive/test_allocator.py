@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from m2pem.api.control import Alert, RunStatus
+from m2pem.api.control import LOGGED, Alert, RunStatus
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import Input, StartRun
@@ -16,6 +16,7 @@ from m2pem.engine.records import (
     ResourcesAllocated,
 )
 from m2pem.engine.run import MissionRun
+from m2pem.errors import InternalError
 from m2pem.fleet.fleet import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
@@ -121,7 +122,7 @@ def test_a_task_that_does_not_wait_fails_with_what_is_in_its_way(play):
     summary, (error,) = play(story, "ugv1")
     assert summary.status is RunStatus.FAILED
     assert error.code == "RESOURCE_UNAVAILABLE"
-    assert error.reason == "role 'driver': ugv1 is held by r1.a1"
+    assert error.reason == "role 'driver': ugv1 is held by A of r1 (r1.a1)"
 
 
 @pytest.mark.parametrize("role", ["vehicle='ugv1'", "requires='true'"])
@@ -185,7 +186,7 @@ def test_a_wait_ends_when_its_time_is_up(play):
     assert summary.status is RunStatus.FAILED
     assert waited_s == 30
     assert ended.code == "RESOURCE_UNAVAILABLE"
-    assert "ugv1 is held by r1.b1" in ended.reason
+    assert "ugv1 is held by Go of r1 (r1.b1)" in ended.reason
 
 
 def test_a_stopped_run_leaves_the_queue(play):
@@ -389,3 +390,38 @@ def test_runs_that_wait_for_each_other_are_told_and_one_can_be_stopped(play):
     assert "`m2pem stop r2`" in alerts[0].text
     assert took_us < 1_000_000
     assert status is RunStatus.TERMINATED
+
+
+def broken(*_: object, **__: object) -> None:
+    raise ZeroDivisionError("a bug")
+
+
+@pytest.mark.parametrize(
+    "where", ["m2pem.executive.allocator.assign", "m2pem.executive.allocator.RoleEvaluator.role"]
+)
+def test_an_exception_while_choosing_holds_the_runs_that_ask_and_tells_operators(
+    play, monkeypatch, where
+):
+    async def story(world: World):
+        control = world.executive.control
+        events = control.subscribe()
+        other = await control.start(one("vehicle='ugv2'"))
+        await world.fake.until_called("start", f"{other}.b1")
+        waits = await control.start(both("vehicle='ugv1'", "requires='true' wait='unlimited'"))
+        await world.fake.until_called("start", f"{waits}.b1")
+        await world.fake.until_called("hold", "ugv1")
+        alert = None
+        while not isinstance(alert, Alert) or alert.code == LOGGED:
+            alert = await anext(events)
+        world.fake.report(f"{other}.b1", SUCCEEDED)
+        status = (await control.wait(other)).status
+        with pytest.raises(InternalError, match="ZeroDivisionError: a bug"):
+            await control.wait(waits)
+        return alert, status, world.fake.count("hold", "ugv2")
+
+    monkeypatch.setattr(where, broken)
+    alert, status, held = play(story, "ugv1", "ugv2")
+    assert (alert.run, alert.code) == ("r2", "RUN_HELD")
+    assert "ZeroDivisionError: a bug. Commanded to hold: ugv1" in alert.text
+    assert status is RunStatus.COMPLETED
+    assert held == 0

@@ -69,6 +69,7 @@ NOT_SERVED = {
     "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",
     "holders": "no message has them; a refused take_vehicle names the holder",
+    "holder_labels": "no message has them; topic events says what each task has",
     "unavailable": "no message has it; diagnostics say why a vehicle is not ready",
     "shared_space": "no message has them; topic events says what a task waits for",
     "waiting": "no message has them; topic events says what a task waits for",

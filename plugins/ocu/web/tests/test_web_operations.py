@@ -64,6 +64,7 @@ QUERIES = {
     "mission_time_s": "/api/runs/{run}",
     "prompts": "/api/prompts",
     "holders": "/api/resources",
+    "holder_labels": "/api/resources",
     "unavailable": "/api/resources",
     "waiting": "/api/resources",
     "shared_space": "/api/resources",

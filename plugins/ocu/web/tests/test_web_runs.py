@@ -157,6 +157,7 @@ async def test_a_vehicle_is_taken_and_given_back(world: MakeWorld) -> None:
         found = (await otto.http.get("/api/resources")).json()
         assert found == {
             "holders": {VEHICLE: "otto"},
+            "labels": {},
             "waiting": [],
             "shared_space": [],
             "unavailable": {VEHICLE: "with otto"},

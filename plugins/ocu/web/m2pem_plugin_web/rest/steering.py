@@ -160,9 +160,11 @@ class SharedSpaceModel(BaseModel):
 
 class HoldersModel(BaseModel):
     """Who has each resource: an operator, a behavior ("r1.b3"), a request ("r1.a2"), or "" when it
-    is free. `waiting`: the tasks that wait for some, in the order in which they are served."""
+    is free. `labels`: the task and run of each behavior and request, by its id. `waiting`: the
+    tasks that wait for some, in the order in which they are served."""
 
     holders: dict[str, str]
+    labels: dict[str, str]
     waiting: list[WaitingTaskModel]
     shared_space: list[SharedSpaceModel]
     unavailable: dict[str, str]
@@ -182,6 +184,7 @@ def resource_router(control: MissionControl) -> APIRouter:
         found = await control.holders()
         return HoldersModel(
             holders={str(each): who for each, who in found.items()},
+            labels=dict(await control.holder_labels()),
             waiting=[
                 WaitingTaskModel.model_validate(each, from_attributes=True)
                 for each in await control.waiting()
