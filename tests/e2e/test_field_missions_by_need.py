@@ -1,0 +1,57 @@
+"""Vignettes of the paper with roles by need: they end as those that name their vehicles do."""
+
+from pathlib import Path
+
+import pytest
+
+from m2pem import rehearse, verify
+from m2pem.engine.records import BehaviorRequested, TokenEntered
+from m2pem.scripting.run_result import RunResult
+
+REPOSITORY = Path(__file__).parents[2]
+MISSIONS = REPOSITORY / "missions"
+FLEETS = {"vignette1": "vignette1.yaml", "mehds_vignette_2": "mehds.yaml"}
+
+ANSWERS = [
+    (name, path)
+    for name in FLEETS
+    for path in sorted((MISSIONS / "answers").glob(f"{name}_*.yaml"))
+    if not path.stem.endswith("_live")
+]
+
+
+def fleet(name: str) -> Path:
+    return REPOSITORY / "fleet_configs" / FLEETS[name]
+
+
+def commanded(result: RunResult) -> list[tuple[str, str, tuple[str, ...]]]:
+    return sorted(
+        (each.element, each.name, tuple(sorted(each.resources)))
+        for each in (stamped.record for stamped in result.records)
+        if isinstance(each, BehaviorRequested)
+    )
+
+
+def ends(result: RunResult) -> list[str]:
+    entered = (each.record for each in result.records)
+    return [e.element for e in entered if isinstance(e, TokenEntered) and "End" in e.element]
+
+
+@pytest.mark.parametrize(("name", "answers"), ANSWERS, ids=[path.stem for _, path in ANSWERS])
+def test_a_vignette_by_need_ends_as_the_one_that_names_its_vehicles(
+    name: str, answers: Path
+) -> None:
+    named, by_need = (
+        rehearse(folder / f"{name}.bpmn", fleet(name), answers=answers)
+        for folder in (MISSIONS, MISSIONS / "by_need")
+    )
+    assert by_need.outcome is named.outcome
+    assert ends(by_need) == ends(named)
+    assert commanded(by_need) == commanded(named)
+
+
+@pytest.mark.parametrize("name", FLEETS)
+@pytest.mark.parametrize("engine", ["builtin", pytest.param("spin", marks=pytest.mark.long)])
+def test_a_vignette_by_need_holds_over_all_choices(name: str, engine: str) -> None:
+    result = verify(MISSIONS / "by_need" / f"{name}.bpmn", fleet(name), engine=engine)
+    assert result.holds, str(result)
