@@ -109,7 +109,9 @@ class Preloaded:
         assert len(request) < MOST_BYTES
         with theirs:
             socket.send_fds(self._control, [request], [theirs.fileno(), *streams])
-        return Process(int(ended.recv(64)), _ended=ended)
+        pid = ended.recv(64)
+        assert pid, "m2pem could not be imported: standard error says why"
+        return Process(int(pid), _ended=ended)
 
 
 @cache
