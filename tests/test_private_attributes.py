@@ -24,7 +24,7 @@ PUBLIC = {
     *("_repr_html_", "_repr_svg_"),
     *("_shutdown", "_run_exitfuncs"),
 }
-"""Of named tuples, `os`, `sys`, `lxml.etree`, IPython, and of Python's own end: not of the product."""
+"""Of named tuples, `os`, `sys`, `lxml.etree`, IPython and the end of Python: not of the product."""
 
 EXCEPTIONS = {
     ("tests/verify/test_interrupted_search.py", "_Search"): "Ctrl-C comes at each line of the "

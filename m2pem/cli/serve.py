@@ -130,8 +130,8 @@ async def _serve(
                     )
                 await _take_up(executive, mine)
                 executive.serve_schedule()
-                for line in (await executive.control.scheduled()).lines():
-                    note(f"m2pem: schedule: {line}")
+                for each in (await executive.control.scheduled()).lines():
+                    note(f"m2pem: schedule: {each}")
                 retention: asyncio.Task[None] | None = None
                 if keep_s is not None:
                     kept = keep_runs(journal, keep_s, clock, by=operator_name())

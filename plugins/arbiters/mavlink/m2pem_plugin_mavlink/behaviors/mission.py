@@ -386,7 +386,8 @@ class Survey(MissionFlight):
         points = [frame.to_local(place) for place in places]
         tracks = SurveyTracks(points, self._width_m, self.parameters.overshoot_m)
         area = self.parameters.area
-        up_m, up_frame = way[0].altitude_m, frame_name(way[0])
+        up_m: float | None = way[0].altitude_m
+        up_frame = frame_name(way[0])
         if area is not None:
             up_m, up_frame = area.rings[0][0][2], area.altitude_frame
         given = raw_parameters(self.parameters.given)
