@@ -70,21 +70,18 @@ process_option = click.option(
 def _read_data(_: click.Context, __: click.Parameter, words: tuple[str, ...]) -> "dict[str, Value]":
     if not words:
         return {}
-    from m2pem.fleet.yaml_source import parse_yaml
+    from m2pem.api.data_text import named_value
+    from m2pem.errors import OperatorError
 
     data: dict[str, Value] = {}
     for word in words:
-        name, equals, text = word.partition("=")
-        name = name.strip()
-        if not equals or not name:
-            raise click.BadParameter(f"{word!r} is not of the form NAME=VALUE")
+        try:
+            name, value = named_value(word)
+        except OperatorError as error:
+            raise click.BadParameter(str(error)) from None
         if name in data:
             raise click.BadParameter(f"{name} is given twice")
-        source = parse_yaml(text.encode("utf-8", "replace"), name)
-        if source.findings:
-            problem = source.findings[0]
-            raise click.BadParameter(f"the value of {name}: {problem.message}")
-        data[name] = source.data
+        data[name] = value
     return data
 
 

@@ -286,7 +286,9 @@ class PlainOcu:
             if not (key and equals):
                 raise OperatorError(f"{word!r} is not of the form NAME=VALUE")
             if choice == "set_data":
-                data[key] = _read_value(value, key)
+                from m2pem.api.data_text import value_of
+
+                data[key] = value_of(value, key)
             else:
                 roles[key] = value.split(",")
         try:
@@ -402,17 +404,6 @@ class PlainOcu:
 
     async def _help(self, _: list[str]) -> None:
         self._out.put(HELP)
-
-
-def _read_value(text: str, name: str) -> Value:
-    """Read a value as YAML 1.2."""
-    from m2pem.fleet.yaml_source import parse_yaml
-
-    source = parse_yaml(text.encode(), name)
-    if source.findings:
-        raise OperatorError(f"the value of {name}: {source.findings[0].message}")
-    value: Value = source.data
-    return value
 
 
 def _decision(prompt: OpenPrompt, text: str) -> Decision:

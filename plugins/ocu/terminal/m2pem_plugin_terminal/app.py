@@ -18,6 +18,7 @@ from m2pem.api import (
     ScheduledStatus,
 )
 from m2pem.api.control import MissionControl, RunId, RunStatus
+from m2pem.api.data_text import named_value
 from m2pem.api.operator import operator_name
 from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem_plugin_terminal import incidents
@@ -313,7 +314,7 @@ class TerminalApp(Display):
         title = incidents.LABELS[choice]
         if choice == "set_data":
             line = await self.push_screen_wait(Ask(title, "name=value"))
-            return None if line is None else Decision(choice, data=incidents.data_of(line))
+            return None if line is None else Decision(choice, data=dict([named_value(line)]))
         if choice == "move":
             listed = incidents.target_choices(incident)
             to = await self.push_screen_wait(Choose(title, listed))

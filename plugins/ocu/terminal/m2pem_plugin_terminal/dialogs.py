@@ -161,7 +161,7 @@ KEYS = (
     ("t", "take a vehicle to steer by hand, or give it back"),
     ("i", "decide about an error that stops a task (!)"),
     ("r", "look at another run"),
-    ("c", "the schedule: hold, release or cancel what starts later"),
+    ("c", "the schedule: hold, release or cancel an entry"),
     ("/", "log: only lines with a text; Esc: all"),
     ("Up, PgUp", "move through the mission, through the log"),
     ("q", "quit"),

@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from m2pem.api import IncidentPreview, IncidentVerdict, OpenIncident
-from m2pem.errors import OperatorError
-from m2pem.fleet.fleet import Fleet
-from m2pem.fleet.yaml_source import parse_yaml
-from m2pem.mission.values import Value
 from m2pem_plugin_terminal.dialogs import Choice
+
+if TYPE_CHECKING:
+    from m2pem.api import Fleet, Value
 
 TITLE = "Errors that stop a task"
 NONE = "No error stops a task here"
@@ -30,7 +30,7 @@ class Decision:
     """What an operator has chosen about an incident, with what it needs."""
 
     choice: str
-    data: dict[str, Value] = field(default_factory=dict)
+    data: "dict[str, Value]" = field(default_factory=dict)
     to: str = ""
     roles: dict[str, list[str]] = field(default_factory=dict)
 
@@ -50,7 +50,7 @@ def role_choices(incident: OpenIncident) -> list[Choice]:
     return [Choice(role, role, ", ".join(ids)) for role, ids in incident.roles.items()]
 
 
-def resource_choices(fleet: Fleet) -> list[Choice]:
+def resource_choices(fleet: "Fleet") -> list[Choice]:
     """Return a line for each vehicle, payload and team."""
     return [Choice(name, name) for name in (*fleet.vehicles, *fleet.payloads, *fleet.teams)]
 
@@ -60,21 +60,6 @@ def target_choices(incident: OpenIncident) -> list[Choice]:
     return [
         Choice(id_, label, "" if label == id_ else id_) for id_, label in incident.targets.items()
     ]
-
-
-def data_of(line: str) -> dict[str, Value]:
-    """Read "name=value"; the value is YAML 1.2.
-
-    Raises:
-        OperatorError: it is not of that form.
-    """
-    name, equals, text = (part.strip() for part in line.partition("="))
-    if not (name and equals):
-        raise OperatorError(f"{line!r} is not of the form name=value")
-    source = parse_yaml(text.encode(), name)
-    if source.findings:
-        raise OperatorError(f"the value of {name}: {source.findings[0].message}")
-    return {name: source.data}
 
 
 def effect_text(incident: OpenIncident, decision: Decision, preview: IncidentPreview) -> Text:

@@ -1,10 +1,7 @@
 """Deciding about an error that stops a task."""
 
-import pytest
-from m2pem_plugin_terminal.incidents import data_of
 from terminal_world import MISSION, World
 
-from m2pem.errors import OperatorError
 from m2pem.mission.catalogue import BehaviorState
 
 
@@ -56,9 +53,3 @@ async def test_without_an_incident_there_is_nothing_to_decide(world: World) -> N
         await world.start()
         await terminal.press("i")
         await terminal.until_shown("No error stops a task here")
-
-
-def test_data_is_read_as_yaml() -> None:
-    assert data_of("a.b = 3.5") == {"a.b": 3.5}
-    with pytest.raises(OperatorError, match="name=value"):
-        data_of("3.5")
