@@ -29,7 +29,7 @@ IN_ORDER = "timers that begin to run together come in the order of their times (
 
 ENDS_THE_RUN = (
     "an error that no event catches ends the run, as if the operator chose `end` about its "
-    "incident (docs/incidents.md); what follows another choice is explored once there is one"
+    "incident; what follows another choice is explored when there is an incident"
 )
 """The note in reports of missions whose errors open incidents."""
 

@@ -7,7 +7,7 @@ from unittest.mock import AsyncMock, Mock
 import httpx
 import pytest
 from fastapi import FastAPI
-from m2pem_plugin_web.rest import schedule, steering
+from m2pem_plugin_web.rest import incidents, schedule, steering
 from rest_world import As, app_of
 
 from m2pem.api import (
@@ -23,6 +23,17 @@ from m2pem.api import (
 
 COMMANDS: dict[str, tuple[str, str, Any]] = {
     "answer": ("POST", "/api/runs/r1/prompts/p1", {"decision": "go"}),
+    "resolve_incident": (
+        "POST",
+        "/api/runs/r1/incidents/r1.i1",
+        {
+            "choice": "retry_with",
+            "data": {"a": 1},
+            "to": "Home",
+            "roles": {"scout": ["uav2"]},
+            "even_if_stuck": True,
+        },
+    ),
     "signal": ("POST", "/api/runs/r1/signals", {"signal": "s", "data": {"a": 1}}),
     "message": ("POST", "/api/runs/r1/messages", {"message": "m", "data": {"a": 1}}),
     "stop": ("POST", "/api/runs/r1/stop", {"reason": "rain"}),
@@ -44,6 +55,11 @@ SENT = {
     "run": "r1",
     "prompt": "p1",
     "decision": "go",
+    "incident": "r1.i1",
+    "choice": "retry_with",
+    "to": "Home",
+    "roles": {"scout": ["uav2"]},
+    "even_if_stuck": True,
     "signal": "s",
     "message": "m",
     "data": {"a": 1},
@@ -63,6 +79,7 @@ QUERIES = {
     "mission": "/api/runs/{run}/mission",
     "mission_time_s": "/api/runs/{run}",
     "prompts": "/api/prompts",
+    "incidents": "/api/incidents",
     "holders": "/api/resources",
     "holder_labels": "/api/resources",
     "unavailable": "/api/resources",
@@ -72,6 +89,7 @@ QUERIES = {
     "catalogue": "/api/behaviors",
 }
 NOT_SERVED = {
+    "preview_incident": "POST .../incidents/{incident}/preview",
     "start": "POST /api/runs names a mission of the server's folder, or brings its BPMN",
     "schedule": "POST /api/schedule names a mission of the server's folder",
     "check": "POST /api/checks brings the BPMN of a draft",
@@ -109,6 +127,7 @@ def app(control: Mock) -> FastAPI:
         steering.prompt_router(control, Mock()),
         steering.resource_router(control),
         schedule.router(control, Mock()),
+        incidents.router(control),
     ):
         app.include_router(router)
     return app

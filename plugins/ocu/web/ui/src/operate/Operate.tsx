@@ -10,6 +10,7 @@ import { Layout } from "./layout/Layout";
 import { loadReplay, loadStage, pathOf, type Source, type Stage } from "./loading";
 import { Player } from "./player/Player";
 import { positionInAddress } from "./player/address";
+import { IncidentPanel } from "./prompts/IncidentPanel";
 import { PromptPanel } from "./prompts/PromptPanel";
 import { RunBar } from "./runbar/RunBar";
 import { RunEnd } from "./runbar/RunEnd";
@@ -80,6 +81,7 @@ export default function Operate({ source }: { source: Source }) {
         <h1 class="for-readers">{scene.run || text.run.rehearsal}</h1>
         <RunBar />
         {!isReplay && <PromptPanel />}
+        {!isReplay && <IncidentPanel />}
         <Layout key={scene.mode} onSeek={isReplay ? (t) => scene.seek(t) : undefined} />
         {isReplay && <Player scene={scene} />}
         {ended.value && <RunEnd onClose={() => (ended.value = false)} />}

@@ -234,6 +234,8 @@ export interface ElementState {
   asking: boolean;
   /** A task of it waits for vehicles or payloads that are not free. */
   waiting: boolean;
+  /** An incident stops a token on it. */
+  stopped?: boolean;
 }
 
 export interface Command {

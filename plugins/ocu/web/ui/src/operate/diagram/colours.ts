@@ -64,6 +64,7 @@ export function chooseFade(seconds: number): void {
 }
 
 export function lookOf(state: ElementState): Look {
+  if (state.stopped) return "failed";
   if (state.asking) return "asking";
   if (state.waiting) return "waiting";
   if (state.active > 0) return "active";

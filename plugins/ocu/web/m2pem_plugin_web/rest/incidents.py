@@ -1,0 +1,103 @@
+"""/api/incidents, /api/runs/{run}/incidents/...: errors about which operators decide."""
+
+from fastapi import APIRouter
+from pydantic import BaseModel
+
+from m2pem.api import MissionControl
+from m2pem_plugin_web.access.permissions import Operator, Viewer
+from m2pem_plugin_web.problems import RESPONSES
+from m2pem_plugin_web.rest.models import Body, Data, Name, known_run
+
+
+class IncidentModel(BaseModel):
+    """An error that no event catches: `MissionControl.incidents`."""
+
+    run: str
+    incident: str
+    element: str
+    task: str
+    code: str
+    reason: str
+    choices: list[str]
+    resources: list[str]
+    roles: dict[str, list[str]]
+    targets: dict[str, str]
+
+
+class ChoiceModel(Body):
+    """What is chosen: one of the incident's `choices`, with what it needs."""
+
+    choice: Name
+    data: Data | None = None
+    to: str = ""
+    roles: dict[str, list[str]] | None = None
+
+
+class ResolveModel(ChoiceModel):
+    """As for a preview. `even_if_stuck`: an operator has confirmed a choice after which the mission
+    cannot complete."""
+
+    even_if_stuck: bool = False
+
+
+class OutlookModel(BaseModel):
+    """What follows a choice. `text`: verdict and reason in a sentence."""
+
+    verdict: str
+    reason: str
+    text: str
+
+
+def router(control: MissionControl) -> APIRouter:
+    """The routes of incidents."""
+    routes = APIRouter(prefix="/api", tags=["incidents"], responses=RESPONSES)
+
+    @routes.get("/incidents")
+    async def incidents(_: Viewer) -> list[IncidentModel]:
+        """The incidents of all runs that are open."""
+        return [
+            IncidentModel(
+                run=each.run,
+                incident=each.incident,
+                element=each.element,
+                task=each.task,
+                code=each.code,
+                reason=each.reason,
+                choices=list(each.choices),
+                resources=list(each.resources),
+                roles={role: list(ids) for role, ids in each.roles.items()},
+                targets=dict(each.targets),
+            )
+            for each in await control.incidents()
+        ]
+
+    @routes.post("/runs/{run}/incidents/{incident}/preview")
+    async def preview(_: Operator, run: str, incident: str, wanted: ChoiceModel) -> OutlookModel:
+        """Whether the mission still completes after a choice."""
+        async with known_run(control, run):
+            found = await control.preview_incident(
+                run,
+                incident,
+                wanted.choice,
+                data=wanted.data,
+                to=wanted.to,
+                roles=wanted.roles,
+            )
+        return OutlookModel(verdict=found.verdict.value, reason=found.reason, text=str(found))
+
+    @routes.post("/runs/{run}/incidents/{incident}", status_code=204)
+    async def resolve(person: Operator, run: str, incident: str, wanted: ResolveModel) -> None:
+        """Decide about an incident. The first choice wins."""
+        async with known_run(control, run):
+            await control.resolve_incident(
+                run,
+                incident,
+                wanted.choice,
+                data=wanted.data,
+                to=wanted.to,
+                roles=wanted.roles,
+                by=person.name,
+                even_if_stuck=wanted.even_if_stuck,
+            )
+
+    return routes
