@@ -9,7 +9,7 @@ from m2pem_plugin_ros import RosRuntime
 
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError, OperatorError
-from m2pem_plugin_mocu import messages, requests
+from m2pem_plugin_mocu import incidents, messages, requests
 from m2pem_plugin_mocu.starting import start_mission
 from m2pem_plugin_mocu.texts import sendable
 from m2pem_plugin_mocu.topics import Topics
@@ -111,6 +111,12 @@ class Services:
         return response
 
     async def _answer_prompt(self, control: MissionControl, request: Any, response: Any) -> None:
+        if incidents.is_incident(request.prompt):
+            chosen = incidents.choice_of(request.decision)
+            await requests.carry_out(
+                control, "resolve_incident", request, incident=request.prompt, **chosen
+            )
+            return
         try:
             await requests.carry_out(control, "answer", request)
         except OperatorError as refusal:

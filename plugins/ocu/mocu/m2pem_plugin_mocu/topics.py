@@ -27,7 +27,7 @@ from m2pem.api import (
 )
 from m2pem.api import records as r
 from m2pem.errors import M2pemError
-from m2pem_plugin_mocu import messages
+from m2pem_plugin_mocu import incidents, messages
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
 
 PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
@@ -68,6 +68,7 @@ class Topics(Listener):
         self._opened_us: dict[tuple[RunId, str], int] = {}
         """When each open prompt became known here."""
         self.closed_prompts: dict[tuple[RunId, str], PromptClosed] = {}
+        self._incidents: dict[str, OpenPrompt] = {}
         self._prompts = publisher(msg.OpenPrompts, "prompts", qos.STATUS)
         self._prompt_events = publisher(msg.Prompt, "prompt_events", PROMPT_EVENTS)
         self._status = publisher(msg.MissionStatus, "status", qos.STATUS)
@@ -130,8 +131,31 @@ class Topics(Listener):
             self.left_out += 1
         self._waiting.append((view, stamped, view.at_us(stamped.t_s)))
         self._some_wait.set()
+        self._note_incident(view, stamped.record)
         if type(stamped.record) in TOKEN_RECORDS:
             self._active_throttle.mark_changed()
+
+    def _note_incident(self, view: RunView, record: r.Record) -> None:
+        """Publish an incident as a prompt that opens, and its end as one that closes."""
+        match record:
+            case r.IncidentOpened():
+                prompt = self._incidents[record.incident] = incidents.prompt_of(view, record)
+                opened_us = self._opened_us[view.run, record.incident] = now_us()
+                self._prompt_events.publish(messages.open_prompt(prompt, opened_us))
+            case r.IncidentResolved(incident=incident, choice=choice, by=by):
+                self._close_incident(view.run, incident, choice.value, by)
+            case r.IncidentClosed(incident=incident):
+                self._close_incident(view.run, incident, "", "")
+            case _:
+                return
+        self._prompts_throttle.mark_changed()
+
+    def _close_incident(self, run: RunId, incident: str, choice: str, by: str) -> None:
+        prompt = self._incidents.pop(incident, None)
+        self._opened_us.pop((run, incident), None)
+        if prompt is not None:
+            closed = messages.closed_prompt(prompt, choice, by, now_us())
+            self._prompt_events.publish(closed)
 
     def status_changed(self, view: RunView) -> None:
         """Publish the status soon."""
@@ -166,6 +190,13 @@ class Topics(Listener):
         prompts = [
             messages.open_prompt(prompt, self._opened_us.get(key, 0))
             for key, prompt in self._follower.prompts.items()
+        ]
+        prompts += [
+            messages.open_prompt(
+                incidents.prompt_of(view, record), self._opened_us.get((view.run, number), 0)
+            )
+            for view in self._follower.views.values()
+            for number, record in view.incidents.items()
         ]
         self._prompts.publish(msg.OpenPrompts(stamp=messages.time_of(now_us()), prompts=prompts))
 

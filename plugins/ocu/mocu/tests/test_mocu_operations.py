@@ -56,12 +56,15 @@ SERVED_OTHERWISE = {
     "runs": "service list_runs, and topic status",
     "mission_time_s": "a field of the runs of list_runs and of topic status",
     "prompts": "topic prompts",
+    "incidents": "topic prompts: an incident is a question there",
+    "resolve_incident": "service answer_prompt, with the incident in place of a prompt",
     "subscribe": "topics events, prompt_events, active_elements",
     "telemetry": "topics payloads, teams and /diagnostics",
     "mission": "topic active_elements has the labels of its elements",
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "preview_incident": "answer_prompt refuses a choice after which the mission cannot complete",
     "check": "start_mission answers with the findings",
     "schedule": "the command line and the page schedule missions",
     "scheduled": "m2pem schedule and the page list them",
@@ -126,3 +129,47 @@ async def test_the_whole_schedule_is_held_and_released(verb: int, operation: str
     response = await handler(request, service_type.Response())
     assert response.success, response.message
     assert method.call_args.kwargs["entry"] is None
+
+
+@pytest.mark.parametrize(
+    ("decision", "chosen"),
+    [
+        ("retry", {"choice": "retry"}),
+        ("skip!", {"choice": "skip", "even_if_stuck": True}),
+        ("move:Home", {"choice": "move", "to": "Home"}),
+        ("set_data:speed=3", {"choice": "set_data", "data": {"speed": 3}}),
+        ("retry_with:scout=uav2", {"choice": "retry_with", "roles": {"scout": ["uav2"]}}),
+    ],
+)
+async def test_an_incident_is_answered_as_a_prompt_is(
+    decision: str, chosen: dict[str, Any]
+) -> None:
+    services: dict[str, tuple[Any, Callable[[Any, Any], Awaitable[Any]]]] = {}
+
+    def serve(service_type: Any, name: str, handler: Any) -> None:
+        services[name] = service_type, handler
+
+    method = AsyncMock(spec=MissionControl.resolve_incident)
+    control = Mock(spec=MissionControl, resolve_incident=method)
+    Services(SimpleNamespace(serve=serve), control, Mock())
+    service_type, handler = services["answer_prompt"]
+    request = service_type.Request(run="r1", prompt="r1.i1", decision=decision, by="anna")
+    response = await handler(request, service_type.Response())
+    assert response.success, response.message
+    sent = method.call_args.kwargs
+    default = {"data": {}, "to": "", "roles": {}, "even_if_stuck": False}
+    assert sent == {"run": "r1", "incident": "r1.i1", "by": "anna", **default, **chosen}
+
+
+async def test_an_answer_that_lacks_what_its_choice_needs_is_refused() -> None:
+    services: dict[str, tuple[Any, Callable[[Any, Any], Awaitable[Any]]]] = {}
+
+    def serve(service_type: Any, name: str, handler: Any) -> None:
+        services[name] = service_type, handler
+
+    Services(SimpleNamespace(serve=serve), Mock(spec=MissionControl), Mock())
+    service_type, handler = services["answer_prompt"]
+    request = service_type.Request(run="r1", prompt="r1.i1", decision="set_data", by="anna")
+    response = await handler(request, service_type.Response())
+    assert not response.success
+    assert "set_data:NAME=VALUE" in response.message

@@ -40,6 +40,6 @@ async def test_an_operator_decides_about_an_error_that_stops_a_task(desk: Desk) 
     records = (await desk.ask("GET", f"/api/runs/{run}/records"))["records"]
     (resolved,) = [each for each in records if each["record"] == "IncidentResolved"]
     assert (resolved["choice"], resolved["by"]) == ("skip", "anna")
-    assert {"gate": "open"} == {
-        each["key"]: each["value"] for each in records if each["record"] == "DataWritten"
+    assert {each["key"]: each["value"] for each in records if each["record"] == "DataWritten"} == {
+        "gate": "open"
     }

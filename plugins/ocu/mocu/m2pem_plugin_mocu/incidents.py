@@ -1,0 +1,62 @@
+"""Incidents as prompts: an error that stops a task is a question, whose answer is the choice.
+
+A choice that needs something has it after a colon: `move:Home`, `retry_with:scout=uav2`,
+`set_data:speed=3`. An exclamation mark at the end confirms a choice after which the mission cannot
+complete: `skip!`.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from m2pem.api import OpenPrompt, RunView
+from m2pem.api import records as r
+from m2pem.errors import OperatorError
+from m2pem.fleet.yaml_source import parse_yaml
+from m2pem.mission.behavior import Decision
+
+_LABELS = {
+    "retry": ("retry", "begin anew"),
+    "retry_with": ("retry_with:ROLE=RESOURCE", "begin anew with another vehicle or payload"),
+    "skip": ("skip", "it counts as done"),
+    "set_data": ("set_data:NAME=VALUE", "write a value, and decide afterwards"),
+    "move": ("move:ELEMENT", "move the token"),
+    "end": ("end", "end the run with the error"),
+}
+
+
+def is_incident(prompt: str) -> bool:
+    """Whether the id that a client answers is that of an incident: "r1.i2"."""
+    return prompt.partition(".")[2].startswith("i")
+
+
+def prompt_of(view: RunView, record: r.IncidentOpened) -> OpenPrompt:
+    """Return an incident as a prompt."""
+    held = f" Held for it: {', '.join(record.resources)}." if record.resources else ""
+    text = f"{view.label(record.element)} is stopped by {record.code}: {record.reason}.{held}"
+    decisions = tuple(Decision(*_LABELS[choice]) for choice in record.choices)
+    return OpenPrompt(view.run, record.incident, record.element, text, decisions)
+
+
+def choice_of(decision: str) -> Mapping[str, Any]:
+    """Return what an answer says: choice, data, to, roles, even_if_stuck.
+
+    Raises:
+        OperatorError: it lacks what its choice needs, or is not of the form.
+    """
+    confirmed = decision.endswith("!")
+    choice, _, rest = decision.removesuffix("!").partition(":")
+    found: dict[str, Any] = {"data": {}, "to": "", "roles": {}}
+    if choice == "move":
+        found["to"] = rest
+    elif choice in ("set_data", "retry_with"):
+        name, equals, value = rest.partition("=")
+        if not (name and equals):
+            raise OperatorError(f"{decision!r} is not of the form {_LABELS[choice][0]}")
+        if choice == "set_data":
+            source = parse_yaml(value.encode("utf-8", "replace"), name)
+            if source.findings:
+                raise OperatorError(f"the value of {name}: {source.findings[0].message}")
+            found["data"] = {name: source.data}
+        else:
+            found["roles"] = {name: value.split(",")}
+    return {"choice": choice, "even_if_stuck": confirmed, **found}
