@@ -500,7 +500,7 @@ class MissionControl(Protocol):
 
     async def holders(self) -> Mapping[ResourceId, str]:
         """Who has each resource: an operator, a behavior ("r1.b3"), a request for which it was just
-        chosen ("r1.a2"), or "" when it is free.
+        chosen ("r1.a2"), an incident ("r1.i1"), or "" when it is free.
         """
         ...
 

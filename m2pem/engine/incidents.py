@@ -13,6 +13,7 @@ from m2pem.engine.inputs import IncidentChoice
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import stop_activity
 from m2pem.engine.state import Behavior, RunState, Scope, Token
+from m2pem.fleet.fleet import Fleet
 from m2pem.mission.behavior import Behavior as BehaviorOfTask
 from m2pem.mission.elements import (
     Activity,
@@ -50,15 +51,20 @@ def opens_incident(x: Execution, token: Token) -> bool:
     The process of the element says so, else that of its caller, and so on; else the process that
     the run began with; else the fleet.
     """
+    return error_policy(x.state, x.fleet, token) is ErrorPolicy.INCIDENT
+
+
+def error_policy(state: RunState, fleet: Fleet, token: Token) -> ErrorPolicy:
+    """Return what an error at a token does that no event catches."""
     scope: Scope | None = token.scope
     while scope is not None:
         said = scope.container.process.on_error
         if said is not None:
-            return said is ErrorPolicy.INCIDENT
+            return said
         scope = scope.parent
-    root = x.state.root
+    root = state.root
     said = root.container.process.on_error if root is not None else None
-    return (said or x.fleet.on_error) is ErrorPolicy.INCIDENT
+    return said or fleet.on_error
 
 
 def open_incident(

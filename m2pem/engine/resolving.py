@@ -18,7 +18,7 @@ from m2pem.engine.throwing import fail_run
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import Element, FlowNode, InclusiveGateway, SequenceFlow
-from m2pem.suggestions import did_you_mean
+from m2pem.suggestions import did_you_mean, suggest_or
 
 # --- checks -------------------------------------------------------------------------------------
 
@@ -73,7 +73,8 @@ def _wrong_target(state: RunState, token: Token, target: str) -> str:
         flows = ", ".join(flow.id for flow in node.incoming)
         return f"{target} joins several sequence flows: say by which the token comes: {flows}"
     where = token.node.container.id
-    return f"the token cannot move to {target!r} in {where}; {did_you_mean(target, targets)}"
+    hint = suggest_or(target, list(targets), f"it can go to: {', '.join(targets)}")
+    return f"the token cannot move to {target!r} in {where}; {hint}"
 
 
 def _wrong_roles(fleet: Fleet, incident: Incident, item: ResolveIncident) -> str:
@@ -82,7 +83,7 @@ def _wrong_roles(fleet: Fleet, incident: Incident, item: ResolveIncident) -> str
     known = {role.name: role for role in behavior.roles}
     for name, resources in item.roles.items():
         if name not in known:
-            hint = did_you_mean(name, known)
+            hint = suggest_or(name, list(known), f"its roles are: {', '.join(known)}")
             return f"{behavior.name} of {incident.token.node.label} has no role {name!r}; {hint}"
         for resource in resources:
             there = (*fleet.vehicles, *fleet.payloads)

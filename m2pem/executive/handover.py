@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 from m2pem.api.control import TakeEffect
 from m2pem.engine.elements.behaviors import preview_control_taken
+from m2pem.engine.incidents import error_policy
 from m2pem.engine.inputs import ControlReturned, ControlTaken
+from m2pem.engine.state import Behavior, RunState
 from m2pem.errors import BusyError, OperatorError
 from m2pem.executive.runner import Runner
 from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.behavior import OnLoss
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.elements import ErrorPolicy
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import did_you_mean
 
@@ -32,6 +35,7 @@ class Handover:
 
     def __init__(self, arbiters: "FleetArbiters", availability: Availability) -> None:
         self._known = arbiters.resources
+        self._fleet = arbiters.fleet
         self._availability = availability
         self.taken: dict[ResourceId, str] = {}
         self.why_not_free: Callable[[ResourceId], str] = lambda _: ""
@@ -67,12 +71,21 @@ class Handover:
                 state.mission.elements[behavior.element].label,
                 catcher.label if catcher is not None else "",
                 on_loss is OnLoss.REASSIGN,
-                on_loss is OnLoss.ASK,
+                on_loss is OnLoss.ASK
+                or (
+                    catcher is None
+                    and on_loss is not OnLoss.REASSIGN
+                    and self._opens_incident(state, behavior)
+                ),
             )
             for runner in runners
             if not runner.done.is_set() and (state := runner.run.state)
             for behavior, catcher, on_loss in preview_control_taken(state, resource)
         ]
+
+    def _opens_incident(self, state: RunState, behavior: Behavior) -> bool:
+        token = state.tokens[behavior.token]
+        return error_policy(state, self._fleet, token) is ErrorPolicy.INCIDENT
 
     async def give_back(self, name: str, by: str, runners: Iterable[Runner]) -> None:
         """Give a resource back to the missions.

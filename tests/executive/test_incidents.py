@@ -171,6 +171,16 @@ def test_the_first_of_two_operators_wins_and_the_other_is_told(play):
     assert status is RunStatus.COMPLETED
 
 
+def test_taking_a_vehicle_says_that_an_incident_opens(play):
+    async def story(world: World):
+        control = world.executive.control
+        await control.start(DRIVE)
+        await world.fake.until_called("start")
+        return [str(each) for each in await control.preview_take("ugv1")]
+
+    assert play(story, "ugv1") == ["r1: an incident opens, which asks what is done with Drive"]
+
+
 def test_stop_and_pause_work_with_an_open_incident(play):
     async def story(world: World):
         control = world.executive.control
