@@ -16,7 +16,7 @@ from m2pem.engine.inputs import (
     PromptAnswer,
     StartRun,
 )
-from m2pem.engine.records import BehaviorRestarted, PromptOpened
+from m2pem.engine.records import BehaviorProgressed, BehaviorRestarted, PromptOpened
 from m2pem.engine.run import MissionRun
 from m2pem.errors import JournalError, OperatorError
 from m2pem.fleet.fleet import dump
@@ -87,6 +87,30 @@ def test_a_behavior_that_still_runs_is_reattached_and_not_started_again(play):
     summary, starts = resumed(play, left_behind(GOTO, ACCEPTED, RUNNING), story, known=known)
     assert summary.status is RunStatus.COMPLETED
     assert starts == 0
+
+
+def test_what_is_left_is_journaled_after_a_restart_though_its_arbiter_counts_again(play):
+    """Before, there were many reports of what is left: the arbiter's next numbers are lower."""
+    before = [
+        BehaviorReported("r1.b1", number, BehaviorState.RUNNING, remaining={"speed": number})
+        for number in range(3, 10)
+    ]
+
+    async def story(world: World):
+        await world.fake.until_called("query", "r1.b1")
+        for speed in (20, 21):
+            world.fake.report("r1.b1", BehaviorState.RUNNING, remaining={"speed": speed})
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await world.executive.control.wait("r1")
+        return await world.executive.control.records("r1", limit=1000)
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)}
+    journal = left_behind(GOTO, ACCEPTED, RUNNING, *before)
+    records = [each.record for each in resumed(play, journal, story, known=known)]
+    left = [each for each in records if isinstance(each, BehaviorProgressed) and each.remaining]
+    assert [each.remaining["speed"] for each in left] == [*range(3, 10), 20, 21]
+    numbers = [each.number for each in left]
+    assert numbers == sorted(set(numbers))
 
 
 def test_a_behavior_that_ended_meanwhile_completes_its_task(play):
