@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,9 +13,12 @@ from m2pem.api.remaining import RemainingWork
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy
 from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
-from m2pem.mission.geometry import Route
+from m2pem.mission.geometry import Area, Route
 from m2pem.simulation.arbiters import SimArbiter
 from m2pem.teams.division import Taker, divide, work_of
+from m2pem.teams.partition import Partition
+from m2pem.teams.plan import Leg, Plan
+from m2pem.teams.restart import Reference, read_reference
 
 from .carts import FRAME
 from .conftest import area, one_task
@@ -164,3 +168,51 @@ def test_several_ways_are_taken_whole_where_that_is_even() -> None:
 
 def test_nothing_is_divided_where_nothing_is_left() -> None:
     assert divide([], [Taker(ResourceId("a"), 0.0, None, 5.0)]) == []
+
+
+def test_pieces_of_areas_are_the_same_after_the_journal() -> None:
+    """As after a restart: what the journal has gives the same parts to the same members."""
+    corners = [(0.0, 0.0), (200.0, 0.0), (200.0, 60.0), (0.0, 60.0), (0.0, 0.0)]
+    field_ = Area((tuple((*FRAME.to_latlon(corner), None) for corner in corners),))
+    given = {"area": field_, "heading": math.pi / 2, "spacing": 21.0, "speed": 5.0}
+    names = [ResourceId(name) for name in "abc"]
+    legs = tuple(Leg(name, "area_survey", given) for name in names)
+    plan = Plan(
+        legs,
+        shared=True,
+        takes=dict.fromkeys(names, frozenset(given)),
+        speeds_m_s=dict.fromkeys(names, 5.0),
+    )
+    crew: Any = {name: SimpleNamespace(id=name, lost="", active=True) for name in names}
+    before = Partition(plan, FRAME)
+    before.place("b", done=False)
+    half = work_of("area_survey", given, FRAME)
+    assert half is not None
+    left = half.part(half.line.length_m * 0.4)
+    assert left is not None
+    assert before.note_left("b", left)
+    crew[names[1]].lost = "LINK_LOST"
+    before.drop(names[1], crew, lambda _: None)
+    assert sorted(each.member for each in before.transfers.values()) == ["a", "c"]
+    kept = Reference(
+        transfers=before.transfers,
+        given_up=before.given_up,
+        lost={names[1]: "LINK_LOST"},
+    )
+    after = Partition(plan, FRAME)
+    after.restore(read_reference(kept.text()))
+    after.drop(names[1], crew, lambda _: None)
+    assert after.transfers == before.transfers
+    assert after.given_up == ("b",)
+    for name in "ac":
+        after.place(name, done=True)
+        crew[ResourceId(name)].active = False
+    begun = {each.part: each.leg.parameters for each in after.assignments(crew, 1)}
+    assert begun.keys() == {f"{each.member}/{key}" for key, each in before.transfers.items()}
+    passes_m = 0.0
+    for parameters in begun.values():
+        piece = work_of("area_survey", parameters, FRAME)
+        assert piece is not None
+        segments = piece.line.segments[::2]
+        passes_m += math.fsum(segment.length_m for segment in segments)
+    assert passes_m == pytest.approx(3 * 200.0 * 0.6, rel=0.05)
