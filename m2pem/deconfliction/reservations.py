@@ -457,9 +457,7 @@ class Reservations:
         for name, reservation in self._reservations.items():
             if name == apart_from:
                 continue
-            if reservation.volumes is None:
-                reservation.volumes = self._volumes(reservation.request, reservation.kind, now_us)
-            for vehicle, volume in reservation.volumes.items():
+            for vehicle, volume in self._volumes_of(reservation, now_us).items():
                 busy.add(vehicle)
                 lost = reservation.over
                 left = self._left_of(reservation, vehicle, volume, now_us)
@@ -475,6 +473,20 @@ class Reservations:
                 place = Piece(participant.stop, span.low_m, span.high_m)
                 lost = vehicle in self._lost and self._domains[vehicle] is not Domain.AIR
                 yield Occupant(vehicle, Volume((place,)), lost=lost)
+
+    def _volumes_of(self, reservation: Reservation, now_us: int) -> Mapping[ResourceId, Volume]:
+        """The volumes of a behavior. After a restart they are computed when its vehicles have said
+        where they are."""
+        known = reservation.volumes or {}
+        late = (
+            each
+            for each in reservation.request.resources
+            if each in self.participants and each in self._states and each not in known
+        )
+        if reservation.volumes is None or any(late):
+            found = self._volumes(reservation.request, reservation.kind, now_us)
+            reservation.volumes = {**found, **known}
+        return reservation.volumes
 
     def _left_of(
         self, reservation: Reservation, vehicle: ResourceId, volume: Volume, now_us: int

@@ -172,3 +172,18 @@ def test_vehicles_of_each_domain_are_kept_apart_from_their_like() -> None:
     assert "start it after" in said
     space.received(state("one", 0, 80, 0))
     assert not goes(space, "two", (10, 50), (-40, 50))
+
+
+def test_after_a_restart_a_vehicle_has_its_places_as_soon_as_it_has_said_where_it_is() -> None:
+    made = replace(
+        fleet(ground=NAMES),
+        geometries={"yard": YARD},
+        shared_space={"yard": SharedSpace("yard", 1)},
+        origin=(*FRAME.to_latlon((0.0, 0.0)), GROUND_M),
+    )
+    space = Reservations(made)
+    space.adopt(request("goto", "one", target=point(-100, 0)), BehaviorType.VEHICLE)
+    space.received(state("two", 0, 100, 0))
+    assert not claim(space, request("goto", "two", target=point(0, 90)))
+    space.received(state("one", 100, 0, 0))
+    assert "taken by one, which does" in goes(space, "two", (0, 0))

@@ -395,3 +395,21 @@ def test_a_later_task_does_not_overtake_one_that_waits_for_space(play: Play) -> 
         return [each.behavior for each in world.seen if isinstance(each, BehaviorRequested)]
 
     assert rovers(play, story, homes=homes) == ["r1.b1", "r3.b1", "r2.b1", "r4.b1"]
+
+
+def test_a_team_crosses_a_bridge_for_one_vehicle_one_by_one(play: Play) -> None:
+    homes = {"one": (0.0, 0.0), "two": (-12.0, 0.0)}
+
+    async def story(world: World) -> None:
+        cross = {"route": "over", "spacing": "10 m", "speed": "3 m/s"}
+        run = await world.begin(task("Cross", "bridge_crossing", "crew", **cross))
+        crossed = set()
+        while not world.ends(run):
+            on_it = [name for name in homes if on_bridge(world, name)]
+            assert len(on_it) < 2
+            crossed.update(on_it)
+            await world.clock.sleep(0.2)
+        assert crossed == {"one", "two"}
+        assert await status(world, run) is RunStatus.COMPLETED
+
+    rovers(play, story, homes=homes, geometries={**GEOMETRIES, "over": route((0, 0), (120, 0))})
