@@ -407,31 +407,18 @@ class Reservations:
     ) -> SpaceConflict | None:
         """The first shared space that has no place for all vehicles of a behavior. A vehicle that
         is in it already has a place."""
-        volumes = wanted.volumes or {}
+        one_by_one = wanted.kind is BehaviorType.TEAM and wanted.request.behavior in ONE_BY_ONE
         for shared in self._regions:
-            space, region = shared.space, shared.region
-            inside, entering = [], []
-            for vehicle, volume in volumes.items():
+            own = {}
+            for vehicle, volume in (wanted.volumes or {}).items():
                 participant = self._participant(vehicle)
-                if participant is None or self._domains[vehicle] not in space.domains:
-                    continue
-                if region.meets(participant.stop):
-                    inside.append(vehicle)
-                elif shared.entered_by(volume):
-                    entering.append(vehicle)
-            if not entering:
-                continue
-            needed = len(inside) + len(entering)
-            if wanted.kind is BehaviorType.TEAM and wanted.request.behavior in ONE_BY_ONE:
-                ends = [volumes[each].route[-1:] for each in entering]
-                staying = sum(not end or region.meets(end) for end in ends)
-                needed = len(inside) + min(len(entering), staying + 1)
-            counting = self._counting(space, occupants)
+                if participant is not None and self._domains[vehicle] in shared.space.domains:
+                    own[vehicle] = participant.stop, volume
+            counting = self._counting(shared.space, occupants)
             others = occupants_of(shared, counting, wanted.request.resources)
-            if needed + len(others) > space.capacity:
-                first = entering[0]
-                place = shared.entrance(volumes[first])
-                return SpaceConflict(space, first, place, needed, others)
+            conflict = shared.conflict(own, others, one_by_one=one_by_one)
+            if conflict is not None:
+                return conflict
         return None
 
     def places(self, now_us: int) -> list[tuple[SharedSpace, tuple[Occupant, ...]]]:

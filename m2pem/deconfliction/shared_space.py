@@ -5,13 +5,14 @@ place in it for each of its vehicles, from its start until the vehicle has left 
 its way does not enter it again. A vehicle that stands in it has a place.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from m2pem.deconfliction.conflicts import Occupant, Refusal, does_what, way_out
 from m2pem.deconfliction.operational_volume import Volume
 from m2pem.fleet.fleet import Fleet, SharedSpace
 from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polygon import Hull
 from m2pem.geo.region import Region, region_of
 from m2pem.mission.catalogue import ResourceId
 
@@ -31,6 +32,37 @@ class SharedRegion:
         """Return a place of it that a volume covers; None: the volume is everywhere."""
         areas = (piece.area for piece in volume.pieces)
         return self.region.common_place(next(each for each in areas if self.region.meets(each)))
+
+    def conflict(
+        self,
+        own: Mapping[ResourceId, tuple[Hull, Volume]],
+        others: tuple[Occupant, ...],
+        *,
+        one_by_one: bool,
+    ) -> "SpaceConflict | None":
+        """Return why there is no place for all vehicles of a behavior; None: there is.
+
+        `own`: where each of them is, and its volume; one that is in the space has a place already.
+        `others`: who else has one. `one_by_one`: one of the vehicles moves at a time.
+        """
+        inside = [each for each, (stop, _) in own.items() if self.region.meets(stop)]
+        entering = {
+            each: volume
+            for each, (_, volume) in own.items()
+            if each not in inside and self.entered_by(volume)
+        }
+        if not entering:
+            return None
+        needed = len(entering)
+        if one_by_one:
+            ends = [volume.route[-1:] for volume in entering.values()]
+            staying = sum(not end or self.region.meets(end) for end in ends)
+            needed = min(needed, staying + 1)
+        needed += len(inside)
+        if needed + len(others) <= self.space.capacity:
+            return None
+        vehicle, volume = next(iter(entering.items()))
+        return SpaceConflict(self.space, vehicle, self.entrance(volume), needed, others)
 
 
 @dataclass(frozen=True, slots=True)
