@@ -26,7 +26,8 @@ def waiting_tasks(runners: Iterable[Runner], now_us: int) -> list[WaitingTask]:
 
 
 def holder_label(runners: Mapping[RunId, Runner], holder: str) -> str:
-    """Return the task and run of a behavior or request, in words; "" if it is not known."""
+    """Return the task and run of a behavior, request or incident, in words; "" if it is not
+    known."""
     run = RunId(holder.partition(".")[0])
     runner = runners.get(run)
     if runner is None:
@@ -36,6 +37,8 @@ def holder_label(runners: Mapping[RunId, Runner], holder: str) -> str:
         return f"{state.mission.elements[behavior.element].label} of {run}"
     if (request := state.allocations.get(holder)) is not None:
         return f"{request.token.node.label} of {run}"
+    if (incident := state.incidents.get(holder)) is not None:
+        return f"the incident of {incident.token.node.label} of {run}"
     return ""
 
 

@@ -52,6 +52,8 @@ def test_what_failed_is_held_and_no_other_run_gets_it(play):
         assert (incident.run, incident.element, incident.code) == (run, "Drive", "ROUTE_BLOCKED")
         assert incident.roles == {"driver": ("ugv1",)}
         assert (await control.holders())["ugv1"] == f"{run}.i1"
+        labels = await control.holder_labels()
+        assert labels[f"{run}.i1"] == f"the incident of Drive of {run}"
         with pytest.raises(BusyError, match=f"run {run} uses ugv1"):
             await control.start(DRIVE)
         other = await control.start(WAITS)
