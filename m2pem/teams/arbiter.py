@@ -158,7 +158,7 @@ class Teams:
         await self._situation.until_seen(request, self._context.clock)
         kept = read_reference(native_ref)
         try:
-            scheme = self._situation.scheme(request, begun=True, split=kept.split)
+            scheme = self._situation.scheme(request, begun=True, split=kept.split, lost=kept.lost)
         except TeamRefusedError as error:
             return replace(known, reason=f"it cannot be gone on with: {error}")
         found = await look_for_parts(request, scheme.plan, kept, self._arbiter_of)

@@ -1,6 +1,6 @@
 """The members' poses and capabilities, and the plan of a team behavior from them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -68,9 +68,15 @@ class TeamSituation:
         }
 
     def scheme(
-        self, request: BehaviorRequest, *, begun: bool, split: tuple[float, ...] = ()
+        self,
+        request: BehaviorRequest,
+        *,
+        begun: bool,
+        split: tuple[float, ...] = (),
+        lost: Collection[ResourceId] = (),
     ) -> TeamPlan:
         """Plan a request. `split`: the members' shares from before a restart, if there are any.
+        `lost`: members that were lost before it: nothing of their parts begins any more.
 
         Raises:
             TeamRefusedError: no plan is possible; the text says why.
@@ -80,10 +86,11 @@ class TeamSituation:
         if request.behavior not in PLANS:
             return TeamPlan(alike(request), LocalFrame((0.0, 0.0)))
         states = {member: self._state(member) for member in request.resources}
+        first = next((state for state in states.values() if state is not None), None)
         for member, state in states.items():
-            if state is None:
+            if state is None and member not in lost:
                 raise TeamRefusedError(f"the position of {member} is not known")
-        first = states[request.resources[0]]
+            states[member] = state or first
         if first is None or first.position is None:
             raise TeamRefusedError(f"the position of {request.resources[0]} is not known")
         frame = LocalFrame(first.position.latlon)

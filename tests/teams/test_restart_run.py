@@ -242,16 +242,14 @@ def test_a_team_that_goes_on_without_lost_members_does_so_after_a_crash(play: Pl
     assert left[1].count("single_vehicle_routing") == 0
 
 
-@pytest.mark.parametrize("meanwhile", [False, True], ids=["lost before", "lost meanwhile"])
-def test_pieces_of_a_lost_members_band_are_those_of_before_the_crash(
-    play: Play, *, meanwhile: bool
-) -> None:
+@pytest.mark.parametrize("lost", ["before", "before, and silent since", "meanwhile"])
+def test_pieces_of_a_lost_members_band_are_those_of_before_the_crash(play: Play, lost: str) -> None:
     policy = LostMemberPolicy.CONTINUE
     geometries = {"field": area((0, 0), (100, 0), (100, 90), (0, 90))}
 
     async def before(world: World) -> None:
         await world.clock.sleep(20)
-        if not meanwhile:
+        if lost != "meanwhile":
             world.arbiter("carts").fail("b", "FAILED")
             await world.clock.sleep(5)
 
@@ -267,8 +265,9 @@ def test_pieces_of_a_lost_members_band_are_those_of_before_the_crash(
     yard = Yard(a=(-10, 20), b=(-10, 45), c=(-10, 80))
     mission = one_task("area_survey", area="field", spacing="10 m")
     left = crash(play, yard, mission, before, policy=policy, geometries=geometries)
-    if meanwhile:
+    if lost == "meanwhile":
         fail(left[1], "b")
+    left[1].driven["b"].mute = "silent" in lost
     passes, (status, (ended,)) = resume(play, left, then, policy=policy, geometries=geometries)
     assert (status, ended.state) == (RunStatus.COMPLETED, BehaviorState.SUCCEEDED)
     assert ended.reason.startswith("without b")
