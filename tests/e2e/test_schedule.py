@@ -44,16 +44,14 @@ def serving(m2pem: CommandLine, *more: str, **environment: str) -> Program:
     program = m2pem.start(
         "serve", "--fleet", FLEET, "--ocu", "none", *JOURNAL, *more, **environment
     )
-    assert program.process.stderr is not None
-    while "serving" not in program.process.stderr.readline():
+    while "serving" not in program.stderr.readline():
         assert program.process.poll() is None
     return program
 
 
 def told(program: Program, wanted: str) -> str:
     """Wait until the executive says it."""
-    assert program.process.stderr is not None
-    for line in program.process.stderr:
+    for line in program.stderr:
         if wanted in line:
             return line
     raise AssertionError(f"it ended before it said {wanted!r}")
