@@ -1,15 +1,19 @@
 """The schedule in virtual time: what starts when, what it waits for, and what is missed."""
 
 import asyncio
+import time
 
 import msgspec
 import pytest
 
-from m2pem.api.clock import run_virtual
+from m2pem.api.clock import SystemClock, run_virtual
 from m2pem.api.schedule import Concurrency, Missed, ScheduledStatus, Settlement
 from m2pem.api.telemetry import LinkState
+from m2pem.engine.inputs import StartRun
+from m2pem.engine.records import RunStarted
 from m2pem.errors import MissionError, OperatorError, ScheduleError
-from m2pem.journal import MemoryJournal
+from m2pem.fleet.fleet import dump
+from m2pem.journal import Entry, MemoryJournal, RunHeader
 from m2pem.mission.catalogue import BehaviorState
 
 from .conftest import START_US, behavior, mission, question, sequence
@@ -466,6 +470,29 @@ def test_times_that_came_while_nothing_served_are_said_and_skipped_or_run_once(m
     ) + ("; it starts once as soon as it can" if missed is Missed.RUN_ONCE else "")
 
 
+def test_a_vehicle_of_a_run_that_nobody_has_taken_up_is_waited_for():
+    journal = MemoryJournal()
+
+    async def main(clock):
+        of, now_us = unattended_fleet("ugv1", "ugv2"), clock.now_us()
+        left = RunHeader("left.bpmn", drive("ugv1"), "P", dump(of))
+        run = await journal.create(left)
+        begun = (RunStarted("P", now_us),)
+        await journal.append([Entry(run, 1, 1, now_us, 0, StartRun("P", {}, "bob"), begun)])
+        await journal.release(run)
+        async with serving(clock, journal, of) as world:
+            await world.schedule(drive("ugv1"))
+            await world.schedule(drive("ugv2"))
+            await world.end("r2")
+            return await world.entry("s1"), await world.entry("s2")
+
+    first, second = run_virtual(main, START_US)
+    assert first.reason == (
+        "r1 was interrupted and may still command ugv1: `m2pem resume r1` takes it up"
+    )
+    assert second.run == "r2"
+
+
 def test_a_mission_that_does_not_fit_the_fleet_any_more_fails_with_its_findings():
     journal = MemoryJournal()
 
@@ -516,3 +543,17 @@ def test_an_executive_that_serves_no_schedule_says_who_does(play):
             await world.executive.control.schedule(ASK)
 
     play(story, "ugv1")
+
+
+async def test_a_clock_of_the_computer_that_was_set_is_said_once():
+    behind = SystemClock(start_us=time.time_ns() // 1000 - 60_000_000)
+    async with serving(behind, MemoryJournal(), unattended_fleet("ugv1")) as world:
+        events = world.executive.control.subscribe()
+        for _ in range(2):
+            await world.schedule(drive("ugv1"), cron="0 8 * * *", time_zone="UTC")
+        async for event in events:
+            if "clock was set" in getattr(event, "text", ""):
+                break
+        await world.executive.control.hold_schedule("s1")
+    said = [text for text in world.told() if "clock was set: it is 60 s from" in text]
+    assert len(said) == 1

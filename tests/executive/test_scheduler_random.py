@@ -215,6 +215,11 @@ class Played:
                 await scheduler.release(entry.id, "ada")
 
     async def check(self) -> None:
+        """A last executive reads the journal; each start that it knows is a run that has begun."""
+        for line in await self.journal.runs():
+            await self.journal.release(line.run)
+        starts, marks = Starts(self.clock, self.journal), StopMarks(None, self.journal.identity)
+        await Scheduler(starts, self.publish, marks, real=False).load()
         begun = {line.run for line in await self.journal.runs() if line.last_seq}
         known: set[str] = set()
         for entry in await self.journal.entries():
@@ -226,7 +231,7 @@ class Played:
             if any(each.settlement is Settlement.MISSED for each in entry.state.times):
                 assert any(f"{entry.id} missed" in text for text in self.told)
             assert sum(each.times for each in entry.state.times if not each.owed) == passed(entry)
-        assert begun <= known
+        assert begun == known
 
 
 def passed(entry: ScheduleEntry) -> int:
