@@ -211,6 +211,17 @@ PROGRAMS = (
         (Goal("percent", "an idle executive, of a core", "%", 0.1),),
     ),
     Program(
+        "200 tasks, 1,000 vehicles",
+        ("allocating", "200", "1000", "20", "100"),
+        ("allocating", "10", "20", "2", "5"),
+        (
+            Goal("decision_ms", "choosing vehicles for 200 tasks of one moment, CPU", "ms", 200),
+            Goal("missions_cpu_s", "20 missions at once on 100 simulated vehicles, CPU", "s"),
+            Goal("longest_wait_s", "the same, the longest wait of a task, mission time", "s"),
+            Goal("bound_s", "the same, the bound on that", "s"),
+        ),
+    ),
+    Program(
         "20,000 frames",
         ("mavlink_frames", "20000"),
         ("mavlink_frames", "500"),

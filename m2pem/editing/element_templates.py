@@ -172,9 +172,13 @@ def _behavior(
         property_name(spec.type.value, spec.type.value),
         spec.type.value,
         value=performers[0] if len(performers) == 1 else "",
-        required=True,
+        doc="Empty: it is chosen when the task starts, by what it requires.",
         choices=performers,
     )
+    for attribute, doc in _NEEDS.items():
+        if attribute != "count" or spec.type is BehaviorType.TEAM:
+            name = property_name(attribute, spec.type.value)
+            template.ask("Chosen when it starts", name, attribute, doc=doc)
     for parameter in {**spec.by_name, **accepted(spec)}.values():
         template.ask(
             "Parameters",
@@ -186,6 +190,18 @@ def _behavior(
             choices=_choices(fleet, parameter),
         )
     return template
+
+
+_NEEDS = {
+    "requires": "Instead of a name: a condition on the candidate, as vehicle.domain == 'air'.",
+    "same": "Instead of a name: the data under which an earlier task stored its choice.",
+    "count": "How many: 2, or 1..3 for as many as are free.",
+    "prefer": "How many seconds of travel time the candidate is worth.",
+    "store": "The name under which the choice is stored.",
+    "wait": "How long it waits until it is free: PT10M, or unlimited.",
+    "priority": "A whole number; what has the greatest is served first.",
+}
+"""The attributes of a role by need (docs/allocation.md), and what each means."""
 
 
 def _choices(fleet: Fleet, parameter: ParameterSpec) -> Sequence[str]:

@@ -78,11 +78,21 @@ def test_roles_offer_what_can_do_the_behavior_and_is_not_manned() -> None:
     templates = made()
     vehicle = field(templates["goto"], "vehicle")
     assert vehicle["binding"]["name"] == "m2pem:vehicle:vehicle"
-    assert values(vehicle) == ["evsg1", "evsg2"]
-    assert vehicle["constraints"] == {"notEmpty": True}
+    assert values(vehicle) == ["", "evsg1", "evsg2"]
+    assert "constraints" not in vehicle  # empty: it is chosen by what it requires
     assert "value" not in vehicle
     assert field(templates["ptz_point_at"], "payload")["value"] == "evsg2/ptz"
-    assert values(field(templates["area_survey"], "team")) == ["section"]
+    assert values(field(templates["area_survey"], "team")) == ["", "section"]
+
+
+def test_roles_offer_what_a_role_by_need_says() -> None:
+    templates = made()
+    needs = ["requires", "same", "prefer", "store", "wait", "priority"]
+    asked = [field(templates["goto"], each)["binding"]["name"] for each in needs]
+    assert asked == [f"m2pem:{each}:vehicle" for each in needs]
+    assert field(templates["ptz_point_at"], "wait")["binding"]["name"] == "m2pem:wait:payload"
+    assert field(templates["area_survey"], "count")["binding"]["name"] == "m2pem:count:team"
+    assert not [each for each in templates["goto"]["properties"] if each.get("label") == "count"]
 
 
 def test_parameters_say_units_bounds_and_defaults() -> None:
@@ -105,7 +115,7 @@ def test_two_arbiters_with_other_parameters_have_a_template_each() -> None:
     other = replace(GOTO, parameters=(ParameterSpec("depth", ParameterKind.DISTANCE),))
     templates = made(offers={"evsg1": (GOTO,), "evsg2": (other,)})
     assert {"goto (evsg1)", "goto (evsg2)"} <= templates.keys()
-    assert values(field(templates["goto (evsg2)"], "vehicle")) == ["evsg2"]
+    assert values(field(templates["goto (evsg2)"], "vehicle")) == ["", "evsg2"]
 
 
 @pytest.mark.parametrize(
