@@ -12,13 +12,12 @@ together with the resources.
 import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.assignment import Request, assign
 from m2pem.allocation.candidates import Candidates, LatestState, Place
-from m2pem.allocation.circles import Waiting, circles
 from m2pem.allocation.explanation import reason, what_was_considered
 from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
@@ -30,24 +29,23 @@ from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.inputs import BehaviorPreempted, ResourcesChosen, ResourcesNotFree
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus
 from m2pem.errors import ExpressionError
+from m2pem.executive.allocation_requests import AskedFor, ConsideredRequest, Preempting
 from m2pem.executive.dispatcher import Geometries
 from m2pem.executive.fleet_connections import FleetArbiters
-from m2pem.executive.preemption import Holder, choose, preemptible, priority_of
+from m2pem.executive.preemption import Holder, choose, preemptible
 from m2pem.executive.runner import Runner
 from m2pem.executive.space_allocation import (
     SpaceAllocation,
     holders_of,
-    space_circle_text,
-    space_circles,
 )
+from m2pem.executive.waiting_circles import WaitingCircles
 from m2pem.executive.waiting_tasks import holder_label
 from m2pem.fleet.allocation import Availability, resources_of
-from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.fleet.space import may_wait_for_space
-from m2pem.mission.behavior import Behavior, BehaviorType
+from m2pem.mission.behavior import Behavior
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.losses import PREEMPTED, TAKEN_OVER, UNAVAILABLE, may_return
+from m2pem.mission.losses import PREEMPTED, UNAVAILABLE
 
 if TYPE_CHECKING:
     from m2pem.deconfliction.conflicts import Refusal
@@ -63,48 +61,6 @@ LOOK_AGAIN_US = 500_000
 
 _MAY_FREE = (r.RunResumed, r.ResourceReturned, r.OperatorGaveControlBack)
 """Records after which a task of the run may get what it could not get before."""
-
-
-@dataclass(slots=True)
-class _Asked:
-    """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what
-    its run knows that it lacks, without the values of telemetry, which change all the time.
-    `preempts`: what is taken from other runs for it, and given when their behaviors have ended."""
-
-    runner: Runner
-    chosen: bool = False
-    lacks: object = None
-    preempts: "_Preempting | None" = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Preempting:
-    """What was chosen for a request, and the behaviors that have to end first."""
-
-    answer: ResourcesChosen
-    resources: tuple[ResourceId, ...]
-    behaviors: frozenset[str]
-
-
-@dataclass(frozen=True, slots=True)
-class _Considered:
-    """A request with all that may fill its roles."""
-
-    asked: _Asked
-    request: AllocationRequest
-    task: Task
-    roles: tuple[ConsideredRole, ...]
-
-    @property
-    def priority(self) -> int:
-        """The greatest priority of its roles."""
-        return priority_of(each.role for each in self.roles)
-
-    @property
-    def waits(self) -> bool:
-        """Whether its task waits until resources are free; one that waits for space does."""
-        asked = any(each.role.need is not None and each.role.need.waits for each in self.roles)
-        return asked or self.request.deadline != 0
 
 
 class Allocator:
@@ -134,11 +90,11 @@ class Allocator:
         self._runners = runners
         self._publish = publish
         self._space = space
-        self._asked: dict[str, _Asked] = {}
+        self._asked: dict[str, AskedFor] = {}
         self._scheduled = False
         self._later: asyncio.Task[None] | None = None
         self._looked_us = 0
-        self._circles: set[frozenset[str]] = set()
+        self._circles = WaitingCircles(runners, arbiters.graph, publish)
         fleet = arbiters.fleet
         self._order = {each: place for place, each in enumerate((*fleet.vehicles, *fleet.payloads))}
 
@@ -149,7 +105,7 @@ class Allocator:
 
         `again`: what was chosen for it had been taken meanwhile.
         """
-        asked = self._asked.setdefault(allocation, _Asked(runner))
+        asked = self._asked.setdefault(allocation, AskedFor(runner))
         if again and asked.chosen:
             asked.chosen, asked.preempts = False, None
             self._release(allocation)
@@ -271,10 +227,10 @@ class Allocator:
         lacking = [each for each in left if each.request.id not in refusals]
         for each in self._preempt(lacking, set(given)):
             self._refuse(each, given, evaluator)
-        self._tell_of_circles(left, refusals)
+        self._circles.look(left, refusals)
 
     def _assign(
-        self, waiting: Sequence[_Considered], requests: dict[str, Request]
+        self, waiting: Sequence[ConsideredRequest], requests: dict[str, Request]
     ) -> tuple[
         dict[str, dict[str, tuple[ResourceId, ...]]], "dict[str, dict[ResourceId, Refusal]]"
     ]:
@@ -308,7 +264,7 @@ class Allocator:
             chosen = assign(list(requests.values()), self._order)
 
     def _without_space(
-        self, each: _Considered, chosen: Mapping[str, tuple[ResourceId, ...]]
+        self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
     ) -> "Refusal | None":
         """Return why a request has no space with what is chosen for it; None: it has."""
         assert self._space is not None
@@ -329,8 +285,8 @@ class Allocator:
         wanted = BehaviorRequest(number, 0, behavior.name, parameters, resources, roles)
         return self._space.refusal(wanted, spec)
 
-    def _consider(self, evaluator: RoleEvaluator) -> list[_Considered]:
-        found: list[_Considered] = []
+    def _consider(self, evaluator: RoleEvaluator) -> list[ConsideredRequest]:
+        found: list[ConsideredRequest] = []
         occupied = self._occupied()
         for allocation, asked in self._asked.items():
             state = asked.runner.run.state
@@ -347,7 +303,7 @@ class Allocator:
                 log.exception("%s: a bug in m2pem", allocation)
                 asked.runner.fail(error)
                 continue
-            found.append(_Considered(asked, request, task, roles))
+            found.append(ConsideredRequest(asked, request, task, roles))
         return found
 
     def _task(
@@ -429,7 +385,7 @@ class Allocator:
 
     def _give(
         self,
-        each: _Considered,
+        each: ConsideredRequest,
         chosen: Mapping[str, tuple[ResourceId, ...]],
         together_with: Sequence[str],
         without_space: Mapping[ResourceId, "Refusal"],
@@ -439,7 +395,7 @@ class Allocator:
 
     def _hold_for(
         self,
-        each: _Considered,
+        each: ConsideredRequest,
         chosen: Mapping[str, tuple[ResourceId, ...]],
         together_with: Sequence[str] = (),
         without_space: Mapping[ResourceId, "Refusal"] = MappingProxyType({}),
@@ -454,7 +410,7 @@ class Allocator:
         return ResourcesChosen(each.request.id, dict(roles), considered), resources
 
     def _filled(
-        self, each: _Considered, chosen: Mapping[str, tuple[ResourceId, ...]]
+        self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
     ) -> dict[str, tuple[ResourceId, ...]]:
         """Return what fills each role, a named team with its lead first."""
         fleet = self._arbiters.fleet
@@ -466,7 +422,7 @@ class Allocator:
             if role.role.name in chosen
         }
 
-    def _refuse_space(self, each: _Considered, refusal: "Refusal") -> None:
+    def _refuse_space(self, each: ConsideredRequest, refusal: "Refusal") -> None:
         """Let a task wait for space, or throw its error."""
         blockers = [(blocker.vehicle, blocker.behavior) for blocker in refusal.blockers]
         lacks = (refusal.vehicle, refusal.space, blockers)
@@ -481,7 +437,10 @@ class Allocator:
         )
 
     def _refuse(
-        self, each: _Considered, given: Mapping[ResourceId, Occupancy], evaluator: RoleEvaluator
+        self,
+        each: ConsideredRequest,
+        given: Mapping[ResourceId, Occupancy],
+        evaluator: RoleEvaluator,
     ) -> None:
         holders = {
             str(resource): holder
@@ -491,7 +450,7 @@ class Allocator:
         }
         why = reason(each.roles, given)
         lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])
-        waits = each.waits and not _is_hopeless(each, evaluator)
+        waits = each.waits and not each.is_hopeless(evaluator)
         if waits and each.asked.lacks == lacks:
             return
         each.asked.lacks = lacks
@@ -500,7 +459,9 @@ class Allocator:
 
     # --- preemption -------------------------------------------------------------------------------
 
-    def _preempt(self, left: Sequence[_Considered], given: set[ResourceId]) -> list[_Considered]:
+    def _preempt(
+        self, left: Sequence[ConsideredRequest], given: set[ResourceId]
+    ) -> list[ConsideredRequest]:
         """Take resources from other runs for requests that get none. Returns the requests for which
         that is not possible.
 
@@ -508,7 +469,7 @@ class Allocator:
         """
         if not self._arbiters.fleet.preemption:
             return list(left)
-        without: list[_Considered] = []
+        without: list[ConsideredRequest] = []
         behaviors = preemptible(self._runners.values(), self._latest)
         kept = set(given)
         for each in left:
@@ -529,10 +490,10 @@ class Allocator:
             kept.update(resources)
             self._take(each, {resource: holders[resource] for resource in taken})
             victims = frozenset(holders[resource].behavior.id for resource in taken)
-            each.asked.preempts = _Preempting(answer, resources, victims)
+            each.asked.preempts = Preempting(answer, resources, victims)
         return without
 
-    def _take(self, each: _Considered, taken: Mapping[ResourceId, Holder]) -> None:
+    def _take(self, each: ConsideredRequest, taken: Mapping[ResourceId, Holder]) -> None:
         """End the behaviors that have what a request gets, and tell the operators of both runs."""
         names = ", ".join(f"{name} is taken from {holder.label}" for name, holder in taken.items())
         has = {str(resource): holder.behavior.id for resource, holder in taken.items()}
@@ -570,126 +531,6 @@ class Allocator:
                 asked.preempts = None
                 asked.runner.post(preempts.answer)
 
-    # --- circles of waiting -----------------------------------------------------------------------
-
-    def _tell_of_circles(
-        self,
-        left: Sequence[_Considered],
-        refusals: Mapping[str, "Refusal"],
-    ) -> None:
-        """Warn operators of runs and tasks that wait for each other, once for each circle.
-
-        `left`: all that waits. `refusals`: why some of it has no space; the rest waits for
-        resources.
-        """
-        waiting = [each for each in left if each.request.id not in refusals]
-        requests = {each.request.id: each for each in left}
-        vehicles = {number: _vehicles(each) for number, each in requests.items()}
-        certain = {  # a task that may get another vehicle need not wait for ever
-            number: refusal
-            for number, refusal in refusals.items()
-            if all(role.role.resource for role in requests[number].roles)
-        }
-        in_space = space_circles(certain, vehicles)
-        for circle in in_space:
-            if circle not in self._circles:
-                text = space_circle_text(
-                    {number: requests[number].request for number in sorted(circle)}, refusals
-                )
-                for run in sorted({requests[number].asked.runner.id for number in circle}):
-                    self._publish(Alert(run, "WAITING_CIRCLE", text))
-        runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
-        idle = {run for run, runner in runners.items() if self._is_idle(runner)}
-        asked = [
-            Waiting(
-                each.request.id,
-                each.asked.runner.id,
-                tuple(self._needed(role) for role in each.roles),
-            )
-            for each in waiting
-            if each.asked.runner.id in idle
-        ]
-        found = circles(asked)
-        for circle in found:
-            if circle not in self._circles:
-                text = _circle_text([each for each in waiting if each.asked.runner.id in circle])
-                for run in sorted(circle):
-                    self._publish(Alert(run, "WAITING_CIRCLE", text))
-        self._circles = {*found, *in_space}
-
-    def _needed(self, role: ConsideredRole) -> tuple[int, tuple[str | None, ...]]:
-        """Return how many resources a role lacks, and the runs that hold one until they go on."""
-        lacking = max(0, role.options.least - len(role.options.costs_s))
-        holders: list[str | None] = []
-        for resource in role.resources:
-            if resource in role.excluded or resource not in role.occupied:
-                continue
-            holder = role.occupied[resource].holder
-            holders.append(holder.partition(".")[0] if self._goes_on(holder) else None)
-        return lacking, tuple(holders)
-
-    def _goes_on(self, behavior: str) -> bool:
-        """Whether a behavior ends only when its run ends it."""
-        runner = self._runners.get(behavior.partition(".")[0])
-        known = runner.run.state.behaviors.get(behavior) if runner is not None else None
-        if known is None or known.phase is not BehaviorPhase.ACTIVE:
-            return False
-        if not ENDING_PARAMETERS.isdisjoint(known.parameters):
-            return False
-        kind = BehaviorType(known.type)
-        spec = self._arbiters.graph.spec(known.resources[0], known.name, kind)
-        return spec is not None and not spec.ends
-
-    def _is_idle(self, runner: Runner) -> bool:
-        """Whether a run can go on only by getting what it asked for."""
-        state = runner.run.state
-        limits = {request.deadline for request in state.allocations.values()}
-        if limits != {0} or state.prompts or state.services or state.waits or state.incidents:
-            return False
-        return all(self._goes_on(behavior) for behavior in state.behaviors)
-
-
-def _circle_text(waiting: Sequence[_Considered]) -> str:
-    said = [
-        f"{each.asked.runner.id} waits at {each.request.token.node.label} for "
-        + ", ".join(
-            f"{resource} ({role.occupied[resource].holder})"
-            for role in each.roles
-            for resource in role.options.busy
-        )
-        for each in waiting
-    ]
-    runs = [each.asked.runner.id for each in waiting]
-    return (
-        f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
-        f"{runs[-1]}`), or take what it has and give it back"
-    )
-
-
-def _is_hopeless(each: _Considered, evaluator: RoleEvaluator) -> bool:
-    """Whether what is left of a lost behavior will be done by no other, however long it waits.
-
-    Of a vehicle that a pilot has taken, not an operator, it is not known when it is given back.
-    """
-    lost, taken = each.task.lost, each.asked.runner.run.state.taken
-    returns = {
-        name
-        for name, loss in lost.items()
-        if may_return(loss.code) and (loss.code != TAKEN_OVER or name in taken)
-    }
-    if each.request.token.lost_work is None:
-        return False
-    for considered in each.roles:
-        role = considered.role
-        if role.resource:
-            continue
-        same = role.need is not None and role.need.same
-        gone = lost.keys() if same else lost.keys() - returns
-        able = [e for e in evaluator.ever(role, each.task) if e not in gone]
-        if len(able) < considered.options.least:
-            return True
-    return False
-
 
 def _foremost(refusals: "Sequence[Refusal]") -> "Refusal":
     """Return which refusal a task is told: of the best vehicle for which it may wait, if any."""
@@ -702,11 +543,6 @@ def _excluding(
     """Return a role whose candidates without space are excluded."""
     reasons = {each: why.reason for each, why in without_space.items() if each in role.resources}
     return replace(role, excluded={**role.excluded, **reasons}) if reasons else role
-
-
-def _vehicles(each: _Considered) -> frozenset[ResourceId]:
-    """Return the vehicles that the roles of a task name."""
-    return frozenset(one for role in each.roles if role.role.resource for one in role.resources)
 
 
 def _without(request: Request, vehicle: ResourceId) -> Request:

@@ -37,7 +37,6 @@ async def test_a_base_stands_with_an_incident_and_drives_after_a_retry(
     place = to_geodetic(500.0, 0.0, 0.0, ORIGIN)
     target = f"[{place.latitude_deg}, {place.longitude_deg}]"
     drive = scenarios.one_behavior("goto", "ugv1", target=target, speed="${speed}")
-    fleet = load_fleet(file)
     with Peer(PEER, ros_domain, ["/ugv1", "base", "map"]):
         async with (
             RosRuntime("incidents", domain_id=ros_domain) as ros,

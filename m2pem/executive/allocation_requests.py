@@ -1,0 +1,82 @@
+"""Requests for resources, as the allocator looks at them."""
+
+from dataclasses import dataclass
+
+from m2pem.allocation.needs import ConsideredRole, RoleEvaluator, Task
+from m2pem.engine.inputs import ResourcesChosen
+from m2pem.engine.state import AllocationRequest
+from m2pem.executive.preemption import priority_of
+from m2pem.executive.runner import Runner
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.losses import TAKEN_OVER, may_return
+
+
+@dataclass(slots=True)
+class AskedFor:
+    """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what
+    its run knows that it lacks, without the values of telemetry, which change all the time.
+    `preempts`: what is taken from other runs for it, and given when their behaviors have ended."""
+
+    runner: Runner
+    chosen: bool = False
+    lacks: object = None
+    preempts: "Preempting | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Preempting:
+    """What was chosen for a request, and the behaviors that have to end first."""
+
+    answer: ResourcesChosen
+    resources: tuple[ResourceId, ...]
+    behaviors: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class ConsideredRequest:
+    """A request with all that may fill its roles."""
+
+    asked: AskedFor
+    request: AllocationRequest
+    task: Task
+    roles: tuple[ConsideredRole, ...]
+
+    @property
+    def priority(self) -> int:
+        """The greatest priority of its roles."""
+        return priority_of(each.role for each in self.roles)
+
+    @property
+    def waits(self) -> bool:
+        """Whether its task waits until resources are free; one that waits for space does."""
+        asked = any(each.role.need is not None and each.role.need.waits for each in self.roles)
+        return asked or self.request.deadline != 0
+
+    @property
+    def named_vehicles(self) -> frozenset[ResourceId]:
+        """The resources that its roles name."""
+        return frozenset(one for role in self.roles if role.role.resource for one in role.resources)
+
+    def is_hopeless(self, evaluator: RoleEvaluator) -> bool:
+        """Whether what is left of a lost behavior will be done by no other, however long it waits.
+
+        Of a vehicle that a pilot has taken, not an operator, it is not known when it is given back.
+        """
+        lost, taken = self.task.lost, self.asked.runner.run.state.taken
+        returns = {
+            name
+            for name, loss in lost.items()
+            if may_return(loss.code) and (loss.code != TAKEN_OVER or name in taken)
+        }
+        if self.request.token.lost_work is None:
+            return False
+        for considered in self.roles:
+            role = considered.role
+            if role.resource:
+                continue
+            same = role.need is not None and role.need.same
+            gone = lost.keys() if same else lost.keys() - returns
+            able = [e for e in evaluator.ever(role, self.task) if e not in gone]
+            if len(able) < considered.options.least:
+                return True
+        return False

@@ -1,0 +1,126 @@
+"""Circles of runs and tasks that wait for each other: found when they close, said to operators."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from m2pem.allocation.circles import Waiting, circles
+from m2pem.allocation.needs import ConsideredRole
+from m2pem.api.control import Alert, RunId
+from m2pem.engine.state import BehaviorPhase
+from m2pem.executive.allocation_requests import ConsideredRequest
+from m2pem.executive.runner import Runner
+from m2pem.executive.space_allocation import space_circle_text, space_circles
+from m2pem.fleet.behaviors import ENDING_PARAMETERS
+from m2pem.fleet.graph import ResourceGraph
+from m2pem.mission.behavior import BehaviorType
+
+if TYPE_CHECKING:
+    from m2pem.deconfliction.conflicts import Refusal
+
+
+class WaitingCircles:
+    """Warns operators of each circle once. `runners`: the runs that are driven here."""
+
+    def __init__(
+        self,
+        runners: Mapping[RunId, Runner],
+        graph: ResourceGraph,
+        publish: Callable[[Alert], None],
+    ) -> None:
+        self._runners = runners
+        self._graph = graph
+        self._publish = publish
+        self._known: set[frozenset[str]] = set()
+
+    def look(
+        self,
+        left: Sequence[ConsideredRequest],
+        refusals: Mapping[str, "Refusal"],
+    ) -> None:
+        """Warn operators of runs and tasks that wait for each other, once for each circle.
+
+        `left`: all that waits. `refusals`: why some of it has no space; the rest waits for
+        resources.
+        """
+        waiting = [each for each in left if each.request.id not in refusals]
+        requests = {each.request.id: each for each in left}
+        vehicles = {number: each.named_vehicles for number, each in requests.items()}
+        certain = {  # a task that may get another vehicle need not wait for ever
+            number: refusal
+            for number, refusal in refusals.items()
+            if all(role.role.resource for role in requests[number].roles)
+        }
+        in_space = space_circles(certain, vehicles)
+        for circle in in_space:
+            if circle not in self._known:
+                text = space_circle_text(
+                    {number: requests[number].request for number in sorted(circle)}, refusals
+                )
+                for run in sorted({requests[number].asked.runner.id for number in circle}):
+                    self._publish(Alert(run, "WAITING_CIRCLE", text))
+        runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
+        idle = {run for run, runner in runners.items() if self._is_idle(runner)}
+        asked = [
+            Waiting(
+                each.request.id,
+                each.asked.runner.id,
+                tuple(self._needed(role) for role in each.roles),
+            )
+            for each in waiting
+            if each.asked.runner.id in idle
+        ]
+        found = circles(asked)
+        for circle in found:
+            if circle not in self._known:
+                text = _circle_text([each for each in waiting if each.asked.runner.id in circle])
+                for run in sorted(circle):
+                    self._publish(Alert(run, "WAITING_CIRCLE", text))
+        self._known = {*found, *in_space}
+
+    def _needed(self, role: ConsideredRole) -> tuple[int, tuple[str | None, ...]]:
+        """Return how many resources a role lacks, and the runs that hold one until they go on."""
+        lacking = max(0, role.options.least - len(role.options.costs_s))
+        holders: list[str | None] = []
+        for resource in role.resources:
+            if resource in role.excluded or resource not in role.occupied:
+                continue
+            holder = role.occupied[resource].holder
+            holders.append(holder.partition(".")[0] if self._goes_on(holder) else None)
+        return lacking, tuple(holders)
+
+    def _goes_on(self, behavior: str) -> bool:
+        """Whether a behavior ends only when its run ends it."""
+        runner = self._runners.get(behavior.partition(".")[0])
+        known = runner.run.state.behaviors.get(behavior) if runner is not None else None
+        if known is None or known.phase is not BehaviorPhase.ACTIVE:
+            return False
+        if not ENDING_PARAMETERS.isdisjoint(known.parameters):
+            return False
+        kind = BehaviorType(known.type)
+        spec = self._graph.spec(known.resources[0], known.name, kind)
+        return spec is not None and not spec.ends
+
+    def _is_idle(self, runner: Runner) -> bool:
+        """Whether a run can go on only by getting what it asked for."""
+        state = runner.run.state
+        limits = {request.deadline for request in state.allocations.values()}
+        if limits != {0} or state.prompts or state.services or state.waits or state.incidents:
+            return False
+        return all(self._goes_on(behavior) for behavior in state.behaviors)
+
+
+def _circle_text(waiting: Sequence[ConsideredRequest]) -> str:
+    said = [
+        f"{each.asked.runner.id} waits at {each.request.token.node.label} for "
+        + ", ".join(
+            f"{resource} ({role.occupied[resource].holder})"
+            for role in each.roles
+            for resource in role.options.busy
+        )
+        for each in waiting
+    ]
+    runs = [each.asked.runner.id for each in waiting]
+    return (
+        f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
+        f"{runs[-1]}`), or take what it has and give it back"
+    )
