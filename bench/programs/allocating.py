@@ -32,6 +32,8 @@ FIELD_M = 10_000.0
 TASKS_A_MISSION = 10
 WAY_M = 100.0
 SPEED_M_S = 5.0
+TELEMETRY_HZ = 0.02
+"""Few states, as those of many vehicles that drive take longer to simulate than the choices."""
 
 
 def place(rng: random.Random) -> tuple[float, float]:
@@ -50,7 +52,7 @@ def drivers(count: int, rng: random.Random) -> Fleet:
                 name,
                 Domain.GROUND,
                 "sim",
-                {"home": list(place(rng))},
+                {"home": list(place(rng)), "telemetry_hz": TELEMETRY_HZ},
                 cruise_speed_m_s=SPEED_M_S,
                 tags=("light",),
             )
