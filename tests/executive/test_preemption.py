@@ -19,7 +19,9 @@ from m2pem.engine.records import (
     WorkReassigned,
 )
 from m2pem.engine.run import MissionRun
+from m2pem.errors import FleetError
 from m2pem.fleet.fleet import dump, restore
+from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.catalogue import BehaviorState, ResourceId
@@ -361,3 +363,15 @@ def test_after_a_restart_the_vehicle_is_still_taken(preempting):
 
     played = preempting(story, journal=taking(), start_us=START_US + 1_000_000)
     assert played == ([], RunStatus.COMPLETED)
+
+
+def test_a_wrong_word_for_preemption_is_named_with_its_line(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    vehicles = "vehicles: {ugv1: {domain: ground, arbiter: sim}}\n"
+    file.write_text(f"version: 1\n{vehicles}allocation: {{preemption: yes}}\n", encoding="utf-8")
+    with pytest.raises(FleetError) as refused:
+        load_fleet(file)
+    (finding,) = refused.value.findings
+    assert (finding.line, finding.element) == (3, "allocation.preemption")
+    file.write_text(f"version: 1\n{vehicles}allocation: {{preemption: true}}\n", encoding="utf-8")
+    assert load_fleet(file).preemption
