@@ -35,6 +35,7 @@ from m2pem.mission.elements import (
     SubProcess,
 )
 from m2pem.mission.events import ErrorEventDefinition
+from m2pem.mission.losses import PREEMPTED
 
 _GATEWAYS = (
     ComplexGateway,
@@ -79,11 +80,12 @@ def open_incident(
     """Stop a token on its element with an incident, and end what it does there.
 
     `behavior`: the one that failed, which has ended or is being cancelled. `rearm`: an event at the
-    element could not be armed.
+    element could not be armed. What a task with a greater priority has taken is not kept.
     """
     failed = [] if behavior is None else [behavior]
     failed += _behaviors_of(x.state, token)
-    resources = [resource for each in failed for resource in each.resources]
+    kept = failed[1:] if behavior is not None and code == PREEMPTED else failed
+    resources = [resource for each in kept for resource in each.resources]
     resources += _resources_of_incidents(x.state, token)
     stop_activity(x, token, TokenOutcome.TERMINATED)
     node = token.node

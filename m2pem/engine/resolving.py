@@ -14,7 +14,7 @@ from m2pem.engine.inputs import IncidentChoice, ResolveIncident
 from m2pem.engine.records import TokenOutcome
 from m2pem.engine.scopes import error_path
 from m2pem.engine.state import Incident, RunState, Token
-from m2pem.engine.throwing import fail_run
+from m2pem.engine.throwing import catcher_of_error, fail_run, throw_error
 from m2pem.fleet.allocation import resources_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.elements import Element, FlowNode, InclusiveGateway, SequenceFlow
@@ -143,7 +143,10 @@ def resolve_incident(x: Execution, item: ResolveIncident) -> None:
         case IncidentChoice.MOVE:
             _move(x, token, item.to)
         case IncidentChoice.END:
-            fail_run(x, token, incident.code, incident.reason, error_path(token))
+            if catcher_of_error(token, incident.code) is not None:  # an operator was asked before
+                throw_error(x, token, incident.code, incident.reason)
+            else:
+                fail_run(x, token, incident.code, incident.reason, error_path(token))
 
 
 def _end(x: Execution, incident: Incident, item: ResolveIncident) -> None:

@@ -100,6 +100,17 @@ def test_a_token_moves_to_another_element_or_along_a_flow_to_a_join() -> None:
     assert other.detail == "stuck: no token can move from join"
 
 
+def test_what_a_task_with_a_greater_priority_takes_is_not_kept() -> None:
+    patrol = play(PATROL).start({"mission.speed": 3})
+    patrol.orders()
+    patrol.give(i.BehaviorPreempted("r1.b1", "uav1", "r2.a1", "for r2"))
+    (incident,) = patrol.run.state.incidents.values()
+    assert (incident.code, incident.resources) == ("PREEMPTED", ())
+    assert patrol.orders() == ["cancel b1"]
+    patrol.report("b1", CANCELLED).resolve("skip").answer().report("spare", SUCCEEDED)
+    assert patrol.ended == "completed"
+
+
 def test_the_end_is_what_an_error_does_without_incidents() -> None:
     patrol = failed_patrol().resolve("end")
     plain = Play(PATROL).start().report("go", FAILED, "ROUTE_BLOCKED")

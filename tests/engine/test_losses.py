@@ -278,6 +278,13 @@ def test_who_is_asked_again_if_nothing_is_free_for_the_rest() -> None:
     assert incident(world) == "r1.i2"
 
 
+def test_to_end_is_to_throw_the_error_that_an_event_catches() -> None:
+    world = running(play(ASK), {"route": "rest"}).fault("ugv1", reachable=False)
+    world.give(i.ResolveIncident("r1.i1", i.IncidentChoice.END, "ops"))
+    assert world.at == "caught"
+    assert not world.run.state.incidents
+
+
 def test_an_error_that_is_no_loss_asks_nobody() -> None:
     world = play(ASK).report("go", FAILED, "ROUTE_BLOCKED")
     assert world.at == "caught"
