@@ -23,16 +23,24 @@ from m2pem.journal.base import Entry
 from m2pem.journal.codec import decode_body, encode_body, record_line, run_id, run_number
 
 INT_64 = st.integers(-(2**63), 2**64 - 1)
+FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 VALUES = st.recursive(
     st.none()
     | st.booleans()
     | INT_64
-    | st.floats(allow_nan=False, allow_infinity=False)
+    | FLOATS
     | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
     max_leaves=5,
 )
-OF_TYPE = {Any: VALUES, str: st.text(), int: INT_64, bool: st.booleans(), NoneType: st.none()}
+OF_TYPE = {
+    Any: VALUES,
+    str: st.text(),
+    int: INT_64,
+    float: FLOATS,
+    bool: st.booleans(),
+    NoneType: st.none(),
+}
 
 
 def of_type(kind):

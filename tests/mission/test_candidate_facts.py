@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from m2pem.fleet import need_check
+from m2pem.fleet import need_check, shortage
 from m2pem.mission.candidate_facts import CANDIDATE_FACTS, FLEET_FACTS, is_fact
 
 PAGE = (Path(__file__).parents[2] / "docs" / "allocation.md").read_text(encoding="utf-8")
@@ -27,4 +27,4 @@ def test_the_page_has_every_finding_about_roles_by_need() -> None:
     findings = set(re.findall(r'findings\.add\(\s*"([\w-]+)"', code))
     assert findings
     table = PAGE.partition("| finding |")[2].partition("\n\n")[0]
-    assert set(re.findall(r"^\| `([\w-]+)` \|", table, re.M)) == findings
+    assert set(re.findall(r"^\| `([\w-]+)` \|", table, re.M)) == {*findings, shortage.RULE}
