@@ -25,11 +25,7 @@ from m2pem.journal.codec import decode_body, encode_body, record_line, run_id, r
 INT_64 = st.integers(-(2**63), 2**64 - 1)
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 VALUES = st.recursive(
-    st.none()
-    | st.booleans()
-    | INT_64
-    | FLOATS
-    | st.text(),
+    st.none() | st.booleans() | INT_64 | FLOATS | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
     max_leaves=5,
 )

@@ -40,7 +40,9 @@ async def test_a_base_stands_with_an_incident_and_drives_after_a_retry(
     with Peer(PEER, ros_domain, ["/ugv1", "base", "map"]):
         async with (
             RosRuntime("incidents", domain_id=ros_domain) as ros,
-            Executive(load_fleet(file), MemoryJournal(), PluginManager(), SystemClock()) as executive,
+            Executive(
+                load_fleet(file), MemoryJournal(), PluginManager(), SystemClock()
+            ) as executive,
         ):
             control, truth = executive.control, Truth(ros)
 
