@@ -23,7 +23,7 @@ DEBIAN_PACKAGES := chromium curl nodejs npm spin systemd tcc tmux
 CREATED := $(VENV)/created
 INSTALLED := $(VENV)/installed
 IDENTITY := $(strip $(CURDIR) $(shell $(if $(filter file,$(origin PYTHON)),$(BIN)/python,$(PYTHON)) -V 2>&1))
-ifeq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(CREATED) 2>/dev/null),$(IDENTITY))
+ifeq ($(shell { $(BIN)/python -c '' && cat $(CREATED); } 2>/dev/null),$(IDENTITY))
 packages_for = $(or $(wildcard $(INSTALLED)),$(VENV)/for-$(1))
 else
 .PHONY: $(CREATED)
@@ -117,7 +117,7 @@ ROS_PACKAGES := ros/m2pem_interfaces plugins/arbiters/ros/tests/nav2_testdouble
 ROS_INTERFACES := $(sort $(shell find $(ROS_PACKAGES) -type f -not -name '*.pyc'))
 ROS_CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/m2pem/ros
 ROS_IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1))
-ifneq ($(shell $(ROS_PYTHON) -c '' 2>/dev/null && cat $(ROS)/created 2>/dev/null),$(ROS_IDENTITY))
+ifneq ($(shell { $(ROS_PYTHON) -c '' && cat $(ROS)/created; } 2>/dev/null),$(ROS_IDENTITY))
 .PHONY: $(ROS)/created
 endif
 
