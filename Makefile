@@ -22,7 +22,7 @@ DEBIAN_PACKAGES := chromium curl nodejs npm spin systemd tcc tmux
 # Each target adds what it needs: a demonstration a few packages, the tests all (`installed`).
 CREATED := $(VENV)/created
 INSTALLED := $(VENV)/installed
-IDENTITY := $(strip $(CURDIR) $(shell $(if $(filter file,$(origin PYTHON)),$(BIN)/python,$(PYTHON)) -V 2>&1))
+IDENTITY := $(strip $(CURDIR) $(shell { $(if $(filter file,$(origin PYTHON)),$(BIN)/python,$(PYTHON)) -V; } 2>&1))
 ifeq ($(shell { $(BIN)/python -c '' && cat $(CREATED); } 2>/dev/null),$(IDENTITY))
 packages_for = $(or $(wildcard $(INSTALLED)),$(VENV)/for-$(1))
 else
