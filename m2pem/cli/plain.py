@@ -384,6 +384,7 @@ class PlainOcu:
         if len(words) != 1:
             raise OperatorError("say which: handback RESOURCE")
         await self._control.give_back(words[0], by=NAME)
+        self._say(f"{words[0]} is the missions' again")
 
     async def _who(self, _: list[str]) -> None:
         unavailable = await self._control.unavailable()
