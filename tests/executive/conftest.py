@@ -42,6 +42,17 @@ def behavior(element: str, name: str, vehicle: str, *, parameters: str = "") -> 
     )
 
 
+def task(element: str, role: str, name: str = "drive_stop", parameters: str = "") -> str:
+    """A task of one vehicle; `role`: the attributes of its role."""
+    return (
+        f'<scriptTask id="{element}"><extensionElements>'
+        f'<m2pem:behavior type="vehicle" name="{name}">'
+        f"<m2pem:properties>{parameters}</m2pem:properties>"
+        f'<m2pem:resources><m2pem:role name="driver" {role}/></m2pem:resources>'
+        "</m2pem:behavior></extensionElements></scriptTask>"
+    )
+
+
 def flow(source: str, target: str) -> str:
     """A sequence flow named after its ends."""
     return f'<sequenceFlow id="{source}_{target}" sourceRef="{source}" targetRef="{target}"/>'

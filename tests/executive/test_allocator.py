@@ -21,20 +21,11 @@ from m2pem.fleet.fleet import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.catalogue import BehaviorState, ResourceId
+from tests.waiting_circle import GO, holding_and_waiting
 
-from .conftest import START_US, World, fleet, flow, mission, sequence
+from .conftest import START_US, World, fleet, flow, mission, sequence, task
 
 SUCCEEDED = BehaviorState.SUCCEEDED
-
-
-def task(element: str, role: str, name: str = "drive_stop", parameters: str = "") -> str:
-    return (
-        f'<scriptTask id="{element}"><extensionElements>'
-        f'<m2pem:behavior type="vehicle" name="{name}">'
-        f"<m2pem:properties>{parameters}</m2pem:properties>"
-        f'<m2pem:resources><m2pem:role name="driver" {role}/></m2pem:resources>'
-        "</m2pem:behavior></extensionElements></scriptTask>"
-    )
 
 
 def one(role: str, name: str = "drive_stop", parameters: str = "") -> bytes:
@@ -335,37 +326,17 @@ def test_who_waited_is_served_after_a_restart_in_the_order_of_before(play):
     assert played == [RunStatus.COMPLETED] * 2
 
 
-TARGET = '<m2pem:property name="target" value="lead"/>'
-
-
-def holding_and_waiting(holds: str, needs: str) -> bytes:
-    """A run that follows with one vehicle until, after signal Go, it has got another one."""
-    catch = (
-        '<intermediateCatchEvent id="Wait"><signalEventDefinition signalRef="Go"/>'
-        "</intermediateCatchEvent>"
-    )
-    return mission(
-        '<signal id="Go"/><process id="P" isExecutable="true"><startEvent id="S"/>'
-        f"<parallelGateway id='F'/>{catch}"
-        + task("Hold", f"vehicle='{holds}'", "follow", TARGET)
-        + task("Need", f"vehicle='{needs}' wait='unlimited'")
-        + '<endEvent id="T"><terminateEventDefinition/></endEvent>'
-        f"{flow('S', 'F')}{flow('F', 'Hold')}{flow('F', 'Wait')}{flow('Wait', 'Need')}"
-        f"{flow('Need', 'T')}</process>"
-    )
-
-
 def test_runs_that_wait_for_each_other_are_told_and_one_can_be_stopped(play):
     async def story(world: World):
         control = world.executive.control
         alerts: list[Alert] = []
         events = control.subscribe()
-        first = await control.start(holding_and_waiting("ugv1", "ugv2"))
+        first = await control.start(holding_and_waiting("ugv1", "ugv2", "lead"))
         await world.fake.until_called("start", f"{first}.b1")
-        second = await control.start(holding_and_waiting("ugv2", "ugv1"))
+        second = await control.start(holding_and_waiting("ugv2", "ugv1", "lead"))
         await world.fake.until_called("start", f"{second}.b1")
         for run in (first, second):
-            await control.signal("Go", run=run)
+            await control.signal(GO, run=run)
         async for event in events:
             if isinstance(event, Alert):
                 alerts.append(event)

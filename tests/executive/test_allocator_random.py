@@ -22,8 +22,7 @@ from m2pem.journal import MemoryJournal
 from m2pem.journal.mission import mission_of
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
-from .conftest import World, flow, mission
-from .test_allocator import task
+from .conftest import World, flow, mission, task
 
 VEHICLES = ("ugv1", "ugv2", "uav1")
 

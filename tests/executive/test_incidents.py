@@ -12,8 +12,7 @@ from m2pem.engine.records import IncidentOpened, IncidentResolved
 from m2pem.errors import BusyError, OperatorError
 from m2pem.mission.catalogue import BehaviorState
 
-from .conftest import World, behavior, flow, mission, question, sequence
-from .test_allocator import task
+from .conftest import World, behavior, flow, mission, question, sequence, task
 from .test_emergency import StallingJournal, alerts
 from .test_lost_resources import says
 from .test_recovery import left_behind

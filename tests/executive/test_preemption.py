@@ -26,8 +26,8 @@ from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
-from .conftest import START_US, World, fleet, flow, mission, question, sequence
-from .test_allocator import both, one, task
+from .conftest import START_US, World, fleet, flow, mission, question, sequence, task
+from .test_allocator import both, one
 
 SUCCEEDED, CANCELLED, RUNNING = (
     BehaviorState.SUCCEEDED,

@@ -25,8 +25,8 @@ from m2pem.journal.mission import mission_of
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.testing.fake_arbiter import Call
 
-from .conftest import START_US, World, fleet, mission, sequence
-from .test_allocator import one, task
+from .conftest import START_US, World, fleet, mission, sequence, task
+from .test_allocator import one
 
 RUNNING, SUCCEEDED = BehaviorState.RUNNING, BehaviorState.SUCCEEDED
 LOST, REJECTED = BehaviorState.LOST, BehaviorState.REJECTED
