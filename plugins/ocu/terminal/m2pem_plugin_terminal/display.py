@@ -12,6 +12,7 @@ from textual.widgets import Static
 
 from m2pem.api import (
     Alert,
+    Importance,
     Listener,
     MissionControl,
     OpenPrompt,
@@ -26,6 +27,7 @@ from m2pem.api import (
 from m2pem.api.control import LOGGED
 from m2pem.api.run_view import Behavior, FinishedToken
 from m2pem.errors import M2pemError
+from m2pem_plugin_terminal.formatting import clock_time
 from m2pem_plugin_terminal.handover import taken
 from m2pem_plugin_terminal.log_pane import Line, LogPane, line_of
 from m2pem_plugin_terminal.mission_pane import FADES_FOR_S, Done, mission_tree, shown_when_done
@@ -278,6 +280,12 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.show()
 
     def alerted(self, alert: Alert) -> None:
-        """Show an alert as an alarm, unless the log shows it."""
-        if alert.code != LOGGED:
-            self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)
+        """Show an alert as an alarm, unless the log shows it. The log of its run has it whole."""
+        if alert.code == LOGGED:
+            return
+        self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)
+        if (view := self.follower.views.get(alert.run)) is not None:
+            line = Line(clock_time(view.t_s), alert.text, Importance.WARNING)
+            self._run_log(alert.run).lines.append(line)
+            if alert.run == self.run_shown:
+                self.log_pane.add(line)
