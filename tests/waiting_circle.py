@@ -23,12 +23,11 @@ routes: {north: north.geojson}
 """
 
 
-def holding_and_waiting(holds: str, needs: str, target: str = "") -> bytes:
-    """A run that follows with one vehicle until, after signal `GO`, it has got another one.
+def holding_and_waiting(holds: str, needs: str) -> bytes:
+    """A run that drives one vehicle by hand until, after signal `GO`, it has got another one.
 
-    It follows `target`, else the vehicle that it needs. Its elements: Hold, Wait, Need.
+    Its elements: Hold, Wait, Need. When Need is done, the run ends at T.
     """
-    property_ = f'<m2pem:property name="target" value="{target or needs}"/>'
     catch = (
         '<intermediateCatchEvent id="Wait"><signalEventDefinition signalRef="Go"/>'
         "</intermediateCatchEvent>"
@@ -36,7 +35,7 @@ def holding_and_waiting(holds: str, needs: str, target: str = "") -> bytes:
     return mission(
         f'<signal id="{GO}"/><process id="P" isExecutable="true"><startEvent id="S"/>'
         f"<parallelGateway id='F'/>{catch}"
-        + task("Hold", f"vehicle='{holds}'", "follow", property_)
+        + task("Hold", f"vehicle='{holds}'", "teleop")
         + task("Need", f"vehicle='{needs}' wait='unlimited'")
         + '<endEvent id="T"><terminateEventDefinition/></endEvent>'
         f"{flow('S', 'F')}{flow('F', 'Hold')}{flow('F', 'Wait')}{flow('Wait', 'Need')}"

@@ -331,9 +331,9 @@ def test_runs_that_wait_for_each_other_are_told_and_one_can_be_stopped(play):
         control = world.executive.control
         alerts: list[Alert] = []
         events = control.subscribe()
-        first = await control.start(holding_and_waiting("ugv1", "ugv2", "lead"))
+        first = await control.start(holding_and_waiting("ugv1", "ugv2"))
         await world.fake.until_called("start", f"{first}.b1")
-        second = await control.start(holding_and_waiting("ugv2", "ugv1", "lead"))
+        second = await control.start(holding_and_waiting("ugv2", "ugv1"))
         await world.fake.until_called("start", f"{second}.b1")
         for run in (first, second):
             await control.signal(GO, run=run)
@@ -353,7 +353,7 @@ def test_runs_that_wait_for_each_other_are_told_and_one_can_be_stopped(play):
         world.fake.report(f"{first}.b1", BehaviorState.CANCELLED)
         return alerts, took_us, (await control.wait(first)).status
 
-    alerts, took_us, status = play(story, "ugv1", "ugv2", "lead")
+    alerts, took_us, status = play(story, "ugv1", "ugv2")
     assert [alert.code for alert in alerts] == ["WAITING_CIRCLE"] * 2
     assert [alert.run for alert in alerts] == ["r1", "r2"]
     assert "r1 waits at Need for ugv2 (r2.b1)" in alerts[0].text
