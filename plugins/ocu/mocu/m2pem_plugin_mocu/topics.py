@@ -63,6 +63,7 @@ class Topics(Listener):
 
     def __init__(self, ros: RosRuntime, control: MissionControl, follower: Follower) -> None:
         publisher = ros.node.create_publisher
+        self._ros_log = ros.node.get_logger()
         self._control = control
         self._follower = follower
         self._opened_us: dict[tuple[RunId, str], int] = {}
@@ -181,8 +182,8 @@ class Topics(Listener):
         self._prompts_throttle.mark_changed()
 
     def alerted(self, alert: Alert) -> None:
-        """Log it, which ROS shows to operators."""
-        log.error("%s", f"{alert.run}: {alert.text}" if alert.run else alert.text)
+        """Log it in ROS, whose topic `/rosout` operators read."""
+        self._ros_log.error(f"{alert.run}: {alert.text}" if alert.run else alert.text)
 
     # --- publishing -----------------------------------------------------------------------------
 

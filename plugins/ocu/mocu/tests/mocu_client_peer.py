@@ -17,10 +17,12 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PolygonStamped
 from m2pem_interfaces import msg, srv
+from rcl_interfaces.msg import Log
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SERVICES = QoSProfile(depth=2000)
 
 TOPICS = {
@@ -99,6 +101,7 @@ def main() -> None:
             name = f"{namespace}/{topic}"
             node.create_subscription(kind, name, tell(namespace, topic), quality)
     node.create_subscription(DiagnosticArray, "/diagnostics", tell("", "diagnostics"), 10)
+    node.create_subscription(Log, "/rosout", tell("", "rosout"), ROSOUT)
 
     executor = SingleThreadedExecutor()
     executor.add_node(node)

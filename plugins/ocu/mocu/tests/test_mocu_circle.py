@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-import pytest
-from mocu_world import Client, World, until
+from mocu_world import Client, World
 
 from m2pem.api import RunStatus
 from tests.waiting_circle import GO, NONE_GOES_ON, holding_and_waiting
@@ -12,7 +11,7 @@ STOP = 1
 
 
 async def test_an_operator_stops_one_of_two_runs_that_wait_for_each_other(
-    world: World, client: Client, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    world: World, client: Client, tmp_path: Path
 ) -> None:
     runs = []
     for holds, needs in (("ugv1", "ugv2"), ("ugv2", "ugv1")):
@@ -21,9 +20,9 @@ async def test_an_operator_stops_one_of_two_runs_that_wait_for_each_other(
         runs.append((await client.call("start_mission", url=str(file)))["run"])
     first, second = runs
     assert (await client.call("send_signal", signal=GO))["success"]
-    await until(lambda: NONE_GOES_ON in caplog.text, lambda: caplog.text)
-    assert f"{first} waits at Need for ugv2 ({second}.b1)" in caplog.text
-    assert f"`m2pem stop {second}`" in caplog.text
+    alert = await client.hears("rosout", lambda each: NONE_GOES_ON in each["msg"])
+    assert f"{first} waits at Need for ugv2 ({second}.b1)" in alert["msg"]
+    assert f"`m2pem stop {second}`" in alert["msg"]
     assert (await client.call("control_run", verb=STOP, run=second, by="anna"))["success"]
     assert (await world.control.wait(second)).status is RunStatus.STOPPED
     assert (await world.control.wait(first)).status is RunStatus.TERMINATED
