@@ -216,6 +216,8 @@ class Answers:
                 return
             by = BY_DEFAULT
             decision = prompt.decisions[0].value
+        # First, tasks that began with the prompt get the vehicles that they need.
+        await asyncio.sleep(0)
         try:
             await control.answer(prompt.run, prompt.prompt, decision, by=by)
         except OperatorError as error:

@@ -10,7 +10,11 @@ from m2pem.scripting.run_result import RunResult
 
 REPOSITORY = Path(__file__).parents[2]
 MISSIONS = REPOSITORY / "missions"
-FLEETS = {"vignette1": "vignette1.yaml", "mehds_vignette_2": "mehds.yaml"}
+FLEETS = {
+    "vignette1": "vignette1.yaml",
+    "team_column": "mehds_mixed.yaml",
+    **{f"mehds_vignette_{number}": "mehds.yaml" for number in range(1, 5)},
+}
 
 ANSWERS = [
     (name, path)
@@ -37,6 +41,10 @@ def ends(result: RunResult) -> list[str]:
     return [e.element for e in entered if isinstance(e, TokenEntered) and "End" in e.element]
 
 
+def test_each_mission_by_need_has_its_fleet() -> None:
+    assert {path.stem for path in (MISSIONS / "by_need").glob("*.bpmn")} == FLEETS.keys()
+
+
 @pytest.mark.parametrize(("name", "answers"), ANSWERS, ids=[path.stem for _, path in ANSWERS])
 def test_a_vignette_by_need_ends_as_the_one_that_names_its_vehicles(
     name: str, answers: Path
@@ -46,8 +54,13 @@ def test_a_vignette_by_need_ends_as_the_one_that_names_its_vehicles(
         for folder in (MISSIONS, MISSIONS / "by_need")
     )
     assert by_need.outcome is named.outcome
-    assert ends(by_need) == ends(named)
-    assert commanded(by_need) == commanded(named)
+    if name == "team_column":
+        # Another vehicle leads, so that the radar is there later: the camera scans more often.
+        assert set(ends(by_need)) == set(ends(named))
+        assert set(commanded(by_need)) == set(commanded(named))
+    else:
+        assert ends(by_need) == ends(named)
+        assert commanded(by_need) == commanded(named)
 
 
 @pytest.mark.parametrize("name", FLEETS)
