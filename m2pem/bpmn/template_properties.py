@@ -36,7 +36,8 @@ TIMEOUT = f"{PREFIX}timeout"
 
 _SETTINGS = (STORE, OPERATORS, TIMEOUT)
 _SINGLE = frozenset({BEHAVIOR, TYPE, PROMPT, *_SETTINGS})
-_ROLES = frozenset({*RoleKind, *NEED_ATTRIBUTES})
+_OF_ROLES = (*NEED_ATTRIBUTES, "onLoss")
+_ROLES = frozenset({*RoleKind, *_OF_ROLES})
 _NAMED = frozenset({"property", "decision", *_ROLES})
 _CONTAINERS = (CAMUNDA + "properties", ZEEBE + "properties")
 _EXTENSIONS = BPMN + "extensionElements"
@@ -121,7 +122,7 @@ class _Replacement:
             return True
         if what in _NAMED:
             right = f"write for example '{property_name(what, _EXAMPLES[what])}'"
-            which = "role" if what in NEED_ATTRIBUTES else what
+            which = "role" if what in _OF_ROLES else what
             self._error(element, f"the property '{whole}' does not say which {which}", right)
         else:
             forms = [*sorted(_SINGLE), *(f"{PREFIX}{each}:" for each in sorted(_NAMED))]
@@ -196,7 +197,7 @@ _EXAMPLES = {
     "vehicle": "mover",
     "payload": "camera",
     "team": "team",
-    **dict.fromkeys(NEED_ATTRIBUTES, "mover"),
+    **dict.fromkeys(_OF_ROLES, "mover"),
 }
 
 

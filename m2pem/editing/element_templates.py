@@ -24,7 +24,7 @@ from m2pem.bpmn.template_properties import (
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.parameters import DIMENSIONS, accepted
 from m2pem.geo.geojson import kind_of
-from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.behavior import BehaviorType, OnLoss
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
 from m2pem.units import UNITS
 
@@ -179,6 +179,14 @@ def _behavior(
         if attribute != "count" or spec.type is BehaviorType.TEAM:
             name = property_name(attribute, spec.type.value)
             template.ask("Chosen when it starts", name, attribute, doc=doc)
+    if spec.type is not BehaviorType.TEAM:  # the fleet file says what a team does
+        template.ask(
+            "When it is lost",
+            property_name("onLoss", spec.type.value),
+            "onLoss",
+            doc="reassign: another one does the rest, if none is named. ask: an operator decides.",
+            choices=tuple(OnLoss),
+        )
     for parameter in {**spec.by_name, **accepted(spec)}.values():
         template.ask(
             "Parameters",

@@ -95,6 +95,16 @@ def test_roles_offer_what_a_role_by_need_says() -> None:
     assert not [each for each in templates["goto"]["properties"] if each.get("label") == "count"]
 
 
+def test_roles_offer_what_happens_when_what_fills_them_is_lost() -> None:
+    templates = made()
+    on_loss = field(templates["goto"], "onLoss")
+    assert on_loss["binding"]["name"] == "m2pem:onLoss:vehicle"
+    assert values(on_loss) == ["", "fail", "reassign", "ask"]
+    # Of a team, the fleet file says it.
+    of_team = templates["area_survey"]["properties"]
+    assert not [each for each in of_team if each.get("label") == "onLoss"]
+
+
 def test_parameters_say_units_bounds_and_defaults() -> None:
     templates = made()
     distance = field(templates["reverse"], "distance")
