@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 from m2pem.allocation.assignment import MAX_COST_S, RoleOptions
 from m2pem.allocation.candidates import Candidates, Group, Place
-from m2pem.errors import ExpressionError
 from m2pem.fleet.allocation import resources_of
-from m2pem.fleet.facts import possible_resources, unfit, vehicle_of
+from m2pem.fleet.facts import possible_resources, preference_s, unfit, vehicle_of
 from m2pem.mission.behavior import Behavior, BehaviorType, Need, Role, RoleKind
 from m2pem.mission.candidate_facts import is_fact
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
-from m2pem.mission.expression.literals import describe, shown
+from m2pem.mission.expression.literals import shown
 from m2pem.mission.expression.partial import first_false
 from m2pem.mission.losses import Loss
 from m2pem.mission.values import ReadValue, Value
@@ -246,15 +245,17 @@ class RoleEvaluator:
         switching_s = np.full(len(group.resources), fleet.switching_cost_s)
         used = [group.index[ResourceId(each)] for each in task.used if each in group.index]
         switching_s[used] = 0.0
-        preference_s = np.zeros(len(group.resources))
+        preferences_s = np.zeros(len(group.resources))
         if need.preference is not None:
             for place, resource in enumerate(group.resources):
                 if resource not in excluded:
                     read = self._reader(resource, group, task)
-                    preference_s[place] = _preference_s(need.preference, read)
+                    preferences_s[place] = preference_s(need.preference, read)
         known_s = np.nan_to_num(travel_s, nan=UNKNOWN_TRAVEL_S)
-        total_s = np.clip(known_s + battery_s + switching_s - preference_s, -MAX_COST_S, MAX_COST_S)
-        return _Costs(group, distance_m, travel_s, battery_s, switching_s, preference_s, total_s)
+        total_s = np.clip(
+            known_s + battery_s + switching_s - preferences_s, -MAX_COST_S, MAX_COST_S
+        )
+        return _Costs(group, distance_m, travel_s, battery_s, switching_s, preferences_s, total_s)
 
 
 def _lost_here(lost: Mapping[str, Loss]) -> dict[ResourceId, str]:
@@ -263,17 +264,6 @@ def _lost_here(lost: Mapping[str, Loss]) -> dict[ResourceId, str]:
         + (f" ({loss.reason})" if loss.reason else "")
         for each, loss in lost.items()
     }
-
-
-def _preference_s(preference: Expression, read: ReadValue) -> float:
-    value = preference.evaluate(read)
-    if value is None:
-        return 0.0
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ExpressionError(
-            f"prefer gives {describe(value)}, not a number of seconds, in {preference.text!r}"
-        )
-    return float(value)
 
 
 def _known(number: float) -> float | None:

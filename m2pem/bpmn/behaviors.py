@@ -212,7 +212,8 @@ class BehaviorReader:
                     "write the vehicle, payload or team itself",
                 )
                 return []
-        needs = {key: text for key in NEED_ATTRIBUTES if (text := _attribute(element, key))}
+        given = ((key, _attribute(element, key)) for key in NEED_ATTRIBUTES)
+        needs = {key: text for key, text in given if text is not None}
         named = [(kind, texts[kind] or "") for kind in RoleKind if texts[kind] is not None]
         by_need = "requires" in needs or "same" in needs
         if by_need and named:

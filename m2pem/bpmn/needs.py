@@ -20,6 +20,9 @@ UNLIMITED = "unlimited"
 MAX_COUNT = 1_000
 """Resources that fill one role, at most."""
 
+MAX_PRIORITY = 999_999
+"""The greatest priority of a role; the least is its negative."""
+
 _NAMED = ("wait", "priority")
 """The attributes that a role which names its resource may have, too."""
 
@@ -51,8 +54,8 @@ class NeedReader:
         condition = self._expression(texts.get("requires"))
         preference = self._expression(texts.get("prefer"))
         priority = self._priority(texts.get("priority", "0"))
-        same = self._name("same", texts.get("same", ""))
-        store = self._name("store", texts.get("store", ""))
+        same = self._name("same", texts.get("same"))
+        store = self._name("store", texts.get("store"))
         limit = self._limit(texts.get("wait"))
         found = (least, most, condition, preference, priority, same, store, limit)
         if any(each is None for each in found):
@@ -88,26 +91,27 @@ class NeedReader:
         return least, most
 
     def _priority(self, text: str) -> int | None:
+        priority: int | None
         try:
             priority = int(text)
         except ValueError:
-            priority = 1_000_000
-        if abs(priority) >= 1_000_000:
+            priority = None
+        if priority is None or abs(priority) > MAX_PRIORITY:
             self._wrong(
-                f"priority='{text}' is no whole number",
+                f"priority='{text}' is no whole number from -{MAX_PRIORITY} to {MAX_PRIORITY}",
                 "write for example priority='1'; what has the greatest number is served first",
             )
             return None
         return priority
 
-    def _name(self, attribute: str, text: str) -> str | None:
-        if text and not _STORE.fullmatch(text.strip()):
+    def _name(self, attribute: str, text: str | None) -> str | None:
+        if text is not None and not _STORE.fullmatch(text.strip()):
             self._wrong(
                 f"{attribute}='{text}' is no name of data",
                 f"write for example {attribute}='surveyor'",
             )
             return None
-        return text.strip()
+        return (text or "").strip()
 
     def _limit(self, text: str | None) -> Expression | Literal[False] | None:
         if text is None or text.strip() == UNLIMITED:

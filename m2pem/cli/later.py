@@ -121,8 +121,16 @@ def scheduled_start(later: Mapping[str, Any]) -> "tuple[int, When | None]":
     given = {name: value for name, value in later.items() if value not in (None, ())}
     if not given:
         return 0, None
+    for name in ("when", "cron", "time_zone", "until", "after", "condition"):
+        if name in given and not given[name].strip():
+            option = f"--{name.replace('_', '-')}"
+            raise click.BadParameter(
+                "it is empty: give a value, or leave it out", None, None, option
+            )
     priority = given.pop("priority", 0)
     at = given.pop("when", "")
+    if at and "cron" in given:
+        raise click.UsageError("--when and --cron: give one of them, not both")
     fields: dict[str, Any] = {"at": "" if at == FREE else at, **given}
     if "missed" in fields:
         fields["missed"] = Missed(fields["missed"])

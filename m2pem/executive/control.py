@@ -43,7 +43,14 @@ from m2pem.editing.outline import outline
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
-from m2pem.errors import BusyError, MissionError, OperatorError, ScheduleError, StuckError
+from m2pem.errors import (
+    BusyError,
+    ExpressionError,
+    MissionError,
+    OperatorError,
+    ScheduleError,
+    StuckError,
+)
 from m2pem.executive.ended_runs import describe_end, in_words
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import choice_input, open_incidents, refuse_wrong_choice
@@ -58,15 +65,19 @@ from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.executive.waiting_tasks import holder_label, waiting_tasks
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import resources_of, resources_of_mission, roles_of_mission
+from m2pem.fleet.facts import fleet_facts
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Entry, RunInfo
 from m2pem.journal.mission import mission_of
+from m2pem.mission.candidate_facts import FLEET_FACTS
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.partial import possible_truth
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
 from m2pem.scheduling.entry import SchedulePlan
-from m2pem.scheduling.times import resolved
+from m2pem.scheduling.times import condition_of, resolved
 from m2pem.suggestions import did_you_mean
 from m2pem.telemetry.bus import Bus
 
@@ -235,17 +246,42 @@ class Control:
         for name in when.vehicles:
             if name not in vehicles:
                 hint = did_you_mean(name, vehicles) or f"it has {', '.join(vehicles)}"
-                raise ScheduleError(f"the fleet has no vehicle {name!r}; {hint}")
+                raise ScheduleError(f"vehicles (--of): the fleet has no {name!r}; {hint}")
         if when.condition and not when.vehicles and not vehicles_of(named):
             raise ScheduleError(
-                "the mission names no vehicle: say of which the condition is to hold"
+                "the mission names no vehicle: say of which the condition is to hold "
+                "(vehicles, --of)"
             )
+        if when.condition:
+            for name in when.vehicles or vehicles_of(named):
+                self._refuse_impossible(condition_of(when.condition), ResourceId(name))
         if when.after and not self._scheduler.has(when.after):
             runs = await self._supervisor.journal.runs()
             if when.after not in {line.run for line in runs}:
                 raise ScheduleError(
-                    f"there is no run and no entry of the schedule {when.after!r} to come after"
+                    f"after: there is no run and no entry of the schedule {when.after!r} to come "
+                    "after; `m2pem runs` and `m2pem schedule --all` list them"
                 )
+
+    def _refuse_impossible(self, condition: Expression, vehicle: ResourceId) -> None:
+        """Check that a condition can hold of a vehicle, as far as the fleet file says.
+
+        Raises:
+            ScheduleError: it cannot.
+        """
+        fleet = self._supervisor.fleet
+        facts = fleet_facts(fleet, self._supervisor.arbiters.graph, vehicle)
+        try:
+            holds = possible_truth(condition, FLEET_FACTS.__contains__, facts.get)
+        except ExpressionError as error:
+            raise ScheduleError(
+                f"condition: {error}; write for example vehicle.battery > 0.9"
+            ) from error
+        if holds is False:
+            raise ScheduleError(
+                f"condition: {condition.text!r} never holds of {vehicle}: change it, or name "
+                "other vehicles (vehicles, --of)"
+            )
 
     async def scheduled(self) -> Schedule:
         """What starts when, and what it waits for."""

@@ -3,14 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet, Payload, Vehicle
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import Behavior, BehaviorType, Role, RoleKind
 from m2pem.mission.candidate_facts import FLEET_FACTS
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.expression.literals import shown
+from m2pem.mission.expression import Expression
+from m2pem.mission.expression.literals import describe, shown
 from m2pem.mission.expression.partial import first_false, possible_truth
-from m2pem.mission.values import Value
+from m2pem.mission.values import ReadValue, Value
 
 
 def vehicle_of(fleet: Fleet, resource: ResourceId) -> Vehicle:
@@ -93,6 +95,22 @@ def fits(fleet: Fleet, graph: ResourceGraph, behavior: Behavior, role: Role) -> 
                 excluded = f"requires is false: {values}" if values else "requires is false"
         found.append(Fit(resource, excluded))
     return found
+
+
+def preference_s(preference: Expression, read: ReadValue) -> float:
+    """Return the seconds of travel time that a candidate is worth; null counts as 0.
+
+    Raises:
+        ExpressionError: `prefer` gives no number, or has a wrong type.
+    """
+    value = preference.evaluate(read)
+    if value is None:
+        return 0.0
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ExpressionError(
+            f"prefer gives {describe(value)}, not a number of seconds, in {preference.text!r}"
+        )
+    return float(value)
 
 
 def possible_resources(

@@ -220,9 +220,8 @@ class SharedSpaceModel(_Model):
 
 
 def _shared_space(value: object) -> object:
-    """A number alone is a capacity."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return {"capacity": value} if is_number else value
+    """A number alone is a capacity; so is what should be one."""
+    return value if isinstance(value, dict | list | SharedSpaceModel) else {"capacity": value}
 
 
 class AllocationModel(_Model):

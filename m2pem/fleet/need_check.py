@@ -9,15 +9,16 @@ import rustworkx
 from m2pem.errors import ExpressionError
 from m2pem.findings import Severity
 from m2pem.fleet.allocation import resources_of, roles_of_mission
-from m2pem.fleet.facts import Fit, fits
+from m2pem.fleet.facts import Fit, fits, fleet_facts, preference_s
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.fleet.space import waits_for_space
 from m2pem.fleet.task_findings import TaskFindings
 from m2pem.mission.behavior import Behavior, BehaviorType, OnLoss, Role, RoleKind
-from m2pem.mission.candidate_facts import CANDIDATE_FACTS, is_fact
+from m2pem.mission.candidate_facts import CANDIDATE_FACTS, FACT_TYPES, FLEET_FACTS, is_fact
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.expression.tree import In, Literal, Name, walk
+from m2pem.mission.expression.literals import describe
+from m2pem.mission.expression.tree import Compare, In, Literal, Name, walk
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import did_you_mean
 
@@ -59,14 +60,16 @@ def check_needs(
     for role in by_need:
         if role.resource:
             continue
-        _check_facts(role, findings)
+        if not _check_facts(role, findings):
+            continue
         _check_count(behavior, role, findings)
         try:
             found = _fits(behavior, role, fleet, graph, known)
         except ExpressionError as error:
-            findings.add("bad-need", f"requires: {error}", line=role.line, role=role.name)
+            _wrong_type(role, f"requires: {error}", findings)
             continue
         able = tuple(fit.resource for fit in found if not fit.excluded)
+        _check_preference(role, able, fleet, graph, findings)
         least = role.need.least if role.need is not None and not role.optional else 0
         if len(able) < least:
             _cannot_fill(role, fleet, found, able, least, findings)
@@ -87,11 +90,14 @@ def _fits(
     return known[key]
 
 
-def _check_facts(role: Role, findings: TaskFindings) -> None:
+def _check_facts(role: Role, findings: TaskFindings) -> bool:
+    """Check that facts are known, and are compared with values of their types."""
     assert role.need is not None
+    right = True
     for expression in role.need.expressions:
         for name in sorted(expression.names):
             if is_fact(name) and name not in CANDIDATE_FACTS:
+                right = False
                 findings.add(
                     "unknown-fact",
                     f"'{name}' is no fact of a candidate",
@@ -100,6 +106,64 @@ def _check_facts(role: Role, findings: TaskFindings) -> None:
                     line=role.line,
                     role=role.name,
                 )
+
+        for node, _ in walk(expression.tree):
+            match node:
+                case Compare(left=Name(name=name), right=Literal(value=value)):
+                    pass
+                case Compare(left=Literal(value=value), right=Name(name=name)):
+                    pass
+                case _:
+                    continue
+            fact = FACT_TYPES.get(name)
+            if fact is not None and value is not None and not _is_of(fact, value):
+                right = False
+                _wrong_type(
+                    role, f"'{name}' is {_TYPES[fact]}, and never {describe(value)}", findings
+                )
+    return right
+
+
+_TYPES = {str: "a text", float: "a number", bool: "true or false", list: "a list"}
+
+
+def _is_of(fact: type[object], value: bool | int | float | str) -> bool:
+    if fact is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, fact)
+
+
+_REQUIRES = "write for example requires=\"vehicle.domain == 'air' and vehicle.battery > 0.4\""
+_PREFERS = "write for example prefer=\"'fast' in vehicle.tags ? 60 : 0\""
+
+
+def _wrong_type(role: Role, text: str, findings: TaskFindings, remedy: str = _REQUIRES) -> None:
+    findings.add(
+        "bad-need",
+        text,
+        remedy,
+        line=role.line,
+        role=role.name,
+    )
+
+
+def _check_preference(
+    role: Role,
+    able: Sequence[ResourceId],
+    fleet: Fleet,
+    graph: ResourceGraph,
+    findings: TaskFindings,
+) -> None:
+    """Check that what a role prefers is a number for each candidate, if the fleet file says it."""
+    preference = role.need.preference if role.need is not None else None
+    if preference is None or not preference.names <= FLEET_FACTS.keys():
+        return
+    for resource in able:
+        try:
+            preference_s(preference, fleet_facts(fleet, graph, resource).get)
+        except ExpressionError as error:
+            _wrong_type(role, f"prefer: {error}, for {resource}", findings, _PREFERS)
+            return
 
 
 def _check_count(behavior: Behavior, role: Role, findings: TaskFindings) -> None:
@@ -180,8 +244,9 @@ def _unknown_tag(role: Role, fleet: Fleet) -> str:
         match node:
             case In(item=Literal(value=str(wanted)), container=Name(name=name)):
                 if name.endswith(".tags") and wanted not in tags:
-                    hint = did_you_mean(wanted, tags)
-                    return f"nothing in the fleet has the tag '{wanted}'. {hint}".rstrip()
+                    there = f"there are: {', '.join(sorted(tags))}" if tags else "it has no tags"
+                    hint = did_you_mean(wanted, tags) or there
+                    return f"nothing in the fleet has the tag '{wanted}'; {hint}"
     return ""
 
 

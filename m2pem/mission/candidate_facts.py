@@ -36,6 +36,18 @@ TELEMETRY_FACTS: Mapping[str, str] = {
 CANDIDATE_FACTS: Mapping[str, str] = {**FLEET_FACTS, **TELEMETRY_FACTS}
 """All facts of a candidate."""
 
+FACT_TYPES: Mapping[str, type[str] | type[float] | type[bool] | type[list[str]]] = {
+    **dict.fromkeys(("vehicle.name", "vehicle.domain", "vehicle.arbiter", "vehicle.mode"), str),
+    **dict.fromkeys(("vehicle.battery", "vehicle.endurance", "vehicle.cruise_speed"), float),
+    **dict.fromkeys(("vehicle.distance", "vehicle.travel_time"), float),
+    **dict.fromkeys(("vehicle.tags", "vehicle.behaviors", "vehicle.payloads"), list),
+    **dict.fromkeys(("vehicle.teams", "vehicle.position"), list),
+    **dict.fromkeys(("payload.behaviors", "payload.tags"), list),
+    **dict.fromkeys(("vehicle.armed", "vehicle.ready", "payload.detector"), bool),
+    "payload.name": str,
+}
+"""The type of each fact, when it is not null."""
+
 PREFIXES = ("vehicle.", "payload.")
 """What begins with one of these in an expression of a role is a fact, not data of the mission."""
 

@@ -49,6 +49,9 @@ CONDITION_FACTS = {
 }
 """What conditions of the schedule may read, and what each is."""
 
+_AT = "at (--when)"
+_CRON = "'0 8 * * MON-FRI': minute, hour, day, month, weekday"
+
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 
@@ -64,25 +67,33 @@ def resolved(when: When, now_us: int, host_zone: str) -> When:
         ScheduleError: it makes no sense, or lies in the past; the error says what would be right.
     """
     if when.at and when.cron:
-        raise ScheduleError("give a date (at) or a cron text, not both")
+        raise ScheduleError("give a date (at, --when) or a cron text (cron), not both")
     zone = when.time_zone or host_zone
+    if when.at or when.cron or when.until or when.time_zone:
+        zone_of(zone)
     if when.at or when.cron or when.until:
         when = msgspec.structs.replace(when, time_zone=zone)
-        zone_of(zone)
     if when.at:
-        moment = _next(when.at, now_us, zone) or _with_offset("at", when.at, zone)
+        moment = _next(when.at, now_us, zone) or _with_offset(_AT, when.at, zone)
         when = msgspec.structs.replace(when, at=moment)
         if instant_us(when.at) <= now_us:
-            raise ScheduleError(f"{when.at} has passed: it is {local(now_us, zone)}")
+            raise ScheduleError(
+                f"{_AT}: {when.at} has passed: it is {local(now_us, zone)}; give a later one"
+            )
     if when.until:
         when = msgspec.structs.replace(when, until=_with_offset("until", when.until, zone))
         first_us = instant_us(when.at) if when.at else now_us
         if instant_us(when.until) <= first_us:
-            raise ScheduleError(f"nothing can start until {when.until}: that is too early")
+            raise ScheduleError(
+                f"until: nothing can start until {when.until}: that is too early; give a later one"
+            )
     if when.cron:
         first = _cron(when.cron).after_us(now_us, zone_of(zone))
         if first is None or (when.until and first > instant_us(when.until)):
-            raise ScheduleError(f"{when.cron!r} has no time from now on, or none until its end")
+            raise ScheduleError(
+                f"cron: {when.cron!r} has no time from now on, or none before until; write for "
+                f"example {_CRON}"
+            )
     _check_rest(when)
     return when
 
@@ -90,17 +101,23 @@ def resolved(when: When, now_us: int, host_zone: str) -> When:
 def _check_rest(when: When) -> None:
     if when.after and when.cron:
         raise ScheduleError(
-            "what starts again and again by cron cannot start after one run: give a date, or none"
+            "after: what starts again and again by cron cannot start after one run: give a date, "
+            "or none"
         )
     wrong = [each for each in when.outcomes if each not in OUTCOMES]
     if wrong or not when.outcomes:
         raise ScheduleError(
             f"outcomes of a run are {', '.join(OUTCOMES)}, not {', '.join(wrong) or 'none'}"
         )
+    if when.outcomes != When().outcomes and not when.after:
+        raise ScheduleError("outcomes of a run (--outcome) go with after: name the run")
     if when.condition:
         condition_of(when.condition)
     elif when.vehicles or when.held_for_s:
-        raise ScheduleError("vehicles and a time to hold go with a condition: give one")
+        raise ScheduleError(
+            "vehicles (--of) and a time to hold (held_for_s, --held-for) go with a condition: "
+            "give one"
+        )
     if when.held_for_s < 0 or (when.starting_deadline_s or 0) < 0:
         raise ScheduleError("a duration cannot be negative")
 
@@ -115,13 +132,13 @@ def _next(text: str, now_us: int, zone: str) -> str:
     try:
         wanted = time.fromisoformat(text.strip().rjust(len("08:00"), "0"))
     except ValueError:
-        raise ScheduleError(f"at: {text} is no time of a day") from None
+        raise ScheduleError(f"{_AT}: {text} is no time of a day such as 08:00") from None
     now = (_EPOCH + timedelta(microseconds=now_us)).astimezone(zone_of(zone))
     for days in (0, 1, 2):
         moment = datetime.combine(now.date() + timedelta(days=days), wanted, now.tzinfo)
         if moment.timestamp() > now.timestamp() and _exists(moment):
             return moment.isoformat()
-    raise ScheduleError(f"at: {text} does not come within two days in {zone}")
+    raise ScheduleError(f"{_AT}: {text} does not come within two days in {zone}")
 
 
 def _exists(moment: datetime) -> bool:
@@ -141,7 +158,9 @@ def _with_offset(what: str, text: str, zone: str) -> str:
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=zone_of(zone))
         if not _exists(moment):
-            raise ScheduleError(f"{what}: {text} does not exist in {zone}: clocks skip it")
+            raise ScheduleError(
+                f"{what}: {text} does not exist in {zone}: clocks skip it; give another"
+            )
     return moment.isoformat()
 
 
@@ -155,7 +174,7 @@ def zone_of(name: str) -> ZoneInfo:
         return ZoneInfo(name)
     except (KeyError, ValueError, OSError):
         raise ScheduleError(
-            f"there is no time zone {name!r}; they are named as Europe/Berlin or UTC"
+            f"time zone: there is no {name!r}; they are named as Europe/Berlin or UTC"
         ) from None
 
 
@@ -175,7 +194,7 @@ def _cron(text: str) -> Cron:
     try:
         return parse_cron(text)
     except ExpressionSyntaxError as error:
-        raise ScheduleError(f"cron: {error}") from error
+        raise ScheduleError(f"cron: {error}; write for example {_CRON}") from error
 
 
 @lru_cache(maxsize=256)
@@ -188,7 +207,9 @@ def condition_of(text: str) -> Expression:
     try:
         found = parse(text)
     except ExpressionSyntaxError as error:
-        raise ScheduleError(f"condition: {error}") from error
+        raise ScheduleError(
+            f"condition: {error}; write for example vehicle.battery > 0.9"
+        ) from error
     for name in sorted(found.names):
         if name not in CONDITION_FACTS:
             hint = did_you_mean(name, CONDITION_FACTS) or f"there are {', '.join(CONDITION_FACTS)}"

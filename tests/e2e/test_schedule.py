@@ -9,6 +9,7 @@ import pytest
 
 from m2pem.testing import scenarios
 from tests.command_line import FLEET, MISSION, CommandLine, Program, install_plugin
+from tests.each_case import failures
 
 JOURNAL = ("--journal", "journal.db")
 SPEED = "20"
@@ -112,6 +113,69 @@ def test_two_entries_for_one_rover_run_one_after_the_other_by_priority(
     _, first, second = runs(m2pem)
     assert "started by s2, scheduled by ada" in m2pem.run("replay", "r2", *JOURNAL)[1]
     assert first["ended_us"] <= second["started_us"]
+
+
+IMPOSSIBLE = [
+    (("--when", "tomorrow"), 1, "at (--when): 'tomorrow' is no date and time such as 2026-"),
+    (("--when", "25:00"), 1, "at (--when): 25:00 is no time of a day such as 08:00"),
+    (("--when", "2020-01-01T08:00"), 1, "give a later one"),
+    (("--when", ""), 2, "--when: it is empty: give a value, or leave it out"),
+    (("--cron", "99 8 * * *"), 1, "cron: bad minute"),
+    (("--cron", "a b c d e"), 1, "write for example '0 8 * * MON-FRI': minute, hour, day"),
+    (("--cron", "0 8 * *"), 1, "cron: a cron text has 5, 6 (seconds first) or 7 fields"),
+    (("--cron", " "), 2, "--cron: it is empty"),
+    (("--cron", "0 8 * * *", "--when", "free"), 2, "--when and --cron: give one of them"),
+    (
+        ("--when", "08:00", "--time-zone", "Mars/Base"),
+        1,
+        "time zone: there is no 'Mars/Base'; they",
+    ),
+    (("--when", "free", "--time-zone", "Mars/Base"), 1, "are named as Europe/Berlin or UTC"),
+    (("--when", "2099-02-01T08:00", "--until", "2099-01-01"), 1, "until: nothing can start until"),
+    (("--until", "later"), 1, "until: 'later' is no date and time such as 2026-"),
+    (("--after", "r99"), 1, "after: there is no run and no entry of the schedule 'r99'"),
+    (("--after", "r99", "--cron", "0 8 * * *"), 1, "give a date, or none"),
+    (("--outcome", "failed"), 1, "(--outcome) go with after: name the run"),
+    (("--outcome", "done"), 2, "'--outcome': 'done' is not one of 'completed', 'terminated'"),
+    (("--condition", "vehicle.batery > 0.9"), 1, "condition: 'vehicle.batery' is no fact"),
+    (("--condition", "vehicle.battery >"), 1, "write for example vehicle.battery > 0.9"),
+    (("--condition", "3"), 1, "condition: a condition takes true or false, not the number 3"),
+    (("--condition", "vehicle.tags + 1 == 2"), 1, "condition: '+' takes two numbers"),
+    (("--condition", "vehicle.domain == 'air'"), 1, "never holds of evsg1: change it, or name"),
+    (("--condition", ""), 2, "--condition: it is empty"),
+    (
+        ("--condition", "vehicle.armed", "--of", "evsg9"),
+        1,
+        "vehicles (--of): the fleet has no 'evsg9'",
+    ),
+    (("--of", "evsg1"), 1, "vehicles (--of) and a time to hold (held_for_s, --held-for) go with"),
+    (("--held-for", "30 s"), 1, "go with a condition: give one"),
+    (("--held-for", "3 m"), 2, "'--held-for': '3 m' is a distance, not a duration"),
+    (
+        ("--starting-deadline", "soon"),
+        2,
+        "'--starting-deadline': 'soon' is not a number with a unit",
+    ),
+    (("--priority", "1.5"), 2, "'--priority': '1.5' is not a valid integer"),
+    (("--missed", "never"), 2, "'--missed': 'never' is not one of 'skip', 'run-once'"),
+    (("--concurrency", "queue"), 2, "'--concurrency': 'queue' is not one of 'forbid', 'allow'"),
+]
+"""Options that make no sense, the exit status, and what is said of it."""
+
+
+def test_what_makes_no_sense_is_refused_and_nothing_is_scheduled(m2pem: CommandLine) -> None:
+    serving(m2pem)
+
+    def is_refused(case: tuple[tuple[str, ...], int, str]) -> None:
+        options, wanted, said = case
+        status, printed, errors = m2pem.run("start", MISSION, *JOURNAL, *options)
+        assert (status, printed) == (wanted, "")
+        assert said in errors
+
+    assert failures(is_refused, IMPOSSIBLE) == []
+    listed = m2pem.run("schedule", "--all", "--format", "json", *JOURNAL)[1]
+    assert [each["entries"] for each in json.loads(listed)] == [[]]
+    assert runs(m2pem) == []
 
 
 def test_a_time_that_came_while_nothing_served_is_said_at_the_start(m2pem: CommandLine) -> None:

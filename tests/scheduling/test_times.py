@@ -76,7 +76,10 @@ def test_a_date_means_an_instant(written: str, zone: str, meant: str) -> None:
         (When(at="08:00", until="2026-01-01T07:00"), "too early"),
         (When(cron="0 8 * *"), "a cron text has 5, 6"),
         (When(cron="0 8 1 1 *", until="2026-01-01T07:00"), "no time from now on"),
-        (When(cron="0 8 * * *", time_zone="Europe/Berlino"), "no time zone 'Europe/Berlino'"),
+        (
+            When(cron="0 8 * * *", time_zone="Europe/Berlino"),
+            "time zone: there is no 'Europe/Berlino'",
+        ),
         (When(cron="0 8 * * *", after="r1"), "cannot start after one run"),
         (When(outcomes=("done",)), "outcomes of a run are completed"),
         (When(outcomes=()), "not none"),
