@@ -85,6 +85,15 @@ def test_every_version_is_pinned() -> None:
     assert pins
 
 
+def test_no_pattern_repeats_a_group_possessively() -> None:
+    """Before Python 3.11.5 what a failed repetition took is lost, and Debian 12 has 3.11.2."""
+    possessive = re.compile(r"\)(?:[*+?]|\{\d*,?\d*\})\+")
+    product = [path for path in files() if path.suffix == ".py" and "tests" not in path.parts]
+    assert len(product) > 300
+    found = [str(path) for path in product if possessive.search(path.read_text(encoding="utf-8"))]
+    assert found == []
+
+
 def test_plugins_import_no_submodule_of_another_plugin() -> None:
     """What a plugin offers to others is in its `__init__`."""
     found = []

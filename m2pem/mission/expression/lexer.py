@@ -47,12 +47,13 @@ _HINTS = {
 _CALLED = {
     Dialect.FEEL: r"date and time(?=\s*\()",
     Dialect.JUEL: r"(?:var|vars|variables):\w+(?=\s*\()",
-    Dialect.XPATH: r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?+[^\W\d][\w-]*+(?=\s*+\()",
+    Dialect.XPATH: r"(?!(?:and|or|div)\s*+\()(?:[^\W\d][\w.-]*+:)?[^\W\d][\w-]*+(?=\s*+\()",
 }
 """Names of functions that are no names of the store."""
 
-_ASCII_NAME = re.compile(r"(?a:[A-Za-z_]\w*+(?:\.\w++)*+)")
-_QUOTED = r"""'[^'\\]*+(?:\\[nt'"\\][^'\\]*+)*+'|"[^"\\]*+(?:\\[nt'"\\][^"\\]*+)*+\""""
+# No group is repeated possessively: before Python 3.11.5, one that fails keeps what it took.
+_ASCII_NAME = re.compile(r"(?a:[A-Za-z_]\w*+(?:\.\w++)*)")
+_QUOTED = r"""'[^'\\]*+(?:\\[nt'"\\][^'\\]*+)*'|"[^"\\]*+(?:\\[nt'"\\][^"\\]*+)*\""""
 _NOTHING = "(?!)"
 _ALONE = r"(?![\w.]|[^\x00-\x7f])"
 
