@@ -276,7 +276,8 @@ def test_a_later_role_means_the_same_vehicle(play):
 
 def test_an_expression_of_a_wrong_type_is_the_tasks_error(play):
     async def story(world: World):
-        run = await world.executive.control.start(one("requires='true' prefer=\"'fast'\""))
+        source = one("requires='true' prefer='pace'")
+        run = await world.executive.control.start(source, data={"pace": "fast"})
         summary = await world.executive.control.wait(run)
         return summary, [each for each in world.seen if isinstance(each, ErrorThrown)]
 
@@ -284,7 +285,7 @@ def test_an_expression_of_a_wrong_type_is_the_tasks_error(play):
     assert summary.status is RunStatus.FAILED
     assert (error.code, error.reason) == (
         "EXPRESSION",
-        "prefer gives the text 'fast', not a number of seconds, in \"'fast'\"",
+        "prefer gives the text 'fast', not a number of seconds, in 'pace'",
     )
 
 

@@ -31,10 +31,11 @@ SKETCH = b"""<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" ta
 </definitions>"""
 
 
-def checked(folder: Path, terms: Terms = TERMS) -> Counts:
-    """What became of the models of a folder."""
+def checked(folder: Path, terms: Terms = TERMS, but: str = "") -> Counts:
+    """What became of the models of a folder, but for those of a folder in it."""
     counts = Counts(terms)
-    for found in measure_all(models(folder), terms):
+    chosen = [path for path in models(folder) if not but or but not in path.parts]
+    for found in measure_all(chosen, terms):
         counts.add(found)
     return counts
 
@@ -113,6 +114,8 @@ def test_every_foreign_model_is_decided_undecided_or_refused_within_limits(terms
 
 @pytest.mark.parametrize("folder", ["missions", "docs/broken"])
 def test_the_missions_of_the_repository_are_decided_within_limits(folder: str) -> None:
-    counts = checked(ROOT / folder, Terms(as_drawn=True))
+    # Those by need are verified with their fleets: one that is made for a mission has too many
+    # vehicles for each role (tests/e2e/test_field_missions_by_need.py).
+    counts = checked(ROOT / folder, Terms(as_drawn=True), but="by_need")
     assert counts.wrong == []
     assert counts.kinds["decided"] == len(counts.files) > 0

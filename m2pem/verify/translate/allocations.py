@@ -438,18 +438,20 @@ def _refusals(fewest: Sequence[Counter[Pool]]) -> list[dict[Pool, int]]:
     """
     found: list[dict[Pool, int]] = [{}]
     for total in fewest:
-        extended = []
+        extended: list[tuple[dict[Pool, int], bool]] = []  # with whether they are new
         for limits in found:
             if any(limits.get(pool, count) < count for pool, count in total.items()):
-                extended.append(limits)
+                extended.append((limits, False))
                 continue
-            extended += [{**limits, pool: count - 1} for pool, count in total.items()]
+            extended += [({**limits, pool: count - 1}, True) for pool, count in total.items()]
+        # Those of before cover none another, and new ones, which are narrower, cover none of them.
         found = [
             each
-            for number, each in enumerate(extended)
-            if not any(
+            for number, (each, new) in enumerate(extended)
+            if not new
+            or not any(
                 _covers(other, each) and (other != each or at < number)
-                for at, other in enumerate(extended)
+                for at, (other, _) in enumerate(extended)
                 if at != number
             )
         ]
