@@ -183,8 +183,8 @@ format: setup ## put the code into shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-# Tests wait half of their time: twice as many workers as processors keep these busy.
-WORKERS := 4
+# Tests wait a third of their time: one more than there are processors keeps these busy.
+WORKERS := 3
 UNITS := $(addprefix tests/,api bpmn control_socket deconfliction diagram editing engine executive fleet geo journal \
   mission rehearsal scripting services simulation teams telemetry)
 
