@@ -376,8 +376,8 @@ def _incident_updated(view: RunView, record: r.IncidentUpdated) -> _Sentence:
 
 
 _CHOSEN = {
-    "retry": "begins anew",
-    "retry_with": "begins anew with {roles}",
+    "retry": "starts again",
+    "retry_with": "starts again with {roles}",
     "skip": "counts as done",
     "move": "the token moves to {to}",
     "end": "the run ends",

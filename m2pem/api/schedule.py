@@ -101,7 +101,7 @@ class ScheduledMission:
 class Schedule:
     """All entries of an executive's fleet, those that may start something in the order of service.
 
-    `hold`: who holds the whole schedule and why; "": nobody. `served`: whether this executive
+    `hold`: who holds the whole schedule and why; "": no operator. `served`: whether this executive
     starts scheduled missions. `warning_s`: how long before a start operators are warned.
     """
 

@@ -80,7 +80,7 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
 
 
 def held_schedules(journal: Path) -> list[str]:
-    """Who holds the schedule of each executive on the journal; "": nobody."""
+    """Who holds the schedule of each executive on the journal; "": no operator."""
     from m2pem.control_socket.client import ask
     from m2pem.control_socket.paths import live_sockets
     from m2pem.errors import M2pemError

@@ -17,9 +17,9 @@ class IncidentChoice(StrEnum):
     """What an operator can do about an incident."""
 
     RETRY = "retry"
-    """The element begins anew."""
+    """The element starts again."""
     RETRY_WITH = "retry_with"
-    """The element begins anew, with other resources for its roles."""
+    """The element starts again, with other resources for its roles."""
     SKIP = "skip"
     """The token goes on as if the element had completed."""
     SET_DATA = "set_data"

@@ -104,7 +104,7 @@ def _wrong_roles(fleet: Fleet, incident: Incident, item: ResolveIncident) -> str
 def replaced_roles(
     fleet: Fleet, incident: Incident, item: ResolveIncident
 ) -> dict[str, tuple[str, ...]]:
-    """Return who fills each role of the behavior that begins anew: what the operator says, else
+    """Return who fills each role of the behavior that starts again: what the operator says, else
     who had it, else what the mission names."""
     behavior = behavior_at(incident.token.node)
     assert behavior is not None

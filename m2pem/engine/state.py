@@ -195,7 +195,7 @@ class Token:
     incident: str = ""
     """The open incident that stops it."""
     replacements: dict[str, tuple[str, ...]] | None = None
-    """Who fills the roles of the behavior that begins anew, by an operator's choice."""
+    """Who fills the roles of the behavior that starts again, by an operator's choice."""
 
     @property
     def is_reopened(self) -> bool:

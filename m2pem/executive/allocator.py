@@ -533,7 +533,7 @@ class Allocator:
 
 
 def _foremost(refusals: "Sequence[Refusal]") -> "Refusal":
-    """Return which refusal a task is told: of the best vehicle for which it may wait, if any."""
+    """Return which refusal a task gets: of the best vehicle for which it may wait, if any."""
     return next((each for each in refusals if each.wait_s is not None), refusals[0])
 
 

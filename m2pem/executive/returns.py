@@ -27,7 +27,7 @@ class Returns:
         self._low: dict[str, set[RunId]] = {}
 
     def faulted(self, resource: str, run: RunId) -> None:
-        """A run is told that the link of a resource is lost; it may decide that later."""
+        """A run gets the input that the link of a resource is lost; it may decide that later."""
         self._lost.setdefault(resource, set()).add(run)
 
     def take_up(self, runner: Runner) -> None:

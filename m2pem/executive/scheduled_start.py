@@ -33,7 +33,7 @@ LOOK_AGAIN_S = 0.5
 """Between two looks at telemetry for a condition."""
 
 ASK_AGAIN_S = 5.0
-"""Between two looks at what nobody reports: runs of other executives, a journal that refused."""
+"""Between two looks at what is not reported: runs of other executives, a journal that refused."""
 
 STARTING = "it starts in a moment"
 

@@ -263,7 +263,7 @@ class Journal(Protocol):
         ...
 
     async def schedule_hold(self, fleet: str) -> Hold | None:
-        """Return who holds the whole schedule of a fleet, and why; None: nobody."""
+        """Return who holds the whole schedule of a fleet, and why; None: no operator."""
         ...
 
     async def close(self) -> None:

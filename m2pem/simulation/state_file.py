@@ -133,7 +133,7 @@ class StateFile:
         except (sqlite3.Error, OSError) as error:
             raise StateFileError(
                 f"{path}: cannot keep the state of a simulation here: {error}; name a file in a "
-                "folder that exists, or remove the file to begin anew"
+                "folder that exists, or remove the file to start again"
             ) from error
         if found != FORMAT:
             raise StateFileError(f"{path}: is of format {found}, not {FORMAT}; remove it")
@@ -228,7 +228,7 @@ class StateFile:
             return msgspec.msgpack.decode(data, type=type_)
         except msgspec.MsgspecError as error:
             raise StateFileError(
-                f"{self.path}: was written by another version ({error}); remove it to begin anew"
+                f"{self.path}: was written by another version ({error}); remove it to start again"
             ) from error
 
 

@@ -20,7 +20,7 @@ _OF = "~"
 class Share:
     """A planned part of one member, or a piece of a lost member's. `by`: the member that carries
     it out; None: it has not begun. `part`: the id of the part. `left`: the parameters of what is
-    left of it, as last reported. `given_up`: nobody does it, or others do it in pieces."""
+    left of it, as last reported. `given_up`: no member does it, or others do it in pieces."""
 
     leg: Leg
     by: ResourceId | None = None

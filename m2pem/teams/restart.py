@@ -27,7 +27,7 @@ class Reference:
     """`begun`: the arbiters' own references of parts that have begun. `done`: parts that have
     succeeded. `lost`: members that the team goes on without, and why. `version`: the number of
     changes. `split`: the members' shares, for a plan that divides its work. `transfers`: pieces of
-    lost members' shares, `given_up`: the shares that nobody does as a whole any more, `left`: the
+    lost members' shares, `given_up`: shares that no member does as a whole any more, `left`: the
     parameters of what was left of others, all by the names of `Partition`.
     """
 

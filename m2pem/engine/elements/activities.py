@@ -47,7 +47,7 @@ def has_been_entered(token: Token) -> bool:
 
 
 def activate_later(x: Execution, token: Token) -> None:
-    """Queue a token that is on its element already: after a yield, or to begin anew."""
+    """Queue a token that is on its element already: after a yield, or to start again."""
     if (token.instance is None and token.node not in x.waits) or has_been_entered(token):
         x.queue.append(token)
     else:

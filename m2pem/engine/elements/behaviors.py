@@ -56,7 +56,7 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
     parameters = _evaluate(x, token, behavior)
     if parameters is None:
         return
-    if token.lost_work is not None:  # an operator has it begin anew, with what was left
+    if token.lost_work is not None:  # an operator has it start again, with what was left
         parameters |= token.lost_work.remaining
     if not behavior.roles and behavior.name == "hold":
         _hold_for(x, token, parameters.get("duration"))
@@ -89,7 +89,7 @@ def _request_with_replacements(
     roles: dict[str, tuple[str, ...]],
     parameters: dict[str, Value],
 ) -> None:
-    """Request a behavior that begins anew with the resources that an operator has chosen."""
+    """Request a behavior that starts again with the resources that an operator has chosen."""
     resources = tuple(dict.fromkeys(each for chosen in roles.values() for each in chosen))
     if refusal := refusal_of(x, resources):
         throw_error(x, token, UNAVAILABLE, refusal)

@@ -40,7 +40,7 @@ class IncidentUpdated(BaseRecord, frozen=True):
 
 class IncidentResolved(BaseRecord, frozen=True):
     """An operator has decided about an incident. `to`: the element or sequence flow to which the
-    token moves. `roles`: who fills the roles of the behavior that begins anew, all of them;
+    token moves. `roles`: who fills the roles of the behavior that starts again, all of them;
     empty: as the mission says. `resources`: what is free now, unless the behavior takes it again.
     """
 

@@ -1,7 +1,7 @@
 """States as integers: each place is a field of bits, each variable has a bit for each value.
 
 A place where one token is meant has one bit; a transition over such places is two masks. A place
-that was found to get more is given more bits, and the search begins anew (`search.explore`).
+that was found to get more is given more bits, and the search starts again (`search.explore`).
 """
 
 from collections.abc import Iterable, Mapping

@@ -6,7 +6,7 @@
     found.run_to(state)               # the transitions that lead there
 
 `Exploration` is what properties are read from. A place that gets more tokens than it has room for
-is noted (`overflows`), and the search begins anew with more room for it, up to `Limits.tokens`.
+is noted (`overflows`), and the search starts again with more room for it, up to `Limits.tokens`.
 """
 
 import gc
@@ -366,7 +366,7 @@ class _Search:
         found.transitions = transitions
 
     def puts_off_for_ever(self, found: Exploration) -> bool:
-        """Whether the search defers a transition for ever. If so, it begins anew and
+        """Whether the search defers a transition for ever. If so, it starts again and
         defers less.
         """
         if not self.partly or not self.goes_back:

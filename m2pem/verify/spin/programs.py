@@ -2,7 +2,7 @@
 
 Spin writes a program in C for each model. tcc compiles it in an instant. gcc takes longer than its
 optimization saves, unless the search is long: then gcc compiles the same code while the search
-runs, and the optimized checker begins anew. Every program is ended when its time is over, and when
+runs, and the optimized checker starts again. Every program is ended when its time is over, and when
 a person interrupts.
 """
 

@@ -15,8 +15,8 @@ from m2pem.fleet.yaml_source import parse_yaml
 from m2pem.mission.behavior import Decision
 
 _LABELS = {
-    "retry": ("retry", "begin anew"),
-    "retry_with": ("retry_with:ROLE=RESOURCE", "begin anew with another vehicle or payload"),
+    "retry": ("retry", "start again"),
+    "retry_with": ("retry_with:ROLE=RESOURCE", "start again with another vehicle or payload"),
     "skip": ("skip", "it counts as done"),
     "set_data": ("set_data:NAME=VALUE", "write a value, and decide afterwards"),
     "move": ("move:ELEMENT", "move the token"),

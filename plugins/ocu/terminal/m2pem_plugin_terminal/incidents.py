@@ -16,7 +16,7 @@ TITLE = "Errors that stop a task"
 NONE = "No error stops a task here"
 
 LABELS = {
-    "retry": "Retry: it begins anew",
+    "retry": "Retry: it starts again",
     "retry_with": "Retry with another vehicle or payload",
     "skip": "Skip: it counts as done",
     "set_data": "Set data, and decide afterwards",

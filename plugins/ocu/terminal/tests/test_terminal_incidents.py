@@ -19,14 +19,14 @@ async def test_the_task_is_marked_and_a_key_decides(world: World) -> None:
         await stopped(world)
         await terminal.until_shown("! DRIVE", "stopped by ROUTE_BLOCKED", "incident r1.i1")
         await terminal.press("i")
-        await terminal.until_shown("1 Retry: it begins anew", "3 Skip: it counts as done")
+        await terminal.until_shown("1 Retry: it starts again", "3 Skip: it counts as done")
         await terminal.press("1")
         await terminal.until_shown("retry r1.i1?")
         await terminal.press("1", "enter")
         await terminal.until_shown("retry r1.i1?")
         await terminal.press("y")
         await world.fake.until_called("start", "r1.b2")
-        await terminal.until_shown("begins anew", "● DRIVE")
+        await terminal.until_shown("starts again", "● DRIVE")
 
 
 async def test_a_vehicle_is_replaced_and_data_is_written(world: World) -> None:

@@ -95,7 +95,7 @@ class ScheduledMissionModel(BaseModel):
 
 
 class ScheduleModel(BaseModel):
-    """The schedule of the executive's fleet. `hold`: who holds it and why; "": nobody."""
+    """The schedule of the executive's fleet. `hold`: who holds it and why; "": no operator."""
 
     hold: str
     served: bool

@@ -176,7 +176,7 @@ export interface ScheduledMission {
   run: string;
 }
 
-/** `hold`: who holds all of it, and why; "": nobody. */
+/** `hold`: who holds all of it, and why; "": no operator. */
 export interface Schedule {
   hold: string;
   served: boolean;
