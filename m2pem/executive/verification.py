@@ -18,6 +18,7 @@ from m2pem.verify.requirements import Names, Requirement, collect
 from m2pem.verify.requirements.results import with_requirements
 from m2pem.verify.search.explore import Limits, Progress
 from m2pem.verify.spin.queries import Storage
+from m2pem.verify.translate.context import behavior_of, may_be_preempted
 from m2pem.verify.translate.options import Options
 
 if TYPE_CHECKING:
@@ -32,6 +33,12 @@ ENDS_THE_RUN = (
     "incident; what follows another choice is explored when there is an incident"
 )
 """The note in reports of missions whose errors open incidents."""
+
+PREEMPTED_AT_ANY_TIME = (
+    "the fleet allows preemption: a task of another run with a greater priority may take the "
+    "vehicle of a task at any time (PREEMPTED), and what it has taken is free again at once"
+)
+"""The note in reports of missions whose tasks may be preempted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +118,9 @@ def search(
         report = replace(report, notes=(*report.notes, IN_ORDER))
     if _opens_incidents(request):
         report = replace(report, notes=(*report.notes, ENDS_THE_RUN))
+    behaviors = map(behavior_of, request.mission.activities())
+    if any(may_be_preempted(request.fleet, each) for each in behaviors):
+        report = replace(report, notes=(*report.notes, PREEMPTED_AT_ANY_TIME))
     return findings_of(request.mission, report, strict=strict, given=request.data)
 
 

@@ -4,6 +4,7 @@ from random import Random
 
 from m2pem.bpmn import parse_mission
 from m2pem.engine import inputs as i
+from m2pem.engine.elements.behaviors import BRINGS_DOWN
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.fleet.fleet import Fleet
@@ -78,6 +79,7 @@ class Walk:
         allocator: Allocator | None = None,
     ) -> None:
         """`allocator`: answers the requests of tasks for resources."""
+        self.fleet = fleet
         self.run = MissionRun(mission, fleet, "r1")
         self.follower = Follower(net)
         self.process = net.process
@@ -137,6 +139,9 @@ class Walk:
             found.append(i.BehaviorReported(behavior.id, number, BehaviorState.SUCCEEDED))
             code = dice.choice(CODES)
             found.append(i.BehaviorReported(behavior.id, number, BehaviorState.FAILED, code))
+            if self.fleet.preemption and behavior.name not in BRINGS_DOWN:
+                taken = behavior.resources[-1]
+                found.append(i.BehaviorPreempted(behavior.id, taken, "r2.a1", "another run"))
         for service in state.services.values():
             data = {"detection.type": dice.choice(["gpr", "other"])}
             found.append(i.ServiceCompleted(service.id, data if "Det" in service.name else {}))

@@ -43,12 +43,12 @@ def walked(mission: Mission, net: PetriNet, seeds: range) -> str:
             lost = walk.go()
         except TooManyStatesError:
             continue
-        if lost and not _explained(walk, net):
+        if lost and not explained(walk, net):
             return f"seed {seed}: {lost}"
     return ""
 
 
-def _explained(walk: Walk, net: PetriNet) -> bool:
+def explained(walk: Walk, net: PetriNet) -> bool:
     """What docs/verification-internals.md says of where the net stops short of the engine."""
     if any(each.exactness is Exactness.BOUNDED for each in net.approximations):
         return True

@@ -8,6 +8,7 @@ from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.expression import literal
+from m2pem.mission.losses import PREEMPTED
 from m2pem.units import Dimension, UnitError, quantity
 from m2pem.verify.net.petri_net import (
     BEGINS,
@@ -35,6 +36,7 @@ from m2pem.verify.translate.context import (
     TranslationContext,
     behavior_of,
     held_by,
+    may_be_preempted,
     register_catcher,
     resources,
     takes_from_pools,
@@ -270,6 +272,8 @@ def _outside_work(
         net.transition(effect, Kind.EXTERNAL, Trigger.SUCCEEDS, unasked)
     if context.options.failures:
         codes = dict.fromkeys((*catchable(context, instance.outer, instance), "FAILED"))
+        if may_be_preempted(context.fleet, behavior_of(instance.node)):
+            codes[PREEMPTED] = None
         for code in codes:
             for effect in failing(context, instance, code, Flag.UNCAUGHT_FAILURE):
                 both = badly.then(effect)

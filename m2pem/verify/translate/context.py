@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from m2pem.engine.elements.behaviors import BRINGS_DOWN
 from m2pem.fleet.allocation import AllocationError, allocate
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission import elements as e
@@ -312,7 +313,14 @@ def takes_from_pools(context: TranslationContext, node: e.Activity, behavior: Be
     return any(each in context.pool_of for each in resources(context, behavior) or ())
 
 
-def behavior_of(node: e.Activity) -> Behavior | None:
+def may_be_preempted(fleet: Fleet, behavior: Behavior | None) -> bool:
+    """Whether a task of another run may take what a behavior has, if its priority is greater."""
+    if not fleet.preemption or behavior is None or not behavior.roles:
+        return False
+    return behavior.name not in BRINGS_DOWN
+
+
+def behavior_of(node: e.FlowNode) -> Behavior | None:
     """The behavior that an activity commands."""
     if isinstance(node, e.ScriptTask | e.ServiceTask | e.SendTask):
         return node.behavior
