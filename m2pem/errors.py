@@ -109,7 +109,8 @@ class JournalUrlError(JournalError):
 
 
 class StaleEntryError(JournalError):
-    """The entry of the schedule was changed by another executive since; nothing was written."""
+    """The entry of the schedule was changed by another executive since, or the whole schedule is
+    held; nothing was written."""
 
 
 class StaleEpochError(JournalError):

@@ -231,11 +231,14 @@ def _ask(
     from m2pem.control_socket.client import ask
 
     name = by or operator_name()
+    serving = list(_sockets(journal_file(url)))
     served = [
         path
-        for path, found in _sockets(journal_file(url))
+        for path, found in serving
         if entry is None or entry in {each.entry for each in found.entries}
     ]
+    if entry is None and method == "release_schedule":  # executives of other fleets hold nothing
+        served = [path for path, found in serving if found.hold] or served
     for path in served:
         ask(path, method, entry=entry, by=name, **params)
 

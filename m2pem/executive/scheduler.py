@@ -100,6 +100,8 @@ class Scheduler:
         self._entries: dict[EntryId, ScheduleEntry] = {}
         self._looks: dict[EntryId, Look] = {}
         self._hold: Hold | None = None
+        self._unwritten: Hold | None = None
+        """The hold of the whole schedule that the journal does not have yet."""
         self._stopped: set[EntryId] = set()
         """Entries that an operator cancels or holds, before the journal has it."""
         self._to_hold: dict[EntryId, Hold] = {}
@@ -240,7 +242,7 @@ class Scheduler:
         self.holds += 1
         if not self._active():
             return None
-        self._hold = Hold(by, reason, self._starter.clock.now_us())
+        self._hold = self._unwritten = Hold(by, reason, self._starter.clock.now_us())
         self._marks.put(MARK, StopMark(by, reason))
         self._say_held()
         return self._hold
@@ -263,6 +265,8 @@ class Scheduler:
                 f"{f' ({error})' if str(error) else ''}"
             ) from error
         self._marks.remove(MARK)
+        if self._unwritten is hold:
+            self._unwritten = None
 
     async def hold(self, number: EntryId | None, by: str, reason: str) -> None:
         """Hold an entry, or the whole schedule.
@@ -294,14 +298,17 @@ class Scheduler:
         """
         who = by or "an operator"
         if number is None:
-            held = self._hold
-            if held is None:
-                raise OperatorError("the schedule is not held")
-            await self._starter.journal.hold_schedule(self._starter.fleet.name, None)
-            if self._hold is not held:  # by a STOP that came meanwhile, and is written after this
-                raise OperatorError(f"not released: the schedule is {self._hold}")
-            self._marks.remove(MARK)
-            self._hold = None
+            async with self._lock:
+                if self._hold is None:
+                    await self._read_hold()
+                held = self._hold
+                if held is None:
+                    raise OperatorError("the schedule is not held")
+                await self._starter.journal.hold_schedule(self._starter.fleet.name, None)
+                if self._hold is not held:  # by a STOP that came meanwhile, written after this
+                    raise OperatorError(f"not released: the schedule is {self._hold}")
+                self._marks.remove(MARK)
+                self._hold = self._unwritten = None
             self._say(f"the schedule is released by {who}")
         else:
             async with self._lock:
@@ -359,6 +366,7 @@ class Scheduler:
     async def _look(self) -> int | None:
         """Start what can start now; returns when to look again."""
         try:
+            await self._read_hold()
             await self._conditions.ask_journal(self._active())
             await self._judge_runs()
         except JournalError as error:
@@ -384,7 +392,25 @@ class Scheduler:
                 again_us = self._in(ASK_AGAIN_S)
             if again_us is not None:
                 wakes.append(again_us)
+        if self._starter.journal.file is not None and (self._active() or self._hold):
+            wakes.append(self._in(ASK_AGAIN_S))  # another executive may hold the schedule
         return min(wakes, default=None)
+
+    async def _read_hold(self) -> None:
+        """Take over what another executive on the journal has held or released.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
+        before = self._hold
+        found = await self._starter.journal.schedule_hold(self._starter.fleet.name)
+        if self._hold is not before or self._unwritten is not None or found == before:
+            return
+        self._hold = found
+        if found is None:
+            self._say("the schedule is released by another executive's operator")
+        else:
+            self._say_held()
 
     def _compare_clocks(self) -> None:
         """Say once when the computer's clock was set: dates do not mean what people read."""

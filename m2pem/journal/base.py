@@ -158,7 +158,8 @@ class Journal(Protocol):
         the run's id. Both are written, or neither.
 
         Raises:
-            StaleEntryError: the entry was changed since; nothing is written.
+            StaleEntryError: the entry was changed since, or the schedule of its fleet is held;
+                nothing is written.
             JournalError: it cannot be written, there is too little free space, or a loss is open.
         """
         ...

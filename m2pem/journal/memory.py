@@ -67,6 +67,8 @@ class MemoryJournal:
         self._check_open()
         if started is not None:
             self._replaceable(started)
+            if self._holds.get(self._entries[started.entry].plan.fleet) is not None:
+                raise StaleEntryError(f"{started.entry} starts nothing: the schedule is held")
         position = RunPosition(epoch=1, pid=os.getpid(), started_us=header.created_us)
         self._last += 1
         self._runs[self._last] = _Run(header, position)

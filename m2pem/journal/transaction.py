@@ -33,6 +33,7 @@ from m2pem.journal.run_locks import RunLocks
 from m2pem.journal.storage_checks import OpenFiles, space_shortage
 from m2pem.scheduling.entry import (
     EntryChange,
+    EntryId,
     EntryState,
     Hold,
     ScheduleEntry,
@@ -112,6 +113,7 @@ class WriteTransaction:
         """Add a run that is claimed with epoch 1, and return its id."""
         if started is not None:
             self._refuse_stale(started)
+            self._refuse_held(started.entry)
         self._refuse_while_short()
         marks = self._marks.read()
         self._refuse_while_lossy(marks)
@@ -265,6 +267,14 @@ class WriteTransaction:
             raise unknown_entry(change.entry)
         if row[0] != change.state.revision - 1:
             raise StaleEntryError(f"{change.entry} was changed by another executive")
+
+    def _refuse_held(self, entry: EntryId) -> None:
+        held = self._connection.execute(
+            "SELECT 1 FROM schedule JOIN schedule_holds USING (fleet) WHERE entry = ?",
+            (known_entry(entry),),
+        ).fetchone()
+        if held is not None:
+            raise StaleEntryError(f"{entry} starts nothing: the schedule is held")
 
     def _replace_state(self, change: EntryChange) -> None:
         self._connection.execute(

@@ -1,12 +1,16 @@
 """The schedule of a real executive: kills, restarts, the queue, and the commands for it."""
 
 import json
+from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
 
+from m2pem.control_socket.client import ask
+from m2pem.control_socket.paths import live_sockets
 from m2pem.testing import scenarios
 from tests.command_line import FLEET, MISSION, CommandLine, Program, install_plugin
 from tests.each_case import failures
@@ -41,9 +45,14 @@ SqliteJournal.create, SqliteJournal.append = creating, appending
 """
 
 
-def serving(m2pem: CommandLine, *more: str, **environment: str) -> Program:
+def serving(
+    m2pem: CommandLine,
+    *more: str,
+    fleet: Path = FLEET,
+    environment: Mapping[str, str] = MappingProxyType({}),
+) -> Program:
     program = m2pem.start(
-        "serve", "--fleet", FLEET, "--ocu", "none", *JOURNAL, *more, **environment
+        "serve", "--fleet", fleet, "--ocu", "none", *JOURNAL, *more, **environment
     )
     while "serving" not in program.stderr.readline():
         assert program.process.poll() is None
@@ -82,7 +91,7 @@ def test_an_executive_that_is_killed_as_it_starts_a_mission_starts_it_once(
     m2pem: CommandLine, tmp_path: Path, place: str, run: str
 ) -> None:
     dying = install_plugin(tmp_path, "dying", DYING)
-    server = serving(m2pem, "--speed", SPEED, DIE_AT=place, **dying)
+    server = serving(m2pem, "--speed", SPEED, environment={"DIE_AT": place, **dying})
     assert m2pem.run("start", MISSION, *JOURNAL, "--when", "free")[:2] == (0, "s1\n")
     assert server.process.wait() == -9
     again = serving(m2pem, "--speed", SPEED)
@@ -113,6 +122,48 @@ def test_two_entries_for_one_rover_run_one_after_the_other_by_priority(
     _, first, second = runs(m2pem)
     assert "started by s2, scheduled by ada" in m2pem.run("replay", "r2", *JOURNAL)[1]
     assert first["ended_us"] <= second["started_us"]
+
+
+NORTH = """\
+version: 1
+name: north
+origin: {{lat: 38.1, lon: -77.3, alt: 0.0}}
+vehicles:
+  {0}: {{domain: ground, arbiter: sim, connection: {{home: [38.1, -77.3]}}}}
+"""
+
+
+def test_two_executives_of_a_fleet_hold_and_release_its_schedule_together(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    """Their files name other vehicles: else the second one is refused."""
+    journal = tmp_path / "journal.db"
+    reverse = tmp_path / "reverse.bpmn"
+    reverse.write_bytes(scenarios.in_sequence("reverse", "ugv1", {"distance": "20 m"}))
+    programs = []
+    for vehicle in ("ugv1", "ugv2"):
+        (tmp_path / f"{vehicle}.yaml").write_text(NORTH.format(vehicle))
+        programs.append(serving(m2pem, "--speed", SPEED, fleet=tmp_path / f"{vehicle}.yaml"))
+        if vehicle == "ugv1":
+            cron = ("--cron", "0 8 * * *", "--time-zone", "UTC")
+            assert m2pem.run("start", reverse, *JOURNAL, *cron)[:2] == (0, "s1\n")
+    sockets = {int(path.stem): path for path in live_sockets(journal)}
+    first, second = (sockets[program.process.pid] for program in programs)
+
+    def hold_at(path: Path) -> str:
+        hold: str = ask(path, "scheduled")["hold"]
+        return hold
+
+    while not ask(second, "scheduled")["served"]:
+        assert programs[1].process.poll() is None
+    ask(second, "hold_schedule", by="anna", reason="rain")
+    while hold_at(first) != "held by anna: rain":
+        assert programs[0].process.poll() is None
+    ask(first, "release_schedule", by="bob")
+    while hold_at(second):
+        assert programs[1].process.poll() is None
+    assert m2pem.run("schedule", "hold", *JOURNAL)[0] == 0
+    assert m2pem.run("schedule", "release", *JOURNAL)[0] == 0
 
 
 IMPOSSIBLE = [
@@ -219,8 +270,8 @@ def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
     listed, note = m2pem.run("schedule", *JOURNAL)[1:]
     assert listed.startswith("the schedule is held by")
     assert "no executive serves this schedule now" in note
-    for words in (("release",), ("release", "s1"), ("cancel", "s2"), ("hold", "s3")):
-        assert m2pem.run("schedule", *words, *JOURNAL)[0] == 0
+    for done in (("release",), ("release", "s1"), ("cancel", "s2"), ("hold", "s3")):
+        assert m2pem.run("schedule", *done, *JOURNAL)[0] == 0
     found = json.loads(m2pem.run("schedule", "--all", "--format", "json", *JOURNAL)[1])
     assert {each["entry"]: each["status"] for each in found[0]["entries"]} == {
         "s1": "scheduled",

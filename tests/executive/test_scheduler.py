@@ -15,6 +15,7 @@ from m2pem.errors import MissionError, OperatorError, ScheduleError
 from m2pem.fleet.fleet import dump
 from m2pem.journal import Entry, MemoryJournal, RunHeader
 from m2pem.mission.catalogue import BehaviorState
+from m2pem.scheduling.entry import Hold
 
 from .conftest import START_US, behavior, mission, question, sequence
 from .schedule_world import at, attended_fleet, drive, serving, unattended_fleet
@@ -344,6 +345,39 @@ def test_stop_of_all_holds_the_schedule_also_after_a_restart():
     said, found = run_virtual(main, START_US)
     assert "the schedule is held by bob: STOP of all: smoke" in said[-1]
     assert found.hold == "held by bob: STOP of all: smoke"
+
+
+def test_what_another_executive_on_the_journal_holds_is_not_started():
+    async def story(world):
+        await world.schedule(drive("ugv1"), at=at(60))
+        await world.journal.hold_schedule("test", Hold("bob", "rain"))
+        await world.at(100)
+        held = await world.begun(), await world.executive.control.scheduled()
+        await world.executive.control.release_schedule(by="ada")
+        await world.end("r1")
+        return held, await world.begun(), world.told()
+
+    (begun, schedule), after, told = play(story)
+    assert (begun, schedule.hold) == ({}, "held by bob: rain")
+    assert schedule.entries[0].reason == "the schedule is held by bob: rain"
+    assert list(after) == ["r1"]
+    assert "the schedule is held by bob: rain; nothing starts until it is released" in told
+
+
+def test_a_hold_that_comes_as_a_run_is_created_keeps_it_from_that():
+    async def story(world):
+        await world.schedule(drive("ugv1"), at=at(60))
+        create = world.journal.create
+
+        async def held_first(*args):
+            await world.journal.hold_schedule("test", Hold("bob", "rain"))
+            return await create(*args)
+
+        world.journal.create = held_first
+        await world.at(100)
+        return await world.begun(), (await world.entry("s1")).reason
+
+    assert play(story) == ({}, "the schedule is held by bob: rain")
 
 
 def test_stop_of_all_comes_before_a_start_that_is_under_way():

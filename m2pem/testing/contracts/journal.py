@@ -224,6 +224,19 @@ class JournalContract(Contract):
             await journal.hold_schedule("north", None)
             assert await journal.schedule_hold("north") is None
 
+    async def test_what_is_held_starts_no_run(self, open_journal: OpenJournal) -> None:
+        """Whoever holds it; and what another fleet holds does not matter."""
+        async with opened(open_journal) as journal:
+            await journal.schedule(PLAN, EntryState(5))
+            started = EntryChange("s1", EntryState(9, times=(STARTED,), revision=1))
+            await journal.hold_schedule(PLAN.fleet, Hold("anna", "rain", 8))
+            with pytest.raises(StaleEntryError, match="s1 starts nothing: the schedule is held"):
+                await journal.create(HEADER, started)
+            assert await journal.runs() == []
+            await journal.hold_schedule(PLAN.fleet, None)
+            await journal.hold_schedule("another", Hold("anna", "rain", 8))
+            assert await journal.create(HEADER, started) == "r1"
+
     # --- runs -----------------------------------------------------------------------------------
 
     async def test_runs_are_named_in_order(self, open_journal: OpenJournal) -> None:
