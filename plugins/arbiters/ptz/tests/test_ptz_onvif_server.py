@@ -36,9 +36,16 @@ SERVICES = {
 GENERIC = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/PositionGenericSpace"
 
 
+def plain_http(kind=httpx.AsyncClient):
+    """A client that does not read the certificates of this machine: the camera speaks HTTP."""
+    return kind(trust_env=False, verify=False)
+
+
 @cache
 def document(file):
-    transport = AsyncTransport(client=httpx.AsyncClient(trust_env=False), cache=InMemoryCache())
+    transport = AsyncTransport(
+        client=plain_http(), wsdl_client=plain_http(httpx.Client), cache=InMemoryCache()
+    )
     return zeep.wsdl.Document(str(WSDL / file), transport)
 
 
@@ -46,8 +53,10 @@ def document(file):
 async def client(server, name, token=None):
     """Plain zeep, strict: what is not by the schema is an error."""
     file, namespace, binding = SERVICES[name]
-    async with httpx.AsyncClient(trust_env=False) as http:
-        transport = AsyncTransport(client=http, cache=InMemoryCache())
+    async with plain_http() as http:
+        transport = AsyncTransport(
+            client=http, wsdl_client=plain_http(httpx.Client), cache=InMemoryCache()
+        )
         found = zeep.AsyncClient(document(file), transport=transport, wsse=token)
         address = f"http://127.0.0.1:{server.port}/onvif/{name}_service"
         yield AsyncServiceProxy(

@@ -44,28 +44,24 @@ class Witness:
                 points.append((east, north))
         east, north = np.array(points).T
         lat, lon, _ = pymap3d.enu2geodetic(east, north, 0.0, *ORIGIN)
-        self.lat, self.lon = lat, lon
+        ground = np.full(count, ORIGIN[2])
+        self.places = np.column_stack(pymap3d.geodetic2ecef(lat, lon, ground))
         self.vector_to = np.zeros(count, dtype=bool)
 
     def ptz(self, world, mast_m=2.0):
         state, gimbal = world.truth(), world.gimbal
         gimbal.move()
         here = state.position
-        azimuth, elevation, _ = pymap3d.geodetic2aer(
-            self.lat,
-            self.lon,
-            ORIGIN[2],
-            here.latitude_deg,
-            here.longitude_deg,
-            here.altitude_m + mast_m,
+        east, north, up = pymap3d.ecef2enu(
+            *self.places.T, here.latitude_deg, here.longitude_deg, here.altitude_m + mast_m
         )
         heading = math.pi / 2 - state.yaw_rad + gimbal.pan
-        az, el = np.radians(azimuth) - heading, np.radians(elevation)
-        ahead = np.cos(el) * np.cos(az) * math.cos(gimbal.tilt) + np.sin(el) * math.sin(gimbal.tilt)
-        right = np.cos(el) * np.sin(az)
-        up = np.sin(el) * math.cos(gimbal.tilt) - np.cos(el) * np.cos(az) * math.sin(gimbal.tilt)
+        level = east * math.sin(heading) + north * math.cos(heading)
+        ahead = level * math.cos(gimbal.tilt) + up * math.sin(gimbal.tilt)
+        right = east * math.cos(heading) - north * math.sin(heading)
+        above = up * math.cos(gimbal.tilt) - level * math.sin(gimbal.tilt)
         wide, high = (math.tan(angle / 2) / gimbal.zoom for angle in VIEW)
-        self.vector_to |= (ahead > 0) & (abs(right) <= wide * ahead) & (abs(up) <= high * ahead)
+        self.vector_to |= (ahead > 0) & (abs(right) <= wide * ahead) & (abs(above) <= high * ahead)
 
     @property
     def share(self):
@@ -141,11 +137,9 @@ def test_a_vehicle_that_leans_sees_all_of_the_area_too():
             gimbal.move()
             pose = VehiclePose(state.position, state.yaw_rad, state.roll_rad, state.pitch_rad)
             here = camera_pose(pose, Mounting(up_m=mast_m), stabilized=False)
-            ground = [ORIGIN[2]] * len(self.lat)
-            places = np.column_stack(pymap3d.geodetic2ecef(self.lat, self.lon, ground))
             axes = here.mount_frame.axes(gimbal.pan, gimbal.tilt)
             self.vector_to |= (
-                FieldOfView(*VIEW).zoomed(gimbal.zoom).holds(axes, here.vector_to(places))
+                FieldOfView(*VIEW).zoomed(gimbal.zoom).holds(axes, here.vector_to(self.places))
             )
 
     end, witness, _ = scan(SQUARE, zoomed(4.0), moves, "air", witness=Leaning(SQUARE))

@@ -7,11 +7,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pymap3d
 from numpy.typing import NDArray
 
 from m2pem.api import GeoPosition
-from m2pem_plugin_ptz.camera_model.frames import Matrix, Vector, enu_vector
+from m2pem_plugin_ptz.camera_model.frames import (
+    EQUATOR_M,
+    POLE_M,
+    Matrix,
+    Vector,
+    enu_vector,
+    geodetic,
+    up_and_heights_m,
+)
 from m2pem_plugin_ptz.camera_model.pose import CameraPose
 
 
@@ -54,8 +61,6 @@ class FieldOfView:
         return unit
 
 
-_EQUATOR_M = 6_378_137.0
-_POLE_M = 6_356_752.314245179
 _CLOSE_M = 1e-4
 _ROUNDS = 4
 
@@ -68,7 +73,7 @@ def ranges_m(camera_pose: CameraPose, directions: Vector, ground_m: float) -> Ve
     """
     rays = directions @ camera_pose.enu
     # The surface of equal height is almost an ellipsoid with longer axes: the first guess.
-    scale = np.array([_EQUATOR_M, _EQUATOR_M, _POLE_M]) + ground_m
+    scale = np.array([EQUATOR_M, EQUATOR_M, POLE_M]) + ground_m
     start, step = camera_pose.place / scale, rays / scale
     a = np.einsum("ij,ij->i", step, step)
     b = step @ start
@@ -82,12 +87,10 @@ def ranges_m(camera_pose: CameraPose, directions: Vector, ground_m: float) -> Ve
         if not known.any():
             break
         places = camera_pose.place + found[known, None] * rays[known]
-        latitude, longitude, height = pymap3d.ecef2geodetic(*places.T)
-        above = height - ground_m
+        up, heights_m = up_and_heights_m(places)
+        above = heights_m - ground_m
         if np.abs(above).max() < _CLOSE_M:
             break
-        lat, lon = np.radians(latitude), np.radians(longitude)
-        up = np.column_stack((np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)))
         sinking = np.einsum("ij,ij->i", up, rays[known])
         found[known] -= above / np.minimum(sinking, -1e-9)
     return found
@@ -95,9 +98,7 @@ def ranges_m(camera_pose: CameraPose, directions: Vector, ground_m: float) -> Ve
 
 def visible(camera_pose: CameraPose, places: Vector) -> NDArray[np.bool_]:
     """Return which points of the ground (ECEF, one in each row) are nearer than the horizon."""
-    latitude, longitude, _ = pymap3d.ecef2geodetic(*places.T)
-    lat, lon = np.radians(latitude), np.radians(longitude)
-    up = np.column_stack((np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)))
+    up, _ = up_and_heights_m(places)
     vector_to: NDArray[np.bool_] = np.einsum("ij,ij->i", up, camera_pose.place - places) > 0
     return vector_to
 
@@ -183,7 +184,4 @@ def _places(
     far = ranges_m(camera_pose, rays, ground_m)
     far = np.where(np.isfinite(far), far, range_m)
     places = camera_pose.place + far[:, None] * (rays @ camera_pose.enu)
-    return tuple(
-        GeoPosition(float(latitude), float(longitude), float(altitude))
-        for latitude, longitude, altitude in zip(*pymap3d.ecef2geodetic(*places.T), strict=True)
-    )
+    return tuple(geodetic(place) for place in places)

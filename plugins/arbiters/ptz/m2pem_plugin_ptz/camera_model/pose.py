@@ -1,5 +1,6 @@
 """The pose of a camera in the world, and the frame in which it turns."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,10 +64,10 @@ class MountFrame:
 
     def axes(self, pan_rad: float, tilt_rad: float) -> Matrix:
         """Return the rotation from ENU to the picture: ahead, left and up."""
-        ahead = deck_vector(pan_rad + self.pan_zero_rad, tilt_rad)
-        level = deck_vector(pan_rad + self.pan_zero_rad, 0.0)
-        left = np.array([-level[1], level[0], 0.0])
-        return np.array([ahead, left, np.cross(ahead, left)]) @ self.enu.T
+        bearing = pan_rad + self.pan_zero_rad
+        ahead, up = deck_vector(bearing, tilt_rad), deck_vector(bearing, tilt_rad + math.pi / 2)
+        left = deck_vector(bearing - math.pi / 2, 0.0)
+        return np.array([ahead, left, up]) @ self.enu.T
 
 
 def mount_frame(
