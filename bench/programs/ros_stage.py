@@ -66,7 +66,6 @@ class Vehicles(Peer):
     ) -> None:
         arguments = [str(count), str(rate_hz), str(first), *["endless"] * endless]
         super().__init__(VEHICLES, domain, arguments)
-        assert self.process.stdout is not None
         self.began_ns = int(self.process.stdout.readline())
         self._got: queue.SimpleQueue[Got] = queue.SimpleQueue()
 
@@ -83,7 +82,6 @@ class Vehicles(Peer):
         return self._got.get(timeout=PATIENCE_S)
 
     def _read(self) -> None:
-        assert self.process.stdout is not None
         with contextlib.suppress(ValueError):  # closed at the end
             for line in self.process.stdout:
                 number, verb, came_ns = map(int, line.split())

@@ -8,7 +8,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import Self
 import pytest
 
 from m2pem_plugin_ros import loopback
+from m2pem_plugin_ros.fork_server import fork_server
 
 DOMAINS = range(1, 101)
 """On Linux, the ports of higher domains are in the ephemeral range."""
@@ -58,12 +58,8 @@ class Peer:
     """
 
     def __init__(self, program: Path | str, domain: int, arguments: Sequence[str] = ()) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, str(program), *arguments],
-            env={**os.environ, **loopback.environment(domain)},
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        environment = {**os.environ, **loopback.environment(domain)}
+        self.process = fork_server().start(program, arguments, environment)
 
     def __enter__(self) -> Self:
         self.wait_for("ready")
@@ -80,8 +76,7 @@ class Peer:
             self.process.wait(STOP_WITHIN_S)
         except subprocess.TimeoutExpired:
             self.kill()
-        if self.process.stdout is not None:
-            self.process.stdout.close()
+        self.process.stdout.close()
 
     def wait_for(self, line: str) -> None:
         """Read its output until that line.
@@ -89,7 +84,6 @@ class Peer:
         Raises:
             RuntimeError: the process ended before.
         """
-        assert self.process.stdout is not None
         for printed in self.process.stdout:
             if printed.strip() == line:
                 return

@@ -4,8 +4,6 @@ import asyncio
 import itertools
 import json
 import os
-import subprocess
-import sys
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
@@ -16,6 +14,7 @@ import pytest
 from m2pem_plugin_mocu.ocu import MocuOcu
 from m2pem_plugin_mocu.settings import NAMESPACE
 from m2pem_plugin_ros import loopback
+from m2pem_plugin_ros.fork_server import fork_server
 from m2pem_plugin_ros.testing import reserved_domain
 
 from m2pem.api import ArbiterContext, Connection, FleetBus, MissionControl, ResourceId
@@ -40,18 +39,12 @@ class Client:
         self.domain = domain
         self.said: list[Message] = []
         self._numbers = itertools.count(1)
-        self.process = subprocess.Popen(
-            [sys.executable, str(PEER), ONE, OTHER],
-            env={**os.environ, **loopback.environment(domain)},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        environment = {**os.environ, **loopback.environment(domain)}
+        self.process = fork_server().start(PEER, [ONE, OTHER], environment, writes=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
     def _read(self) -> None:
-        assert self.process.stdout is not None
         for line in self.process.stdout:
             self.said.append(json.loads(line))
 
@@ -106,9 +99,9 @@ class Client:
         self.process.kill()
         self.process.wait()
         self._reader.join()
-        for pipe in (self.process.stdin, self.process.stdout):
-            if pipe is not None:
-                pipe.close()
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self.process.stdout.close()
 
 
 def values(diagnostics: Message, name: str = "m2pem: executive") -> dict[str, str]:
