@@ -32,7 +32,8 @@ def read_cases() -> list[Case]:
     return [case for topic in TOPICS for case in read_topic(topic)]
 
 
-def read_topic(path: Path) -> list[Case]:
+@cache
+def read_topic(path: Path) -> tuple[Case, ...]:
     """The cases of one file.
 
     Raises:
@@ -54,7 +55,7 @@ def read_topic(path: Path) -> list[Case]:
         except _WrongError as error:
             title = item.get("case", "a case without a title")
             raise CaseError(f"{path}:{error.line or line}: {title}: {error}") from None
-    return cases
+    return tuple(cases)
 
 
 class _WrongError(Exception):
