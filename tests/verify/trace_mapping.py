@@ -13,10 +13,12 @@ from m2pem.engine.state import RunState, RunStatus, Scope, Token
 from m2pem.mission.elements import CallActivity, ComplexGateway, InclusiveGateway, ParallelGateway
 from m2pem.verify.net.encoding import Encoding
 from m2pem.verify.net.petri_net import Kind, PetriNet, Role
-from m2pem.verify.search.read_write_sets import affected_transitions
 
 Look = Counter[tuple[tuple[str, ...], str]]
 """Tokens by where they are: the activities around them, and their element."""
+
+Tested = tuple[int, int, int]
+"""A transition, and bits of a state that must be as these: most are not, which is seen quickly."""
 
 _MOST_AT_ONCE = 4
 """Timers that one tick may let fire."""
@@ -66,10 +68,10 @@ class Follower:
         self.encoding = Encoding(
             net, {p.index: bits for p in net.places if p.role not in (Role.END,)}
         )
-        self._affected = affected_transitions(self.encoding)
-        self._outside = [r.index for r in net.transitions if r.kind is Kind.EXTERNAL]
-        self._joins = [r.index for r in net.transitions if r.kind is Kind.JOIN]
-        self._internal = [r.index for r in net.transitions if r.kind is Kind.INTERNAL]
+        self._outside = self._tested(Kind.EXTERNAL)
+        self._joins = self._tested(Kind.JOIN)
+        self._internal = self._tested(Kind.INTERNAL)
+        self._known: dict[int, set[int]] = {}
         self._paths = [
             tuple(_NUMBERED.sub("", step) for step in scope.path) for scope in net.scopes
         ]
@@ -100,9 +102,18 @@ class Follower:
 
     # --- steps ----------------------------------------------------------------------------------
 
-    def _fire(self, transitions: Iterable[int], number: int) -> list[int]:
+    def _tested(self, kind: Kind) -> list[Tested]:
+        compiled = self.encoding.transitions
+        found = (r.index for r in self.net.transitions if r.kind is kind)
+        return [(each, compiled[each].test, compiled[each].need) for each in found]
+
+    def _fire(self, transitions: Iterable[Tested], number: int) -> list[int]:
         encoding = self.encoding
-        return [encoding.fire(r, number)[0] for r in transitions if encoding.enabled(r, number)]
+        return [
+            encoding.fire(r, number)[0]
+            for r, test, need in transitions
+            if number & test == need and encoding.enabled(r, number)
+        ]
 
     def _quiet(self, states: set[int]) -> set[int]:
         """Where the internal steps lead that follow."""
@@ -121,7 +132,9 @@ class Follower:
         return found
 
     def _after(self, number: int) -> set[int]:
-        return self._quiet(set(self._fire(self._outside, number)))
+        if number not in self._known:
+            self._known[number] = self._quiet(set(self._fire(self._outside, number)))
+        return self._known[number]
 
     def step(self, state: RunState) -> bool:
         """The engine has taken an input in. False: no run of the transitions looks like
