@@ -100,11 +100,15 @@ def hull_meets_edges(hull: Hull | None, edges: Sequence[Edge]) -> bool:
     if hull is None or edges_enclose(edges, hull[0]):
         return True
     own = _edges(hull)
-    return any(
-        _holds(hull, edge[0]) or _edges_distance_m(mine, edge) == 0.0
-        for edge in edges
-        for mine in own
-    )
+    west, east = min(corner[0] for corner in hull), max(corner[0] for corner in hull)
+    south, north = min(corner[1] for corner in hull), max(corner[1] for corner in hull)
+    for edge in edges:
+        (ae, an), (be, bn) = edge
+        if max(ae, be) < west or min(ae, be) > east or max(an, bn) < south or min(an, bn) > north:
+            continue  # it is outside of the bounding box, as most are
+        if _holds(hull, edge[0]) or any(_edges_distance_m(mine, edge) == 0.0 for mine in own):
+            return True
+    return False
 
 
 def meeting_place(a: Hull | None, b: Hull | None) -> EastNorth | None:

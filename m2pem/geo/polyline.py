@@ -91,6 +91,8 @@ class Polyline:
         point, and the segment.
         """
         for segment, begin_m in zip(self.segments, self.marks_m, strict=False):
+            if begin_m > to_m:
+                return
             low_m = max(0.0, from_m - begin_m)
             high_m = min(segment.length_m, to_m - begin_m)
             if segment.length_m and low_m <= high_m:

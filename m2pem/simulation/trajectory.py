@@ -55,13 +55,14 @@ class Plan(Generic[S]):
     def __init__(self, phases: Iterable[Phase[S]], cycle_from: int | None = None) -> None:
         self.phases = tuple(phases)
         self.cycle_from = cycle_from
+        self._durations_s = [phase.duration_s for phase in self.phases]
         self._ends: list[float] = []
         self._work: list[float] = []
         self._level_m_after: list[float] = []
         end = work = 0.0
-        for phase in self.phases:
-            end += phase.duration_s
-            work += phase.duration_s * phase.load if phase.load else 0.0
+        for phase, duration_s in zip(self.phases, self._durations_s, strict=True):
+            end += duration_s
+            work += duration_s * phase.load if phase.load else 0.0
             self._ends.append(end)
             self._work.append(work)
 
@@ -84,9 +85,9 @@ class Plan(Generic[S]):
     def work(self, t: float) -> float:
         """Seconds of full battery load until plan time `t`."""
         index, inside, laps_work = self._find(t)
-        phase = self.phases[index]
         before = self._work[index - 1] if index else 0.0
-        return laps_work + before + min(inside, phase.duration_s) * phase.load
+        load_s = min(inside, self._durations_s[index]) * self.phases[index].load
+        return laps_work + before + load_s
 
     def level_m_left(self, t: float) -> float:
         """Return the length on the map from plan time `t` to the plan's end."""
@@ -196,6 +197,7 @@ class Track(Generic[S]):
         self.warp = warp or Warp(started_us)
         self.counted_us = started_us if counted_us is None else counted_us
         self._counted_tau = 0.0 if counted_us is None else self._tau(counted_us)
+        self._counted_work = plan.work(self._counted_tau)
 
     def at(self, now_us: int) -> S:
         """Where the body is."""
@@ -213,13 +215,14 @@ class Track(Generic[S]):
         tau = self._tau(now_us)
         moving_s = tau - self._counted_tau
         standing_s = max(0.0, (now_us - self.counted_us) / US_PER_S - moving_s)
-        work = self.plan.work(tau) - self.plan.work(self._counted_tau)
+        work = self.plan.work(tau) - self._counted_work
         return work + standing_s * standing_load
 
     def count_from(self, now_us: int) -> None:
         """Count battery load from now on."""
         self.counted_us = now_us
         self._counted_tau = self._tau(now_us)
+        self._counted_work = self.plan.work(self._counted_tau)
 
     def hold(self, now_us: int, braking_s: float) -> None:
         """Slow to a stop within `braking_s`."""

@@ -105,14 +105,20 @@ class SimVehicle:
 
     def aloft(self, now_us: int) -> bool:
         """Whether it flies."""
-        return self.domain == "air" and self.pose(now_us).place[2] - self.home[2] > ALOFT_M
+        return self.domain == "air" and self._is_aloft(self.pose(now_us))
+
+    def _is_aloft(self, pose: Pose) -> bool:
+        return self.domain == "air" and pose.place[2] - self.home[2] > ALOFT_M
 
     def battery_at(self, now_us: int) -> float:
         """What is left, as a fraction."""
         # A function of time, as a rehearsal jumps to the moment at which a level is reached. The
         # simulators of plugins integrate in steps instead: by the load that an autopilot reports,
         # or by the distance driven.
-        standing = 1.0 if self.aloft(now_us) else STANDING_LOAD
+        return self._battery(now_us, aloft=self.aloft(now_us))
+
+    def _battery(self, now_us: int, *, aloft: bool) -> float:
+        standing = 1.0 if aloft else STANDING_LOAD
         used = self.track.load_s(now_us, standing) / self.kinematics.endurance_s
         return max(0.0, self.battery - used)
 
@@ -144,8 +150,8 @@ class SimVehicle:
     def state(self, now_us: int, frame: FlatFrame) -> VehicleState:
         """What it says about itself."""
         pose = self.pose(now_us)
-        battery = self.battery_at(now_us)
-        aloft = self.aloft(now_us)
+        aloft = self._is_aloft(pose)
+        battery = self._battery(now_us, aloft=aloft)
         return VehicleState(
             resource=self.id,
             time_us=now_us,
