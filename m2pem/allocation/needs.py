@@ -55,7 +55,8 @@ class Cost:
 class Task:
     """The task whose roles are to be filled. `read`: the data store, as seen from it. `used`: what
     its run has commanded before. `occupied`: what is not free for its run, and why. `lost`: what
-    did its work before, and is not chosen for it again, and why."""
+    did its work before, and is not chosen for it again, and why. `given`: who fills roles by an
+    operator's word."""
 
     behavior: Behavior
     place: Place
@@ -63,6 +64,7 @@ class Task:
     used: Collection[str]
     occupied: Mapping[ResourceId, Occupancy]
     lost: Mapping[str, Loss] = field(default_factory=dict)
+    given: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,7 @@ class ConsideredRole:
 
     `resources`: the candidates in the order of the fleet. `excluded`: why some cannot fill the
     role. `occupied`: why some are not free. `costs`: the cost of each in seconds of travel time.
+    `named`: the mission or an operator says what fills the role; all of `resources` do.
     """
 
     role: Role
@@ -104,6 +107,7 @@ class ConsideredRole:
     excluded: Mapping[ResourceId, str]
     occupied: Mapping[ResourceId, Occupancy]
     costs: _Costs
+    named: bool = False
 
     def total_s(self, resource: ResourceId) -> float:
         """Return the cost of a candidate; less is better."""
@@ -129,8 +133,10 @@ class RoleEvaluator:
         excluded: Mapping[ResourceId, str] = {}
         resources = group.resources
         least, most = (0 if role.optional else need.least), need.most
-        if role.resource:
-            resources = resources_of(role, fleet)
+        given = task.given.get(role.name)
+        named = bool(given or role.resource)
+        if named:
+            resources = tuple(map(ResourceId, given)) if given else resources_of(role, fleet)
             least = most = 0 if role.optional and not resources else max(1, len(resources))
         else:
             excluded = self._exclusions(need, role.kind, task)
@@ -147,7 +153,7 @@ class RoleEvaluator:
             {each: totals[index[each]] for each in able if each not in occupied},
             [each for each in able if each in occupied and not occupied[each].withdrawn],
         )
-        return ConsideredRole(role, options, resources, excluded, occupied, costs)
+        return ConsideredRole(role, options, resources, excluded, occupied, costs, named)
 
     def ever(self, role: Role, task: Task) -> list[ResourceId]:
         """Return what may ever fill a role by need, as far as the fleet file says.

@@ -5,7 +5,7 @@ the time are arguments.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest
@@ -132,11 +132,13 @@ class Reservations:
         ahead: Sequence[Reservation] = (),
         *,
         takes_altitude: bool = False,
+        ended: Collection[str] = (),
     ) -> Refusal | None:
         """Return why a behavior may not start now; None: it may.
 
         `ahead`: what others are to reserve before it. `takes_altitude`: the behavior has a
-        parameter for that, so that another one may be proposed.
+        parameter for that, so that another one may be proposed. `ended`: behaviors that will have
+        ended before it starts, and whose vehicles stand then where they are now.
         """
         request = wanted.request
         if request.behavior in STOPS:
@@ -147,7 +149,7 @@ class Reservations:
                 "in its way"
             )
             return Refusal(reason, unseen[0], lacking=0, wait_s=self._unseen_wait_s())
-        occupants = list(self._occupants(request.id, now_us, ahead))
+        occupants = list(self._occupants({request.id, *ended}, now_us, ahead))
         if (space := self._space_conflict(wanted, occupants)) is not None:
             return space.refusal(self._where(space.place))
         volumes = wanted.volumes or {}
@@ -423,7 +425,7 @@ class Reservations:
 
     def places(self, now_us: int) -> list[tuple[SharedSpace, tuple[Occupant, ...]]]:
         """Return the shared spaces, and who has a place in each."""
-        occupants = list(self._occupants("", now_us, ()))
+        occupants = list(self._occupants((), now_us, ()))
         return [
             (each.space, occupants_of(each, self._counting(each.space, occupants), ()))
             for each in self._regions
@@ -436,13 +438,12 @@ class Reservations:
     # --- who is in the way ----------------------------------------------------------------------
 
     def _occupants(
-        self, apart_from: BehaviorId, now_us: int, ahead: Sequence[Reservation]
+        self, apart_from: Collection[str], now_us: int, ahead: Sequence[Reservation]
     ) -> Iterator[Occupant]:
-        """All that take part, but for what a behavior itself reserves. `ahead`: as in
-        `refusal`."""
+        """All that take part, but for what some behaviors reserve. `ahead`: as in `refusal`."""
         busy = set()
         for name, reservation in self._reservations.items():
-            if name == apart_from:
+            if name in apart_from:
                 continue
             for vehicle, volume in self._volumes_of(reservation, now_us).items():
                 busy.add(vehicle)

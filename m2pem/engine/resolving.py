@@ -90,9 +90,6 @@ def _wrong_roles(fleet: Fleet, incident: Incident, item: ResolveIncident) -> str
             if resource not in there:
                 return f"the fleet has no {resource!r}; {did_you_mean(resource, there)}"
     roles = replaced_roles(fleet, incident, item)
-    missing = [role.name for role in behavior.roles if not (role.optional or roles.get(role.name))]
-    if missing:
-        return f"say also who fills {', '.join(missing)}"
     counted: dict[str, str] = {}
     for name, resources in roles.items():
         for resource in resources:
@@ -104,14 +101,16 @@ def _wrong_roles(fleet: Fleet, incident: Incident, item: ResolveIncident) -> str
 def replaced_roles(
     fleet: Fleet, incident: Incident, item: ResolveIncident
 ) -> dict[str, tuple[str, ...]]:
-    """Return who fills each role of the behavior that starts again: what the operator says, else
-    who had it, else what the mission names."""
+    """Return who fills roles of the behavior that starts again: what the operator says. A role that
+    names its resource, and of which the operator says nothing, is filled by who had it, else by
+    what the mission names. What is left out is chosen when the task starts again."""
     behavior = behavior_at(incident.token.node)
     assert behavior is not None
     found: dict[str, tuple[str, ...]] = {}
     for role in behavior.roles:
-        named = resources_of(role, fleet) if role.resource else ()
-        chosen = item.roles.get(role.name) or incident.roles.get(role.name) or named
+        chosen = item.roles.get(role.name, ())
+        if role.resource and not chosen:
+            chosen = incident.roles.get(role.name) or resources_of(role, fleet)
         if chosen:
             found[role.name] = tuple(chosen)
     return found

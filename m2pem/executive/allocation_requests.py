@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 from m2pem.allocation.needs import ConsideredRole, RoleEvaluator, Task
+from m2pem.api.arbiter import BehaviorRequest
 from m2pem.engine.inputs import ResourcesChosen
 from m2pem.engine.state import AllocationRequest
 from m2pem.executive.preemption import priority_of
 from m2pem.executive.runner import Runner
-from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.losses import TAKEN_OVER, may_return
 
 
@@ -25,11 +26,13 @@ class AskedFor:
 
 @dataclass(frozen=True, slots=True)
 class Preempting:
-    """What was chosen for a request, and the behaviors that have to end first."""
+    """What was chosen for a request, and the behaviors that have to end first. `wanted`: the
+    behavior that is requested then, for which space is reserved; None: it needs none."""
 
     answer: ResourcesChosen
     resources: tuple[ResourceId, ...]
     behaviors: frozenset[str]
+    wanted: tuple[BehaviorRequest, BehaviorSpec] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +57,8 @@ class ConsideredRequest:
 
     @property
     def named_vehicles(self) -> frozenset[ResourceId]:
-        """The resources that its roles name."""
-        return frozenset(one for role in self.roles if role.role.resource for one in role.resources)
+        """The resources that its roles name, or an operator."""
+        return frozenset(one for role in self.roles if role.named for one in role.resources)
 
     def is_hopeless(self, evaluator: RoleEvaluator) -> bool:
         """Whether what is left of a lost behavior will be done by no other, however long it waits.
@@ -72,7 +75,7 @@ class ConsideredRequest:
             return False
         for considered in self.roles:
             role = considered.role
-            if role.resource:
+            if considered.named:
                 continue
             same = role.need is not None and role.need.same
             gone = lost.keys() if same else lost.keys() - returns

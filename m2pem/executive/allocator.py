@@ -40,7 +40,7 @@ from m2pem.executive.space_allocation import (
 )
 from m2pem.executive.waiting_circles import WaitingCircles
 from m2pem.executive.waiting_tasks import holder_label
-from m2pem.fleet.allocation import Availability, resources_of
+from m2pem.fleet.allocation import Availability
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior
@@ -225,8 +225,12 @@ class Allocator:
                     self._refuse_space(each, refusal)
         left = [each for each in waiting if each.request.id not in chosen]
         lacking = [each for each in left if each.request.id not in refusals]
-        for each in self._preempt(lacking, set(given)):
-            self._refuse(each, given, evaluator)
+        for each, refusal in self._preempt(lacking, set(given)):
+            if refusal is not None and refusal.wait_s is not None:
+                refusals[each.request.id] = refusal
+                self._refuse_space(each, refusal)
+            else:
+                self._refuse(each, given, evaluator, refusal)
         self._circles.look(left, refusals)
 
     def _assign(
@@ -268,12 +272,20 @@ class Allocator:
     ) -> "Refusal | None":
         """Return why a request has no space with what is chosen for it; None: it has."""
         assert self._space is not None
+        fleet, behavior = self._arbiters.fleet, behavior_of(each.request)
+        resources = tuple(one for ids in self._filled(each, chosen).values() for one in ids)
+        if not may_wait_for_space(fleet, behavior.type, behavior.name, resources):
+            return None
+        wanted = self._wanted(each, chosen)
+        return None if wanted is None else self._space.refusal(*wanted)
+
+    def _wanted(
+        self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
+    ) -> tuple[BehaviorRequest, BehaviorSpec] | None:
+        """Return the behavior that is requested with what is chosen; None: it will be refused."""
         behavior = behavior_of(each.request)
         roles = self._filled(each, chosen)
         resources = tuple(dict.fromkeys(one for ids in roles.values() for one in ids))
-        fleet = self._arbiters.fleet
-        if not may_wait_for_space(fleet, behavior.type, behavior.name, resources):
-            return None
         spec = self._spec(behavior)
         if spec is None:
             return None
@@ -282,8 +294,7 @@ class Allocator:
         except ParameterError:
             return None  # its behavior is refused later, with the reason
         number = BehaviorId(each.request.id)
-        wanted = BehaviorRequest(number, 0, behavior.name, parameters, resources, roles)
-        return self._space.refusal(wanted, spec)
+        return BehaviorRequest(number, 0, behavior.name, parameters, resources, roles), spec
 
     def _consider(self, evaluator: RoleEvaluator) -> list[ConsideredRequest]:
         found: list[ConsideredRequest] = []
@@ -329,6 +340,7 @@ class Allocator:
             state.commanded,
             occupied,
             {} if lost is None else lost.resources,
+            request.token.replacements or {},
         )
 
     def _occupied(self) -> dict[ResourceId, Occupancy]:
@@ -412,12 +424,9 @@ class Allocator:
     def _filled(
         self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
     ) -> dict[str, tuple[ResourceId, ...]]:
-        """Return what fills each role, a named team with its lead first."""
-        fleet = self._arbiters.fleet
+        """Return what fills each role, a named team, and what an operator named, in their order."""
         return {
-            role.role.name: resources_of(role.role, fleet)
-            if role.role.resource
-            else chosen[role.role.name]
+            role.role.name: role.resources if role.named else chosen[role.role.name]
             for role in each.roles
             if role.role.name in chosen
         }
@@ -441,7 +450,10 @@ class Allocator:
         each: ConsideredRequest,
         given: Mapping[ResourceId, Occupancy],
         evaluator: RoleEvaluator,
+        without_space: "Refusal | None" = None,
     ) -> None:
+        """Let a task wait for its resources, or throw its error. `without_space`: why it takes none
+        from other runs."""
         holders = {
             str(resource): holder
             for role in each.roles
@@ -449,6 +461,8 @@ class Allocator:
             if (holder := _holder(role, resource) or given.get(resource, Occupancy()).holder)
         }
         why = reason(each.roles, given)
+        if without_space is not None:
+            why = f"{why}; {without_space.vehicle} is not taken: {without_space.reason}"
         lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])
         waits = each.waits and not each.is_hopeless(evaluator)
         if waits and each.asked.lacks == lacks:
@@ -461,18 +475,18 @@ class Allocator:
 
     def _preempt(
         self, left: Sequence[ConsideredRequest], given: set[ResourceId]
-    ) -> list[ConsideredRequest]:
+    ) -> "list[tuple[ConsideredRequest, Refusal | None]]":
         """Take resources from other runs for requests that get none. Returns the requests for which
-        that is not possible.
+        that is not possible; with why, if they would have no space then.
 
         `given`: what others were given at the same moment.
         """
         if not self._arbiters.fleet.preemption:
-            return list(left)
-        without: list[ConsideredRequest] = []
+            return [(each, None) for each in left]
+        without: list[tuple[ConsideredRequest, Refusal | None]] = []
         behaviors = preemptible(self._runners.values(), self._latest)
         kept = set(given)
-        for each in left:
+        for place, each in enumerate(left):
             holders = {
                 resource: holder
                 for holder in behaviors
@@ -480,18 +494,49 @@ class Allocator:
                 for resource in holder.resources
                 if self._availability.holder(resource) in (None, holder.behavior.id)
             }
-            chosen = choose(each.request.id, each.roles, holders, kept, self._order)
+            before = [other.request.id for other in left[:place]]
+            chosen, refusal = self._with_space(each, holders, kept, before)
             taken = [e for ids in (chosen or {}).values() for e in ids if e in holders]
             if chosen is None or not taken:
                 kept.update(able for role in each.roles for able in role.options.costs_s)
-                without.append(each)
+                without.append((each, refusal))
                 continue
             answer, resources = self._hold_for(each, chosen)
             kept.update(resources)
             self._take(each, {resource: holders[resource] for resource in taken})
             victims = frozenset(holders[resource].behavior.id for resource in taken)
-            each.asked.preempts = Preempting(answer, resources, victims)
+            each.asked.preempts = Preempting(answer, resources, victims, self._wanted(each, chosen))
         return without
+
+    def _with_space(
+        self,
+        each: ConsideredRequest,
+        holders: Mapping[ResourceId, Holder],
+        kept: set[ResourceId],
+        before: Sequence[str],
+    ) -> "tuple[dict[str, tuple[ResourceId, ...]] | None, Refusal | None]":
+        """Choose resources for a request, also among those of `holders`, with which it has space
+        when their behaviors have ended; that space is reserved. A vehicle whose task could not
+        begin then is not taken from another run.
+
+        Returns what is chosen, if anything; else why what could be taken has no space.
+        """
+        refusals: list[Refusal] = []
+        without: set[ResourceId] = set()
+        while True:
+            chosen = choose(each.request.id, each.roles, holders, kept | without, self._order)
+            taken = [e for ids in (chosen or {}).values() for e in ids if e in holders]
+            if chosen is None or not taken:
+                return None, _foremost(refusals) if refusals else None
+            wanted = None if self._space is None else self._wanted(each, chosen)
+            if self._space is None or wanted is None:
+                return chosen, None
+            ending = {holders[resource].behavior.id for resource in taken}
+            refusal = self._space.refusal_after(*wanted, ending, before)
+            if refusal is None:
+                return chosen, None
+            refusals.append(refusal)
+            without.add(refusal.vehicle)
 
     def _take(self, each: ConsideredRequest, taken: Mapping[ResourceId, Holder]) -> None:
         """End the behaviors that have what a request gets, and tell the operators of both runs."""
@@ -522,14 +567,20 @@ class Allocator:
                 continue
             ended = not any(map(self._availability.is_held, preempts.behaviors))
             gone = any(self._availability.reason(each) for each in preempts.resources)
-            if gone or (ended and self._space is not None):
-                # Lost, or taken by an operator, meanwhile; or it has to have space, too: it is
-                # chosen again, among all that asks.
+            if gone or (ended and not self._has_space(preempts)):
+                # Lost, or taken by an operator, meanwhile; or another vehicle has come into the
+                # space that was free: it is chosen again, among all that asks.
                 asked.chosen, asked.preempts = False, None
                 self._release(allocation)
             elif ended:
                 asked.preempts = None
                 asked.runner.post(preempts.answer)
+
+    def _has_space(self, preempts: Preempting) -> bool:
+        """Whether a task has space with the vehicles that were taken for it, where they stand."""
+        if self._space is None or preempts.wanted is None:
+            return True
+        return self._space.refusal_after(*preempts.wanted, (), ()) is None
 
 
 def _foremost(refusals: "Sequence[Refusal]") -> "Refusal":

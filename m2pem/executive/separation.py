@@ -3,7 +3,7 @@
 The reservation waits until the positions of the vehicles are known.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem.api.arbiter import BehaviorRequest
@@ -87,13 +87,21 @@ class VehicleSeparation:
         return self.reservations.propose(request, spec.type, self._clock.now_us())
 
     def conflict(
-        self, wanted: "Reservation", ahead: "Sequence[Reservation]", spec: BehaviorSpec
+        self,
+        wanted: "Reservation",
+        ahead: "Sequence[Reservation]",
+        spec: BehaviorSpec,
+        ended: Collection[str] = (),
     ) -> "Refusal | None":
         """Return why a behavior may not start now; None: it may. `ahead`: what others are to
-        reserve before it."""
-        takes_altitude = "altitude" in spec.by_name
-        now_us = self._clock.now_us()
-        return self.reservations.refusal(wanted, now_us, ahead, takes_altitude=takes_altitude)
+        reserve before it. `ended`: behaviors that will have ended before it starts."""
+        return self.reservations.refusal(
+            wanted,
+            self._clock.now_us(),
+            ahead,
+            takes_altitude="altitude" in spec.by_name,
+            ended=ended,
+        )
 
 
 def separation_for(fleet: Fleet, clock: Clock) -> VehicleSeparation | None:

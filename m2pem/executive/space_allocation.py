@@ -30,6 +30,8 @@ class SpaceAllocation:
         self._separation = separation
         self._proposed: dict[str, Reservation | None] = {}
         self._kept_back: dict[str, Reservation] = {}
+        self._kept_before: dict[str, Reservation] = {}
+        self._kept_for_next: dict[str, Reservation] = {}
         self._ahead: list[Reservation] = []
 
     def awaits_positions(self) -> bool:
@@ -39,6 +41,7 @@ class SpaceAllocation:
     def begin(self) -> None:
         """Begin a decision."""
         self._kept_back.clear()
+        self._kept_before, self._kept_for_next = self._kept_for_next, {}
 
     def begin_round(self) -> None:
         """Look at all requests again, from the first."""
@@ -58,10 +61,35 @@ class SpaceAllocation:
             self._kept_back.setdefault(request.id, wanted)
         return found
 
+    def refusal_after(
+        self,
+        request: BehaviorRequest,
+        spec: BehaviorSpec,
+        ended: Collection[str],
+        before: Collection[str],
+    ) -> "Refusal | None":
+        """Return why a request has no space when the behaviors of `ended` have ended, whose
+        vehicles it takes; None: it has, and keeps it from now on.
+
+        `before`: the requests that come before it and wait. If it waits for behaviors that will
+        end, the space is not for those that follow, from the next decision on.
+        """
+        wanted = self._separation.propose(request, spec)
+        if wanted is None:
+            return None
+        ahead = [each for each in self._ahead if each.request.id in before]
+        found = self._separation.conflict(wanted, ahead, spec, ended)
+        if found is None:
+            self._separation.reservations.commit(wanted)
+        elif found.wait_s is not None and found.blockers and all(map(_ends, found.blockers)):
+            self._kept_for_next[request.id] = wanted
+        return found
+
     def keep_back(self, request: str) -> None:
         """A request waits: what it needs is not for those that follow."""
-        if request in self._kept_back:
-            self._ahead.append(self._kept_back[request])
+        kept = self._kept_back.get(request) or self._kept_before.get(request)
+        if kept is not None:
+            self._ahead.append(kept)
 
     def commit(self, request: str) -> None:
         """Reserve the space of a request that is served."""
@@ -75,6 +103,7 @@ class SpaceAllocation:
 
     def release(self, request: str) -> None:
         """A request is served no more."""
+        self._kept_for_next.pop(request, None)
         self._separation.reservations.withdraw(BehaviorId(request))
 
 

@@ -182,9 +182,9 @@ class Supervisor:
         )
 
     def _space(self) -> SpaceAllocation | None:
-        """None: no task waits for space."""
-        separation = self._separation
-        if separation is None or not waits_for_space(self.fleet):
+        """None: no task waits for space, nor for vehicles that it takes from others."""
+        separation, fleet = self._separation, self.fleet
+        if separation is None or not (fleet.preemption or waits_for_space(fleet)):
             return None
         return SpaceAllocation(separation)
 

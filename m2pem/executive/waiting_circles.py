@@ -48,7 +48,7 @@ class WaitingCircles:
         certain = {  # a task that may get another vehicle need not wait for ever
             number: refusal
             for number, refusal in refusals.items()
-            if all(role.role.resource for role in requests[number].roles)
+            if all(role.named for role in requests[number].roles)
         }
         in_space = space_circles(certain, vehicles)
         for circle in in_space:

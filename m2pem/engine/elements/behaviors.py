@@ -89,10 +89,14 @@ def _request_with_replacements(
     roles: dict[str, tuple[str, ...]],
     parameters: dict[str, Value],
 ) -> None:
-    """Request a behavior that starts again with the resources that an operator has chosen."""
+    """Request a behavior that starts again with the resources that an operator has chosen. The
+    roles of which the operator said nothing are filled as at the start of the task."""
     resources = tuple(dict.fromkeys(each for chosen in roles.values() for each in chosen))
     if refusal := refusal_of(x, resources):
         throw_error(x, token, UNAVAILABLE, refusal)
+        return
+    if any(role.name not in roles and not role.resource for role in behavior.roles):
+        request_allocation(x, token, behavior, parameters)
         return
     store_chosen(x, token, behavior, roles)
     emit_behavior(x, token, behavior, resources, roles, parameters)
