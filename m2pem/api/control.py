@@ -248,7 +248,8 @@ class OpenIncident:
 
     `task`: the element's label. `choices`: what can be chosen, of `retry`, `retry_with`, `skip`,
     `set_data`, `move` and `end`. `resources`: what is held for it. `roles`: those of the behavior,
-    with who had each. `targets`: where the token can move, by id, with labels.
+    with who had each. `targets`: where the token can move, by id, with labels. `operator_role`:
+    which operators may decide; "": all.
     """
 
     run: RunId
@@ -261,11 +262,13 @@ class OpenIncident:
     resources: tuple[str, ...] = ()
     roles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     targets: Mapping[str, str] = field(default_factory=dict)
+    operator_role: str = ""
 
     def __str__(self) -> str:
         held = f"; held for it: {', '.join(self.resources)}" if self.resources else ""
         reason = f": {self.reason}" if self.reason else ""
-        return f"{self.incident}: {self.task}: {self.code}{reason}{held}"
+        who = f"; for {self.operator_role}" if self.operator_role else ""
+        return f"{self.incident}: {self.task}: {self.code}{reason}{held}{who}"
 
 
 class IncidentVerdict(StrEnum):
@@ -471,7 +474,8 @@ class MissionControl(Protocol):
         ...
 
     async def answer(self, run: RunId, prompt: str, decision: str, *, by: str = "") -> None:
-        """Answer a prompt. The first answer wins; a later one raises OperatorError."""
+        """Answer a prompt. The first answer wins; a later one raises OperatorError, and so does one
+        of an operator who has not the role of the prompt, where the fleet file says who has it."""
         ...
 
     async def set_geometry(
@@ -564,7 +568,8 @@ class MissionControl(Protocol):
         `even_if_stuck`: an operator has confirmed a choice after which the mission cannot complete.
 
         Raises:
-            OperatorError: the choice is wrong or comes too late; it says what would be right.
+            OperatorError: the choice is wrong or comes too late, or others decide about it; the
+                error says what would be right.
             StuckError: the mission cannot complete after it, and that was not confirmed.
         """
         ...

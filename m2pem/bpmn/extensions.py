@@ -227,6 +227,12 @@ EXTENSIONS = (
                 "`incident`: an error that no event catches opens an incident; `end`: it ends the "
                 "run; otherwise what the caller, else the fleet file says",
             ),
+            Attribute(
+                "incidentRole",
+                Type.TEXT,
+                "the role of the operators who may decide about incidents; otherwise what the "
+                "caller, else the fleet file says",
+            ),
         ),
     ),
     OwnAttributes(

@@ -171,6 +171,7 @@ def read_process(context: ReadingContext, element: etree._Element) -> None:
         context.findings.line(element),
         context.boolean(element, "isExecutable", False, identifier),
         on_error=_on_error(context, element, identifier),
+        incident_role=(element.get(M2PEM + "incidentRole") or "").strip(),
     )
     context.processes.append(process)
     stack = [_frame(context, process, element)]

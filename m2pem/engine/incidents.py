@@ -27,6 +27,7 @@ from m2pem.mission.elements import (
     FlowNode,
     InclusiveGateway,
     ParallelGateway,
+    Process,
     ScriptTask,
     SendTask,
     SequenceFlow,
@@ -57,15 +58,24 @@ def opens_incident(x: Execution, token: Token) -> bool:
 
 def error_policy(state: RunState, fleet: Fleet, token: Token) -> ErrorPolicy:
     """Return what an error at a token does that no event catches."""
+    said = (each.on_error for each in _processes_of(state, token))
+    return next(filter(None, said), fleet.on_error)
+
+
+def role_for(state: RunState, fleet: Fleet, token: Token) -> str:
+    """Return which operators may decide about an incident of a token; "": all."""
+    said = (each.incident_role for each in _processes_of(state, token))
+    return next(filter(None, said), fleet.incident_role)
+
+
+def _processes_of(state: RunState, token: Token) -> Iterator[Process]:
+    """Return the process of a token's element, its callers, and that with which the run began."""
     scope: Scope | None = token.scope
     while scope is not None:
-        said = scope.container.process.on_error
-        if said is not None:
-            return said
+        yield scope.container.process
         scope = scope.parent
-    root = state.root
-    said = root.container.process.on_error if root is not None else None
-    return said or fleet.on_error
+    if state.root is not None:
+        yield state.root.container.process
 
 
 def open_incident(
@@ -102,6 +112,7 @@ def open_incident(
             tuple(dict.fromkeys(resources)),
             failed[0].roles if failed and failed[0].token == token.id else {},
             rearm,
+            role_for(x.state, x.fleet, token),
         )
     )
 

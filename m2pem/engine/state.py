@@ -195,7 +195,8 @@ class Token:
     incident: str = ""
     """The open incident that stops it."""
     replacements: dict[str, tuple[str, ...]] | None = None
-    """Who fills the roles of the behavior that starts again, by an operator's choice."""
+    """Who fills roles of the behavior that starts again, by an operator's choice; the others are
+    filled as at the start of the task. None: all are."""
 
     @property
     def is_reopened(self) -> bool:
@@ -310,6 +311,7 @@ class Incident:
     choices: tuple[IncidentChoice, ...]
     resources: tuple[str, ...]
     roles: dict[str, tuple[str, ...]]
+    operator_role: str
 
 
 @dataclass(slots=True, eq=False)

@@ -67,6 +67,7 @@ from m2pem.findings import Finding
 from m2pem.fleet.allocation import resources_of, resources_of_mission, roles_of_mission
 from m2pem.fleet.facts import fleet_facts
 from m2pem.fleet.fleet import Fleet
+from m2pem.fleet.operator_roles import why_not_allowed
 from m2pem.journal.base import Entry, RunInfo
 from m2pem.journal.mission import mission_of
 from m2pem.mission.candidate_facts import FLEET_FACTS
@@ -373,6 +374,10 @@ class Control:
                 case _:
                     raise unknown_decision(decision)
             return
+        runner = self._supervisor.runners.get(run)
+        asked = runner.prompts.get(prompt) if runner is not None else None
+        if asked is not None:
+            self._refuse_others(f"{run}: {prompt}", asked.role, by)
         await self._ask("answer", run, i.PromptAnswer(prompt, decision, by))
 
     async def set_geometry(
@@ -484,6 +489,8 @@ class Control:
         async with self._explain_end("resolve_incident", run):
             self._refuse_ended(run)
             item = self._choice(run, incident, choice, data, to, roles, by)
+            known = self._supervisor.runner(run).run.state.incidents[item.incident]
+            self._refuse_others(item.incident, known.operator_role, by)
         ends_or_stays = item.choice in (i.IncidentChoice.END, i.IncidentChoice.SET_DATA)
         if self._foresee is not None and not (even_if_stuck or ends_or_stays):
             preview = await self._outlook(run, item)
@@ -513,6 +520,15 @@ class Control:
         runner, arbiters = supervisor.runner(run), supervisor.arbiters
         refuse_wrong_choice(runner, item, arbiters, supervisor.availability)
         return item
+
+    def _refuse_others(self, what: str, role: str, by: str) -> None:
+        """Check that an operator has the role of those who decide about something.
+
+        Raises:
+            OperatorError: the fleet file says who has it: others.
+        """
+        if refusal := why_not_allowed(self._supervisor.fleet, role, by):
+            raise OperatorError(f"{what}: {refusal}")
 
     async def _ask(self, request: str, run: RunId, item: i.Input) -> None:
         """Have an input decided; one that the engine ignored is the operator's to know.

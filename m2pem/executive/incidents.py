@@ -47,6 +47,7 @@ def _described(state: RunState, incident: Incident, fleet: Fleet) -> OpenInciden
         incident.resources,
         roles,
         {each.id: each.label for each in move_targets(incident.token)},
+        incident.operator_role,
     )
 
 

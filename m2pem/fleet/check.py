@@ -9,6 +9,7 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.fleet import SIMULATED, Fleet
 from m2pem.fleet.graph import Catalogue, ResourceGraph
 from m2pem.fleet.need_check import KnownFits, check_needs, places_of
+from m2pem.fleet.operator_roles import check_operator_roles
 from m2pem.fleet.parameters import ParameterProblem, examine
 from m2pem.fleet.shortage import Demand, check_shortages
 from m2pem.fleet.space_check import check_space
@@ -183,7 +184,8 @@ def check_mission(
     check = _Check(mission, fleet, graph, catalogue, handed_over)
     findings = [finding for task in mission.activities() for finding in check.task(task)]
     shortages = check_shortages(mission, check.demands)
-    return [*findings, *shortages, *_returned(mission, fleet)]
+    roles = check_operator_roles(mission, fleet)
+    return [*findings, *shortages, *_returned(mission, fleet), *roles]
 
 
 def _returned(mission: Mission, fleet: Fleet) -> Iterator[Finding]:

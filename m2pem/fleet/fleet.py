@@ -127,7 +127,9 @@ class Fleet:
     no event of the mission catches, where the mission does not say. `unattended`: scheduled
     missions may start real vehicles with no operator present; `start_warning_s`: how long before a
     start operators are warned of it. `preemption`: whether a task may take vehicles from tasks of
-    other runs with a lower priority.
+    other runs with a lower priority. `incident_role`: which operators decide about incidents, where
+    the mission does not say; "": all. `operators`: the names of those who have each role; none:
+    every operator has every role.
     """
 
     name: str
@@ -154,6 +156,8 @@ class Fleet:
     unattended: bool = False
     start_warning_s: float = 10.0
     preemption: bool = False
+    incident_role: str = ""
+    operators: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:

@@ -58,6 +58,7 @@ def load_fleet(path: str | Path) -> Fleet:
             note_shape_findings(source, error, FleetModel)
         _check_names(source)
         _check_teams(source)
+        _check_incident_role(source)
         geometries = _read_geometries(source, path.parent)
         _check_fence(source)
         _check_shared_space(source)
@@ -115,6 +116,14 @@ def _check_teams(source: YamlSource) -> None:
             hint = suggest(lead, [m for m in members if isinstance(m, str)], "members")
             message = f"the lead '{lead}' is not one of the members"
             source.error(("teams", name, "lead"), "lead-not-member", message, hint)
+
+
+def _check_incident_role(source: YamlSource) -> None:
+    role, operators = source.mapping().get("incident_role"), source.mapping("operators")
+    if isinstance(role, str) and operators and role not in operators:
+        hint = suggest(role, operators, "roles")
+        message = f"'operators' names nobody with the role '{role}'"
+        source.error(("incident_role",), "no-operator", message, hint)
 
 
 def _check_fence(source: YamlSource) -> None:
@@ -231,6 +240,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         unattended=later.unattended,
         start_warning_s=later.warning,
         preemption=costs.preemption,
+        incident_role=model.incident_role or "",
+        operators={role: tuple(names) for role, names in model.operators.items()},
     )
 
 

@@ -281,6 +281,20 @@ class FleetModel(_Model):
             "which an operator decides. What a process of the mission says comes first."
         ),
     ] = "end"
+    incident_role: Annotated[
+        Text | None,
+        Field(
+            description="The role of the operators who may decide about incidents; all if left "
+            "out. What a process of the mission says comes first."
+        ),
+    ] = None
+    operators: Annotated[
+        dict[Text, Annotated[list[Text], Field(min_length=1)]],
+        Field(
+            description="Who has each role of operators, as the executive knows them: anna stands "
+            "for her on every host, anna@gcs1 on one. If left out, every operator has every role."
+        ),
+    ] = {}
     vehicles: dict[Name, VehicleModel] = {}
     teams: dict[Name, TeamModel] = {}
     routes: Annotated[

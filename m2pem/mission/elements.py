@@ -107,12 +107,14 @@ class Process(Element):
 
     `global_task`: it has a global task of its id in it, and nothing else; it can only be called.
     `on_error`: what an error in it does that no event catches; None: what its caller, else the
-    fleet, says.
+    fleet, says. `incident_role`: which operators may decide about its incidents; "": as its caller,
+    else the fleet, says.
     """
 
     executable: bool = False
     global_task: bool = False
     on_error: ErrorPolicy | None = None
+    incident_role: str = ""
     file: str = field(init=False, repr=False, default="")
     """The file that it is in; "" in the mission's own."""
     nodes: tuple[FlowNode, ...] = field(init=False, repr=False, default=())

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -252,8 +252,10 @@ class _Rehearsal:
     ) -> RunSummary:
         journal = _NotifyingJournal(self._on_record)
         seen = {"telemetry_hz": SPACE_HZ} if waits_for_space(self._fleet) else {}
+        # Who answers is a script: it stands for whoever may.
+        fleet = replace(self._fleet, operators={})
         executive = Executive(
-            simulated_fleet(self._fleet, {**SETTINGS, **seen}),
+            simulated_fleet(fleet, {**SETTINGS, **seen}),
             journal,
             self._scripted,
             clock,

@@ -1,6 +1,7 @@
 """Incidents on an executive: what is held, what is refused, and who decides first."""
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,11 +9,16 @@ import pytest
 from m2pem.api.control import RunStatus
 from m2pem.api.telemetry import LinkState
 from m2pem.engine.inputs import BehaviorReported
-from m2pem.engine.records import IncidentOpened, IncidentResolved
+from m2pem.engine.records import (
+    BehaviorRequested,
+    DataWritten,
+    IncidentOpened,
+    IncidentResolved,
+)
 from m2pem.errors import BusyError, OperatorError
 from m2pem.mission.catalogue import BehaviorState
 
-from .conftest import World, behavior, flow, mission, question, sequence, task
+from .conftest import World, behavior, fleet, flow, mission, question, sequence, task
 from .test_emergency import StallingJournal, alerts
 from .test_lost_resources import says
 from .test_recovery import left_behind
@@ -85,6 +91,71 @@ def test_a_retry_gets_its_vehicle_before_a_task_that_waits_for_it(play):
         return (await control.wait(run)).status
 
     assert play(story, "ugv1") is RunStatus.COMPLETED
+
+
+PAIR = stopping(
+    sequence(
+        (
+            "Drive",
+            task("Drive", "requires='true' store='first'").replace(
+                "</m2pem:resources>",
+                '<m2pem:role name="wing" requires="true" store="second"/></m2pem:resources>',
+            ),
+        )
+    )
+)
+
+
+@pytest.mark.parametrize(
+    ("roles", "again"),
+    [
+        ({"wing": ["ugv3"]}, ("ugv1", "ugv3")),
+        ({"driver": ["ugv2"]}, ("ugv2", "ugv1")),
+        ({"driver": ["ugv3"], "wing": ["ugv2"]}, ("ugv3", "ugv2")),
+    ],
+)
+def test_of_roles_by_need_some_are_named_and_the_others_are_chosen_anew(
+    play, roles: dict[str, list[str]], again: tuple[str, ...]
+):
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world, PAIR)
+        (incident,) = await control.incidents()
+        assert incident.resources == ("ugv1", "ugv2")
+        await control.resolve_incident(run, "i1", "retry_with", roles=roles)
+        await world.fake.until_called("start", f"{run}.b2")
+        world.fake.report(f"{run}.b2", SUCCEEDED)
+        await control.wait(run)
+        return [each for each in world.seen if isinstance(each, BehaviorRequested)], world.seen
+
+    (_, second), seen = play(story, "ugv1", "ugv2", "ugv3")
+    assert second.resources == again
+    written = {each.key: each.value for each in seen if isinstance(each, DataWritten)}
+    assert (written["first"], written["second"]) == again
+
+
+def test_of_roles_by_need_one_is_named_though_the_task_never_got_any(play):
+    """Nothing was free, so no behavior has begun: what had the roles is not known."""
+
+    async def story(world: World):
+        control = world.executive.control
+        for name in ("ugv1", "ugv2", "ugv3"):
+            await control.take(name, by="anna")
+        run = await control.start(PAIR)
+        while not (found := await control.incidents()):
+            await world.clock.sleep(0.01)
+        assert found[0].code == "RESOURCE_UNAVAILABLE"
+        for name in ("ugv3", "ugv2"):
+            await control.give_back(name, by="anna")
+        with pytest.raises(OperatorError, match="ugv1 is unavailable: with anna"):
+            await control.resolve_incident(run, "i1", "retry_with", roles={"wing": ["ugv1"]})
+        await control.resolve_incident(run, "i1", "retry_with", roles={"wing": ["ugv2"]})
+        await world.fake.until_called("start", f"{run}.b1")
+        world.fake.report(f"{run}.b1", SUCCEEDED)
+        await control.wait(run)
+        return [each.resources for each in world.seen if isinstance(each, BehaviorRequested)]
+
+    assert play(story, "ugv1", "ugv2", "ugv3") == [("ugv3", "ugv2")]
 
 
 def test_the_hold_goes_out_while_the_commit_is_stalled(play):
@@ -180,6 +251,77 @@ def test_taking_a_vehicle_says_that_an_incident_opens(play):
         return [str(each) for each in await control.preview_take("ugv1")]
 
     assert play(story, "ugv1") == ["r1: an incident opens, which asks what is done with Drive"]
+
+
+SAYS = {"commander": ("anna", "cid@gcs1"), "pilot": ("otto",)}
+
+
+def for_role(role: str) -> bytes:
+    return DRIVE.replace(b" m2pem:onError", f' m2pem:incidentRole="{role}" m2pem:onError'.encode())
+
+
+@pytest.mark.parametrize(
+    ("source", "refused", "allowed"),
+    [
+        (DRIVE, ["otto", "ben@gcs1", "cid", ""], "anna@gcs2"),  # the fleet file says commander
+        (for_role("commander"), ["otto", "cid@gcs2"], "cid@gcs1"),
+        (for_role("pilot"), ["anna", "cid@gcs1"], "otto@gcs1"),
+    ],
+)
+def test_only_operators_with_its_role_decide_about_an_incident(
+    play, source: bytes, refused: list[str], allowed: str
+):
+    vehicles = replace(fleet("ugv1"), incident_role="commander", operators=SAYS)
+
+    async def story(world: World):
+        control = world.executive.control
+        run = await failed(world, source)
+        before = world.executive.runner(run).run.state.seq
+        said = []
+        for by in refused:
+            with pytest.raises(OperatorError) as error:
+                await control.resolve_incident(run, "i1", "skip", by=by)
+            said.append(str(error.value))
+        assert world.executive.runner(run).run.state.seq == before
+        (incident,) = await control.incidents()
+        assert str(incident).endswith(f"; for {incident.operator_role}")
+        await control.preview_incident(run, "i1", "skip")  # whoever may look, may look
+        await control.resolve_incident(run, "i1", "skip", by=allowed)
+        return said, (await control.wait(run)).status
+
+    said, status = play(story, fleet=vehicles)
+    role = "pilot" if b"pilot" in source else "commander"
+    for by, text in zip(refused, said, strict=True):
+        assert text.startswith(f"r1.i1: only operators with the role '{role}' may: ")
+        assert text.endswith(f"'{by}' is not" if by else "who asks gave no name")
+    assert status is RunStatus.COMPLETED
+
+
+def test_where_the_fleet_names_no_operators_all_decide(play):
+    async def story(world: World):
+        run = await failed(world, for_role("commander"))
+        (incident,) = await world.executive.control.incidents()
+        assert incident.operator_role == "commander"
+        await world.executive.control.resolve_incident(run, "i1", "skip", by="ben")
+        return (await world.executive.control.wait(run)).status
+
+    assert play(story, "ugv1") is RunStatus.COMPLETED
+
+
+def test_only_operators_with_its_role_answer_a_prompt(play):
+    asking = question("Ask").replace("<m2pem:prompt>", '<m2pem:prompt role="pilot">')
+
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(mission(sequence(("Ask", asking))))
+        (prompt,) = control.prompts()
+        with pytest.raises(OperatorError, match=r"r1: p1: only .*'pilot' may: otto; 'anna' is not"):
+            await control.answer(run, prompt.prompt, "yes", by="anna")
+        await control.answer(run, prompt.prompt, "yes", by="otto@gcs1")
+        return (await control.wait(run)).status
+
+    vehicles = replace(fleet("ugv1"), operators=SAYS)
+    assert play(story, fleet=vehicles) is RunStatus.COMPLETED
 
 
 def test_stop_and_pause_work_with_an_open_incident(play):

@@ -17,6 +17,7 @@ def incident_opened(state: RunState, record: r.IncidentOpened) -> None:
         record.choices,
         record.resources,
         record.roles,
+        record.operator_role,
     )
     token.incident = record.incident
     token.replacements = None

@@ -12,6 +12,7 @@ class IncidentOpened(BaseRecord, frozen=True):
     `choices`: what an operator can do about it. `resources`: what the failed work commanded: they
     are held, and stay with the run until the incident is over. `roles`: who filled the roles of the
     failed behavior. `rearm`: an event at the element could not be armed; a retry arms all of them.
+    `operator_role`: which operators may decide; "": all.
     """
 
     token: int
@@ -25,6 +26,7 @@ class IncidentOpened(BaseRecord, frozen=True):
     resources: tuple[str, ...] = ()
     roles: dict[str, tuple[str, ...]] = msgspec.field(default_factory=dict)
     rearm: bool = False
+    operator_role: str = ""
 
 
 class IncidentUpdated(BaseRecord, frozen=True):
@@ -40,8 +42,9 @@ class IncidentUpdated(BaseRecord, frozen=True):
 
 class IncidentResolved(BaseRecord, frozen=True):
     """An operator has decided about an incident. `to`: the element or sequence flow to which the
-    token moves. `roles`: who fills the roles of the behavior that starts again, all of them;
-    empty: as the mission says. `resources`: what is free now, unless the behavior takes it again.
+    token moves. `roles`: who fills roles of the behavior that starts again; those by need that are
+    left out are chosen anew; empty: as the mission says. `resources`: what is free now, unless the
+    behavior takes it again.
     """
 
     token: int

@@ -1,8 +1,8 @@
 """Incidents as prompts: an error that stops a task is a question, whose answer is the choice.
 
 A choice that needs something has it after a colon: `move:Home`, `retry_with:scout=uav2`,
-`set_data:speed=3`. An exclamation mark at the end confirms a choice after which the mission cannot
-complete: `skip!`.
+`set_data:speed=3`. With several roles, a semicolon is between them. An exclamation mark at the end
+confirms a choice after which the mission cannot complete: `skip!`.
 """
 
 from collections.abc import Mapping
@@ -34,7 +34,8 @@ def prompt_of(view: RunView, record: r.IncidentOpened) -> OpenPrompt:
     held = f" Held for it: {', '.join(record.resources)}." if record.resources else ""
     text = f"{view.label(record.element)} is stopped by {record.code}: {record.reason}.{held}"
     decisions = tuple(Decision(*_LABELS[choice]) for choice in record.choices)
-    return OpenPrompt(view.run, record.incident, record.element, text, decisions)
+    place = (view.run, record.incident, record.element)
+    return OpenPrompt(*place, text, decisions, record.operator_role)
 
 
 def choice_of(decision: str) -> Mapping[str, Any]:
@@ -48,15 +49,20 @@ def choice_of(decision: str) -> Mapping[str, Any]:
     found: dict[str, Any] = {"data": {}, "to": "", "roles": {}}
     if choice == "move":
         found["to"] = rest
-    elif choice in ("set_data", "retry_with"):
-        name, equals, value = rest.partition("=")
-        if not (name and equals):
-            raise OperatorError(f"{decision!r} is not of the form {_LABELS[choice][0]}")
-        if choice == "set_data":
-            source = parse_yaml(value.encode("utf-8", "replace"), name)
-            if source.findings:
-                raise OperatorError(f"the value of {name}: {source.findings[0].message}")
-            found["data"] = {name: source.data}
-        else:
-            found["roles"] = {name: value.split(",")}
+    elif choice == "set_data":
+        name, value = _named(rest, decision, choice)
+        source = parse_yaml(value.encode("utf-8", "replace"), name)
+        if source.findings:
+            raise OperatorError(f"the value of {name}: {source.findings[0].message}")
+        found["data"] = {name: source.data}
+    elif choice == "retry_with":
+        named = [_named(each, decision, choice) for each in rest.split(";")]
+        found["roles"] = {role: resources.split(",") for role, resources in named}
     return {"choice": choice, "even_if_stuck": confirmed, **found}
+
+
+def _named(text: str, decision: str, choice: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise OperatorError(f"{decision!r} is not of the form {_LABELS[choice][0]}")
+    return name, value

@@ -139,6 +139,10 @@ async def test_the_whole_schedule_is_held_and_released(verb: int, operation: str
         ("move:Home", {"choice": "move", "to": "Home"}),
         ("set_data:speed=3", {"choice": "set_data", "data": {"speed": 3}}),
         ("retry_with:scout=uav2", {"choice": "retry_with", "roles": {"scout": ["uav2"]}}),
+        (
+            "retry_with:scout=uav2;column=ugv1,ugv2",
+            {"choice": "retry_with", "roles": {"scout": ["uav2"], "column": ["ugv1", "ugv2"]}},
+        ),
     ],
 )
 async def test_an_incident_is_answered_as_a_prompt_is(

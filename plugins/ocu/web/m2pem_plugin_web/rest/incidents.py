@@ -22,6 +22,7 @@ class IncidentModel(BaseModel):
     resources: list[str]
     roles: dict[str, list[str]]
     targets: dict[str, str]
+    operator_role: str
 
 
 class ChoiceModel(Body):
@@ -67,6 +68,7 @@ def router(control: MissionControl) -> APIRouter:
                 resources=list(each.resources),
                 roles={role: list(ids) for role, ids in each.roles.items()},
                 targets=dict(each.targets),
+                operator_role=each.operator_role,
             )
             for each in await control.incidents()
         ]

@@ -938,6 +938,7 @@ export const strings = {
     incidents: {
       title: "{task} is stopped (run {run})",
       held: "held for it: {resources}",
+      decides: "for {role}",
       choice: "What is to be done",
       choices: {
         retry: "Retry",

@@ -26,6 +26,7 @@ interface Incident {
   resources: string[];
   roles: Record<string, string[]>;
   targets: Record<string, string>;
+  operator_role: string;
 }
 
 interface Wanted {
@@ -126,6 +127,7 @@ export function IncidentPanel() {
         {incident.resources.length > 0 && (
           <span>{fill(text.held, { resources: incident.resources.join(", ") })}</span>
         )}
+        {incident.operator_role && <span>{fill(text.decides, { role: incident.operator_role })}</span>}
       </div>
       <p>
         {incident.code}
