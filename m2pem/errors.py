@@ -83,7 +83,11 @@ class BusyError(OperatorError):
 
 class ScheduleError(OperatorError):
     """A mission cannot be scheduled so; nothing was scheduled. The message says what would be
-    right."""
+    right. `field`: of `When`, which is wrong; "": none alone."""
+
+    def __init__(self, message: str, field: str = "") -> None:
+        self.field = field
+        super().__init__(message)
 
 
 class StuckError(OperatorError):

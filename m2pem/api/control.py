@@ -389,6 +389,19 @@ class MissionControl(Protocol):
         """Cancel an entry: it starts nothing any more. A run that it has started goes on."""
         ...
 
+    async def start_scheduled(self, entry: EntryId, *, by: str = "") -> RunId:
+        """Start the mission of an entry now, whatever it waits for; no operator is warned.
+
+        It stands for the time of the entry that has come, or for its only one. Times of cron that
+        are to come stay.
+
+        Raises:
+            MissionError: with every finding, when it does not fit the fleet any more.
+            BusyError: runs or operators have its vehicles; it says who has what.
+            OperatorError: there is no such entry, it is over, or held, or its last run goes on.
+        """
+        ...
+
     async def hold_schedule(
         self, entry: EntryId | None = None, *, by: str = "", reason: str = ""
     ) -> None:

@@ -266,6 +266,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("schedule", ToSchedule, EntryId, alone=True),
         Operation("scheduled", Nothing, Schedule),
         Operation("unschedule", OfEntry),
+        Operation("start_scheduled", OfEntry, RunId, alone=True),
         Operation("hold_schedule", HoldSchedule, alone=True),
         Operation("release_schedule", ReleaseSchedule),
         Operation("stop", Stop, alone=True),

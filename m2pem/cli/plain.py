@@ -47,6 +47,7 @@ HELP = """\
   start! FILE        the same, even if other runs or operators have its vehicles
   schedule           list the missions that start later
   schedule TIME FILE  start it at 08:00, or 2026-05-01T08:00; or free: when its vehicles are
+  schedule start s1  start that entry now
   schedule cancel s1  start that entry no more
   schedule hold      hold all of it (hold s1: one entry)
   schedule release   release it
@@ -358,18 +359,20 @@ class PlainOcu:
                     self._say(line)
             case ["cancel", entry]:
                 await self._control.unschedule(entry, by=NAME)
+            case ["start", entry]:
+                await self._control.start_scheduled(entry, by=NAME)
             case ["hold", *entry] if len(entry) <= 1:
                 await self._control.hold_schedule(entry[0] if entry else None, by=NAME)
             case ["release", *entry] if len(entry) <= 1:
                 await self._control.release_schedule(entry[0] if entry else None, by=NAME)
-            case [time, *file] if file and time != "cancel":
+            case [time, *file] if file and time not in ("cancel", "start"):
                 when = When(at="" if time == "free" else time)
                 entry_id = await self._control.schedule(" ".join(file), when=when, by=NAME)
                 self._say(f"{entry_id} is scheduled; schedule cancel {entry_id} takes it back")
             case _:
                 raise OperatorError(
-                    "say what: schedule 08:00 FILE, schedule free FILE, schedule cancel s1, "
-                    "schedule hold, or schedule release"
+                    "say what: schedule 08:00 FILE, schedule free FILE, schedule start s1, "
+                    "schedule cancel s1, schedule hold, or schedule release"
                 )
 
     async def _take(self, words: list[str]) -> None:

@@ -120,6 +120,27 @@ def cancel(entry: str, journal: str | None, by: str | None) -> None:
     _ask(journal, entry, "unschedule", by, offline, f"{entry} is cancelled")
 
 
+@schedule.command(epilog=example("m2pem schedule start s1"))
+@entry_argument
+@journal_option
+@by_option
+def start(entry: str, journal: str | None, by: str | None) -> None:
+    """Start the mission of an entry now, whatever it waits for, and print the id of the run.
+
+    It is refused while it is held, or while its vehicles are not free.
+    """
+    from m2pem.api.operator import operator_name
+    from m2pem.control_socket.client import LONG_TIMEOUT_S, ask
+
+    _find(journal, entry)
+    for path, found in _sockets(journal_file(journal)):
+        if entry in {each.entry for each in found.entries}:
+            params = {"entry": entry, "by": by or operator_name()}
+            click.echo(ask(path, "start_scheduled", timeout_s=LONG_TIMEOUT_S, **params))
+            return
+    raise UnusableError(f"no executive serves {entry} now: `m2pem serve` does")
+
+
 @schedule.command(epilog=example("m2pem schedule hold s1 --reason 'rain'"))
 @optional_entry_argument
 @click.option("--reason", default="", help="Why, for the journal.")

@@ -247,11 +247,14 @@ class Control:
         for name in when.vehicles:
             if name not in vehicles:
                 hint = did_you_mean(name, vehicles) or f"it has {', '.join(vehicles)}"
-                raise ScheduleError(f"vehicles (--of): the fleet has no {name!r}; {hint}")
+                raise ScheduleError(
+                    f"vehicles (--of): the fleet has no {name!r}; {hint}", "vehicles"
+                )
         if when.condition and not when.vehicles and not vehicles_of(named):
             raise ScheduleError(
                 "the mission names no vehicle: say of which the condition is to hold "
-                "(vehicles, --of)"
+                "(vehicles, --of)",
+                "vehicles",
             )
         if when.condition:
             for name in when.vehicles or vehicles_of(named):
@@ -261,7 +264,8 @@ class Control:
             if when.after not in {line.run for line in runs}:
                 raise ScheduleError(
                     f"after: there is no run and no entry of the schedule {when.after!r} to come "
-                    "after; `m2pem runs` and `m2pem schedule --all` list them"
+                    "after; `m2pem runs` and `m2pem schedule --all` list them",
+                    "after",
                 )
 
     def _refuse_impossible(self, condition: Expression, vehicle: ResourceId) -> None:
@@ -276,12 +280,13 @@ class Control:
             holds = possible_truth(condition, FLEET_FACTS.__contains__, facts.get)
         except ExpressionError as error:
             raise ScheduleError(
-                f"condition: {error}; write for example vehicle.battery > 0.9"
+                f"condition: {error}; write for example vehicle.battery > 0.9", "condition"
             ) from error
         if holds is False:
             raise ScheduleError(
                 f"condition: {condition.text!r} never holds of {vehicle}: change it, or name "
-                "other vehicles (vehicles, --of)"
+                "other vehicles (vehicles, --of)",
+                "condition",
             )
 
     async def scheduled(self) -> Schedule:
@@ -291,6 +296,10 @@ class Control:
     async def unschedule(self, entry: EntryId, *, by: str = "") -> None:
         """Cancel an entry."""
         await self._scheduler.cancel(entry, by)
+
+    async def start_scheduled(self, entry: EntryId, *, by: str = "") -> RunId:
+        """Start the mission of an entry now."""
+        return await self._scheduler.start(entry, by)
 
     async def hold_schedule(
         self, entry: EntryId | None = None, *, by: str = "", reason: str = ""

@@ -52,6 +52,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.scheduling import times
 from m2pem.scheduling.entry import (
+    Concurrency,
     EntryChange,
     EntryId,
     EntryState,
@@ -321,6 +322,44 @@ class Scheduler:
             look.warned_due_us = look.starts_us = None
         self._wake.set()
 
+    async def start(self, number: EntryId, by: str) -> RunId:
+        """Start the mission of an entry now; the start stands for the time that has come, or for
+        the only one that is to come. Times of cron that are to come stay.
+
+        Raises:
+            MissionError: `check` refuses it; the entry is as before.
+            BusyError: its vehicles are not free.
+            OperatorError: there is no such entry, it is over or held, its last run goes on, or a
+                run that was interrupted may command its vehicles.
+        """
+        async with self._lock:
+            await self._read_hold()
+            entry = self._active_entry(number)
+            if held := self._why_held(entry):
+                raise OperatorError(f"{number} is not started: {held}; release it first")
+            now_us = self._starter.clock.now_us()
+            entry, found = await self._settle_passed(entry, now_us)
+            if not entry.state.active:
+                raise OperatorError(f"{number} is {entry.state.status.value}")
+            forbids = entry.plan.when.concurrency is Concurrency.FORBID
+            if forbids and entry.state.run and self._conditions.outcome(entry.state.run) == "":
+                raise OperatorError(f"{number} is not started: its run {entry.state.run} goes on")
+            loaded, process = await asyncio.to_thread(self._starter.admitted, entry.plan)
+            resources = resources_of_mission(loaded, self._starter.fleet)
+            if why := await self._conditions.interrupted(resources):
+                raise OperatorError(f"{number} is not started: {why}")
+            extra = bool(entry.plan.when.cron) and found.due_us is None
+            due_us = now_us if extra else found.due_us or found.next_us or now_us
+            settled = SettledTime(due_us, now_us, Settlement.STARTED, owed=found.owed)
+            who = f"{entry.id}, started by {by or 'an operator'}"
+            try:
+                run = await self._begin(entry, loaded, process, who, settled)
+            except NotBegunError as error:
+                await self._not_begun(entry, self._started(entry, settled, error.run), str(error))
+                raise OperatorError(f"{number} is not started: {error}") from error
+        self._wake.set()
+        return run
+
     def run_stopping(self, run: RunId, by: str) -> None:
         """An operator stops a run: the entry that would start its mission again is held."""
         number = self._runs.get(run)
@@ -482,16 +521,9 @@ class Scheduler:
         """
         now_us = self._starter.clock.now_us()
         look = self._looks[entry.id]
-        found = times.due(entry.plan, entry.state, now_us)
-        overdue = found.deadline_us is not None and now_us > found.deadline_us
-        if found.due_us is not None and (overdue or found.passed):
-            due_us = found.due_us if overdue else found.passed_us
-            ends = "its last moment has passed" if overdue and found.owed else ""
-            number = found.passed + overdue
-            entry = await self._missed(entry, due_us, number, owed=found.owed, ends=ends)
-            if not entry.state.active:
-                return None
-            found = times.due(entry.plan, entry.state, now_us)
+        entry, found = await self._settle_passed(entry, now_us)
+        if not entry.state.active:
+            return None
         if found.due_us is None:
             return self._before(entry, look, found, now_us)
         if look.resources is None and not self._why_held(entry):
@@ -517,6 +549,20 @@ class Scheduler:
         if found.deadline_us is not None:
             limits.append(found.deadline_us + 1)
         return min((each for each in limits if each is not None), default=None)
+
+    async def _settle_passed(self, entry: ScheduleEntry, now_us: int) -> tuple[ScheduleEntry, Due]:
+        """Settle the times that are missed by now; returns what the entry is then, and its due
+        time."""
+        found = times.due(entry.plan, entry.state, now_us)
+        overdue = found.deadline_us is not None and now_us > found.deadline_us
+        if found.due_us is not None and (overdue or found.passed):
+            due_us = found.due_us if overdue else found.passed_us
+            ends = "its last moment has passed" if overdue and found.owed else ""
+            number = found.passed + overdue
+            entry = await self._missed(entry, due_us, number, owed=found.owed, ends=ends)
+            if entry.state.active:
+                found = times.due(entry.plan, entry.state, now_us)
+        return entry, found
 
     def _before(self, entry: ScheduleEntry, look: Look, found: Due, now_us: int) -> int | None:
         """Warn operators of a time that comes; returns when to look again."""
@@ -614,22 +660,41 @@ class Scheduler:
         if why := await self._conditions.interrupted(look.resources):
             return Wait(why, self._in(ASK_AGAIN_S), for_resources=True)
         settled = SettledTime(found.due_us, now_us, Settlement.STARTED, owed=found.owed)
-        change = EntryChange(entry.id, times.settle(plan, entry.state, settled))
         by = f"{entry.id}, scheduled by {plan.by or 'an operator'}"
         try:
-            run = await self._starter.begin_scheduled(
-                loaded, process, plan, by, change, lambda: not self._why_held(entry)
-            )
+            await self._begin(entry, loaded, process, by, settled)
         except NotBegunError as error:
-            return await self._not_begun(entry, change.with_run(error.run), str(error))
+            return await self._not_begun(
+                entry, self._started(entry, settled, error.run), str(error)
+            )
         except BusyError as error:
             return Wait(str(error), self._in(LOOK_AGAIN_S), for_resources=True)
-        started = msgspec.structs.replace(entry, state=change.with_run(run).state)
-        self._add(started)
+        return None
+
+    async def _begin(
+        self, entry: ScheduleEntry, loaded: Mission, process: str, by: str, settled: SettledTime
+    ) -> RunId:
+        """Begin a run of an entry, which settles a time of it.
+
+        Raises:
+            NotBegunError: it was created, and nothing of it has begun.
+            M2pemError: nothing was written.
+        """
+        plan, look = entry.plan, self._looks[entry.id]
+        change = EntryChange(entry.id, times.settle(plan, entry.state, settled))
+        run = await self._starter.begin_scheduled(
+            loaded, process, plan, by, change, lambda: not self._why_held(entry)
+        )
+        self._add(msgspec.structs.replace(entry, state=change.with_run(run).state))
         look.reason, look.starts_us, look.warned_due_us = "", None, None
         look.true_since_us = None
         self._say(f"{entry.id} has started {plan.mission_name} as {run}")
-        return None
+        return run
+
+    @staticmethod
+    def _started(entry: ScheduleEntry, settled: SettledTime, run: RunId) -> EntryChange:
+        state = times.settle(entry.plan, entry.state, settled)
+        return EntryChange(entry.id, state).with_run(run)
 
     async def _not_begun(self, entry: ScheduleEntry, change: EntryChange, why: str) -> Wait | None:
         """Take a start back of which nothing has begun: its time counts again."""

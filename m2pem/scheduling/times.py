@@ -50,6 +50,8 @@ CONDITION_FACTS = {
 """What conditions of the schedule may read, and what each is."""
 
 _AT = "at (--when)"
+_FIELDS = {_AT: "at", "until": "until"}
+"""The fields of `When` that are dates, by what they are called in errors."""
 _CRON = "'0 8 * * MON-FRI': minute, hour, day, month, weekday"
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -67,7 +69,7 @@ def resolved(when: When, now_us: int, host_zone: str) -> When:
         ScheduleError: it makes no sense, or lies in the past; the error says what would be right.
     """
     if when.at and when.cron:
-        raise ScheduleError("give a date (at, --when) or a cron text (cron), not both")
+        raise ScheduleError("give a date (at, --when) or a cron text (cron), not both", "cron")
     zone = when.time_zone or host_zone
     if when.at or when.cron or when.until or when.time_zone:
         zone_of(zone)
@@ -78,21 +80,24 @@ def resolved(when: When, now_us: int, host_zone: str) -> When:
         when = msgspec.structs.replace(when, at=moment)
         if instant_us(when.at) <= now_us:
             raise ScheduleError(
-                f"{_AT}: {when.at} has passed: it is {local(now_us, zone)}; give a later one"
+                f"{_AT}: {when.at} has passed: it is {local(now_us, zone)}; give a later one",
+                "at",
             )
     if when.until:
         when = msgspec.structs.replace(when, until=_with_offset("until", when.until, zone))
         first_us = instant_us(when.at) if when.at else now_us
         if instant_us(when.until) <= first_us:
             raise ScheduleError(
-                f"until: nothing can start until {when.until}: that is too early; give a later one"
+                f"until: nothing can start until {when.until}: that is too early; give a later one",
+                "until",
             )
     if when.cron:
         first = _cron(when.cron).after_us(now_us, zone_of(zone))
         if first is None or (when.until and first > instant_us(when.until)):
             raise ScheduleError(
                 f"cron: {when.cron!r} has no time from now on, or none before until; write for "
-                f"example {_CRON}"
+                f"example {_CRON}",
+                "cron",
             )
     _check_rest(when)
     return when
@@ -102,24 +107,28 @@ def _check_rest(when: When) -> None:
     if when.after and when.cron:
         raise ScheduleError(
             "after: what starts again and again by cron cannot start after one run: give a date, "
-            "or none"
+            "or none",
+            "after",
         )
     wrong = [each for each in when.outcomes if each not in OUTCOMES]
     if wrong or not when.outcomes:
         raise ScheduleError(
-            f"outcomes of a run are {', '.join(OUTCOMES)}, not {', '.join(wrong) or 'none'}"
+            f"outcomes of a run are {', '.join(OUTCOMES)}, not {', '.join(wrong) or 'none'}",
+            "outcomes",
         )
     if when.outcomes != When().outcomes and not when.after:
-        raise ScheduleError("outcomes of a run (--outcome) go with after: name the run")
+        raise ScheduleError("outcomes of a run (--outcome) go with after: name the run", "after")
     if when.condition:
         condition_of(when.condition)
     elif when.vehicles or when.held_for_s:
         raise ScheduleError(
             "vehicles (--of) and a time to hold (held_for_s, --held-for) go with a condition: "
-            "give one"
+            "give one",
+            "condition",
         )
-    if when.held_for_s < 0 or (when.starting_deadline_s or 0) < 0:
-        raise ScheduleError("a duration cannot be negative")
+    for field in ("held_for_s", "starting_deadline_s"):
+        if (getattr(when, field) or 0) < 0:
+            raise ScheduleError("a duration cannot be negative", field)
 
 
 _TIME = re.compile(r"[0-9]{1,2}:[0-9]{2}(:[0-9]{2})?")
@@ -132,13 +141,13 @@ def _next(text: str, now_us: int, zone: str) -> str:
     try:
         wanted = time.fromisoformat(text.strip().rjust(len("08:00"), "0"))
     except ValueError:
-        raise ScheduleError(f"{_AT}: {text} is no time of a day such as 08:00") from None
+        raise ScheduleError(f"{_AT}: {text} is no time of a day such as 08:00", "at") from None
     now = (_EPOCH + timedelta(microseconds=now_us)).astimezone(zone_of(zone))
     for days in (0, 1, 2):
         moment = datetime.combine(now.date() + timedelta(days=days), wanted, now.tzinfo)
         if moment.timestamp() > now.timestamp() and _exists(moment):
             return moment.isoformat()
-    raise ScheduleError(f"{_AT}: {text} does not come within two days in {zone}")
+    raise ScheduleError(f"{_AT}: {text} does not come within two days in {zone}", "at")
 
 
 def _exists(moment: datetime) -> bool:
@@ -153,13 +162,15 @@ def _with_offset(what: str, text: str, zone: str) -> str:
     except ValueError:
         raise ScheduleError(
             f"{what}: {text!r} is no date and time such as 2026-01-01T08:00 or "
-            "2026-01-01T08:00:00+01:00"
+            "2026-01-01T08:00:00+01:00",
+            _FIELDS[what],
         ) from None
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=zone_of(zone))
         if not _exists(moment):
             raise ScheduleError(
-                f"{what}: {text} does not exist in {zone}: clocks skip it; give another"
+                f"{what}: {text} does not exist in {zone}: clocks skip it; give another",
+                _FIELDS[what],
             )
     return moment.isoformat()
 
@@ -174,7 +185,8 @@ def zone_of(name: str) -> ZoneInfo:
         return ZoneInfo(name)
     except (KeyError, ValueError, OSError):
         raise ScheduleError(
-            f"time zone: there is no {name!r}; they are named as Europe/Berlin or UTC"
+            f"time zone: there is no {name!r}; they are named as Europe/Berlin or UTC",
+            "time_zone",
         ) from None
 
 
@@ -194,7 +206,7 @@ def _cron(text: str) -> Cron:
     try:
         return parse_cron(text)
     except ExpressionSyntaxError as error:
-        raise ScheduleError(f"cron: {error}; write for example {_CRON}") from error
+        raise ScheduleError(f"cron: {error}; write for example {_CRON}", "cron") from error
 
 
 @lru_cache(maxsize=256)
@@ -208,12 +220,12 @@ def condition_of(text: str) -> Expression:
         found = parse(text)
     except ExpressionSyntaxError as error:
         raise ScheduleError(
-            f"condition: {error}; write for example vehicle.battery > 0.9"
+            f"condition: {error}; write for example vehicle.battery > 0.9", "condition"
         ) from error
     for name in sorted(found.names):
         if name not in CONDITION_FACTS:
             hint = did_you_mean(name, CONDITION_FACTS) or f"there are {', '.join(CONDITION_FACTS)}"
-            raise ScheduleError(f"condition: {name!r} is no fact of a vehicle; {hint}")
+            raise ScheduleError(f"condition: {name!r} is no fact of a vehicle; {hint}", "condition")
     return found
 
 

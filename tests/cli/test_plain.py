@@ -208,6 +208,7 @@ async def test_missions_are_scheduled_held_released_and_cancelled(operator: Oper
         "schedule hold s1",
         "schedule release",
         "schedule cancel s1",
+        "schedule start s1",
         "schedule cancel",
         "schedule 08:00",
     )
@@ -218,6 +219,7 @@ async def test_missions_are_scheduled_held_released_and_cancelled(operator: Oper
         ("hold_schedule", "s1"),
         ("release_schedule", None),
         ("unschedule", "s1"),
+        ("start_scheduled", "s1"),
     ]
     assert operator.screen.count("say what: schedule 08:00 FILE") == 2
 

@@ -34,6 +34,7 @@ OTHERWISE = {
     "schedule": "m2pem start --when and its like",
     "scheduled": "m2pem schedule",
     "unschedule": "m2pem schedule cancel",
+    "start_scheduled": "m2pem schedule start",
     "hold_schedule": "m2pem schedule hold",
     "release_schedule": "m2pem schedule release",
     "set_geometry": "route, area and point in m2pem attach",

@@ -124,6 +124,14 @@ def test_two_entries_for_one_rover_run_one_after_the_other_by_priority(
     assert first["ended_us"] <= second["started_us"]
 
 
+def until_served(journal: Path, program: Program) -> None:
+    """Wait until an executive starts what is scheduled."""
+    while program.process.poll() is None:
+        for path in live_sockets(journal):
+            if int(path.stem) == program.process.pid and ask(path, "scheduled")["served"]:
+                return
+
+
 NORTH = """\
 version: 1
 name: north
@@ -143,7 +151,9 @@ def test_two_executives_of_a_fleet_hold_and_release_its_schedule_together(
     programs = []
     for vehicle in ("ugv1", "ugv2"):
         (tmp_path / f"{vehicle}.yaml").write_text(NORTH.format(vehicle))
-        programs.append(serving(m2pem, "--speed", SPEED, fleet=tmp_path / f"{vehicle}.yaml"))
+        program = serving(m2pem, "--speed", SPEED, fleet=tmp_path / f"{vehicle}.yaml")
+        programs.append(program)
+        until_served(journal, program)
         if vehicle == "ugv1":
             cron = ("--cron", "0 8 * * *", "--time-zone", "UTC")
             assert m2pem.run("start", reverse, *JOURNAL, *cron)[:2] == (0, "s1\n")
@@ -154,8 +164,6 @@ def test_two_executives_of_a_fleet_hold_and_release_its_schedule_together(
         hold: str = ask(path, "scheduled")["hold"]
         return hold
 
-    while not ask(second, "scheduled")["served"]:
-        assert programs[1].process.poll() is None
     ask(second, "hold_schedule", by="anna", reason="rain")
     while hold_at(first) != "held by anna: rain":
         assert programs[0].process.poll() is None
@@ -247,7 +255,12 @@ def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
     m2pem: CommandLine,
 ) -> None:
     server = serving(m2pem)
-    for more in (("--cron", "0 8 * * *"), ("--when", "08:00"), ("--after", "s1")):
+    for more in (
+        ("--cron", "0 8 * * *"),
+        ("--when", "08:00"),
+        ("--after", "s1"),
+        ("--after", "s1"),
+    ):
         zone = () if "--after" in more else ("--time-zone", "UTC")
         assert m2pem.run("start", MISSION, *JOURNAL, *more, *zone)[0] == 0
     listed = m2pem.run("schedule", *JOURNAL)[1]
@@ -257,6 +270,8 @@ def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
     assert refused[0] == 1
     assert "did you mean 'vehicle.battery'" in refused[2]
     assert m2pem.run("start", MISSION, *JOURNAL, "--when", "free", "--even-if-busy")[0] == 2
+    assert m2pem.run("schedule", "start", "s4", "--by", "ada", *JOURNAL)[:2] == (0, "r1\n")
+    assert "by s4, started by ada" in m2pem.run("replay", "r1", *JOURNAL)[1]
     assert m2pem.run("schedule", "hold", "s1", "--reason", "rain", "--by", "ada", *JOURNAL)[0] == 0
     assert entry(m2pem, "s1")["reason"] == "held by ada: rain"
     stopped = m2pem.run("stop", "--all", *JOURNAL)[1]
@@ -267,6 +282,8 @@ def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
         _M2PEM_COMPLETE="bash_complete", COMP_WORDS=words, COMP_CWORD=str(words.count(" "))
     )[1]
     assert completed.split() == ["plain,s3", "plain,s2", "plain,s1"]
+    status, _, refused_start = m2pem.run("schedule", "start", "s3", *JOURNAL)
+    assert (status, "no executive serves s3 now" in refused_start) == (2, True)
     listed, note = m2pem.run("schedule", *JOURNAL)[1:]
     assert listed.startswith("the schedule is held by")
     assert "no executive serves this schedule now" in note
@@ -277,6 +294,7 @@ def test_the_commands_of_the_schedule_work_with_an_executive_and_without(
         "s1": "scheduled",
         "s2": "cancelled",
         "s3": "held",
+        "s4": "ended",
     }
     assert m2pem.run("schedule", "cancel", "s2", *JOURNAL)[0] == 1
     assert m2pem.run("schedule", "show", "s9", *JOURNAL)[0] == 2

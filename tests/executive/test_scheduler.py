@@ -11,7 +11,7 @@ from m2pem.api.schedule import Concurrency, Missed, ScheduledStatus, Settlement
 from m2pem.api.telemetry import LinkState
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.records import RunStarted
-from m2pem.errors import MissionError, OperatorError, ScheduleError
+from m2pem.errors import BusyError, MissionError, OperatorError, ScheduleError
 from m2pem.fleet.fleet import dump
 from m2pem.journal import Entry, MemoryJournal, RunHeader
 from m2pem.mission.catalogue import BehaviorState
@@ -95,6 +95,108 @@ def test_what_is_free_at_once_starts_after_the_warning():
     assert play(story, fleet=unattended_fleet("ugv1", warning_s=10)) == {
         "r1": pytest.approx(10, abs=1e-3)
     }
+
+
+# --- now ------------------------------------------------------------------------------------------
+
+
+def test_an_operator_starts_an_entry_now_in_place_of_its_only_time():
+    async def story(world):
+        await world.schedule(drive("ugv1"), at=at(600), condition="vehicle.battery < 0.1")
+        run = await world.executive.control.start_scheduled("s1", by="bob")
+        records = await world.executive.control.records(run)
+        return await world.begun(), await world.entry("s1"), records[0].record.by
+
+    begun, entry, by = play(story, fleet=unattended_fleet("ugv1", warning_s=10))
+    assert begun == {"r1": pytest.approx(0, abs=1e-3)}
+    assert (entry.status, entry.run) == (ScheduledStatus.ENDED, "r1")
+    (settled,) = entry.times
+    assert (settled.settlement, settled.run) == (Settlement.STARTED, "r1")
+    assert settled.due_us == START_US + 600_000_000
+    assert by == "s1, started by bob"
+
+
+def test_a_start_now_leaves_the_times_of_cron_that_are_to_come():
+    async def story(world):
+        await world.schedule(drive("ugv1"), cron="*/10 * * * *", time_zone="UTC")
+        await world.at(100)
+        await world.executive.control.start_scheduled("s1", by="bob")
+        with pytest.raises(OperatorError, match="s1 is not started: its run r1 goes on"):
+            await world.executive.control.start_scheduled("s1", by="bob")
+        await world.end("r1")
+        await world.end("r2")
+        return await world.begun(), (await world.entry("s1")).times
+
+    begun, settled = play(story)
+    assert begun == {"r1": 100.0, "r2": 600.0}
+    assert [each.run for each in settled] == ["r1", "r2"]
+
+
+def test_a_start_now_stands_for_the_time_that_waits_and_those_before_are_missed():
+    async def story(world):
+        busy = await world.executive.control.start(drive("ugv1"))
+        wanted = {"cron": "*/1 * * * *", "time_zone": "UTC", "condition": "vehicle.battery < 0.1"}
+        await world.schedule(drive("ugv1"), **wanted)
+        await world.at(130)
+        with pytest.raises(BusyError, match="ugv1"):
+            await world.executive.control.start_scheduled("s1")
+        await world.end(busy)
+        await world.executive.control.start_scheduled("s1")
+        await world.end("r2")
+        return (await world.entry("s1")).times
+
+    settled = play(story)
+    assert [(each.settlement, each.due_us - START_US, each.run) for each in settled] == [
+        (Settlement.MISSED, 60_000_000, ""),
+        (Settlement.STARTED, 120_000_000, "r2"),
+    ]
+
+
+def test_what_is_held_over_or_refused_by_check_is_not_started_now():
+    async def story(world):
+        control = world.executive.control
+        await world.schedule(drive("ugv1"), at=at(600))
+        await control.hold_schedule("s1", by="bob", reason="rain")
+        with pytest.raises(OperatorError, match="not started: held by bob: rain; release it first"):
+            await control.start_scheduled("s1")
+        await control.release_schedule("s1")
+        await control.hold_schedule(by="bob")
+        with pytest.raises(OperatorError, match="the schedule is held by bob"):
+            await control.start_scheduled("s1")
+        await control.release_schedule()
+        await control.unschedule("s1", by="ada")
+        with pytest.raises(OperatorError, match="s1 is cancelled"):
+            await control.start_scheduled("s1")
+        with pytest.raises(OperatorError, match="no entry 's9'"):
+            await control.start_scheduled("s9")
+        return await world.begun()
+
+    assert play(story) == {}
+
+
+def test_stop_of_all_comes_before_a_start_now_that_is_under_way():
+    async def story(world):
+        control = world.executive.control
+        await world.schedule(drive("ugv1"), at=at(600))
+        create = world.journal.create
+        creating = asyncio.Event()
+
+        async def slow(*args):
+            run = await create(*args)
+            creating.set()
+            await world.clock.sleep(1.0)
+            return run
+
+        world.journal.create = slow
+        starting = asyncio.create_task(control.start_scheduled("s1"))
+        await creating.wait()
+        await control.stop_all(by="bob")
+        with pytest.raises(OperatorError, match="s1 is not started"):
+            await starting
+        entry = await world.entry("s1")
+        return await world.begun(), entry.next_us, entry.times
+
+    assert play(story) == ({}, START_US + 600_000_000, ())
 
 
 # --- the queue ------------------------------------------------------------------------------------

@@ -68,6 +68,7 @@ NOT_SERVED = {
     "check": "start_mission answers with the findings",
     "schedule": "the command line and the page schedule missions",
     "scheduled": "m2pem schedule and the page list them",
+    "start_scheduled": "m2pem schedule and the page start them",
     "missions": "start_mission names a file, or brings one",
     "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",

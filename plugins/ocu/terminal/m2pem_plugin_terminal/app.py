@@ -423,6 +423,8 @@ class TerminalApp(Display):
         def chosen(what: str | None) -> None:
             if what == "cancel":
                 self._carry_out("Cancel", self.control.unschedule(mission.entry, by=self.by))
+            elif what == "start":
+                self._carry_out("Start", self.control.start_scheduled(mission.entry, by=self.by))
             elif what is not None:
                 self._carry_out("Schedule", self._hold_or_release(mission.entry, held=held))
 

@@ -28,4 +28,8 @@ def entry_choices(mission: ScheduledMission) -> list[Choice]:
     """Return what can be done with an entry."""
     held = mission.status is ScheduledStatus.HELD
     hold = Choice("release", "Release it") if held else Choice("hold", "Hold it")
-    return [hold, Choice("cancel", "Cancel it: it starts nothing any more")]
+    return [
+        hold,
+        Choice("start", "Start it now, whatever it waits for"),
+        Choice("cancel", "Cancel it: it starts nothing any more"),
+    ]

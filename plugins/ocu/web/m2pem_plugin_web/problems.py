@@ -24,6 +24,7 @@ from m2pem.errors import (
     NotDrivenError,
     OperatorError,
     PluginError,
+    ScheduleError,
     StuckError,
 )
 from m2pem_plugin_web.missions.names import PathNames
@@ -100,6 +101,8 @@ def handle_problems(app: FastAPI, missions: Path = Path()) -> None:
             return problem(status, called.text(error.what), findings=findings)
         if isinstance(error, BusyError):
             return problem(status, str(error), busy=error.holders)
+        if isinstance(error, ScheduleError):
+            return problem(status, str(error), field=error.field)
         if isinstance(error, StuckError):
             return problem(status, str(error), stuck=True)
         if status == 500:

@@ -46,6 +46,7 @@ COMMANDS: dict[str, tuple[str, str, Any]] = {
         {"geometry": {"type": "Point", "coordinates": [7.0, 51.0]}, "run": "r1"},
     ),
     "unschedule": ("POST", "/api/schedule/s1/cancel", None),
+    "start_scheduled": ("POST", "/api/schedule/s1/start", None),
     "hold_schedule": ("POST", "/api/schedule/s1/hold", {"reason": "rain"}),
     "release_schedule": ("POST", "/api/schedule/s1/release", None),
     "take": ("POST", "/api/resources/ugv1/camera/take", None),

@@ -56,6 +56,12 @@ class EntryModel(BaseModel):
     entry: str
 
 
+class StartedModel(BaseModel):
+    """The id of the run."""
+
+    run: str
+
+
 class HoldModel(Body):
     """Why, for the journal."""
 
@@ -173,6 +179,12 @@ def router(control: MissionControl, folder: MissionFolder) -> APIRouter:
         """Cancel an entry: it starts nothing any more."""
         await known(entry)
         await control.unschedule(entry, by=person.name)
+
+    @routes.post("/{entry}/start", status_code=201)
+    async def start(person: Commander, entry: str) -> StartedModel:
+        """Start the mission of an entry now, whatever it waits for."""
+        await known(entry)
+        return StartedModel(run=await control.start_scheduled(entry, by=person.name))
 
     @routes.post("/{entry}/hold", status_code=204)
     async def hold_entry(person: Stopper, entry: str, wanted: HoldModel) -> None:

@@ -102,6 +102,11 @@ export const strings = {
       releaseLabel: "Release {entry}",
       cancel: "Cancel",
       cancelLabel: "Cancel {entry}",
+      runNow: "Start now",
+      runNowLabel: "Start {entry} now",
+      runNowTitle: "Start {entry} now?",
+      runNowText:
+        "{mission} starts at once, whatever it waits for. It is refused if its vehicles are not free.",
       cancelTitle: "Cancel {entry}?",
       cancelText: "{mission} is not started any more. A run that has begun goes on.",
       keep: "Keep it",

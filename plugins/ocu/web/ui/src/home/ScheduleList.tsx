@@ -19,7 +19,7 @@ const SHOWN_OVER = 3;
 export function ScheduleList() {
   const { schedule, failed, refresh } = useSchedule();
   const [adding, setAdding] = useState(false);
-  const [leaving, setLeaving] = useState<ScheduledMission | null>(null);
+  const [asked, setAsked] = useState<Asked | null>(null);
   const act = async (path: string) => {
     await attempt(() => post(`/schedule${path}`));
     await refresh();
@@ -75,7 +75,7 @@ export function ScheduleList() {
             </thead>
             <tbody>
               {[...active, ...over].map((each) => (
-                <EntryRow key={each.entry} each={each} act={act} leave={() => setLeaving(each)} />
+                <EntryRow key={each.entry} each={each} act={act} ask={setAsked} />
               ))}
             </tbody>
           </table>
@@ -89,42 +89,54 @@ export function ScheduleList() {
           }}
         />
       )}
-      {leaving && (
+      {asked && (
         <Dialog
-          title={fill(words.cancelTitle, { entry: leaving.entry })}
-          onClose={() => setLeaving(null)}
+          title={fill(asked.what === "cancel" ? words.cancelTitle : words.runNowTitle, {
+            entry: asked.each.entry,
+          })}
+          onClose={() => setAsked(null)}
           actions={
             <>
-              <button type="button" class="secondary" onClick={() => setLeaving(null)}>
-                {words.keep}
+              <button type="button" class="secondary" onClick={() => setAsked(null)}>
+                {asked.what === "cancel" ? words.keep : strings.home.cancel}
               </button>
               <button
                 type="button"
                 class="primary"
                 onClick={() => {
-                  setLeaving(null);
-                  void act(`/${leaving.entry}/cancel`);
+                  setAsked(null);
+                  void act(`/${asked.each.entry}/${asked.what}`);
                 }}
               >
-                {words.cancel}
+                {asked.what === "cancel" ? words.cancel : words.runNow}
               </button>
             </>
           }
         >
-          <p>{fill(words.cancelText, { mission: nameOf(leaving) })}</p>
+          <p>
+            {fill(asked.what === "cancel" ? words.cancelText : words.runNowText, {
+              mission: nameOf(asked.each),
+            })}
+          </p>
         </Dialog>
       )}
     </section>
   );
 }
 
+/** What is done with an entry once the operator has confirmed it. */
+interface Asked {
+  what: "cancel" | "start";
+  each: ScheduledMission;
+}
+
 interface EntryRowProps {
   each: ScheduledMission;
   act(path: string): Promise<void>;
-  leave(): void;
+  ask(asked: Asked): void;
 }
 
-function EntryRow({ each, act, leave }: EntryRowProps) {
+function EntryRow({ each, act, ask }: EntryRowProps) {
   const { entry, status, run, reason } = each;
   const isOver = OVER.has(status);
   const next = each.starts_us ?? each.next_us;
@@ -152,12 +164,22 @@ function EntryRow({ each, act, leave }: EntryRowProps) {
             {isHeld ? words.release : words.hold}
           </button>
         )}
+        {!isOver && !isHeld && may("commander") && (
+          <button
+            type="button"
+            class="plain"
+            aria-label={fill(words.runNowLabel, { entry })}
+            onClick={() => ask({ what: "start", each })}
+          >
+            {words.runNow}
+          </button>
+        )}
         {!isOver && may("operator") && (
           <button
             type="button"
             class="plain"
             aria-label={fill(words.cancelLabel, { entry })}
-            onClick={leave}
+            onClick={() => ask({ what: "cancel", each })}
           >
             {words.cancel}
           </button>
