@@ -28,8 +28,9 @@ export interface Window {
 
 const CORNER = 10;
 const SELECTED = "#0b63ce";
-/** Fading is slow: it needs no more frames than this. */
-const FADE_FRAME_MS = 50;
+/** Of a colour that fades: nobody sees these steps, and each draws the whole canvas. */
+const FADE_STEPS = 50;
+const LEAST_STEP_MS = 50;
 
 export class Painter {
   private readonly painted = new Map<string, Painted>();
@@ -37,8 +38,8 @@ export class Painter {
   private selected: Outline | undefined;
   private readonly pen: CanvasRenderingContext2D;
   private frame = 0;
+  private step: ReturnType<typeof setTimeout> | undefined;
   private drawn_ms = 0;
-  private changed = false;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -88,23 +89,20 @@ export class Painter {
 
   dispose(): void {
     cancelAnimationFrame(this.frame);
+    clearTimeout(this.step);
   }
 
   private soon(): void {
-    this.changed = true;
-    this.next();
-  }
-
-  private next(): void {
     if (this.frame === 0) this.frame = requestAnimationFrame(() => this.tick());
   }
 
   private tick(): void {
     this.frame = 0;
-    const now = performance.now();
-    const fades = this.fades(now);
-    if (this.changed || !fades || now - this.drawn_ms >= FADE_FRAME_MS) this.draw();
-    if (fades) this.next();
+    this.draw();
+    clearTimeout(this.step);
+    if (!this.fades(this.drawn_ms)) return;
+    const step_ms = Math.max(LEAST_STEP_MS, this.fading_ms / FADE_STEPS);
+    this.step = setTimeout(() => this.soon(), step_ms);
   }
 
   private fades(now: number): boolean {
@@ -117,7 +115,6 @@ export class Painter {
   private draw(): void {
     const { pen, canvas, window } = this;
     this.drawn_ms = performance.now();
-    this.changed = false;
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.clearRect(0, 0, canvas.width, canvas.height);
     const scale = window.scale * devicePixelRatio;

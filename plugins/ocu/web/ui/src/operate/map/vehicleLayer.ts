@@ -36,6 +36,14 @@ const place = ({ latitude_deg, longitude_deg }: GeoPosition): L.LatLngTuple => [
   longitude_deg,
 ];
 
+/** Leaflet draws the whole map anew for a polygon that is only set to what it was. */
+const isSame = (before: readonly GeoPosition[], now: readonly GeoPosition[]): boolean =>
+  before.length === now.length &&
+  before.every(
+    ({ latitude_deg, longitude_deg }, index) =>
+      latitude_deg === now[index]!.latitude_deg && longitude_deg === now[index]!.longitude_deg,
+  );
+
 export class VehicleLayer {
   private readonly shown = new Map<string, Shown>();
   private readonly trails = L.layerGroup();
@@ -104,9 +112,10 @@ export class VehicleLayer {
     for (const [resource, state] of Object.entries(states)) {
       const seen = this.seen.get(resource);
       if (seen?.state === state) continue;
-      const corners = state.footprint.map(place);
       const polygon = seen?.polygon ?? L.polygon([], FOOTPRINT).addTo(this.footprints);
-      polygon.setLatLngs(corners);
+      if (!isSame(seen?.state.footprint ?? [], state.footprint)) {
+        polygon.setLatLngs(state.footprint.map(place));
+      }
       this.seen.set(resource, { polygon, state });
     }
     for (const [resource, { polygon }] of this.seen) {
@@ -141,7 +150,7 @@ export class VehicleLayer {
 
   private move(shown: Shown, state: VehicleState, position: GeoPosition): void {
     const at = L.latLng(place(position));
-    shown.marker.setLatLng(at);
+    if (!shown.marker.getLatLng().equals(at, 0)) shown.marker.setLatLng(at);
     if (state.yaw_rad !== null && shown.symbol) {
       shown.symbol.style.transform = `rotate(${heading_deg(state.yaw_rad).toFixed(1)}deg)`;
     }

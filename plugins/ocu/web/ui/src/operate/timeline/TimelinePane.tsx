@@ -8,6 +8,7 @@ import type { Fleet } from "../../shared/types";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { usePaced } from "../layout/pace";
+import type { Scene } from "../scene/scene";
 import { heldElsewhere } from "../vehicles/work";
 import { Bars } from "./Bars";
 import { lanes, marks, whole, zoomed, type Bar, type Window } from "./scale";
@@ -17,6 +18,8 @@ const text = strings.operate.timeline;
 
 const LANE_PX = 22;
 const AXIS_PX = 22;
+/** Bars that go on grow slowly; who replays looks closer. What begins or ends is drawn at once. */
+const EVERY_MS: Record<Scene["mode"], number> = { live: 1000, replay: 200 };
 /** Between a bar and who has the vehicle since. */
 const HELD_PX = 6;
 
@@ -31,7 +34,8 @@ export interface Row {
 export function TimelinePane({ onSeek }: { onSeek?: ((t: number) => void) | undefined }) {
   const { scene, fleet } = useOperating();
   const { spans } = usePaced(scene.timeline, 300);
-  const time = usePaced(scene.time, 200);
+  usePaced(scene.time, EVERY_MS[scene.mode]);
+  const time = scene.now();
   const end = Math.max(usePaced(scene.end, 1000), time);
   const [width, setWidth] = useState(600);
   const chosen = useSignal<Window | null>(null);
