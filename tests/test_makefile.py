@@ -74,6 +74,19 @@ def test_root_is_told_of_each_package_that_is_installed(root: Path) -> None:
     assert "You are root: installing the Debian package m2pem-absent-1" in done.stdout
 
 
+def test_a_package_that_the_distribution_lacks_has_a_substitute(root: Path) -> None:
+    done = make("npm-packages", "DEBIAN_PACKAGES=m2pem-no-such/m2pem-absent-1", path=root)
+    assert done.returncode == 0, done.stderr
+    assert "m2pem-absent-1" in (root / "asked").read_text()
+
+
+def test_a_substitute_that_is_there_serves_where_no_package_is_known(root: Path) -> None:
+    program(root, "apt-cache", "exit 100")
+    done = make("npm-packages", "DEBIAN_PACKAGES=m2pem-no-such/id", path=root)
+    assert done.returncode == 0, done.stderr
+    assert not (root / "asked").exists()
+
+
 def test_nothing_is_installed_for_another_user_than_root(root: Path) -> None:
     program(root, "id", "echo 1000")
     done = make("npm-packages", "DEBIAN_PACKAGES=m2pem-absent-1", path=root)

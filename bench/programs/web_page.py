@@ -76,7 +76,8 @@ async def measure(seconds: float, folder: Path) -> dict[str, Any]:
     journal = SqliteJournal.open(folder / "journal.db")
     async with executive(journal) as running, async_playwright() as playwright:
         chromium = await playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=ARGUMENTS
+            executable_path=shutil.which("chromium-headless-shell") or shutil.which("chromium"),
+            args=ARGUMENTS,
         )
         page = await chromium.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(WITHIN_MS)

@@ -7,7 +7,7 @@ import { promisify } from 'node:util';
 
 const BROWSERS = process.env.CHROMIUM
   ? [process.env.CHROMIUM]
-  : ['chromium', 'chromium-browser', 'google-chrome'];
+  : ['chromium-headless-shell', 'chromium', 'chromium-browser', 'google-chrome'];
 // Root has no sandbox. What is drawn is all in the page: nothing is to be asked of any host.
 const OPTIONS = [
   ...(process.getuid?.() === 0 ? ['--no-sandbox'] : []),

@@ -76,6 +76,7 @@ async def test_the_palette_is_what_elements_are_painted_with(desk: Desk) -> None
     ("fade", "fades"), [("2 s", True), pytest.param("no fade", False, marks=pytest.mark.long)]
 )
 async def test_what_is_over_fades_or_is_gray_at_once(desk: Desk, fade: str, fades: bool) -> None:
+    await desk.page.emulate_media(reduced_motion="no-preference")
     page = await desk.start()
     await page.get_by_label("Fade").select_option(fade)
     await wait_for_colour(page, "USER SEND ROUTE", AMBER)
