@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from m2pem_plugin_web.access.permissions import SCOPE_KEY
 from m2pem_plugin_web.access.roles import Person, Role
 from m2pem_plugin_web.problems import handle_problems
@@ -23,13 +23,13 @@ from m2pem_plugin_web.rest import (
 )
 from m2pem_plugin_web.services import Services, services_of
 from starlette.types import ASGIApp, Receive, Scope, Send
+from web_world import PLUGINS
 
 from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
-from m2pem.plugins import PluginManager
 from m2pem.rehearsal.worker import rehearse_in_subprocess
 
 REPOSITORY = Path(__file__).parents[4]
@@ -52,11 +52,10 @@ class As:
         await self._app(scope, receive, send)
 
 
-def app_of(services: Services) -> FastAPI:
+def app_of(services: Services, *others: APIRouter) -> FastAPI:
     """The routers, and how refusals look."""
     control, folder = services.control, services.folder
-    app = FastAPI(title="m2pem", openapi_url="/api/openapi.json")
-    for router in (
+    routers = (
         missions.router(control, folder),
         runs.router(control, folder),
         missions.template_router(),
@@ -65,8 +64,10 @@ def app_of(services: Services) -> FastAPI:
         rehearsals.router(control, folder, services.rehearsals),
         catalogue.router(control),
         geometries.router(control),
-    ):
-        app.include_router(router)
+        *others,
+    )
+    routes = [route for router in routers for route in router.routes]
+    app = FastAPI(title="m2pem", openapi_url="/api/openapi.json", routes=routes)
     handle_problems(app)
     return app
 
@@ -113,7 +114,7 @@ async def rest_world(folder: Path) -> AsyncIterator[Rest]:
     executive = Executive(
         simulated_fleet(load_fleet(FLEET)),
         MemoryJournal(),
-        PluginManager(),
+        PLUGINS,
         SystemClock(20.0),
         speed=20.0,
         rehearse=rehearse_in_subprocess,

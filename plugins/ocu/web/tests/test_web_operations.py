@@ -107,7 +107,7 @@ NOT_SERVED = {
 }
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def control() -> Mock:
     control = Mock(spec=MissionControl)
     for name in COMMANDS:
@@ -120,18 +120,16 @@ def control() -> Mock:
     return control
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def app(control: Mock) -> FastAPI:
-    app = app_of(Mock(control=control))
-    for router in (
+    return app_of(
+        Mock(control=control),
         steering.router(control, Mock()),
         steering.prompt_router(control, Mock()),
         steering.resource_router(control),
         schedule.router(control, Mock()),
         incidents.router(control),
-    ):
-        app.include_router(router)
-    return app
+    )
 
 
 def test_every_operation_has_a_route_or_a_reason_why_not() -> None:
@@ -143,6 +141,7 @@ async def test_a_route_passes_every_parameter_of_its_operation(
     operation: str, app: FastAPI, control: Mock
 ) -> None:
     method, path, body = COMMANDS[operation]
+    getattr(control, operation).reset_mock()
     transport = httpx.ASGITransport(As(app))
     async with httpx.AsyncClient(transport=transport, base_url="http://test") as http:
         answer = await http.request(method, path, json=body)

@@ -15,14 +15,13 @@ from m2pem_plugin_web.tracks.stores import FolderStore
 from m2pem_plugin_web.tracks.thinning import SPACING_S
 from m2pem_plugin_web.tracks.track import Head, Track
 from test_web_restart import left_by_a_crash
-from web_world import SPEED, VEHICLE, Browser, MakeWorld, World, executive, serving
+from web_world import PLUGINS, SPEED, VEHICLE, Browser, MakeWorld, World, executive, serving
 
 from m2pem.api import OpenPrompt, RunStatus, VehicleState
 from m2pem.api.clock import SystemClock
 from m2pem.cli.journals import last_decided_us
 from m2pem.executive.executive import Executive
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
 
 WITHIN_S = 60.0
@@ -77,7 +76,7 @@ async def begun(stack: AsyncExitStack, folder: Path) -> World:
         Executive(
             scenarios.fleet("sim", {VEHICLE: {}}),
             journal,
-            PluginManager(),
+            PLUGINS,
             SystemClock(SPEED, max([time.time_ns() // 1000, *decided_us])),
             speed=SPEED,
         )

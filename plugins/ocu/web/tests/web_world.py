@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import sys
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
@@ -32,6 +33,13 @@ SPEED = 20.0
 SLOW_S = 60.0
 """A machine on which many tests run may take that long to answer."""
 PASSWORD = "correct horse"
+PLUGINS = PluginManager()
+"""Those that are installed. Looked for once: it takes longer than most tests."""
+
+# httpx looks for it at each request, in all folders of sys.path where it is not installed.
+with suppress(ImportError):
+    import sniffio  # noqa: F401
+sys.modules.setdefault("sniffio", None)  # type: ignore[arg-type]  # Python's sign for "there is none"
 
 
 class Live:
@@ -279,7 +287,7 @@ def executive(journal: Journal, plugins: PluginManager | None = None) -> Executi
     return Executive(
         scenarios.fleet("sim", {VEHICLE: {}}),
         journal,
-        plugins or PluginManager(),
+        plugins or PLUGINS,
         SystemClock(SPEED),
         speed=SPEED,
         rehearse=rehearse_in_subprocess,
