@@ -130,6 +130,13 @@ def run(
             timeout=BOUND_S,
             check=False,
         )
+    return run_preloaded(words, folder, environment)
+
+
+def run_preloaded(
+    words: list[str], folder: Path, environment: Mapping[str, str]
+) -> subprocess.CompletedProcess[str]:
+    """Run `m2pem WORDS`, or Python code, as `Preloaded.start` does."""
     with Path(os.devnull).open() as nothing, TemporaryFile("w+") as said:
         streams = nothing.fileno(), said.fileno(), said.fileno()
         process = preloaded().start(words, folder, environment, streams)

@@ -99,7 +99,7 @@ class Preloaded:
         *,
         at_terminal: bool = False,
     ) -> Process:
-        """Start `m2pem WORDS` in the folder.
+        """Start `m2pem WORDS` in the folder, or `python -c CODE` where that is what `words` are.
 
         `streams`: its standard input, output and error. `at_terminal`: the input is to be the
         terminal that controls it.
@@ -163,6 +163,9 @@ def _become(
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.argv = ["m2pem", *words]
     try:
+        if words[:1] == ["-c"]:
+            exec(words[1], {"__name__": "__main__"})
+            sys.exit(0)
         runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
     except SystemExit as end:
         # As Python ends, but for its modules: to take them to pieces takes longer than a command.

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from lxml import etree
 
+from m2pem.api.authoring import Editable
 from m2pem.bpmn import parse_mission
 from m2pem.bpmn.search_path import SearchPath
 from m2pem.editing.editable import editable
@@ -66,6 +67,11 @@ def loaded(path: Path, source: bytes) -> Mission:
 
 
 @cache
+def edited(file: Path, *, anew: bool = False) -> Editable:
+    return editable(file.read_bytes(), anew=anew)
+
+
+@cache
 def moddle(foreign: bool) -> dict[Path, tuple[list[str], str]]:
     """What an editor says to each file of the repository or of others, and how it writes it."""
     found: dict[Path, tuple[list[str], str]] = {}
@@ -75,7 +81,7 @@ def moddle(foreign: bool) -> dict[Path, tuple[list[str], str]]:
             for number, file in enumerate(FOREIGN if foreign else FILES)
         }
         for copy, file in made.items():
-            copy.write_bytes(editable(file.read_bytes()).source)
+            copy.write_bytes(edited(file).source)
         read = read_with_moddle(made)
         for copy, file in made.items():
             said: Any = read[str(copy)]
@@ -92,9 +98,9 @@ def test_the_model_stays_the_same(file: Path) -> None:
     try:
         before = loaded(file, source)
     except MissionError:
-        editable(source)
+        edited(file)
         return
-    result = editable(source)
+    result = edited(file)
     after = loaded(file, result.source)
     if any("editors refuse such an id" in note for note in result.notes):
         assert len(after.nodes) == len(before.nodes)
@@ -107,7 +113,7 @@ def test_what_an_editor_saves_is_the_same_model(file: Path) -> None:
     warnings, saved = moddle(file in FOREIGN)[file]
     assert warnings == []
     try:
-        before = loaded(file, editable(file.read_bytes()).source)
+        before = loaded(file, edited(file).source)
     except MissionError:
         return
     assert model_of(loaded(file, saved.encode())) == model_of(before)
@@ -125,7 +131,7 @@ def test_everything_is_drawn_where_all_is_laid_out(file: Path) -> None:
 
 def assert_everything_is_drawn(file: Path, *, anew: bool) -> None:
     source = file.read_bytes()
-    result = editable(source, anew=anew)
+    result = edited(file, anew=anew)
     root = tree(result.source)
     drawn = {
         each.get("bpmnElement", "").rpartition(":")[2]: plane
@@ -171,8 +177,8 @@ def test_the_same_file_gives_the_same_bytes() -> None:
 
 @for_every_file
 def test_once_is_enough(file: Path) -> None:
-    first = editable(file.read_bytes())
-    assert editable(first.source).source == first.source
+    once = edited(file).source
+    assert editable(once).source == once
 
 
 # --- behaviors ----------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ QUICK = settings(
     suppress_health_check=list(HealthCheck),
     database=None,
 )
-FEW = 150
+FEW = 100
 LONG_S = 600.0
 BATCHES = (1, 2, 5, 100, 100)
 GRAPH_BATCH = 20

@@ -11,7 +11,7 @@ from tests.engine.random_play import RandomPlay
 from tests.engine.test_random import BATCHES, check_taken_up
 from tests.seeds import seeds_for
 
-FEW = 40
+FEW = 25
 LONG_S = 300.0
 
 

@@ -3,7 +3,6 @@
 import asyncio
 import json
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Awaitable, Callable
@@ -26,6 +25,7 @@ from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.worker import rehearse_in_subprocess
 from m2pem.verify.requirements.requirement import RequirementsError
+from tests.console import run_preloaded
 
 T = TypeVar("T")
 
@@ -72,11 +72,9 @@ def test_verifying_gives_the_very_answers_of_the_command_line() -> None:
         return await control.verify(VIGNETTE.read_bytes(), on_progress=told.append)
 
     found = with_control(story)
-    said = subprocess.run(
-        [sys.executable, "-m", "m2pem", "verify", VIGNETTE, "--fleet", FLEET, "--format", "json"],
-        capture_output=True,
-        check=True,
-    )
+    words = ["verify", str(VIGNETTE), "--fleet", str(FLEET), "--format", "json"]
+    said = run_preloaded(words, REPOSITORY, os.environ)
+    assert said.returncode == 0, said.stdout
     assert without_times(found) == without_times(json.loads(said.stdout))
     jsonschema.validate(found, SCHEMA)
     assert found["verdict"] == "holds"

@@ -102,7 +102,7 @@ def test_an_alias_to_what_contains_it_is_refused(read, text: str) -> None:
     assert [finding.rule for finding in source.findings] in (["too-large"], ["yaml-syntax"])
 
 
-@pytest.mark.parametrize("depth", [100, 100_000])
+@pytest.mark.parametrize("depth", [100, 10_000])
 def test_deep_nesting_is_refused(read, depth: int) -> None:
     source = read("[" * depth + "]" * depth)
     assert source.data is None

@@ -1,13 +1,11 @@
 """The code of docs/python.md runs, and prints what its comments say."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.console import REPOSITORY, environment, first_unprinted, make_workspace
+from tests.console import REPOSITORY, environment, first_unprinted, make_workspace, run_preloaded
 
 PAGE = REPOSITORY / "docs" / "python.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -32,16 +30,7 @@ def test_comments_are_read_as_output() -> None:
 @pytest.mark.parametrize("line", BLOCKS)
 def test_a_block_does_what_it_says(line: int, tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path / "workspace")
-    done = subprocess.run(
-        [sys.executable, "-c", BLOCKS[line]],
-        cwd=workspace,
-        env=environment(tmp_path / "home"),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=100,
-        check=False,
-    )
+    done = run_preloaded(["-c", BLOCKS[line]], workspace, environment(tmp_path / "home"))
     assert done.returncode == 0, done.stdout
     expected = output(BLOCKS[line])
     if expected:

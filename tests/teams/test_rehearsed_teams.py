@@ -17,6 +17,7 @@ from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import RehearsalResult, rehearse
 from m2pem.simulation.faults import Fault
 from m2pem.teams.paths import MemberPath, slot
+from tests.seeds import examples
 
 from .conftest import START_US, area, one_task, route
 from .rehearsed import Rehearsed, rehearsed, sim_fleet
@@ -29,7 +30,7 @@ ROAD = {
 MARCH = one_task("road_following_formation", route="road", spacing="20 m", speed="5 m/s")
 GO_ON, STOP = LostMemberPolicy.CONTINUE, LostMemberPolicy.STOP
 QUICK = settings(
-    max_examples=15,
+    max_examples=examples(8, 30),
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     phases=(Phase.explicit, Phase.generate),  # shrinking would take minutes

@@ -291,7 +291,7 @@ def _on_elements(formula: Formula, names: dict[str, str]) -> Formula:
 
 @given(formulas.formulas, st.integers(0, 10_000))
 @settings(
-    max_examples=examples(10, 25),
+    max_examples=examples(6, 25),
     deadline=None,
     suppress_health_check=list(HealthCheck),
     derandomize=True,

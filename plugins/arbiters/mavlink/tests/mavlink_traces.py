@@ -7,6 +7,7 @@ differences that are left, each with its reason.
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
@@ -88,6 +89,7 @@ def reasons(vehicle: str, scenario: str) -> dict[str, str]:
     return dict((listed.get(vehicle) or {}).get(scenario) or {})
 
 
+@cache
 def play_simulated(vehicle: str, scenario: Scenario) -> Trace:
     """The trace of the simulated autopilot."""
     kind, firmware, _, parameters, estimator_s, _ = VEHICLES[vehicle]

@@ -103,7 +103,23 @@ class TestSimulatedCoptersOnARoute(_OnARoute, _Airborne):
 
 
 class TestSimulatedPx4Copters(_Airborne):
+    """`quick`: what depends on the autopilot; the other tests are of the arbiter alone."""
+
     firmware = "px4"
+    quick: ClassVar = {
+        "test_a_behavior_that_preempts_takes_the_vehicle_over",
+        "test_a_cancelled_vehicle_can_be_commanded_again",
+        "test_a_cut_link_is_lost_within_the_declared_bound",
+        "test_a_lost_vehicle_whose_link_returns_stops_before_it_is_free",
+        "test_a_second_start_has_one_physical_effect",
+        "test_a_vehicle_that_another_arbiter_has_held_is_reported_as_held",
+        "test_accepted_comes_before_running_and_one_terminal_report_last",
+        "test_another_arbiter_finds_the_behavior_again",
+        "test_cancel_ends_a_behavior_within_the_declared_bound",
+        "test_hold_stops_the_vehicle_within_the_declared_bound",
+        "test_resume_goes_on_with_the_behavior",
+        "test_two_vehicles_do_not_mix",
+    }
 
 
 @pytest.mark.long

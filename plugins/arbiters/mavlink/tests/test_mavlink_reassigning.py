@@ -52,12 +52,12 @@ def task(name: str, behavior: str, parameters: dict[str, str], role: str) -> str
 def mission() -> str:
     """Both copters take off; one flies the route; uav2 lands."""
     tasks = {
-        "Up1": task("Up1", "takeoff", {"altitude": "20"}, 'vehicle="uav1"'),
-        "Up2": task("Up2", "takeoff", {"altitude": "20"}, 'vehicle="uav2"'),
+        "Up1": task("Up1", "takeoff", {"altitude": "10"}, 'vehicle="uav1"'),
+        "Up2": task("Up2", "takeoff", {"altitude": "10"}, 'vehicle="uav2"'),
         "Fly": task(
             "Fly",
             "single_vehicle_routing",
-            {"route": "around", "speed": "4 m/s"},
+            {"route": "around", "speed": "8 m/s"},
             'requires="vehicle.domain == \'air\'" onLoss="reassign" store="pilot"'
             " prefer=\"vehicle.name == 'uav1' ? 1000 : 0\"",
         ),
@@ -97,7 +97,7 @@ def test_another_copter_flies_the_rest_and_the_first_one_is_stopped_when_it_retu
         m2pem(
             *("sim", "mavlink", "--copters", 2, "--speed", SPEED, "--ekf", "6s"),
             *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{port}"),
-            *("--set", "FS_GCS_ENABLE=0", "--fault", "1: cut link at 80 s for 60 s"),
+            *("--set", "FS_GCS_ENABLE=0", "--fault", "1: cut link at 80 s for 50 s"),
         ),
         stdout=subprocess.DEVNULL,
     )

@@ -14,6 +14,20 @@ from m2pem.testing import ArbiterCase, ArbiterContract
 A, B = ResourceId("a/ptz"), ResourceId("b/ptz")
 
 
+OF_THE_HEAD = frozenset(
+    {
+        "test_a_behavior_that_preempts_takes_the_vehicle_over",
+        "test_a_cut_link_is_lost_within_the_declared_bound",
+        "test_accepted_comes_before_running_and_one_terminal_report_last",
+        "test_another_arbiter_finds_the_behavior_again",
+        "test_cancel_ends_a_behavior_within_the_declared_bound",
+        "test_hold_stops_the_vehicle_within_the_declared_bound",
+        "test_resume_goes_on_with_the_behavior",
+    }
+)
+"""What another head or another motion could change; the other tests are of the arbiter alone."""
+
+
 class _Heads(ArbiterContract):
     unsupported: ClassVar[Mapping[str, str]] = {
         "telemetry": "a camera that turns has a look, not a speed (test_ptz_arbiter)"
@@ -66,6 +80,7 @@ class TestPointing(_Heads):
 
 
 class TestEndlessPan(_Heads):
+    quick: ClassVar = OF_THE_HEAD
     settings: ClassVar[Mapping[str, object]] = {"reach": {"endless": True}}
 
     @pytest.fixture
@@ -74,6 +89,7 @@ class TestEndlessPan(_Heads):
 
 
 class TestZooming(_Heads):
+    quick: ClassVar = OF_THE_HEAD
     unsupported: ClassVar[Mapping[str, str]] = {
         **_Heads.unsupported,
         "effects": "the zoom is not counted",
