@@ -386,6 +386,7 @@ class SimArbiter:
             if resource in self._faults:
                 fault = self._faults[resource].take(request.behavior)
                 if fault is not None:
+                    self._keep_taken(resource, request.behavior)
                     return fault
         return None
 
@@ -458,12 +459,21 @@ class SimArbiter:
             executions += file.load_behaviors(self._bodies, self._frame)
         for resource, file in by_resource.items():
             found[resource] = json.loads(file.meta(f"found {resource}", "[]"))
+            for behavior in json.loads(file.meta(f"struck {resource}", "[]")):
+                self._faults[resource].take(behavior)
         self._memory.files = by_resource
         for execution in executions:
             self._epochs.admit(execution.id, execution.epoch)
         self._links.muted = True
         self._simulation.restore(executions, now_us)
         return began_us, found
+
+    def _keep_taken(self, resource: ResourceId, behavior: str) -> None:
+        """Keep in the file that a fault has struck, which does not strike again after a restart."""
+        file = self._memory.files.get(resource)
+        if file is not None:
+            taken = json.loads(file.meta(f"struck {resource}", "[]"))
+            file.set_meta(f"struck {resource}", json.dumps([*taken, behavior]))
 
     def _keep_found(self, payload: ResourceId, found: Iterable[int]) -> None:
         file = self._memory.files.get(payload)

@@ -1,10 +1,18 @@
 """An incident outlives the executive: kill -9, resume, resolve, and replay to the same state."""
 
+import asyncio
+import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import pytest
+
+from m2pem.api.clock import SystemClock
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import ANSWERS, MISSION, CommandLine, Program, fleet_with_state
+from tests.incident_rows import CHOICES, SPARE, Provocation, Table, decide_after_kill
 
 
 def stopped(m2pem: CommandLine, folder: Path) -> tuple[Program, Path]:
@@ -109,3 +117,87 @@ def test_a_choice_after_which_the_mission_cannot_complete_must_be_confirmed(
     program.until_record("IncidentResolved", choice="move", by="plain")
     program.type("stop")
     assert program.rest()[0] == 130
+
+
+# --- every error and every choice, with a kill while the incidents are open -----------------------
+
+SPEED = 50.0
+HOME = (38.1075, -77.3192)
+NEAR, FAR = (38.1080, -77.3192), (38.1165, -77.3192)
+"""50 m, and 1 km: a vehicle is under way there long enough to be taken."""
+FAULTS = {
+    "FAILED": "goto: fail at 1 s",
+    "REJECTED": "goto: refuse",
+    "TIMEOUT": "goto: fail TIMEOUT at 1 s",
+    "LINK_LOST": "goto: cut link at 1 s",
+    "BATTERY_LOW": "goto: fail BATTERY_LOW at 1 s",
+    "ROUTE_BLOCKED": "goto: fail ROUTE_BLOCKED at 1 s",
+}
+ERRORS = (*FAULTS, "an operator has it", "an operator takes over", "a task takes it")
+
+
+class Simulated(Table):
+    """A vehicle of the simulated arbiter, which fails once."""
+
+    def __init__(self, error: str, choice: str) -> None:
+        self.error, self.vehicle = error, f"{error}_{choice}".lower().replace(" ", "_")
+
+    def data(self) -> dict[str, Any]:
+        return {"speed": 5, "target": list(NEAR if self.error in FAULTS else FAR)}
+
+    def provocations(self) -> dict[str, Provocation]:
+        async def available(_: str) -> None:
+            await self.available()
+
+        faults = {code: Provocation(code, mend=available) for code in FAULTS}
+        return {**self.common(), **faults}
+
+    def connection(self, state: Path) -> dict[str, Any]:
+        faults = [FAULTS[self.error]] if self.error in FAULTS else []
+        return {"state": str(state), "home": list(HOME), "faults": faults}
+
+
+def simulated_rows(m2pem: CommandLine, folder: Path, rows: Sequence[tuple[str, str]]) -> None:
+    """Play rows: all come to their incidents, then the executive is killed."""
+    tables = [Simulated(error, choice) for error, choice in rows]
+    state = folder / "vehicles.state"
+    connections = {each.vehicle: each.connection(state) for each in tables}
+    connections[SPARE] = {"state": str(state), "home": list(HOME)}
+    fleet = folder / "fleet.yaml"
+    content = {
+        "version": 1,
+        "origin": {"lat": HOME[0], "lon": HOME[1], "alt": 60.0},
+        "allocation": {"preemption": True},
+        "vehicles": {
+            name: {"domain": "ground", "arbiter": "sim", "connection": connection}
+            for name, connection in connections.items()
+        },
+    }
+    fleet.write_text(json.dumps(content), encoding="utf-8")
+    journal = folder / "journal.db"
+
+    def serve() -> Program:
+        words = ("--fleet", fleet, "--journal", journal, "--speed", f"{SPEED:g}", "--ocu", "none")
+        program = m2pem.start("serve", *words)
+        assert "serving" in program.stderr.readline()
+        return program
+
+    played = [(table, error, choice) for table, (error, choice) in zip(tables, rows, strict=True)]
+    asyncio.run(decide_after_kill(serve, journal, SystemClock(SPEED), played))
+    held = {each.resource for each in recorded_effects(state) if each.kind is EffectKind.HOLD}
+    assert held >= {each.vehicle for each in tables if each.error in ("FAILED", "ROUTE_BLOCKED")}
+
+
+def test_each_choice_is_made_after_kill_9_and_the_replay_is_equal(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    errors = ("ROUTE_BLOCKED", "TIMEOUT", "REJECTED", "an operator has it", "FAILED", "BATTERY_LOW")
+    simulated_rows(m2pem, tmp_path, list(zip(errors, CHOICES, strict=True)))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("error", ERRORS)
+def test_every_choice_about_every_error_is_made_after_kill_9(
+    m2pem: CommandLine, tmp_path: Path, error: str
+) -> None:
+    simulated_rows(m2pem, tmp_path, [(error, choice) for choice in CHOICES])

@@ -68,6 +68,18 @@ def test_a_behavior_goes_on_while_nobody_is_there(state: str) -> None:
     lives(state, drive, again, gap_s=6.0)
 
 
+def test_a_fault_that_has_struck_does_not_strike_again_after_a_restart(state: str) -> None:
+    async def fails(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await drive(bench, _)
+        assert (await bench.ended("r1.b1", 100)).code == "ROUTE_BLOCKED"
+
+    async def succeeds(bench: ArbiterHarness, _: SimArbiter) -> None:
+        await bench.start("r1.b2", "single_vehicle_routing", "ugv", route=EAST_100, epoch=2)
+        assert (await bench.ended("r1.b2", 100)).state is BehaviorState.SUCCEEDED
+
+    lives(state, fails, succeeds, faults=["single_vehicle_routing: fail ROUTE_BLOCKED at 5 s"])
+
+
 def test_a_behavior_of_another_journal_is_neither_taken_over_nor_repeated(state: str) -> None:
     fleet: Fleet = {"ugv": ("ground", {"state": state, "heading": "90 deg"})}
     other = UUID("9b1c2f04-0d0e-4c35-8a54-5a7b6f3c2e10")
