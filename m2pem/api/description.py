@@ -287,6 +287,18 @@ def _resource_returned(_: RunView, record: r.ResourceReturned) -> _Sentence:
     return f"{record.resource}: {how}{_in_brackets(record.reason)}", Importance.WARNING
 
 
+def _resource_kept(view: RunView, record: r.ResourceKept) -> _Sentence:
+    scope = view.scopes.get(record.until)
+    until = f" until {view.label(scope.element)} ends" if scope is not None else ""
+    text = f"{view.label(record.element)}: {record.resource} is kept{until}"
+    return text, Importance.NORMAL
+
+
+def _keeping_ended(_: RunView, record: r.KeepingEnded) -> _Sentence:
+    text = f"{record.resource} is kept no longer{_in_brackets(record.reason)}"
+    return text, Importance.NORMAL
+
+
 def _prompt_opened(view: RunView, record: r.PromptOpened) -> _Sentence:
     return f"{view.label(record.element)} asks: {record.text}", Importance.ATTENTION
 
@@ -441,6 +453,8 @@ _SENTENCES: dict[type, Callable[[RunView, Any], _Sentence]] = {
     r.BehaviorEnded: _behavior_ended,
     r.WorkReassigned: _work_reassigned,
     r.ResourceReturned: _resource_returned,
+    r.ResourceKept: _resource_kept,
+    r.KeepingEnded: _keeping_ended,
     r.PromptOpened: _prompt_opened,
     r.PromptAnswered: _prompt_answered,
     r.PromptWithdrawn: _prompt_withdrawn,
@@ -492,6 +506,8 @@ _KINDS: dict[type, Kind] = {
             r.BehaviorEnded,
             r.WorkReassigned,
             r.ResourceReturned,
+            r.ResourceKept,
+            r.KeepingEnded,
             r.ServiceRequested,
             r.ServiceEnded,
             r.ServiceWithdrawn,

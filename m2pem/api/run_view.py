@@ -215,6 +215,8 @@ class RunView:
         self.prompts: dict[str, r.PromptOpened] = {}
         self.incidents: dict[str, r.IncidentOpened] = {}
         self.waits: dict[int, Wait] = {}
+        self.kept: dict[str, r.ResourceKept] = {}
+        """What the run keeps between tasks, by the id of that."""
         self.holders: dict[str, str] = {}
         """Operators who have taken a resource, by resource, as far as the run's records say."""
         self.changes: Changes | None = None
@@ -281,6 +283,8 @@ class RunView:
             return f"{self.label(allocation.element)} ({id_})"
         if (incident := self.incidents.get(id_)) is not None:
             return f"the incident of {self.label(incident.element)} ({id_})"
+        if (kept := self.kept.get(id_)) is not None:
+            return f"{self.label(kept.element)}, which keeps it ({id_})"
         return id_
 
     def prompt(self, id_: str) -> r.PromptOpened | None:
@@ -370,6 +374,7 @@ class RunView:
         self.tokens.clear()
         self.allocations.clear()
         self.incidents.clear()
+        self.kept.clear()
         self.waits.clear()
 
     def _take(self, record: r.OperatorTookControl) -> None:
@@ -579,6 +584,12 @@ class RunView:
         if opened is not None:
             self._note_stopped(opened)
 
+    def _keep_resource(self, record: r.ResourceKept) -> None:
+        self.kept[record.keeping] = record
+
+    def _end_keeping(self, record: r.KeepingEnded) -> None:
+        self.kept.pop(record.keeping, None)
+
     def _note_stopped(self, record: r.IncidentOpened) -> None:
         place = (record.process, record.element)
         state = self._element(place)
@@ -658,6 +669,8 @@ _FOLDS: dict[type, Callable[[RunView, Any], None]] = {
     r.IncidentOpened: RunView._open_incident,
     r.IncidentResolved: RunView._close_incident,
     r.IncidentClosed: RunView._close_incident,
+    r.ResourceKept: RunView._keep_resource,
+    r.KeepingEnded: RunView._end_keeping,
     r.EventAwaited: RunView._await_event,
     r.EventTriggered: RunView._trigger_event,
 }

@@ -27,6 +27,7 @@ from m2pem.bpmn.xml import BPMN, M2PEM, local
 from m2pem.mission.behavior import (
     Behavior,
     BehaviorType,
+    Keep,
     OnLoss,
     Parameter,
     Role,
@@ -34,7 +35,7 @@ from m2pem.mission.behavior import (
     ServiceCall,
 )
 
-_LITERAL_ATTRIBUTES = frozenset({"name", "optional", "onLoss", *RoleKind})
+_LITERAL_ATTRIBUTES = frozenset({"name", "optional", "onLoss", "keep", *RoleKind})
 
 
 class BehaviorReader:
@@ -141,11 +142,11 @@ class BehaviorReader:
         self.refuse_repeated(parameters, DUPLICATE_PROPERTY)
         self.refuse_repeated(roles, DUPLICATE_ROLE)
         for role in roles:
-            if role.need is not None:
+            if role.need is not None or role.keep is not None:
                 self._error(
                     role.line,
                     ROLE_NEED,
-                    f"role '{role.name}' of a service says what it needs, or waits",
+                    f"role '{role.name}' of a service says what it needs, waits or keeps it",
                     "only behaviors choose resources as they start: name the payload or vehicle",
                 )
         self._refuse_on_loss(
@@ -241,7 +242,23 @@ class BehaviorReader:
                 return []
         optional = self._optional(line, name, texts["optional"])
         on_loss = self._on_loss(line, name, texts["onLoss"], by_need=by_need)
-        return [Role(name, kind, resource.strip(), line, optional, need, on_loss)] if name else []
+        keep = self._keep(line, name, texts["keep"])
+        found = Role(name, kind, resource.strip(), line, optional, need, on_loss, keep)
+        return [found] if name else []
+
+    def _keep(self, line: int, role: str, text: str | None) -> Keep | None:
+        if text is None:
+            return None
+        if text not in list(Keep):
+            self._error(
+                line,
+                ROLE_NEED,
+                f"role '{role}': keep='{text}' is none of {', '.join(Keep)}",
+                "write keep='process' or keep='subprocess', keep='task' to keep it no longer than "
+                "this task, or delete it",
+            )
+            return None
+        return Keep(text)
 
     def _on_loss(self, line: int, role: str, text: str | None, *, by_need: bool) -> OnLoss:
         if text is None:

@@ -132,6 +132,12 @@ _TABLE = (
             Attribute("wait", Type.DURATION, "how long the task waits for them, or `unlimited`"),
             Attribute("priority", Type.TEXT, "the greatest number is served first; 0"),
             Attribute("onLoss", Type.TEXT, "when it is lost: `fail`, `reassign` or `ask`; `fail`"),
+            Attribute(
+                "keep",
+                Type.TEXT,
+                "until what ends the run keeps it, also between tasks: `process`, `subprocess`, or "
+                "`task` for no longer",
+            ),
         ),
         places=_SERVING,
     ),

@@ -36,7 +36,7 @@ TIMEOUT = f"{PREFIX}timeout"
 
 _SETTINGS = (STORE, OPERATORS, TIMEOUT)
 _SINGLE = frozenset({BEHAVIOR, TYPE, PROMPT, *_SETTINGS})
-_OF_ROLES = (*NEED_ATTRIBUTES, "onLoss")
+_OF_ROLES = (*NEED_ATTRIBUTES, "onLoss", "keep")
 _ROLES = frozenset({*RoleKind, *_OF_ROLES})
 _NAMED = frozenset({"property", "decision", *_ROLES})
 _CONTAINERS = (CAMUNDA + "properties", ZEEBE + "properties")

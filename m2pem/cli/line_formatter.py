@@ -28,6 +28,8 @@ SHOWN = frozenset(
         r.BehaviorEnded,
         r.WorkReassigned,
         r.ResourceReturned,
+        r.ResourceKept,
+        r.KeepingEnded,
         r.BehaviorUnsettled,
         r.BehaviorContinued,
         r.BehaviorRestarted,

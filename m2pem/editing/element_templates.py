@@ -24,7 +24,7 @@ from m2pem.bpmn.template_properties import (
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.parameters import DIMENSIONS, accepted
 from m2pem.geo.geojson import kind_of
-from m2pem.mission.behavior import BehaviorType, OnLoss
+from m2pem.mission.behavior import BehaviorType, Keep, OnLoss
 from m2pem.mission.catalogue import BehaviorSpec, ParameterKind, ParameterSpec
 from m2pem.units import UNITS
 
@@ -187,6 +187,13 @@ def _behavior(
             doc="reassign: another one does the rest, if none is named. ask: an operator decides.",
             choices=tuple(OnLoss),
         )
+    template.ask(
+        "Between tasks",
+        property_name("keep", spec.type.value),
+        "keep",
+        doc="process, subprocess: the run keeps it until that ends. task: no longer.",
+        choices=tuple(Keep),
+    )
     for parameter in {**spec.by_name, **accepted(spec)}.values():
         template.ask(
             "Parameters",

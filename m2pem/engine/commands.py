@@ -29,7 +29,8 @@ class WithdrawAllocation:
 
 @dataclass(frozen=True, slots=True)
 class StartBehavior:
-    """Start a behavior on the arbiters of its resources; idempotent on `behavior`."""
+    """Start a behavior on the arbiters of its resources; idempotent on `behavior`. `keepings`: the
+    ids under which the run keeps resources of it."""
 
     behavior: str
     element: str
@@ -40,6 +41,7 @@ class StartBehavior:
     roles: dict[str, tuple[str, ...]]
     parameters: dict[str, Value]
     preempts: tuple[str, ...] = ()
+    keepings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

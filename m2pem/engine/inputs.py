@@ -225,8 +225,8 @@ class ResourceReturned(_Input, frozen=True):
 
 
 class BehaviorPreempted(_Input, frozen=True):
-    """A task of another run with a greater priority gets a resource of a behavior. `by`: its
-    request."""
+    """A task of another run with a greater priority gets a resource of a behavior, or one that the
+    run keeps between tasks: `behavior` is the id of the keeping then. `by`: its request."""
 
     behavior: str
     resource: str

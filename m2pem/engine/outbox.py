@@ -212,6 +212,7 @@ def _start(state: RunState, behavior: Behavior) -> StartBehavior:
         behavior.roles,
         behavior.parameters,
         behavior.preempts,
+        tuple(state.kept[each].id for each in behavior.resources if each in state.kept),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Collection
 
 from m2pem.engine import records as r
 from m2pem.engine.execution import Execution
+from m2pem.engine.keeping import end_keepings_of
 from m2pem.engine.records import RunOutcome, TokenOutcome
 from m2pem.engine.state import Scope, Token
 from m2pem.mission.elements import Activity, BoundaryEvent, Container, StartEvent, SubProcess
@@ -84,6 +85,7 @@ def close_scope(x: Execution, scope: Scope, outcome: TokenOutcome) -> None:
         process, element = x.process_of(node), node.id
     else:
         process = element = scope.container.id
+    end_keepings_of(x, scope)
     x.emit(r.ScopeClosed(scope.id, process, element, outcome, kept))
 
 

@@ -272,6 +272,20 @@ class OutOfReach:
     native_ref: str | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Keeping:
+    """What the run keeps between tasks, until the scope `until` ends. Other fields as in record
+    `ResourceKept`."""
+
+    id: str
+    token: int
+    element: str
+    role: str
+    resource: str
+    until: Scope
+    priority: int
+
+
 @dataclass(slots=True, eq=False)
 class AllocationRequest:
     """A task that waits for resources to be chosen. Fields as in record `AllocationRequested`.
@@ -355,6 +369,7 @@ class RunState:
     last_completion: int = 0
     last_compensation: int = 0
     last_allocation: int = 0
+    last_keeping: int = 0
     last_behavior: int = 0
     last_prompt: int = 0
     last_service: int = 0
@@ -368,6 +383,8 @@ class RunState:
     behaviors: dict[str, Behavior] = field(default_factory=dict)
     held: dict[str, list[str]] = field(default_factory=dict)
     """Behaviors that hold a resource: at most one that is not being cancelled."""
+    kept: dict[str, Keeping] = field(default_factory=dict)
+    """What the run keeps between tasks, by resource."""
     commanded: dict[str, None] = field(default_factory=dict)
     """Every resource that a behavior of the run has had."""
     taken: dict[str, str] = field(default_factory=dict)

@@ -27,6 +27,7 @@ from m2pem.engine import records as r
 from m2pem.engine.data import reader
 from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.inputs import BehaviorPreempted, ResourcesChosen, ResourcesNotFree
+from m2pem.engine.keeping import may_use
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus
 from m2pem.errors import ExpressionError
 from m2pem.executive.allocation_requests import AskedFor, ConsideredRequest, Preempting
@@ -40,7 +41,7 @@ from m2pem.executive.space_allocation import (
 )
 from m2pem.executive.waiting_circles import WaitingCircles
 from m2pem.executive.waiting_tasks import holder_label
-from m2pem.fleet.allocation import Availability
+from m2pem.fleet.allocation import Availability, is_behavior
 from m2pem.fleet.parameters import ParameterError, resolve
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission.behavior import Behavior
@@ -328,7 +329,9 @@ class Allocator:
         ending = {
             each.id for each in state.behaviors.values() if each.phase is BehaviorPhase.CANCELLING
         }
-        if ending:  # the run may preempt what it has cancelled itself
+        # The run may preempt what it has cancelled itself, and has what it keeps for this task.
+        ending |= {each.id for each in state.kept.values() if may_use(each, request.token)}
+        if ending:
             occupied = {
                 each: found for each, found in occupied.items() if found.holder not in ending
             }
@@ -355,7 +358,11 @@ class Allocator:
         for resource in self._order:
             if withdrawn := self._availability.reason(resource):
                 found[resource] = Occupancy(withdrawn=withdrawn)
-            elif holder := self._availability.holder(resource) or requested.get(resource):
+                continue
+            holder = self._availability.holder(resource)
+            if not is_behavior(holder):
+                holder = requested.get(resource) or holder
+            if holder:
                 found[resource] = Occupancy(holder, label=self._label(holder))
         return found
 
@@ -492,7 +499,7 @@ class Allocator:
                 for holder in behaviors
                 if holder.runner is not each.asked.runner and holder.priority < each.priority
                 for resource in holder.resources
-                if self._availability.holder(resource) in (None, holder.behavior.id)
+                if self._availability.holder(resource) in (None, holder.id)
             }
             before = [other.request.id for other in left[:place]]
             chosen, refusal = self._with_space(each, holders, kept, before)
@@ -504,7 +511,7 @@ class Allocator:
             answer, resources = self._hold_for(each, chosen)
             kept.update(resources)
             self._take(each, {resource: holders[resource] for resource in taken})
-            victims = frozenset(holders[resource].behavior.id for resource in taken)
+            victims = frozenset(holders[resource].id for resource in taken)
             each.asked.preempts = Preempting(answer, resources, victims, self._wanted(each, chosen))
         return without
 
@@ -531,7 +538,7 @@ class Allocator:
             wanted = None if self._space is None else self._wanted(each, chosen)
             if self._space is None or wanted is None:
                 return chosen, None
-            ending = {holders[resource].behavior.id for resource in taken}
+            ending = {holders[resource].id for resource in taken}
             refusal = self._space.refusal_after(*wanted, ending, before)
             if refusal is None:
                 return chosen, None
@@ -539,23 +546,24 @@ class Allocator:
             without.add(refusal.vehicle)
 
     def _take(self, each: ConsideredRequest, taken: Mapping[ResourceId, Holder]) -> None:
-        """End the behaviors that have what a request gets, and tell the operators of both runs."""
+        """End the behaviors that have what a request gets, or the keeping of it, and tell the
+        operators of both runs."""
         names = ", ".join(f"{name} is taken from {holder.label}" for name, holder in taken.items())
-        has = {str(resource): holder.behavior.id for resource, holder in taken.items()}
+        has = {str(resource): holder.id for resource, holder in taken.items()}
         reason = f"{names}, whose priority is lower and which ends first"
         each.asked.lacks = None
         each.asked.runner.post(ResourcesNotFree(each.request.id, reason, has))
         ending: set[str] = set()
         for resource, holder in taken.items():
-            behavior = holder.behavior.id
-            if behavior in ending or holder.behavior.phase is not BehaviorPhase.ACTIVE:
+            kept = resource in holder.runner.run.state.kept
+            if not kept and (holder.id in ending or not holder.goes_on):
                 continue  # it ends already
-            ending.add(behavior)
+            ending.add(holder.id)
             reason = (
                 f"{resource} goes to {each.request.token.node.label} of {each.asked.runner.id}, "
                 f"whose priority {each.priority} is greater than {holder.priority}"
             )
-            holder.runner.post(BehaviorPreempted(behavior, resource, each.request.id, reason))
+            holder.runner.post(BehaviorPreempted(holder.id, resource, each.request.id, reason))
             text = f"{holder.task} is preempted: {reason}"
             self._publish(Alert(holder.runner.id, PREEMPTED, text))
 

@@ -154,9 +154,13 @@ class Dispatcher:
         """Keep resources for an incident: no behavior gets them."""
         self._availability.adopt(_ids(resources), incident)
 
-    def release(self, incident: str) -> None:
-        """An incident is over: what was kept for it is free."""
-        self._availability.release(incident)
+    def keep_between_tasks(self, keeping: str, resource: str) -> None:
+        """Keep a resource for the tasks of a run that may have it."""
+        self._availability.keep(ResourceId(resource), keeping)
+
+    def release(self, holder: str) -> None:
+        """An incident, or what a run keeps between tasks, is over: what it held is free."""
+        self._availability.release(holder)
 
     def _active_of(self, run: str) -> list[tuple[str, _Active]]:
         return [each for each in self._active.items() if each[0].partition(".")[0] == run]
@@ -314,7 +318,8 @@ class Dispatcher:
             reason = f"{', '.join(ids)}: no {kind.value} behavior {command.name} is offered"
             self._refuse(command.behavior, "REJECTED", reason)
             return
-        refusal = self._availability.acquire(ids, command.behavior, command.preempts)
+        had_by = (*command.preempts, *command.keepings)
+        refusal = self._availability.acquire(ids, command.behavior, had_by)
         if refusal is not None:
             self._refuse(command.behavior, "RESOURCE_UNAVAILABLE", refusal)
             return

@@ -22,7 +22,7 @@ from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
 from m2pem.executive.runner import Runner
-from m2pem.fleet.allocation import Availability, resources_of_mission
+from m2pem.fleet.allocation import Availability, is_behavior, resources_of_mission
 from m2pem.journal.base import Journal, Loss
 from m2pem.mission.behavior import Decision
 from m2pem.mission.catalogue import BehaviorState, ResourceId, ResumePolicy
@@ -121,7 +121,7 @@ class JournalLossPrompts:
                     services = self._services.pop(run)
                     runner.take_up([each for each in services if each.service in open_])
                     for resource in self._close(run, "go_on", by):
-                        if self._availability.holder(resource) is None:
+                        if not is_behavior(self._availability.holder(resource)):
                             self._dispatcher.resume(resource)
                     return
                 case RunEnded():

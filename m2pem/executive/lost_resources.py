@@ -19,7 +19,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
-from m2pem.fleet.allocation import Availability, is_incident
+from m2pem.fleet.allocation import Availability, is_behavior
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 log = logging.getLogger("m2pem.executive")
@@ -87,8 +87,8 @@ class LostResources:
             stopping.cancel()
         elif self._availability.reason(resource):
             return  # an operator has it, or it is manned: what it does is theirs
+        commands = self._is_commanded(resource)
         holder = self._availability.holder(resource)
-        commands = holder is not None and not is_incident(holder)
         if commands or resource not in self._lost:
             self._lost[resource] = _Lost(holder if commands else None)
         self._withdraw(resource, reason)
@@ -117,7 +117,7 @@ class LostResources:
             return why
         if resource not in self._held:
             return ""
-        if resource in self._handover.taken or self._availability.holder(resource) is not None:
+        if resource in self._handover.taken or self._is_commanded(resource):
             self._held.discard(resource)
             return ""
         return RETURNED
@@ -187,7 +187,7 @@ class LostResources:
         try:
             async with asyncio.timeout(ONCE_WITHIN_S):
                 lost = self._lost[resource]
-                if lost.is_earlier and self._availability.holder(resource) is not None:
+                if lost.is_earlier and self._is_commanded(resource):
                     return ""  # a run that was resumed later has it: it had returned
                 if lost.is_earlier and (why := await self._end_earlier(arbiter, resource, lost)):
                     return why
@@ -220,6 +220,10 @@ class LostResources:
         self._why[resource] = why
         if resource not in self._handover.taken:
             self._availability.withdraw(resource, why)
+
+    def _is_commanded(self, resource: ResourceId) -> bool:
+        """Whether a behavior has it; what an incident or a run keeps for later does nothing new."""
+        return is_behavior(self._availability.holder(resource))
 
     def _why_not_free(self, resource: ResourceId) -> str:
         return self._why.get(resource) or self._silent.get(resource, "")

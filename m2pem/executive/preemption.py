@@ -3,8 +3,8 @@
 Only where the fleet file allows it (`allocation: {preemption: true}`). The behavior that has the
 vehicle ends with error PREEMPTED, or another does the rest of its work (`onLoss` of its role). The
 vehicle is held for the task with the greater priority from that moment, and given to it when the
-other behavior has ended. As the priority must be strictly greater, tasks cannot take a vehicle from
-each other in turn.
+other behavior has ended. What a run keeps between tasks is given at once. As the priority must be
+strictly greater, tasks cannot take a vehicle from each other in turn.
 """
 
 import re
@@ -30,21 +30,20 @@ _COMES_DOWN = frozenset({"rtl", "land", "qrtl", "qland", "landing", "return", "d
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """A behavior of another run that a task with a greater priority may take vehicles from."""
+    """A behavior of another run that a task with a greater priority may take vehicles from, or
+    what that run keeps between tasks. `goes_on`: it is not ending already."""
 
     runner: Runner
-    behavior: Behavior
+    id: str
+    resources: tuple[ResourceId, ...]
+    element: str
     priority: int
-
-    @property
-    def resources(self) -> tuple[ResourceId, ...]:
-        """What it has."""
-        return tuple(map(ResourceId, self.behavior.resources))
+    goes_on: bool = True
 
     @property
     def task(self) -> str:
         """The label of its task."""
-        return self.runner.run.state.mission.elements[self.behavior.element].label
+        return self.runner.run.state.mission.elements[self.element].label
 
     @property
     def label(self) -> str:
@@ -58,7 +57,7 @@ def priority_of(roles: Iterable[Role]) -> int:
 
 
 def preemptible(runners: Iterable[Runner], latest: LatestState) -> list[Holder]:
-    """Return the behaviors from which vehicles may be taken.
+    """Return the behaviors from which vehicles may be taken, and what is kept and idle.
 
     Not from a paused run, which decides nothing; not from a behavior that brings its vehicle down,
     or whose vehicle returns or lands by itself; and not from one that an operator is asked about.
@@ -71,10 +70,22 @@ def preemptible(runners: Iterable[Runner], latest: LatestState) -> list[Holder]:
         for behavior in state.behaviors.values():
             if behavior.phase is BehaviorPhase.UNSETTLED or behavior.name in BRINGS_DOWN:
                 continue
-            holder = Holder(runner, behavior, priority_of(_roles(state, behavior)))
-            if not any(_comes_down(each, latest) for each in holder.resources):
-                found.append(holder)
-    return found
+            found.append(
+                Holder(
+                    runner,
+                    behavior.id,
+                    tuple(map(ResourceId, behavior.resources)),
+                    behavior.element,
+                    priority_of(_roles(state, behavior)),
+                    behavior.phase is BehaviorPhase.ACTIVE,
+                )
+            )
+        found += [
+            Holder(runner, each.id, (ResourceId(each.resource),), each.element, each.priority)
+            for each in state.kept.values()
+            if each.resource not in state.held
+        ]
+    return [each for each in found if not any(_comes_down(one, latest) for one in each.resources)]
 
 
 def _roles(state: RunState, behavior: Behavior) -> Iterator[Role]:

@@ -74,6 +74,8 @@ async def take_over(
     known = list(state.behaviors.values())
     for incident in state.incidents.values():
         dispatcher.keep(incident.id, incident.resources)
+    for keeping in state.kept.values():
+        dispatcher.keep_between_tasks(keeping.id, keeping.resource)
     _recall(runner, arbiters, dispatcher)
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
     resend: set[str] = set()

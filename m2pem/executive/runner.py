@@ -378,6 +378,10 @@ class Runner:
                 context.dispatcher.keep(record.incident, record.resources)
             elif type(record) is r.IncidentResolved or type(record) is r.IncidentClosed:
                 context.dispatcher.release(record.incident)
+            elif type(record) is r.ResourceKept:
+                context.dispatcher.keep_between_tasks(record.keeping, record.resource)
+            elif type(record) is r.KeepingEnded:
+                context.dispatcher.release(record.keeping)
         if context.events.has_subscribers:
             t_s = step.t_us / 1_000_000
             places = enumerate(step.records, step.seq)

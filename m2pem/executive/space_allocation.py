@@ -5,7 +5,8 @@ that will end are in its way: so it is not overtaken for ever. A vehicle that st
 that is lost, may stay there: what the task needs is then free for others.
 """
 
-from collections.abc import Collection, Mapping
+import re
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.circles import Waiting, circles
@@ -151,13 +152,20 @@ def space_circles(
 
 
 def space_circle_text(
-    circle: Mapping[str, AllocationRequest], refusals: Mapping[str, "Refusal"]
+    circle: Mapping[str, AllocationRequest],
+    refusals: Mapping[str, "Refusal"],
+    who: Callable[[str], str],
 ) -> str:
-    """Say which tasks wait for each other, for what, and the way out."""
-    said = [
-        f"{request.token.node.label} of {request.id.partition('.')[0]}: {refusals[number].reason}"
-        for number, request in circle.items()
-    ]
+    """Say which tasks wait for each other, for what, and the way out. `who`: returns what the id of
+    a behavior or request means, in words."""
+    said: list[str] = []
+    for number, request in circle.items():
+        reason = refusals[number].reason
+        ids = {blocker.behavior for blocker in refusals[number].blockers if blocker.behavior}
+        if ids:
+            any_of_them = rf"\b({'|'.join(map(re.escape, sorted(ids)))})\b"
+            reason = re.sub(any_of_them, lambda found: who(found[0]), reason)
+        said.append(f"{who(request.id)}: {reason}")
     first = next(iter(circle))
     return (
         f"{'; '.join(said)}: none of them can go on by itself. Stop one of the runs, or take "

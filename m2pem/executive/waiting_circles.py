@@ -10,6 +10,7 @@ from m2pem.engine.state import BehaviorPhase
 from m2pem.executive.allocation_requests import ConsideredRequest
 from m2pem.executive.runner import Runner
 from m2pem.executive.space_allocation import space_circle_text, space_circles
+from m2pem.executive.waiting_tasks import holder_label
 from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
@@ -53,9 +54,8 @@ class WaitingCircles:
         in_space = space_circles(certain, vehicles)
         for circle in in_space:
             if circle not in self._known:
-                text = space_circle_text(
-                    {number: requests[number].request for number in sorted(circle)}, refusals
-                )
+                asking = {number: requests[number].request for number in sorted(circle)}
+                text = space_circle_text(asking, refusals, self._who)
                 for run in sorted({requests[number].asked.runner.id for number in circle}):
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
         runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
@@ -72,7 +72,7 @@ class WaitingCircles:
         found = circles(asked)
         for circle in found:
             if circle not in self._known:
-                text = _circle_text([each for each in waiting if each.asked.runner.id in circle])
+                text = self._text([each for each in waiting if each.asked.runner.id in circle])
                 for run in sorted(circle):
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
         self._known = {*found, *in_space}
@@ -88,10 +88,14 @@ class WaitingCircles:
             holders.append(holder.partition(".")[0] if self._goes_on(holder) else None)
         return lacking, tuple(holders)
 
-    def _goes_on(self, behavior: str) -> bool:
-        """Whether a behavior ends only when its run ends it."""
-        runner = self._runners.get(behavior.partition(".")[0])
-        known = runner.run.state.behaviors.get(behavior) if runner is not None else None
+    def _goes_on(self, holder: str) -> bool:
+        """Whether a behavior ends only when its run ends it, as what a run keeps does."""
+        runner = self._runners.get(holder.partition(".")[0])
+        if runner is None:
+            return False
+        if any(each.id == holder for each in runner.run.state.kept.values()):
+            return True
+        known = runner.run.state.behaviors.get(holder)
         if known is None or known.phase is not BehaviorPhase.ACTIVE:
             return False
         if not ENDING_PARAMETERS.isdisjoint(known.parameters):
@@ -108,19 +112,22 @@ class WaitingCircles:
             return False
         return all(self._goes_on(behavior) for behavior in state.behaviors)
 
+    def _who(self, holder: str) -> str:
+        """Return what holds something in words: its task, run and mission."""
+        return holder_label(self._runners, holder, mission=True) or holder
 
-def _circle_text(waiting: Sequence[ConsideredRequest]) -> str:
-    said = [
-        f"{each.asked.runner.id} waits at {each.request.token.node.label} for "
-        + ", ".join(
-            f"{resource} ({role.occupied[resource].holder})"
-            for role in each.roles
-            for resource in role.options.busy
+    def _text(self, waiting: Sequence[ConsideredRequest]) -> str:
+        said = [
+            f"{self._who(each.request.id)} waits for "
+            + ", ".join(
+                f"{resource} (held by {self._who(role.occupied[resource].holder)})"
+                for role in each.roles
+                for resource in role.options.busy
+            )
+            for each in waiting
+        ]
+        runs = [each.asked.runner.id for each in waiting]
+        return (
+            f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
+            f"{runs[-1]}`), or take what it has and give it back"
         )
-        for each in waiting
-    ]
-    runs = [each.asked.runner.id for each in waiting]
-    return (
-        f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
-        f"{runs[-1]}`), or take what it has and give it back"
-    )

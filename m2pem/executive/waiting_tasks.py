@@ -2,6 +2,7 @@
 and which task has what they wait for."""
 
 from collections.abc import Iterable, Mapping
+from pathlib import PurePath
 
 from m2pem.api.control import RunId, WaitingTask
 from m2pem.engine.elements.allocations import behavior_of
@@ -25,20 +26,24 @@ def waiting_tasks(runners: Iterable[Runner], now_us: int) -> list[WaitingTask]:
     return [_task(state, request, now_us) for state, request in requests]
 
 
-def holder_label(runners: Mapping[RunId, Runner], holder: str) -> str:
-    """Return the task and run of a behavior, request or incident, in words; "" if it is not
-    known."""
-    run = RunId(holder.partition(".")[0])
-    runner = runners.get(run)
+def holder_label(runners: Mapping[RunId, Runner], holder: str, *, mission: bool = False) -> str:
+    """Return the task and run of a behavior, request, incident or keeping, in words; "" if it is
+    not known. `mission`: also the name of the run's mission."""
+    runner = runners.get(RunId(holder.partition(".")[0]))
     if runner is None:
         return ""
     state = runner.run.state
+    run = f"{state.run} ({PurePath(state.mission.file).stem})" if mission else state.run
     if (behavior := state.behaviors.get(holder)) is not None:
         return f"{state.mission.elements[behavior.element].label} of {run}"
     if (request := state.allocations.get(holder)) is not None:
         return f"{request.token.node.label} of {run}"
     if (incident := state.incidents.get(holder)) is not None:
         return f"the incident of {incident.token.node.label} of {run}"
+    for keeping in state.kept.values():
+        if keeping.id == holder:
+            label = state.mission.elements[keeping.element].label
+            return f"{label} of {run}, which keeps it until {keeping.until.container.label} ends"
     return ""
 
 

@@ -82,9 +82,10 @@ def spelled_out(team: Team) -> tuple[ResourceId, ...]:
     return (team.lead, *(member for member in team.members if member != team.lead))
 
 
-def is_incident(holder: str) -> bool:
-    """Whether the id of what holds a resource is that of an incident ("r1.i2")."""
-    return holder.partition(".")[2].startswith("i")
+def is_behavior(holder: str | None) -> bool:
+    """Whether the id of what holds a resource is that of a behavior ("r1.b2"), or of a request for
+    one, not of an incident, or of what a run keeps between tasks. None: nothing holds it."""
+    return holder is not None and not holder.partition(".")[2].startswith(("i", "k"))
 
 
 MANNED = "manned"
@@ -94,8 +95,9 @@ class Availability:
     """The one ledger of an executive, across all its runs. Behavior ids are unique in it.
 
     Requests for resources (`m2pem.executive.allocator`) hold what was chosen for them by their own
-    id, and incidents what their failed work commanded. `on_change`: is called when a resource may
-    be free, or is not available any more.
+    id, and incidents what their failed work commanded. What a run keeps between tasks is held by
+    the id of that beneath the behaviors of those. `on_change`: is called when a resource may be
+    free, or is not available any more.
 
     A behavior that took a resource over from one which is being cancelled may end first: the
     resource is then held by the one before again.
@@ -147,8 +149,9 @@ class Availability:
     ) -> str | None:
         """Give all of `resources` to `behavior`, or none.
 
-        `preempts`: behaviors that are being cancelled; what they hold passes to the new one at
-        once. Returns None, or why not, for a person. Asking again for what is held is no error.
+        `preempts`: behaviors that are being cancelled, and what the run keeps between tasks; what
+        they hold passes to the new one at once. Returns None, or why not, for a person. Asking
+        again for what is held is no error.
         """
         wanted = tuple(dict.fromkeys(resources))
         refusals = [self._refusal(resource, behavior, preempts) for resource in wanted]
@@ -164,6 +167,10 @@ class Availability:
             if behavior in holders:
                 holders.remove(behavior)
             holders.append(behavior)
+
+    def keep(self, resource: ResourceId, keeping: str) -> None:
+        """Note that a run keeps a resource between tasks: it is held when nothing else holds it."""
+        self._holders.setdefault(resource, []).insert(0, keeping)
 
     def _refusal(self, resource: ResourceId, behavior: str, preempts: Collection[str]) -> str:
         reason = self.reason(resource)

@@ -7,7 +7,7 @@ tasks in every run, else a warning.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import zip_longest
 from typing import TypeAlias
@@ -16,12 +16,29 @@ import rustworkx
 
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.task_findings import TaskFindings
-from m2pem.mission.behavior import Behavior, Role
+from m2pem.mission.behavior import Behavior, Keep, Role
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.concurrency import HOST, INSTANCE, ConcurrentTasks, Occurrence, Together
-from m2pem.mission.elements import Activity, CallActivity, Process, SubProcess
+from m2pem.mission.concurrency import (
+    HOST,
+    INSTANCE,
+    ConcurrentTasks,
+    Occurrence,
+    Together,
+    instances_at_once,
+)
+from m2pem.mission.elements import (
+    Activity,
+    CallActivity,
+    Container,
+    EventBasedGateway,
+    ExclusiveGateway,
+    FlowNode,
+    Process,
+    SubProcess,
+)
 from m2pem.mission.events import error_code
 from m2pem.mission.mission import Mission
+from m2pem.mission.reachability import following
 
 UNAVAILABLE = "RESOURCE_UNAVAILABLE"
 
@@ -40,11 +57,13 @@ class Demand:
     """What a task needs while it is active: one resource for each place, of some that may fill it.
 
     A place is there as often as its role has to be filled. Optional roles have none, and those that
-    mean an earlier role's resources: the task before has them, or nobody.
+    mean an earlier role's resources: the task before has them, or nobody. `kept`: what earlier
+    tasks keep for the run meanwhile, and the task cannot use in place of what it needs.
     """
 
     behavior: Behavior
     places: tuple[tuple[Role, Resources], ...]
+    kept: tuple[tuple[Role, Resources], ...] = ()
 
     @classmethod
     def of(
@@ -76,7 +95,7 @@ class Demand:
 
     def within(self, resources: Resources) -> int:
         """Return how many of some resources it has in any case."""
-        return sum(able <= resources for _, able in self.places)
+        return sum(able <= resources for _, able in (*self.places, *self.kept))
 
 
 def check_shortages(mission: Mission, demands: Mapping[Activity, Demand]) -> list[Finding]:
@@ -84,7 +103,69 @@ def check_shortages(mission: Mission, demands: Mapping[Activity, Demand]) -> lis
     chosen = [each for each in demands.values() if each.behavior.allocated_at_start]
     if not chosen:
         return []
+    demands = _with_what_is_kept(demands)
     return _Check(mission, demands, ConcurrentTasks(mission, demands.__contains__)).findings()
+
+
+def _with_what_is_kept(demands: Mapping[Activity, Demand]) -> Mapping[Activity, Demand]:
+    """Add to the demand of each task what earlier tasks of its scope keep for the run."""
+    kept: dict[Activity, list[tuple[Role, Resources]]] = {}
+    for task, demand in demands.items():
+        for role, able in demand.places:
+            if role.keep not in (Keep.PROCESS, Keep.SUBPROCESS):
+                continue
+            later = _later_in_scope(task, role.keep)
+            if any(map(_splits, (task, *later))):
+                continue  # beside several tasks it would count several times
+            for other, its in demands.items():
+                if other in later and not _may_use(its, role, able):
+                    kept.setdefault(other, []).append((role, able))
+    if not kept:
+        return demands
+    return {task: replace(each, kept=tuple(kept.get(task, ()))) for task, each in demands.items()}
+
+
+def _later_in_scope(task: Activity, keep: Keep) -> list[FlowNode]:
+    """Return what comes after a task before its scope ends, but not the task itself."""
+    scope: Container = task.container
+    waiting: list[FlowNode] = [task]
+    while keep is Keep.PROCESS and isinstance(scope, SubProcess):
+        waiting.append(scope)
+        scope = scope.container
+    found: dict[FlowNode, None] = {}
+    while waiting:
+        entered = following(waiting.pop())
+        for each in entered:
+            if isinstance(each, SubProcess):
+                entered += each.nodes
+            if each is not task and each not in found:
+                found[each] = None
+                waiting.append(each)
+    return list(found)
+
+
+def _splits(node: FlowNode) -> bool:
+    """Whether an element may make several tokens of one."""
+    if isinstance(node, Activity):
+        several = instances_at_once(node) > 1
+        beside = any(not each.interrupting for each in node.boundary)
+        container = node if isinstance(node, SubProcess) else None
+        events = container is not None and bool(container.event_subprocesses)
+        return several or beside or events or len(node.outgoing) > 1
+    one = isinstance(node, ExclusiveGateway | EventBasedGateway)
+    return len(node.outgoing) > 1 and not one
+
+
+def _may_use(demand: Demand, role: Role, able: Resources) -> bool:
+    """Whether a task may have what an earlier role keeps as what it needs itself, or ends the
+    keeping. One with `same` has what is kept, and no place for it."""
+    if any(not able.isdisjoint(its) for _, its in demand.places):
+        return True
+    store = role.need.store if role.need is not None else ""
+    return any(
+        each.keep is Keep.TASK and each.need is not None and each.need.same == store
+        for each in demand.behavior.roles
+    )
 
 
 @dataclass(slots=True)
@@ -187,7 +268,9 @@ class _Check:
             if self.demands[late.task].waits or _is_caught(late.task, self.mission):
                 continue
             others: list[Activity] = []
-            total, named = own, self.demands[late.task].named
+            demand = self.demands[late.task]
+            total = own - sum(able <= resources for _, able in demand.kept)
+            named = demand.named
             for other, more in sorted(weighted, key=lambda each: -each[1]):
                 if other is late or total > len(resources):
                     continue
@@ -203,7 +286,7 @@ class _Check:
         self, late: Activity, others: Sequence[Activity], resources: Resources
     ) -> Finding:
         findings = TaskFindings(self.mission.file_of(late), late)
-        own = self._roles(late, resources)
+        own = self._roles(late, resources, kept=False)
         findings.add(
             RULE,
             f"{own} may find none of {_listed(resources)} free, and does not wait: "
@@ -228,10 +311,11 @@ class _Check:
             said.append(f"{task.label} ({self._roles(task, resources)}{often})")
         return _joined(said)
 
-    def _roles(self, task: Activity, resources: Resources | None) -> str:
+    def _roles(self, task: Activity, resources: Resources | None, *, kept: bool = True) -> str:
+        demand = self.demands[task]
         names = dict.fromkeys(
             f"'{role.name}'"
-            for role, able in self.demands[task].places
+            for role, able in (*demand.places, *(demand.kept if kept else ()))
             if resources is None or able <= resources
         )
         return f"role{'s' if len(names) > 1 else ''} {_joined(list(names))}"

@@ -31,6 +31,16 @@ class OnLoss(StrEnum):
     ASK = "ask"
 
 
+class Keep(StrEnum):
+    """Until when the run keeps what fills a role, also between tasks: until the process, or the
+    subprocess, that the task is in ends; or only until the task ends, also if an earlier task has
+    kept it for longer."""
+
+    PROCESS = "process"
+    SUBPROCESS = "subprocess"
+    TASK = "task"
+
+
 @dataclass(frozen=True, slots=True)
 class Need:
     """What a role asks of the resources that fill it; they are chosen when its task starts.
@@ -65,7 +75,8 @@ class Role:
 
     `resource` is the id in the fleet: a vehicle ("evsg1"), a payload ("evsg2/ptz") or a team; ""
     for a role by need. `need` None: the resource is allocated at once or not at all. `on_loss`:
-    what is done when what fills it is lost.
+    what is done when what fills it is lost. `keep`: until when the run keeps it; None: nothing
+    changes about that, and what is not kept is free when the task ends.
     """
 
     name: str
@@ -75,6 +86,7 @@ class Role:
     optional: bool = False
     need: Need | None = None
     on_loss: OnLoss = OnLoss.FAIL
+    keep: Keep | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +114,8 @@ class Behavior:
 
     @property
     def allocated_at_start(self) -> bool:
-        """Whether a role is filled, or waited for, when the task starts."""
-        return any(role.need is not None for role in self.roles)
+        """Whether a role is filled, waited for or kept when the task starts."""
+        return any(role.need is not None or role.keep is not None for role in self.roles)
 
 
 @dataclass(frozen=True, slots=True)

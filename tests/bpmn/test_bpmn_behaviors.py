@@ -9,6 +9,7 @@ from m2pem.mission.behavior import (
     Assignment,
     Behavior,
     BehaviorType,
+    Keep,
     OnLoss,
     Role,
     RoleKind,
@@ -175,6 +176,7 @@ ROLES = {
     "priority in words": ('<role name="d" requires="true" priority="high"/>', "role-need"),
     "loss of a named one": ('<role name="d" vehicle="v" onLoss="reassign"/>', "role-need"),
     "loss in words": ('<role name="d" requires="true" onLoss="retry"/>', "role-need"),
+    "keep in words": ('<role name="d" requires="true" keep="always"/>', "role-need"),
     "data without a name": ('<role name="d" requires="true" store="a b"/>', "role-need"),
     "need of what was chosen, no name": ('<role name="d" same="a+b"/>', "role-need"),
     "optional that is no truth": ('<role name="d" vehicle="v" optional="y"/>', "bad-value"),
@@ -286,6 +288,17 @@ def test_what_is_done_when_a_vehicle_is_lost_is_read() -> None:
         .behavior
     )  # type: ignore[attr-defined]
     assert [role.on_loss for role in behavior.roles] == [OnLoss.REASSIGN, OnLoss.FAIL]
+
+
+def test_until_when_a_vehicle_is_kept_is_read() -> None:
+    roles = '<role name="a" requires="true" keep="process"/><role name="b" vehicle="v"/>'
+    text = f'<behavior type="vehicle" name="goto"><resources>{roles}</resources></behavior>'
+    behavior = load(as_child(text)).elements["T"].behavior  # type: ignore[attr-defined]
+    assert [role.keep for role in behavior.roles] == [Keep.PROCESS, None]
+    named = roles.replace('vehicle="v"', 'vehicle="v" keep="task"').replace("requires", "same")
+    behavior = load(as_child(text.replace(roles, named))).elements["T"].behavior  # type: ignore[attr-defined]
+    assert [role.keep for role in behavior.roles] == [Keep.PROCESS, Keep.TASK]
+    assert behavior.allocated_at_start
 
 
 def test_the_fleet_file_says_what_a_team_does_when_a_member_is_lost() -> None:

@@ -3,7 +3,7 @@
 import pytest
 from bpmn_text import around, definitions, findings, line_of, load, summary
 
-from m2pem.mission.behavior import BehaviorType, Decision, OnLoss, RoleKind
+from m2pem.mission.behavior import BehaviorType, Decision, Keep, OnLoss, RoleKind
 from m2pem.mission.elements import ScriptTask, ServiceTask, UserTask
 from m2pem.mission.expression import Expression
 
@@ -61,6 +61,7 @@ def test_what_a_role_needs_is_read(engine: str) -> None:
         "m2pem:requires:mover": "vehicle.battery > 0.4",
         "m2pem:wait:mover": "PT10M",
         "m2pem:onLoss:mover": "reassign",
+        "m2pem:keep:mover": "process",
         "m2pem:vehicle:leader": "ugv1",
         "m2pem:wait:leader": "unlimited",
     }
@@ -75,6 +76,7 @@ def test_what_a_role_needs_is_read(engine: str) -> None:
     assert (mover.name, mover.need.condition.text) == ("mover", "vehicle.battery > 0.4")
     assert mover.need.wait_limit is not None
     assert mover.on_loss is OnLoss.REASSIGN
+    assert mover.keep is Keep.PROCESS
     assert leader.need is not None
     assert (leader.resource, leader.need.waits, leader.need.wait_limit) == ("ugv1", True, None)
 

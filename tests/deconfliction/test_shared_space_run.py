@@ -1,5 +1,6 @@
 """Ground vehicles share a bridge, and a road: one goes, the other is refused or waits."""
 
+import re
 import shutil
 from copy import deepcopy
 from dataclasses import replace
@@ -248,6 +249,8 @@ def test_three_in_a_ring_wait_for_each_other_and_operators_are_warned(play: Play
         ground=tuple(spots),
     )
     assert len(set(alerts)) == 1
+    assert all(f"Next of {run} (" in alerts[0] for run in ("r1", "r2", "r3"))
+    assert not re.search(r"\br\d\.\w", alerts[0])
     for name in spots:
         assert f"taken by {name}, which stands there" in alerts[0]
     assert "none of them can go on by itself" in alerts[0]

@@ -105,6 +105,12 @@ def test_roles_offer_what_happens_when_what_fills_them_is_lost() -> None:
     assert not [each for each in of_team if each.get("label") == "onLoss"]
 
 
+def test_roles_offer_until_when_the_run_keeps_what_fills_them() -> None:
+    keep = field(made()["area_survey"], "keep")
+    assert keep["binding"]["name"] == "m2pem:keep:team"
+    assert values(keep) == ["", "process", "subprocess", "task"]
+
+
 def test_parameters_say_units_bounds_and_defaults() -> None:
     templates = made()
     distance = field(templates["reverse"], "distance")

@@ -11,6 +11,7 @@ from m2pem.engine.state import (
     DataStores,
     Incident,
     Join,
+    Keeping,
     KeptMessage,
     Loop,
     LostWork,
@@ -35,6 +36,7 @@ _OBJECTS = (
     Prompt,
     Incident,
     Service,
+    Keeping,
     CompletedActivity,
     Compensation,
 )
@@ -46,7 +48,8 @@ def snapshot(state: RunState) -> dict[str, Any]:
     held: list[object] = [state.root] if state.root is not None else []
     for kept in (state.scopes, state.tokens, state.waits, state.behaviors):
         held.extend(kept.values())
-    for also in (state.allocations, state.prompts, state.services, state.incidents):
+    objects = (state.allocations, state.prompts, state.services, state.incidents, state.kept)
+    for also in objects:
         held.extend(also.values())
     for each in held:
         if isinstance(each, Scope):  # grows while it is walked

@@ -357,8 +357,8 @@ def test_runs_that_wait_for_each_other_are_told_and_one_can_be_stopped(play):
     alerts, took_us, status = play(story, "ugv1", "ugv2")
     assert [alert.code for alert in alerts] == ["WAITING_CIRCLE"] * 2
     assert [alert.run for alert in alerts] == ["r1", "r2"]
-    assert "r1 waits at Need for ugv2 (r2.b1)" in alerts[0].text
-    assert "r2 waits at Need for ugv1 (r1.b1)" in alerts[0].text
+    assert "Need of r1 (mission) waits for ugv2 (held by Hold of r2 (mission))" in alerts[0].text
+    assert "Need of r2 (mission) waits for ugv1 (held by Hold of r1 (mission))" in alerts[0].text
     assert "`m2pem stop r2`" in alerts[0].text
     assert took_us < 1_000_000
     assert status is RunStatus.TERMINATED

@@ -254,3 +254,21 @@ def test_forks_one_after_the_other_are_looked_at_by_themselves() -> None:
     read = mission("\n".join((ends, *blocks, *chain)))
     fleet = with_vehicles(fleet_for(read), **{f"uav{n}": "red" for n in range(1, 51)})
     assert check_mission(read, fleet, offers_all) == []
+
+
+@pytest.mark.parametrize(("keep", "found"), [("process", ["X"]), ("task", []), ("", [])])
+def test_what_is_kept_between_tasks_counts_as_held(keep: str, found: list[str]) -> None:
+    kept = f"need:requires=vehicle.name=='uav1'{f';keep={keep}' if keep else ''}"
+    other = "need:requires=vehicle.name=='uav2'"
+    text = f"""
+    <startEvent id="s"/><parallelGateway id="f"/><endEvent id="e"/><endEvent id="e2"/>
+    <subProcess id="P"><startEvent id="ps"/>{task("A", kept)}{task("B", other)}<endEvent id="pe"/>
+      ps -> A -> B -> pe
+    </subProcess>
+    <userTask id="ask">ask on</userTask>{task("X", AIR)}
+    s -> f -> P -> e
+    f -> ask -> X -> e2
+    """
+    within = text.replace("keep=process", "keep=subprocess")
+    assert [each.element for each in shortages(within, 2)] == found
+    assert shortages(within, 3) == []

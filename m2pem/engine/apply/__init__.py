@@ -57,6 +57,8 @@ APPLIERS: dict[type, Callable[[RunState, Any], None]] = {
     r.BehaviorEnded: tasks.behavior_ended,
     r.WorkReassigned: tasks.work_reassigned,
     r.ResourceReturned: tasks.resource_returned,
+    r.ResourceKept: tasks.resource_kept,
+    r.KeepingEnded: tasks.keeping_ended,
     r.PromptOpened: tasks.prompt_opened,
     r.PromptAnswered: tasks.prompt_ended,
     r.PromptWithdrawn: tasks.prompt_ended,

@@ -17,6 +17,7 @@ def run_started(state: RunState, record: r.RunStarted) -> None:
 def run_claimed(state: RunState, record: r.RunClaimed) -> None:
     state.epoch = record.epoch
     state.last_allocation += record.lost
+    state.last_keeping += record.lost
     state.last_behavior += record.lost
     state.last_prompt += record.lost
     state.last_service += record.lost
@@ -39,6 +40,7 @@ def run_ended(state: RunState, record: r.RunEnded) -> None:
     state.outcome = record.outcome
     state.detail = record.detail
     state.kept_messages.clear()
+    state.kept.clear()
     state.deferred.clear()
     state.yielded = ()
 

@@ -6,6 +6,7 @@ from m2pem.engine.state import (
     AllocationRequest,
     Behavior,
     BehaviorPhase,
+    Keeping,
     LostWork,
     OutOfReach,
     Prompt,
@@ -143,6 +144,23 @@ def _forget_behavior(state: RunState, behavior: Behavior) -> None:
     token = state.tokens.get(behavior.token)
     if token is not None and token.behavior == behavior.id:
         token.behavior = ""
+
+
+def resource_kept(state: RunState, record: r.ResourceKept) -> None:
+    state.last_keeping += 1
+    state.kept[record.resource] = Keeping(
+        record.keeping,
+        record.token,
+        record.element,
+        record.role,
+        record.resource,
+        state.scopes[record.until],
+        record.priority,
+    )
+
+
+def keeping_ended(state: RunState, record: r.KeepingEnded) -> None:
+    del state.kept[record.resource]
 
 
 def prompt_opened(state: RunState, record: r.PromptOpened) -> None:

@@ -12,6 +12,7 @@ from m2pem.engine import records as r
 from m2pem.engine.arming import await_event, due_after
 from m2pem.engine.execution import Execution
 from m2pem.engine.incidents import incident_holding, open_incident
+from m2pem.engine.keeping import keep_resources, kept_for_others
 from m2pem.engine.records import Trigger
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, Token
 from m2pem.engine.throwing import throw_error
@@ -65,7 +66,7 @@ def resources_chosen(x: Execution, item: i.ResourcesChosen) -> None:
         return
     token, behavior = request.token, behavior_of(request)
     resources = tuple(dict.fromkeys(each for chosen in item.roles.values() for each in chosen))
-    if refusal := refusal_of(x, resources):
+    if refusal := refusal_of(x, token, resources):
         x.emit(r.AllocationDelayed(request.id, refusal, {}, again=True))
         return
     x.emit(
@@ -106,14 +107,16 @@ def behavior_of(request: AllocationRequest) -> Behavior:
     return node.behavior
 
 
-def refusal_of(x: Execution, resources: Sequence[str]) -> str:
-    """Return why a behavior cannot have resources: an operator, an incident or another behavior of
-    the run has one; "" if it can."""
+def refusal_of(x: Execution, token: Token, resources: Sequence[str]) -> str:
+    """Return why the behavior of a task cannot have resources: an operator, an incident or another
+    behavior of the run has one, or it is kept for other tasks; "" if it can."""
     for resource in resources:
         if incident := incident_holding(x.state, resource):
             return f"{resource} is held for incident {incident}"
         if resource in x.state.taken:
             return f"{resource} is with {x.state.taken[resource]}"
+        if why := kept_for_others(x.state, token, resource):
+            return why
         for holder in x.state.held.get(resource, ()):
             held_by = x.state.behaviors[holder]
             if held_by.phase is not BehaviorPhase.CANCELLING:
@@ -150,6 +153,7 @@ def emit_behavior(
             allocation,
         )
     )
+    keep_resources(x, token, behavior, roles)
 
 
 def resources_not_free(x: Execution, item: i.ResourcesNotFree) -> None:

@@ -25,6 +25,7 @@ from m2pem.engine.elements.allocations import (
 )
 from m2pem.engine.elements.losses import end_work, what_is_done
 from m2pem.engine.execution import Execution
+from m2pem.engine.keeping import end_keeping
 from m2pem.engine.records import RunOutcome, Trigger
 from m2pem.engine.scopes import end_run
 from m2pem.engine.state import Behavior, BehaviorPhase, RunState, Token
@@ -74,7 +75,7 @@ def request_behavior(x: Execution, token: Token, behavior: BehaviorOfTask) -> No
         return
     if not allocation.resources:
         throw_error(x, token, UNAVAILABLE, f"no resource is allocated to {behavior.name}")
-    elif refusal := refusal_of(x, allocation.resources):
+    elif refusal := refusal_of(x, token, allocation.resources):
         throw_error(x, token, UNAVAILABLE, refusal)
     elif may_wait_for_space(x.fleet, behavior.type, behavior.name, allocation.resources):
         request_allocation(x, token, behavior, parameters)
@@ -92,7 +93,7 @@ def _request_with_replacements(
     """Request a behavior that starts again with the resources that an operator has chosen. The
     roles of which the operator said nothing are filled as at the start of the task."""
     resources = tuple(dict.fromkeys(each for chosen in roles.values() for each in chosen))
-    if refusal := refusal_of(x, resources):
+    if refusal := refusal_of(x, token, resources):
         throw_error(x, token, UNAVAILABLE, refusal)
         return
     if any(role.name not in roles and not role.resource for role in behavior.roles):
@@ -328,9 +329,14 @@ def fail_behavior(x: Execution, behavior: Behavior, code: str, reason: str, reso
 
 
 def behavior_preempted(x: Execution, item: i.BehaviorPreempted) -> None:
-    """End a behavior with PREEMPTED: a task with a greater priority gets one of its resources."""
+    """End a behavior with PREEMPTED, and the keeping of the resource: a task with a greater
+    priority gets it."""
+    kept = item.resource in x.state.kept
+    end_keeping(x, item.resource, item.reason)
     behavior = x.state.behaviors.get(item.behavior)
     if behavior is None or behavior.phase is not BehaviorPhase.ACTIVE:
+        if kept:
+            return
         x.ignore(f"{item.behavior} is not active: {item.by} need not take {item.resource} from it")
         return
     fail_behavior(x, behavior, PREEMPTED, item.reason, item.resource)

@@ -13,6 +13,7 @@ from m2pem.engine import records as r
 from m2pem.engine.elements.allocations import request_allocation
 from m2pem.engine.execution import Execution
 from m2pem.engine.incidents import behavior_at, open_incident
+from m2pem.engine.keeping import end_keeping
 from m2pem.engine.state import Behavior, RunStatus, Token
 from m2pem.engine.throwing import throw_error
 from m2pem.mission.behavior import BehaviorType, OnLoss
@@ -62,6 +63,9 @@ def end_work(
     if asks:
         open_incident(x, token, code, reason, behavior)
     else:
+        if is_excluded(code):
+            for resource in resources:
+                end_keeping(x, resource, f"{code}: another does the rest")
         request_allocation(x, token, task, parameters)
 
 

@@ -170,6 +170,30 @@ class ResourceReturned(BaseRecord, frozen=True):
     reason: str = ""
 
 
+class ResourceKept(BaseRecord, frozen=True):
+    """The run keeps a resource of a task until the scope `until` ends: only tasks in that scope get
+    it, also between tasks. `keeping`: the id of that. `role`: which says so. `priority`: that of
+    the task; in a fleet with preemption, a task of another run with a greater one may take it."""
+
+    token: int
+    process: str
+    element: str
+    scope: int
+    keeping: str
+    role: str
+    resource: str
+    until: int
+    priority: int = 0
+
+
+class KeepingEnded(BaseRecord, frozen=True):
+    """The run keeps a resource no more: the scope has ended, or the reason says why."""
+
+    keeping: str
+    resource: str
+    reason: str = ""
+
+
 class PromptOpened(BaseRecord, frozen=True):
     """A prompt is open. `behavior`: the behavior that a recovery prompt is about."""
 

@@ -30,6 +30,8 @@ LOGGED = frozenset(
         r.BehaviorEnded,
         r.WorkReassigned,
         r.ResourceReturned,
+        r.ResourceKept,
+        r.KeepingEnded,
         r.PromptOpened,
         r.PromptAnswered,
         r.PromptWithdrawn,

@@ -331,6 +331,10 @@ export const strings = {
           label: "When it is lost",
           hint: "reassign: another one does the rest. ask: an operator decides. Else it fails.",
         },
+        keep: {
+          label: "Keep it until the end of the",
+          hint: "process or subprocess: no other run gets it between tasks. task: no longer.",
+        },
       },
     },
     service: {

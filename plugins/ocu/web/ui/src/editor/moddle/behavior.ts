@@ -22,10 +22,11 @@ export const NEEDS = [
   "wait",
   "priority",
   "onLoss",
+  "keep",
 ] as const;
 
 /** Those that a role which names its resource may have, too. */
-export const WAITS: readonly NeedName[] = ["wait", "priority", "onLoss"];
+export const WAITS: readonly NeedName[] = ["wait", "priority", "onLoss", "keep"];
 
 export type NeedName = (typeof NEEDS)[number];
 

@@ -83,10 +83,10 @@ describe("behaviors", () => {
       '<m2pem:role name="surveyor" requires="vehicle.battery &#62; 0.4" count="2" store="s"' +
         ' wait="PT10M" priority="1" onLoss="reassign" />',
     );
-    const named = { ...read_!, resource: "uav1", need: { wait: "PT1M" } };
+    const named = { ...read_!, resource: "uav1", need: { wait: "PT1M", keep: "process" } };
     apply(setBehavior(factory, element, { ...use, roles: [named] }));
     expect(await written(definitions)).toContain(
-      '<m2pem:role name="surveyor" vehicle="uav1" wait="PT1M" />',
+      '<m2pem:role name="surveyor" vehicle="uav1" wait="PT1M" keep="process" />',
     );
   });
 
