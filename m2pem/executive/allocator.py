@@ -226,12 +226,12 @@ class Allocator:
                     self._refuse_space(each, refusal)
         left = [each for each in waiting if each.request.id not in chosen]
         lacking = [each for each in left if each.request.id not in refusals]
-        for each, refusal in self._preempt(lacking, set(given)):
-            if refusal is not None and refusal.wait_s is not None:
-                refusals[each.request.id] = refusal
-                self._refuse_space(each, refusal)
+        for each, why in self._preempt(lacking, set(given)):
+            if why is not None and why.wait_s is not None:
+                refusals[each.request.id] = why
+                self._refuse_space(each, why)
             else:
-                self._refuse(each, given, evaluator, refusal)
+                self._refuse(each, given, evaluator, why)
         self._circles.look(left, refusals)
 
     def _assign(

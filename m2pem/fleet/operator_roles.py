@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.elements import Element, UserTask
+from m2pem.mission.elements import Activity, Process, UserTask
 from m2pem.mission.mission import Mission
 from m2pem.suggestions import suggest
 
@@ -46,7 +46,9 @@ def check_operator_roles(mission: Mission, fleet: Fleet) -> Iterator[Finding]:
             yield _unknown(mission, fleet, task, "role", role)
 
 
-def _unknown(mission: Mission, fleet: Fleet, element: Element, key: str, role: str) -> Finding:
+def _unknown(
+    mission: Mission, fleet: Fleet, element: Process | Activity, key: str, role: str
+) -> Finding:
     return Finding(
         Severity.ERROR,
         mission.file_of(element),
