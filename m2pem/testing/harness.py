@@ -41,12 +41,14 @@ async def run_executive(
     simulated: bool = False,
     arbiters: Factories | None = None,
     services: Factories | None = None,
+    serves_schedule: bool = False,
 ) -> AsyncIterator[MissionControl]:
     """Run an executive with a journal in memory; at the end all runs are stopped.
 
     `clock`: a wall clock of `speed`, unless one is given. `simulated`: the simulated arbiter
     replaces every arbiter. `arbiters`, `services`: factories by name, beside those of the installed
-    plugins, so that a tested plugin need not be installed.
+    plugins, so that a tested plugin need not be installed. `serves_schedule`: it starts scheduled
+    missions.
 
     Raises:
         PluginError: the fleet names an arbiter that no plugin offers, or one cannot connect.
@@ -59,6 +61,9 @@ async def run_executive(
         speed=speed,
     )
     async with executive:
+        if serves_schedule:
+            await executive.load_schedule()
+            executive.serve_schedule()
         yield executive.control
 
 

@@ -3,7 +3,6 @@
 Each function raises `M2pemError` if the request is refused; its text is then the answer.
 """
 
-import re
 from typing import Any
 
 import msgspec
@@ -24,28 +23,24 @@ EXAMPLES = {
     "signal": "the UUID or the name of a signal of the mission",
     "message_id": "the id of a message of the mission",
     "vehicle": "evsg1 or evsg2/ptz",
+    "entry": "s1",
 }
 """What a request may say in fields that it must fill."""
 
 ALL_RUNS = "all"
 
-SCHEDULE = "schedule"
-"""In place of a run: the whole schedule. An entry of it (s1) may take its place, too."""
-
-_ENTRY = re.compile(r"s[1-9][0-9]{0,16}")
-
 
 async def carry_out(
     control: MissionControl, operation_name: str, request: Any, **parameters: Any
-) -> None:
-    """Call an operation. `parameters`: those that have been read already."""
+) -> Any:
+    """Call an operation; returns its result. `parameters`: those that have been read already."""
     operation = OPERATIONS[operation_name]
     for parameter in msgspec.structs.fields(operation.parameters):
         if parameter.name not in parameters:
             field = FIELDS.get(parameter.name, parameter.name)
             value = _read(field, getattr(request, field), is_required=parameter.required)
             parameters[parameter.name] = value
-    await operation.call(control, operation.parameters(**parameters))
+    return await operation.call(control, operation.parameters(**parameters))
 
 
 def _read(field: str, sent: Any, *, is_required: bool) -> Any:
@@ -67,31 +62,39 @@ def _optional(sent: str, field: str) -> str | None:
 
 
 async def control_run(control: MissionControl, request: Any, _: Any) -> None:
-    """Pause or resume a run, or hold or release the schedule; `stop_run` stops a run."""
+    """Pause or resume a run; `stop_run` stops one."""
     verbs = srv.ControlRun.Request
     operation = {verbs.PAUSE: "pause", verbs.RESUME: "resume"}.get(request.verb)
-    if request.run == SCHEDULE or _ENTRY.fullmatch(request.run):
-        operation = {verbs.PAUSE: "hold_schedule", verbs.RESUME: "release_schedule"}.get(
-            request.verb
-        )
     if operation is None:
         raise OperatorError(
             f"verb {request.verb} is not known; give one of: STOP ({verbs.STOP}), "
             f"PAUSE ({verbs.PAUSE}), RESUME ({verbs.RESUME})"
         )
-    if operation in ("hold_schedule", "release_schedule"):
-        entry = None if request.run == SCHEDULE else request.run
-        await carry_out(control, operation, request, entry=entry)
-        return
     await carry_out(control, operation, request)
 
 
 async def stop_run(control: MissionControl, request: Any, _: Any) -> None:
-    """Stop a run, or all of them, or cancel an entry of the schedule: a ControlRun request."""
-    if _ENTRY.fullmatch(request.run):
-        await carry_out(control, "unschedule", request, entry=request.run)
-        return
+    """Stop a run, or all of them: a ControlRun request."""
     await carry_out(control, "stop_all" if request.run == ALL_RUNS else "stop", request)
+
+
+async def control_schedule(control: MissionControl, request: Any, response: Any) -> None:
+    """Hold, release, cancel or start an entry of the schedule, or hold or release all of it."""
+    verbs = srv.ControlSchedule.Request
+    match request.verb:
+        case verbs.HOLD:
+            await carry_out(control, "hold_schedule", request)
+        case verbs.RELEASE:
+            await carry_out(control, "release_schedule", request)
+        case verbs.CANCEL:
+            await carry_out(control, "unschedule", request)
+        case verbs.START:
+            response.run = await carry_out(control, "start_scheduled", request)
+        case _:
+            raise OperatorError(
+                f"verb {request.verb} is not known; give one of: HOLD ({verbs.HOLD}), RELEASE "
+                f"({verbs.RELEASE}), CANCEL ({verbs.CANCEL}), START ({verbs.START})"
+            )
 
 
 async def set_route(control: MissionControl, request: Any, _: Any) -> None:

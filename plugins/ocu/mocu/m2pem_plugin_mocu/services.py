@@ -10,6 +10,7 @@ from m2pem_plugin_ros import RosRuntime
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError, OperatorError
 from m2pem_plugin_mocu import incidents, messages, requests
+from m2pem_plugin_mocu.schedule import list_schedule
 from m2pem_plugin_mocu.starting import start_mission
 from m2pem_plugin_mocu.texts import sendable
 from m2pem_plugin_mocu.topics import Topics
@@ -65,7 +66,9 @@ class Services:
         self.limits: dict[str, ConcurrencyLimit] = {}
         self._offer(srv.StartMission, "start_mission", start_mission, STARTING)
         self._offer(srv.ListRuns, "list_runs", self._list_runs, LISTING)
-        self._offer_control()
+        self._offer_stopping("control_run", srv.ControlRun, requests.control_run)
+        self._offer_stopping("control_schedule", srv.ControlSchedule, requests.control_schedule)
+        self._offer(srv.ListSchedule, "list_schedule", list_schedule, LISTING)
         for service_type, name, handler in (
             (srv.SendSignal, "send_signal", _operation("signal")),
             (srv.SendMessage, "send_message", _operation("message")),
@@ -86,16 +89,22 @@ class Services:
 
         self._ros.serve(service_type, name, serve)
 
-    def _offer_control(self) -> None:
-        limit = self.limits["control_run"] = ConcurrencyLimit(SEVERAL)
-        stop = self.limits["stop"] = ConcurrencyLimit(STOPPING)
+    def _offer_stopping(self, name: str, service_type: Any, handler: Handler) -> None:
+        """Offer a service with verbs; those that only end or hold something have more places."""
+        limit = self.limits[name] = ConcurrencyLimit(SEVERAL)
+        stop = self.limits.setdefault("stop", ConcurrencyLimit(STOPPING))
 
         async def serve(request: Any, response: Any) -> Any:
-            if request.verb == srv.ControlRun.Request.STOP:
+            verbs = type(request)
+            if service_type is srv.ControlRun and request.verb == verbs.STOP:
                 return await self._handle(stop, requests.stop_run, request, response)
-            return await self._handle(limit, requests.control_run, request, response)
+            holds = service_type is srv.ControlSchedule and request.verb in (
+                verbs.HOLD,
+                verbs.CANCEL,
+            )
+            return await self._handle(stop if holds else limit, handler, request, response)
 
-        self._ros.serve(srv.ControlRun, "control_run", serve)
+        self._ros.serve(service_type, name, serve)
 
     async def _handle(
         self, limit: ConcurrencyLimit, handler: Handler, request: Any, response: Any

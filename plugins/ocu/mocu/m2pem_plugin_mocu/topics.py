@@ -29,6 +29,7 @@ from m2pem.api import records as r
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import incidents, messages
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
+from m2pem_plugin_mocu.schedule import ScheduleTopics
 
 PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -75,6 +76,7 @@ class Topics(Listener):
         self._status = publisher(msg.MissionStatus, "status", qos.STATUS)
         self._active = publisher(msg.ActiveElements, "active_elements", qos.STATUS)
         self._events = publisher(msg.MissionEvent, "events", qos.EVENTS)
+        self.schedule = ScheduleTopics(ros, control, now_us)
         self._waiting: deque[tuple[RunView, StampedRecord, int]] = deque()
         self._some_wait = asyncio.Event()
         self.left_out = 0
@@ -93,6 +95,7 @@ class Topics(Listener):
             for throttle in (self._prompts_throttle, self._status_throttle, self._active_throttle):
                 group.create_task(throttle.run())
             group.create_task(self._send_events())
+            group.create_task(self.schedule.run())
 
     async def flush(self) -> None:
         """Publish the last state, and give clients the time to receive it."""
@@ -180,6 +183,10 @@ class Topics(Listener):
             messages.closed_prompt(prompt, closed.decision, closed.by, now_us())
         )
         self._prompts_throttle.mark_changed()
+
+    def schedule_changed(self) -> None:
+        """Publish the schedule soon."""
+        self.schedule.mark_changed()
 
     def alerted(self, alert: Alert) -> None:
         """Log it in ROS, whose topic `/rosout` operators read."""

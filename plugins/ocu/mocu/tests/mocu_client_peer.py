@@ -33,6 +33,9 @@ TOPICS = {
     "events": (msg.MissionEvent, QoSProfile(depth=1000)),
     "payloads": (msg.PayloadStatuses, LATCHED),
     "teams": (msg.TeamStatuses, LATCHED),
+    "schedule": (msg.Schedule, LATCHED),
+    "schedule_events": (msg.ScheduleEvent, QoSProfile(depth=100)),
+    "shared_spaces": (msg.SharedSpaces, LATCHED),
     "footprints/ugv2/camera": (PolygonStamped, LATCHED),
 }
 

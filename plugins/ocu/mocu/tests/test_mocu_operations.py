@@ -15,6 +15,7 @@ from m2pem.api import OPERATIONS, MissionControl
 POINT = msg.GeoPoint(latitude_deg=51.0, longitude_deg=7.0, altitude_m=2.0)
 DATA = [msg.KeyValue(key="a", value="1")]
 CONTROL = srv.ControlRun.Request
+SCHEDULE = srv.ControlSchedule.Request
 
 COMMANDS: dict[str, tuple[str, dict[str, Any]]] = {
     "answer": ("answer_prompt", {"run": "r1", "prompt": "p1", "decision": "go"}),
@@ -24,9 +25,13 @@ COMMANDS: dict[str, tuple[str, dict[str, Any]]] = {
     "stop_all": ("control_run", {"verb": CONTROL.STOP, "run": "all", "reason": "rain"}),
     "pause": ("control_run", {"verb": CONTROL.PAUSE, "run": "r1"}),
     "resume": ("control_run", {"verb": CONTROL.RESUME, "run": "r1"}),
-    "unschedule": ("control_run", {"verb": CONTROL.STOP, "run": "s1"}),
-    "hold_schedule": ("control_run", {"verb": CONTROL.PAUSE, "run": "s1", "reason": "rain"}),
-    "release_schedule": ("control_run", {"verb": CONTROL.RESUME, "run": "s1"}),
+    "unschedule": ("control_schedule", {"verb": SCHEDULE.CANCEL, "entry": "s1"}),
+    "start_scheduled": ("control_schedule", {"verb": SCHEDULE.START, "entry": "s1"}),
+    "hold_schedule": (
+        "control_schedule",
+        {"verb": SCHEDULE.HOLD, "entry": "s1", "reason": "rain"},
+    ),
+    "release_schedule": ("control_schedule", {"verb": SCHEDULE.RELEASE, "entry": "s1"}),
     "set_geometry": ("set_waypoints", {"name": "gate", "waypoints": [POINT], "run": "r1"}),
     "take": ("take_vehicle", {"vehicle": "ugv1/camera"}),
     "give_back": ("give_back_vehicle", {"vehicle": "ugv1/camera"}),
@@ -53,6 +58,7 @@ SENT = {
 
 SERVED_OTHERWISE = {
     "start": "service start_mission brings the BPMN, or names a file of the executive's machine",
+    "scheduled": "service list_schedule, and topic schedule",
     "runs": "service list_runs, and topic status",
     "mission_time_s": "a field of the runs of list_runs and of topic status",
     "prompts": "topic prompts",
@@ -67,8 +73,6 @@ NOT_SERVED = {
     "preview_incident": "answer_prompt refuses a choice after which the mission cannot complete",
     "check": "start_mission answers with the findings",
     "schedule": "the command line and the page schedule missions",
-    "scheduled": "m2pem schedule and the page list them",
-    "start_scheduled": "m2pem schedule and the page start them",
     "missions": "start_mission names a file, or brings one",
     "preview_start": "start_mission answers with what speaks against the start",
     "preview_take": "no message has its effects",
@@ -99,7 +103,7 @@ async def test_a_service_passes_every_parameter_of_its_operation(operation: str)
         services[name] = service_type, handler
 
     control = Mock(spec=MissionControl, mission_time_s=AsyncMock())
-    method = AsyncMock(spec=getattr(MissionControl, operation))
+    method = AsyncMock(spec=getattr(MissionControl, operation), return_value="r1")
     setattr(control, operation, method)
     Services(SimpleNamespace(serve=serve), control, Mock())
     name, fields = COMMANDS[operation]
@@ -114,7 +118,7 @@ async def test_a_service_passes_every_parameter_of_its_operation(operation: str)
 
 @pytest.mark.parametrize(
     ("verb", "operation"),
-    [(CONTROL.PAUSE, "hold_schedule"), (CONTROL.RESUME, "release_schedule")],
+    [(SCHEDULE.HOLD, "hold_schedule"), (SCHEDULE.RELEASE, "release_schedule")],
 )
 async def test_the_whole_schedule_is_held_and_released(verb: int, operation: str) -> None:
     services: dict[str, tuple[Any, Callable[[Any, Any], Awaitable[Any]]]] = {}
@@ -125,8 +129,8 @@ async def test_the_whole_schedule_is_held_and_released(verb: int, operation: str
     method = AsyncMock(spec=getattr(MissionControl, operation))
     control = Mock(spec=MissionControl, **{operation: method})
     Services(SimpleNamespace(serve=serve), control, Mock())
-    service_type, handler = services["control_run"]
-    request = service_type.Request(verb=verb, run="schedule", by="anna")
+    service_type, handler = services["control_schedule"]
+    request = service_type.Request(verb=verb, by="anna")
     response = await handler(request, service_type.Response())
     assert response.success, response.message
     assert method.call_args.kwargs["entry"] is None
