@@ -61,7 +61,8 @@ async def field(desk: Desk) -> AsyncIterator[Field]:
         origin = f"http://127.0.0.1:{proxy.port}"
         # The cookie of the session is valid at all ports of a host; its key is kept by each page.
         page = await desk.watched.context.new_page()
-        await forget(desk.watched.context, page, origin, desk.key)
+        await page.goto(f"{origin}/healthz")
+        await forget(page, origin, desk.key)
         yield Field(proxy, page, origin)
         await page.close()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from playwright.async_api import Browser, Page, expect
+from playwright.async_api import Browser, Page, ViewportSize, expect
 from web_browsing import page_at
 from web_desk import IN_ONE_LOOP, Desk
 from web_drawing import Drawing, new_mission
@@ -35,9 +35,12 @@ NAME = "vignette1"
 PROCESS = "{http://www.omg.org/spec/BPMN/20100524/MODEL}process"
 FASTER = ("--simulate", "--speed", "5", "--journal", "memory:")
 PROBLEMS = ".m2-problems-head p"
+ROOM: ViewportSize = {"width": 1440, "height": 900}
+"""For a whole diagram beside the form, as wide as it is drawn here."""
 
 
 async def test_a_process_is_drawn_with_the_mouse(desk: Desk) -> None:
+    await desk.page.set_viewport_size(ROOM)
     drawing = await new_mission(await desk.home(), "drawn")
     await draw_main(drawing)
     await drawing.save()
@@ -57,7 +60,7 @@ async def test_vignette1_is_drawn_from_an_empty_page_and_lives_its_whole_life(
 ) -> None:
     fleet = fleet_with_mine(tmp_path)
     with served(tmp_path, fleet=fleet, words=FASTER) as executive:
-        async with page_at(chromium, executive.url) as it:
+        async with page_at(chromium, executive.url, **ROOM) as it:
             page = it.page
             drawing = await begin(page)
             mission = await draw(drawing)

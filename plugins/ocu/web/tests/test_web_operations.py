@@ -112,6 +112,7 @@ def control() -> Mock:
     control = Mock(spec=MissionControl)
     for name in COMMANDS:
         setattr(control, name, AsyncMock(spec=getattr(MissionControl, name), return_value=[]))
+    control.start_scheduled.return_value = "r1"
     control.waiting = AsyncMock(return_value=[])
     entry = ScheduledMission(SENT["entry"], "M", "P", When(), "", ScheduledStatus.SCHEDULED)
     control.scheduled = AsyncMock(return_value=Schedule((entry,)))

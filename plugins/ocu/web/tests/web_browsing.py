@@ -95,8 +95,8 @@ async def page_at(
     started: Browser,
     url: str,
     *,
-    width: int = 1440,
-    height: int = 900,
+    width: int = 1280,
+    height: int = 720,
     dark: bool = False,
 ) -> AsyncIterator[Watched]:
     """A page of its own profile, so of its own operator, at an address."""

@@ -19,7 +19,7 @@ import pytest
 import pytest_asyncio
 from m2pem_plugin_web.access.roles import Role
 from m2pem_plugin_web.access.users import User, write_users
-from playwright.async_api import Browser, BrowserContext, Locator, Page, expect
+from playwright.async_api import Browser, Locator, Page, expect
 from web_browsing import SIGN_IN, TIMEOUT_MS, Watched, browser, page_at
 from web_running import answer
 from web_served import REPOSITORY, Served, served
@@ -170,13 +170,12 @@ async def profile(chromium: Browser, executive: Served) -> AsyncIterator[Desk]:
         yield first
 
 
-async def forget(context: BrowserContext, page: Page, origin: str, key: str) -> None:
-    """Remove what pages have stored, but for the key of the session."""
-    session = await context.new_cdp_session(page)
+async def forget(page: Page, origin: str, key: str) -> None:
+    """Remove what pages of an origin, as `page` is, have stored, but for the key of the session."""
+    session = await page.context.new_cdp_session(page)
     stored = {"origin": origin, "storageTypes": "indexeddb,local_storage"}
     await session.send("Storage.clearDataForOrigin", stored)
     await session.detach()
-    await page.goto(f"{origin}/healthz")
     await page.evaluate("key => localStorage.setItem('m2pem.key', JSON.stringify(key))", key)
 
 
@@ -187,9 +186,9 @@ async def desk(request: pytest.FixtureRequest, profile: Desk) -> AsyncIterator[D
     shutil.rmtree(executive.missions)
     shutil.copytree(REPOSITORY / "missions", executive.missions)
     dark = "callspec" in dir(request.node) and request.node.callspec.params.get("dark", False)
+    await forget(profile.page, executive.origin, profile.key)
     page = await context.new_page()
     await page.emulate_media(color_scheme="dark" if dark else "light")
-    await forget(context, page, executive.origin, profile.key)
     watched = Watched(page, context)
     watched.listen(page)
     here = Desk(executive, watched, profile.key)
