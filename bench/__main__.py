@@ -7,7 +7,18 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from bench.engines import M2PEM, REPOSITORY, Engine, Figure, graph, measure, own, peers, play
+from bench.engines import (
+    M2PEM,
+    REPOSITORY,
+    Engine,
+    Figure,
+    graph,
+    measure,
+    own,
+    peers,
+    play,
+    play_once,
+)
 from bench.figures import Figures, OtherError, kept
 from bench.machine import machine
 from bench.plots import plot
@@ -100,22 +111,23 @@ def quick(others: Sequence[Engine], works: Sequence[Work], programs: Sequence[Pr
     for name in {"SpiffWorkflow", "bpmn-elements", "bpmn-engine"} - names if works else ():
         print(f"bench: {name} is not installed, and left out")
 
-    engines = [each for each in others if not each.name.endswith(STOCK)]
-    engines += [own(), own("memory"), own("sqlite")]
-
-    def look(job: tuple[Engine, str, int]) -> tuple[str, Figure]:
-        engine, work, size = job
-        return f"{engine.name}, {work}, {size}", play(engine, work, size, 1, enough_s=0.0)
-
-    jobs = [(engine, work.name, work.sizes[0]) for work in works for engine in engines]
+    smallest = [(work.name, work.sizes[0]) for work in works]
+    players = [[each] for each in others if not each.name.endswith(STOCK)]
+    players.append([own(), own("memory"), own("sqlite")])
+    players = players if works else []
     commands = {program.quick: _python(program) for program in programs}
     with ThreadPoolExecutor(2) as pool:
-        done = [*pool.map(look, jobs)]
-        done += pool.map(lambda each: (" ".join(each), measure(each, 1, commands[each])), commands)
-    for name, figure in done:
-        if figure.wrong:
-            print(f"bench: {name}: {figure.wrong}", file=sys.stderr)
-    return int(any(figure.wrong for _, figure in done))
+        played = pool.map(lambda each: play_once(each, smallest), players)
+        figures = pool.map(lambda each: measure(each, 1, commands[each]), commands)
+        wrong = {each[0].name: said for each, said in zip(players, played, strict=True) if said}
+        wrong |= {
+            " ".join(command): figure.wrong
+            for command, figure in zip(commands, figures, strict=True)
+            if figure.wrong
+        }
+    for name, said in wrong.items():
+        print(f"bench: {name}: {said}", file=sys.stderr)
+    return bool(wrong)
 
 
 def measure_all(

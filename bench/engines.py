@@ -71,16 +71,15 @@ def graph(work: str, size: int) -> Graph:
     return GRAPHS[work](size)
 
 
-def play(engine: Engine, work: str, size: int, runs: int, **more: float) -> Figure:
-    """An engine on a graph; `more` is for its order."""
+def play(engine: Engine, work: str, size: int, runs: int) -> Figure:
+    """An engine on a graph."""
     limit_s = OWN_LIMIT_S if engine.name == M2PEM else PEER_LIMIT_S
     made = graph(work, size)
-    order = {"xml": made.xml.decode(), "given": made.given, "instances": made.instances}
-    text = json.dumps({**order, **engine.order, **more})
+    text = _order(engine, made)
     answers = []
     try:
         for _ in range(runs):
-            answer = ask(engine.command, text, limit_s)
+            (answer,) = ask(engine.command, [text], limit_s)
             check(answer, made)
             answers.append(answer)
             if answer["cpu_s"] > LONG_S:
@@ -90,13 +89,38 @@ def play(engine: Engine, work: str, size: int, runs: int, **more: float) -> Figu
     return Figure(medians(answers, ("cpu_s", "wall_s", "parse_s", "peak_kb")), len(answers))
 
 
+def play_once(engines: Sequence[Engine], works: Sequence[tuple[str, int]]) -> str:
+    """Engines of the same command on graphs (work, size), all in one process; what went wrong.
+
+    No time is looked at. "": all is right.
+    """
+    (command,) = {engine.command for engine in engines}
+    jobs = [(engine, work) for engine in engines for work in works]
+    orders = [_order(engine, graph(*work), enough_s=0.0) for engine, work in jobs]
+    try:
+        answers = ask(command, orders, OWN_LIMIT_S)
+    except FailedError as failure:
+        return str(failure)
+    for (_, (work, size)), answer in zip(jobs, answers, strict=True):
+        try:
+            check(answer, graph(work, size))
+        except FailedError as failure:
+            return f"{work}, {size}: {failure}"
+    return ""
+
+
+def _order(engine: Engine, made: Graph, **more: float) -> str:
+    order = {"xml": made.xml.decode(), "given": made.given, "instances": made.instances}
+    return json.dumps({**order, **engine.order, **more})
+
+
 def measure(command: Sequence[str], runs: int, python: str = sys.executable) -> Figure:
     """One of m2pem's own programs, by that Python."""
     answers = []
     try:
         for _ in range(runs):
             program = [python, "-m", f"bench.programs.{command[0]}", *command[1:]]
-            answers.append(ask(program, "", OWN_LIMIT_S))
+            answers += ask(program, [""], OWN_LIMIT_S)
     except FailedError as failure:
         return Figure(wrong=str(failure))
     return Figure(medians(answers, tuple(answers[0])), len(answers))
@@ -111,8 +135,8 @@ def medians(answers: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str
     }
 
 
-def ask(command: Sequence[str], order: str, limit_s: float) -> dict[str, Any]:
-    """Run a program.
+def ask(command: Sequence[str], orders: Sequence[str], limit_s: float) -> list[dict[str, Any]]:
+    """Run a program, which has one line for each order; its answers, in order.
 
     Raises:
         FailedError: it took too long, or crashed.
@@ -120,7 +144,7 @@ def ask(command: Sequence[str], order: str, limit_s: float) -> dict[str, Any]:
     try:
         done = subprocess.run(
             command,
-            input=order,
+            input="".join(f"{order}\n" for order in orders),
             capture_output=True,
             text=True,
             check=False,
@@ -130,12 +154,11 @@ def ask(command: Sequence[str], order: str, limit_s: float) -> dict[str, Any]:
     except subprocess.TimeoutExpired:
         raise FailedError(f"no answer in {limit_s:g} s") from None
     lines = done.stdout.strip().splitlines()
-    if done.returncode or not lines:
+    if done.returncode or len(lines) < len(orders):
         words = done.stderr.strip().splitlines() or ["it ended without an answer or a word"]
         said = next((line for line in reversed(words) if "Error" in line), words[-1])
         raise FailedError(f"{said.strip()[:160]} (exit status {done.returncode})")
-    answer: dict[str, Any] = json.loads(lines[-1])
-    return answer
+    return [json.loads(line) for line in lines[-len(orders) :]]
 
 
 def check(answer: dict[str, Any], made: Graph) -> None:

@@ -1,4 +1,4 @@
-"""Plays a graph with m2pem's engine: the order as JSON on standard input, the answer as JSON.
+"""Plays graphs with m2pem's engine: each line of standard input is an order, its answer a line.
 
     {"xml": ..., "given": {"n": 0}, "instances": 1, "journal": "none"}
 
@@ -108,8 +108,13 @@ def entry(run: str, step: Step) -> Entry:
 
 
 def main() -> None:
-    """Play the order, and answer."""
-    order = json.load(sys.stdin)
+    """Play each order, and answer."""
+    for line in sys.stdin:
+        print(json.dumps(played(json.loads(line))), flush=True)
+
+
+def played(order: dict[str, Any]) -> dict[str, Any]:
+    """Play an order, and return the answer."""
     watch = Stopwatch()
     with watch:
         mission = parse_mission(order["xml"].encode(), "bench.bpmn")
@@ -127,7 +132,7 @@ def main() -> None:
             cpu_s, (wall_s, seen) = asyncio.run(play_into(journal, mission, order))
     different = [each for place, each in enumerate(seen) if each not in seen[:1] or not place]
     answer = {"parse_s": watch.cpu_s, "cpu_s": cpu_s, "wall_s": wall_s, "peak_kb": peak_kb()}
-    print(json.dumps({**answer, "outcomes": different, "instances": len(seen)}))
+    return {**answer, "outcomes": different, "instances": len(seen)}
 
 
 if __name__ == "__main__":

@@ -115,7 +115,7 @@ def _ros_command(journal: str, bound_ms: float | None) -> Program:
         Goal("cpu_percent", f"an executive with all that, ROS, {journal} journal, of a core", "%"),
     )
     command = ("ros_command", journal, "20", "500")
-    quick = ("ros_command", "sqlite", "3", "10")
+    quick = ("ros_command", "sqlite", "2", "3")
     return Program("20 vehicles, 10 messages/s each", command, quick, goals, ros=True)
 
 
@@ -130,7 +130,7 @@ def _team_orders(journal: str) -> Program:
         )
     ]
     command = ("team_orders", journal, "5", "5", "100")
-    quick = ("team_orders", "sqlite", "2", "2", "3")
+    quick = ("team_orders", "sqlite", "2", "2", "1")
     size = "5 ROS and 5 MAVLink members, 10 and 50 messages/s each"
     return Program(size, command, quick, tuple(goals), ros=True)
 
@@ -140,7 +140,7 @@ def _ros_discovery(count: int) -> Program:
         Goal("all_s", "ROS, from connect until all are heard", "s"),
         Goal("late_s", "ROS, from a vehicle's beginning to its first command", "s"),
     )
-    command, quick = ("ros_discovery", str(count)), ("ros_discovery", "2")
+    command, quick = ("ros_discovery", str(count)), ("ros_discovery", "1")
     return Program(f"{count} vehicle{'s' * (count > 1)}", command, quick, goals, ros=True)
 
 
@@ -198,7 +198,7 @@ PROGRAMS = (
     Program(
         "without the start-up",
         ("command_line", "32000", "16000", "5"),
-        ("command_line", "1000", "500", "1"),
+        ("command_line", "100", "50", "1"),
         (
             Goal("row_per_s", "m2pem run, 32,000 tasks in a row", "elements/s", 25_000, True),
             Goal("branches_per_s", "m2pem run, 16,000 branches", "elements/s", 15_000, True),
@@ -257,7 +257,7 @@ PROGRAMS = (
     Program(
         "302 elements, 10,000 token events/s or more, three browsers of which one never reads",
         ("web", "60"),
-        ("web", "1", "1"),
+        ("web", "0.3", "1"),
         (
             Goal("ratio", "an engine with the page, times its speed without", "", 0.95, True),
             Goal("per_s", "the page, token events, all of them counted", "/s"),
@@ -273,7 +273,7 @@ PROGRAMS = (
     Program(
         "The same, looked at in Chromium as well, which draws without a graphics card",
         ("web_page", "60"),
-        ("web_page", "2"),
+        ("web_page", "1"),
         (
             Goal("fps", "the page, pictures drawn", "/s", 25, at_least=True),
             Goal("told_per_s", "the page, frames told to it", "/s", 24, at_least=True),
@@ -288,7 +288,7 @@ PROGRAMS = (
     Program(
         "100 vehicles, odometry and status at 10 Hz, 30 s",
         ("ros_fleet", "100", "10", "30"),
-        ("ros_fleet", "5", "10", "1"),
+        ("ros_fleet", "2", "10", "0.5"),
         (
             Goal("states_per_s", "ROS, states that arrive on the fleet bus", "/s"),
             Goal("longest_s", "ROS, longest time without a state of the same vehicle", "s", 1),

@@ -1,11 +1,12 @@
 """A wrong result of an engine is seen, and said; `make bench-quick` runs the programs."""
 
+import json
 import sys
 from typing import Any
 
 import pytest
 
-from bench.engines import Engine, FailedError, Figure, ask, check, graph, play
+from bench.engines import Engine, FailedError, Figure, ask, check, graph, own, play, play_once
 from bench.plots import plot
 from bench.readme import BEGIN, END, rewritten
 from bench.table import table, wrongs
@@ -46,13 +47,30 @@ def test_a_wrong_result_is_a_failure(answer: dict[str, Any]) -> None:
 
 def test_a_hang_is_a_failure() -> None:
     with pytest.raises(FailedError, match=r"no answer in 0\.1 s"):
-        ask([sys.executable, "-c", "import signal; signal.pause()"], "", 0.1)
+        ask([sys.executable, "-c", "import signal; signal.pause()"], [""], 0.1)
 
 
 def test_a_crash_is_a_failure_in_its_own_words() -> None:
     crashing = Engine("peer", (sys.executable, "-c", "raise RecursionError('too deep')"))
     figure = play(crashing, "row", 100, 1)
     assert figure == Figure(wrong="RecursionError: too deep (exit status 1)")
+
+
+def test_engines_play_all_graphs_in_one_process() -> None:
+    smallest = [(work.name, work.sizes[0]) for work in WORK]
+    assert play_once([own(), own("memory")], smallest) == ""
+
+
+def test_a_wrong_result_among_several_is_a_failure() -> None:
+    answer = json.dumps({"instances": 1, "outcomes": [RIGHT]})
+    peer = Engine("peer", (sys.executable, "-c", f"print({answer!r}); print({answer!r})"))
+    assert play_once([peer], [("row", 100), ("row", 100)]) == ""
+    assert play_once([peer], [("row", 100), ("row", 99)]).startswith("row, 99: wrong: completed")
+
+
+def test_an_engine_that_leaves_a_graph_out_is_a_failure() -> None:
+    peer = Engine("peer", (sys.executable, "-c", "print('{}')"))
+    assert "without an answer" in play_once([peer], [("row", 100), ("loop", 100)])
 
 
 def test_the_table_has_ratios_and_what_failed() -> None:

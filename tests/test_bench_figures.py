@@ -2,6 +2,7 @@
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +28,16 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         asked.append(f"{engine.name} {work} {size}")
         return NEW
 
+    def play_once(engines: Sequence[Engine], works: Sequence[tuple[str, int]]) -> str:
+        asked.extend(f"{engine.name} {work} {size}" for engine in engines for work, size in works)
+        return ""
+
     def measure(command: tuple[str, ...], _: int, __: str) -> Figure:
         asked.append(" ".join(command))
         return NEW
 
     monkeypatch.setattr(bench, "play", play)
+    monkeypatch.setattr(bench, "play_once", play_once)
     monkeypatch.setattr(bench, "measure", measure)
     monkeypatch.setattr(bench, "machine", lambda *_: HERE)
     monkeypatch.setattr(bench, "peers", lambda *_: [PEER])

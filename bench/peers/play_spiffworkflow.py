@@ -74,6 +74,12 @@ def answer(order: dict[str, Any]) -> None:
     print(json.dumps({**figures, "outcomes": different, "instances": len(seen)}))
 
 
+def answer_all(orders: list[dict[str, Any]]) -> None:
+    """Play them one after the other."""
+    for order in orders:
+        answer(order)
+
+
 def peak_kb() -> int:
     """As in `bench.measured`."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
@@ -82,14 +88,14 @@ def peak_kb() -> int:
 
 def main() -> None:
     """With all the stack that there is, unless it is to run as installed."""
-    order = json.load(sys.stdin)
-    if order.get("stock"):
-        answer(order)
+    orders = [json.loads(line) for line in sys.stdin]
+    if orders[0].get("stock"):
+        answer_all(orders)
         return
     go_deeper()
     sys.setrecursionlimit(10_000_000)
     threading.stack_size(STACK_BYTES)
-    thread = threading.Thread(target=answer, args=(order,))
+    thread = threading.Thread(target=answer_all, args=(orders,))
     thread.start()
     thread.join()
 

@@ -65,7 +65,8 @@ class Vehicles(Peer):
         self, domain: int, count: int, rate_hz: float, first: int = 0, *, endless: bool = False
     ) -> None:
         arguments = [str(count), str(rate_hz), str(first), *["endless"] * endless]
-        super().__init__(VEHICLES, domain, arguments)
+        super().__init__(VEHICLES, domain, arguments, forked=False)  # what it imports is little
+        assert self.process.stdout is not None
         self.began_ns = int(self.process.stdout.readline())
         self._got: queue.SimpleQueue[Got] = queue.SimpleQueue()
 
@@ -82,6 +83,7 @@ class Vehicles(Peer):
         return self._got.get(timeout=PATIENCE_S)
 
     def _read(self) -> None:
+        assert self.process.stdout is not None
         with contextlib.suppress(ValueError):  # closed at the end
             for line in self.process.stdout:
                 number, verb, came_ns = map(int, line.split())

@@ -1,4 +1,4 @@
-"""One verification: the order as JSON on standard input, figures and a verdict as JSON.
+"""Verifies: each line of standard input is an order as JSON; figures and a verdict as JSON.
 
     {"how": "whole" | "reduced" | "spin", "xml": ...}
     {"how": ..., "xml": ..., "requirement": "<> completed(t0_2)"}
@@ -164,8 +164,13 @@ def answer(order: dict[str, Any], steps: Steps) -> tuple[int, str]:
 
 
 def main() -> None:
-    """Do the order until there is something to measure, and answer."""
-    order = json.load(sys.stdin)
+    """Do each order until there is something to measure, and answer."""
+    for line in sys.stdin:
+        print(json.dumps(measured(json.loads(line))), flush=True)
+
+
+def measured(order: dict[str, Any]) -> dict[str, Any]:
+    """Do an order until there is something to measure."""
     times: list[dict[str, float]] = []
     while True:
         steps = Steps()
@@ -181,7 +186,7 @@ def main() -> None:
         if spent > order.get("enough_s", ENOUGH_S) or len(times) >= MOST_TIMES:
             break
     figures = {name: median(each[name] for each in times) for name in times[0]}
-    print(json.dumps({**figures, "states": states, "peak_kb": peak_kb(), "verdict": verdict}))
+    return {**figures, "states": states, "peak_kb": peak_kb(), "verdict": verdict}
 
 
 if __name__ == "__main__":

@@ -5,9 +5,10 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from bench.engines import REPOSITORY, Engine
-from bench.verification.checkers import OWN, Found, look, own, peers, spin_is_here
+from bench.verification.checkers import OWN, Found, look, look_once, own, peers, spin_is_here
 from bench.verification.models import branches
 from bench.verification.works import (
     CASES,
@@ -76,36 +77,43 @@ def measure(machine: dict[str, str], done: Callable[[Verified], object]) -> Veri
 
 def quick() -> list[str]:
     """Each kind of work once, at its smallest; what went wrong."""
-    found = Verified({})
     subject = next(each for each in subjects() if each.bound_s)
-    found.missions[subject.file] = verify(subject, enough_s=0.0)
-    for shape, asked in {(case.shape, case.requirement) for case in CASES}:
-        case = Case(3, "reduced", shape, asked)
-        found.cases[case.name] = search(case, enough_s=0.0)
-    order = {"xml": branches(2, 2), "enough_s": 0.0}
-    for engine in own():
-        found.cases[engine.name] = look(engine, order, CASE_LIMIT_S, expected=EXPECTED, runs=1)
+    missions = _orders(subject)
+    kinds = dict.fromkeys((case.shape, case.requirement) for case in CASES)
+    cases = [Case(3, "reduced", shape, asked) for shape, asked in kinds]
+    orders = {case.name: _order(case) for case in cases}
+    orders |= {each.name: {"xml": branches(2, 2), **each.order} for each in own()}
+    expected = [*("" for _ in missions), *(EXPECTED for _ in orders)]
+    done = look_once([*missions.values(), *orders.values()], CASE_LIMIT_S, expected)
+    found = Verified({})
+    found.missions[subject.file] = dict(zip(missions, done[: len(missions)], strict=True))
+    found.cases = dict(zip(orders, done[len(missions) :], strict=True))
     return found.wrongs()
 
 
-def verify(subject: Subject, **more: float) -> dict[str, Found]:
+def verify(subject: Subject) -> dict[str, Found]:
     """A mission, with each engine that is installed."""
-    fleet = str(REPOSITORY / subject.fleet) if subject.fleet else None
-    order = {"file": str(REPOSITORY / subject.file), "fleet": fleet, **more}
-    engines = [BUILT_IN, "spin"] if spin_is_here() else [BUILT_IN]
     return {
-        name: look(Engine(name, OWN, {"how": name}), order, CASE_LIMIT_S, runs=1)
-        for name in engines
+        name: look(Engine(name, OWN), order, CASE_LIMIT_S, runs=1)
+        for name, order in _orders(subject).items()
     }
 
 
-def search(case: Case, **more: float) -> Found:
+def _orders(subject: Subject) -> dict[str, dict[str, Any]]:
+    fleet = str(REPOSITORY / subject.fleet) if subject.fleet else None
+    order = {"file": str(REPOSITORY / subject.file), "fleet": fleet}
+    engines = [BUILT_IN, "spin"] if spin_is_here() else [BUILT_IN]
+    return {name: {**order, "how": name} for name in engines}
+
+
+def search(case: Case) -> Found:
     """So many branches."""
-    order: dict[str, object] = {"xml": branches(case.count, TASKS, case.shape), **more}
-    if case.requirement:
-        order["requirement"] = case.requirement
-    engine = Engine(case.name, OWN, {"how": case.how})
-    return look(engine, order, CASE_LIMIT_S, expected=EXPECTED, runs=1)
+    return look(Engine(case.name, OWN), _order(case), CASE_LIMIT_S, expected=EXPECTED, runs=1)
+
+
+def _order(case: Case) -> dict[str, Any]:
+    order = {"how": case.how, "xml": branches(case.count, TASKS, case.shape)}
+    return {**order, "requirement": case.requirement} if case.requirement else order
 
 
 def overlapping() -> list[tuple[str, str]]:

@@ -1,5 +1,5 @@
-// Plays a graph of bench/ with bpmn-elements or bpmn-engine, named as the first argument: JSON on
-// standard input, JSON out, as bench/play_m2pem.py.
+// Plays graphs of bench/ with bpmn-elements or bpmn-engine, named as the first argument: each line
+// of standard input is an order as JSON, its answer a line, as of bench/play_m2pem.py.
 import { EventEmitter } from 'node:events';
 import { readFileSync } from 'node:fs';
 import BpmnModdle from 'bpmn-moddle';
@@ -9,7 +9,7 @@ import * as serializer from 'moddle-context-serializer';
 
 const ENOUGH_S = 0.3;
 const MOST_TIMES = 20;
-const order = JSON.parse(readFileSync(0, 'utf8'));
+let order;
 
 function cpuSeconds() {
   const { user, system } = process.cpuUsage();
@@ -89,27 +89,30 @@ async function all(context) {
   return [cpuSeconds() - began, outcomes];
 }
 
-const began = cpuSeconds();
-const context = await parse();
-const parse_s = cpuSeconds() - began;
-const times = [];
-let outcomes;
-let total = 0;
-const enough = order.enough_s ?? ENOUGH_S;
-while (!times.length || (total < enough && times.length < MOST_TIMES)) {
-  let spent;
-  [spent, outcomes] = await all(context);
-  times.push(spent);
-  total += spent;
+for (const line of readFileSync(0, 'utf8').trim().split('\n')) {
+  order = JSON.parse(line);
+  const began = cpuSeconds();
+  const context = await parse();
+  const parse_s = cpuSeconds() - began;
+  const times = [];
+  let outcomes;
+  let total = 0;
+  const enough = order.enough_s ?? ENOUGH_S;
+  while (!times.length || (total < enough && times.length < MOST_TIMES)) {
+    let spent;
+    [spent, outcomes] = await all(context);
+    times.push(spent);
+    total += spent;
+  }
+  times.sort((a, b) => a - b);
+  const [first] = outcomes;
+  const different = outcomes.filter((each) => JSON.stringify(each) !== JSON.stringify(first));
+  console.log(JSON.stringify({
+    parse_s,
+    cpu_s: times[Math.floor(times.length / 2)],
+    // Not maxRSS, which begins with the memory of the process that started this one.
+    peak_kb: Number(readFileSync('/proc/self/status', 'utf8').match(/VmHWM:\s*(\d+)/)[1]),
+    outcomes: [first, ...different],
+    instances: outcomes.length,
+  }));
 }
-times.sort((a, b) => a - b);
-const [first] = outcomes;
-const different = outcomes.filter((each) => JSON.stringify(each) !== JSON.stringify(first));
-console.log(JSON.stringify({
-  parse_s,
-  cpu_s: times[Math.floor(times.length / 2)],
-  // Not maxRSS, which begins with the memory of the process that started this one.
-  peak_kb: Number(readFileSync('/proc/self/status', 'utf8').match(/VmHWM:\s*(\d+)/)[1]),
-  outcomes: [first, ...different],
-  instances: outcomes.length,
-}));

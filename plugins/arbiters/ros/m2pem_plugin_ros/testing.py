@@ -8,6 +8,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Self
 import pytest
 
 from m2pem_plugin_ros import loopback
-from m2pem_plugin_ros.fork_server import fork_server
+from m2pem_plugin_ros.fork_server import ForkedProgram, fork_server
 
 DOMAINS = range(1, 101)
 """On Linux, the ports of higher domains are in the ephemeral range."""
@@ -54,12 +55,26 @@ class Peer:
     """A Python program in another process, on 127.0.0.1, in a ROS domain.
 
     The block begins when the program has printed the line "ready". It ends the program by SIGTERM,
-    or `kill`.
+    or `kill`. `forked`: it finds ROS and m2pem imported (m2pem_plugin_ros.fork_server).
     """
 
-    def __init__(self, program: Path | str, domain: int, arguments: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        program: Path | str,
+        domain: int,
+        arguments: Sequence[str] = (),
+        *,
+        forked: bool = True,
+    ) -> None:
         environment = {**os.environ, **loopback.environment(domain)}
-        self.process = fork_server().start(program, arguments, environment)
+        self.process: subprocess.Popen[str] | ForkedProgram
+        if forked:
+            self.process = fork_server().start(program, arguments, environment)
+        else:
+            command = [sys.executable, str(program), *arguments]
+            self.process = subprocess.Popen(
+                command, env=environment, stdout=subprocess.PIPE, text=True
+            )
 
     def __enter__(self) -> Self:
         self.wait_for("ready")
@@ -76,7 +91,8 @@ class Peer:
             self.process.wait(STOP_WITHIN_S)
         except subprocess.TimeoutExpired:
             self.kill()
-        self.process.stdout.close()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
 
     def wait_for(self, line: str) -> None:
         """Read its output until that line.
@@ -84,6 +100,7 @@ class Peer:
         Raises:
             RuntimeError: the process ended before.
         """
+        assert self.process.stdout is not None
         for printed in self.process.stdout:
             if printed.strip() == line:
                 return
