@@ -154,7 +154,7 @@ class Autopilot:
     @property
     def tuning(self) -> Tuning:
         """How the vehicle behaves, by the present parameters."""
-        return self.firmware.tuning(self.parameters)
+        return self.parameters.derived(self.firmware.tuning)
 
     @property
     def target_point(self) -> Point | None:

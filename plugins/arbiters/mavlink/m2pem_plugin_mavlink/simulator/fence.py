@@ -131,7 +131,7 @@ class Fence(Component):
     @property
     def rules(self) -> FenceRules:
         """The rules, by the present parameters."""
-        return self.autopilot.firmware.fence_rules(self.autopilot.parameters)
+        return self.autopilot.parameters.derived(self.autopilot.firmware.fence_rules)
 
     @property
     def zones(self) -> tuple[Zone, ...]:

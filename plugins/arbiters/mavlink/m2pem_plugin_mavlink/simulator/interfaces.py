@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, cast
 
 from m2pem_plugin_mavlink.simulator.dynamics import (
     BodyState,
@@ -17,6 +17,8 @@ from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Point
 from m2pem_plugin_mavlink.simulator.messages import Command, Peer, Result, Sender
 from m2pem_plugin_mavlink.simulator.missions.plan import Item, PlanStore
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
+
+T = TypeVar("T")
 
 
 class Event(NamedTuple):
@@ -81,6 +83,7 @@ class Parameters:
         self._values = {name: float(values[name]) for name in sorted(values)}
         self._names = list(self._values)
         self._index = {name: index for index, name in enumerate(self._names)}
+        self._derived: dict[Callable[[Parameters], object], object] = {}
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
@@ -89,6 +92,13 @@ class Parameters:
         if name not in self._values:
             raise KeyError(name)
         self._values[name] = float(value)
+        self._derived.clear()
+
+    def derived(self, derive: Callable[["Parameters"], T]) -> T:
+        """What a function derives from the values; again only after one has changed."""
+        if derive not in self._derived:
+            self._derived[derive] = derive(self)
+        return cast("T", self._derived[derive])
 
     def __contains__(self, name: object) -> bool:
         return name in self._values
