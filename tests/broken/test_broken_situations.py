@@ -16,7 +16,7 @@ from tests.broken.expected import EXPECTED, Expected
 from tests.broken.situations import Records, Situation, situations
 
 SITUATIONS = {each.name: each for each in situations()}
-MOST_STEPS = 500
+MOST_STEPS = 200
 """Of a rehearsal: a loop that is not left by then goes on for ever here."""
 
 every_one = pytest.mark.parametrize("expected", EXPECTED, ids=lambda each: each.name)
