@@ -69,14 +69,14 @@ class Provocation:
     mend: Callable[[str], Awaitable[None]] | None = None
 
 
-def go(vehicle: str, role: str = "") -> bytes:
-    """A mission: `Go` (the vehicle goes to `target` at `speed`), then `Home`, a question."""
-    parameters = "".join(
-        f'<m2pem:property name="{name}" value="${{{name}}}"/>' for name in ("target", "speed")
-    )
+def go(resource: str, data: Iterable[str], attributes: str = "", behavior: str = "goto") -> bytes:
+    """A mission: `Go` (a behavior of a vehicle or payload, with the values of `data`), then `Home`,
+    a question. `attributes`: of the role."""
+    parameters = "".join(f'<m2pem:property name="{name}" value="${{{name}}}"/>' for name in data)
+    kind = "payload" if "/" in resource else "vehicle"
+    doing = task("Go", f'{kind}="{resource}" {attributes}', behavior, parameters)
     body = sequence(
-        ("Go", task("Go", role or f'vehicle="{vehicle}"', "goto", parameters)),
-        ("Home", question("Home")),
+        ("Go", doing.replace('type="vehicle"', f'type="{kind}"')), ("Home", question("Home"))
     )
     executable = 'isExecutable="true"'
     return mission(body.replace(executable, f'{executable} m2pem:onError="incident"'))
@@ -98,9 +98,9 @@ class Desk:
             await asyncio.sleep(LOOK_EVERY_S)
         return value
 
-    async def start(self, vehicle: str, data: Mapping[str, Any], role: str = "") -> str:
+    async def start(self, mission: bytes, data: Mapping[str, Any]) -> str:
         """Start the mission `go`."""
-        source = MissionFiles("go.bpmn", go(vehicle, role))
+        source = MissionFiles("go.bpmn", mission)
         return await self.control.start(source, data=data, even_if_busy=True, by="anna")
 
     async def records(self, run: str) -> list[r.Record]:
@@ -154,14 +154,27 @@ async def over_socket(executive: Executive, folder: Path) -> AsyncIterator[Missi
 
 class Table:
     """The rows of one executive, whose `desk` is open while they are played. `vehicle`: the one to
-    which all happens; `data`: with which a run begins, so that it has to move."""
+    which all happens, or a payload; `spare`: with which `retry_with` does it; `behavior`: what they
+    are to do."""
 
     vehicle: str
     desk: Desk
+    spare = SPARE
+    behavior = "goto"
 
     def data(self) -> dict[str, Any]:
-        """Return the `target` and `speed` of a run."""
+        """Return the parameters with which a run begins, so that the vehicle has to move."""
         raise NotImplementedError
+
+    def far(self) -> dict[str, Any]:
+        """Return parameters with which a run takes so long that something can be done meanwhile;
+        {}: those of `data` do."""
+        return {}
+
+    async def start(self, data: Mapping[str, Any], attributes: str = "") -> str:
+        """Start a run; `attributes`: of its role."""
+        mission = go(self.vehicle, data, attributes, self.behavior)
+        return await self.desk.start(mission, data)
 
     def provocations(self) -> dict[str, Provocation]:
         """Return how each error of this arbiter's vehicles comes about, by a name."""
@@ -172,8 +185,8 @@ class Table:
         provocations, runs = self.provocations(), []
         for name, choice in rows:
             row = Row(provocations[name].code, choice, self.data())
-            incident = await provoke(self.desk, self.vehicle, provocations[name], row)
-            await decide(self.desk, self.vehicle, row, incident)
+            incident = await provoke(self, provocations[name], row)
+            await decide(self, row, incident)
             runs.append(row.run)
         await verify_replays(journal, runs)
 
@@ -182,19 +195,21 @@ class Table:
         return {
             "a wrong parameter": Provocation("REJECTED", {"speed": "fast"}, mend=self.set_right),
             "an operator takes over": Provocation(
-                "TAKEN_OVER", during=self._take, mend=self._give_back
+                "TAKEN_OVER", self.far(), during=self._take, mend=self._give_back
             ),
             "an operator has it": Provocation(
                 "RESOURCE_UNAVAILABLE", before=self._take, mend=self._give_back
             ),
             "a task takes it": Provocation(
-                "PREEMPTED", during=self._preempt, mend=self._end_preemption
+                "PREEMPTED", self.far(), during=self._preempt, mend=self._end_preemption
             ),
         }
 
     async def set_right(self, run: str) -> None:
-        """Write data with which the task can be done."""
-        await self.desk.resolve(await self.desk.incident(run), "set_data", data=self.data())
+        """Write data with which the task can be done, and soon."""
+        if not (data := self.data()):
+            return
+        await self.desk.resolve(await self.desk.incident(run), "set_data", data=data)
 
     async def available(self) -> None:
         """Wait until the vehicle is back, and held."""
@@ -208,15 +223,16 @@ class Table:
     async def _take(self) -> None:
         await self.desk.control.take(self.vehicle, by="ben")
 
-    async def _give_back(self, _: str) -> None:
+    async def _give_back(self, run: str) -> None:
         await self.desk.control.give_back(self.vehicle, by="ben")
+        await self.set_right(run)
 
     async def _preempt(self) -> None:
-        role = f'vehicle="{self.vehicle}" priority="5"'
-        self._taker = await self.desk.start(self.vehicle, self.data(), role)
+        self._taker = await self.start(self.data(), 'priority="5"')
 
-    async def _end_preemption(self, _: str) -> None:
+    async def _end_preemption(self, run: str) -> None:
         await self.desk.go_home(self._taker)
+        await self.set_right(run)
 
 
 def act(do: Callable[[], object]) -> Callable[..., Awaitable[None]]:
@@ -228,11 +244,12 @@ def act(do: Callable[[], object]) -> Callable[..., Awaitable[None]]:
     return step
 
 
-async def provoke(desk: Desk, vehicle: str, provocation: Provocation, row: Row) -> OpenIncident:
+async def provoke(table: Table, provocation: Provocation, row: Row) -> OpenIncident:
     """Begin the run of a row, and have its task stopped by the error; its cause is removed."""
+    desk, vehicle = table.desk, table.vehicle
     if provocation.before is not None:
         await provocation.before()
-    row.run = await desk.start(vehicle, {**row.data, **provocation.data})
+    row.run = await table.start({**row.data, **provocation.data})
     if provocation.during is not None:
         await desk.under_way(row.run)
         await provocation.during()
@@ -246,12 +263,12 @@ async def provoke(desk: Desk, vehicle: str, provocation: Provocation, row: Row) 
     return incident
 
 
-async def decide(desk: Desk, vehicle: str, row: Row, incident: OpenIncident) -> None:
+async def decide(table: Table, row: Row, incident: OpenIncident) -> None:
     """Make the choice of a row, and finish its run."""
-    run, choice = row.run, row.choice
+    desk, run, choice = table.desk, row.run, row.choice
     before = len(requested(await desk.records(run)))
     needs: dict[str, Any] = {
-        "retry_with": {"roles": {"driver": [SPARE]}},
+        "retry_with": {"roles": {"driver": [table.spare]}},
         "set_data": {"data": {"seen": choice}},
         "move": {"to": "Home"},
     }.get(choice, {})
@@ -269,7 +286,8 @@ async def decide(desk: Desk, vehicle: str, row: Row, incident: OpenIncident) -> 
     await desk.go_home(run)
     records = await desk.records(run)
     again = requested(records)[before:]
-    assert again == {"retry": [(vehicle,)], "retry_with": [(SPARE,)]}.get(choice, [])
+    anew = {"retry": [(table.vehicle,)], "retry_with": [(table.spare,)]}
+    assert again == anew.get(choice, [])
     resolved = [each for each in records if isinstance(each, r.IncidentResolved)]
     assert {each.by for each in resolved} == {"anna"}
 
@@ -318,15 +336,16 @@ async def decide_after_kill(
             table.desk = desk
             provocation = table.provocations()[name]
             row = Row(provocation.code, choice, table.data())
-            incident = await provoke(desk, table.vehicle, provocation, row)
-            opened.append((table.vehicle, row, incident))
+            incident = await provoke(table, provocation, row)
+            opened.append((table, row, incident))
         program.kill()
     program = serve()
     async with served(journal) as control:
         desk = Desk(control, clock)
-        for vehicle, row, incident in opened:
+        for table, row, incident in opened:
+            table.desk = desk
             assert await desk.incident(row.run) == incident
-            await decide(desk, vehicle, row, incident)
+            await decide(table, row, incident)
     program.kill()
     read = SqliteJournal.open(journal)
     try:

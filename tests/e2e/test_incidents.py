@@ -15,10 +15,15 @@ from tests.command_line import ANSWERS, MISSION, CommandLine, Program, fleet_wit
 from tests.incident_rows import CHOICES, SPARE, Provocation, Table, decide_after_kill
 
 
-def stopped(m2pem: CommandLine, folder: Path) -> tuple[Program, Path]:
-    """The mission, with an incident of its first drive, and the state file of its vehicles."""
+def stopped(m2pem: CommandLine, folder: Path, operators: str = "") -> tuple[Program, Path]:
+    """The mission, with an incident of its first drive, and the state file of its vehicles.
+
+    `operators`: those who decide about it, "" for all.
+    """
     fleet, state = fleet_with_state(folder)
-    fleet.write_text(fleet.read_text() + "\non_error: incident\n")
+    who = f"incident_role: commander\noperators: {{commander: [{operators}]}}\n"
+    text = f"{fleet.read_text()}\non_error: incident\n{who if operators else ''}"
+    fleet.write_text(text)
     answers = folder / "answers.yaml"
     answers.write_text(
         (ANSWERS / "vignette1_detection.yaml").read_text()
@@ -36,7 +41,11 @@ def stopped(m2pem: CommandLine, folder: Path) -> tuple[Program, Path]:
 def test_an_incident_is_resolved_after_kill_9_and_the_replay_is_equal(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:
-    program, state = stopped(m2pem, tmp_path)
+    program, state = stopped(m2pem, tmp_path, "anna")
+    program.type("resolve i1 skip")
+    refused = "r1.i1: only operators with the role 'commander' may: anna; 'plain' is not"
+    while refused not in program.stderr.readline():
+        pass
     program.kill()
     assert "INCIDENT" in m2pem.run("replay", "r1", "--state")[1]
     resumed = m2pem.start("resume", "r1", "--format", "json")
@@ -44,7 +53,7 @@ def test_an_incident_is_resolved_after_kill_9_and_the_replay_is_equal(
     status, listed, _ = m2pem.run("incidents")
     assert status == 0
     assert "r1.i1: " in listed
-    assert "held for it: evsg1" in listed
+    assert "held for it: evsg1; for commander" in listed
     held = [each for each in recorded_effects(state) if each.kind is EffectKind.HOLD]
     assert held
     status, _, errors = m2pem.run("resolve", "r1", "i1", "move", "--to", "nowhere")
@@ -53,7 +62,10 @@ def test_an_incident_is_resolved_after_kill_9_and_the_replay_is_equal(
     status, foreseen, _ = m2pem.run("resolve", "r1", "i1", "skip", "--preview")
     assert status == 0
     assert "the mission" in foreseen
-    assert m2pem.run("resolve", "r1", "i1", "retry", "--by", "anna")[0] == 0
+    status, _, errors = m2pem.run("resolve", "r1", "i1", "retry", "--by", "ben")
+    assert status == 1
+    assert "r1.i1: only operators with the role 'commander' may: anna; 'ben' is not" in errors
+    assert m2pem.run("resolve", "r1", "i1", "retry", "--by", "anna@here")[0] == 0
     assert m2pem.run("resolve", "r1", "i1", "skip", "--by", "ben")[0] == 1
     again = resumed.until_record("BehaviorRequested", element="DriveRoute")
     assert again["resources"] == ["evsg1"]
@@ -123,8 +135,8 @@ def test_a_choice_after_which_the_mission_cannot_complete_must_be_confirmed(
 
 SPEED = 50.0
 HOME = (38.1075, -77.3192)
-NEAR, FAR = (38.1080, -77.3192), (38.1165, -77.3192)
-"""50 m, and 1 km: a vehicle is under way there long enough to be taken."""
+NEAR, FAR = (38.1080, -77.3192), (38.2, -77.3192)
+"""50 m, and 10 km."""
 FAULTS = {
     "FAILED": "goto: fail at 1 s",
     "REJECTED": "goto: refuse",
@@ -143,7 +155,10 @@ class Simulated(Table):
         self.error, self.vehicle = error, f"{error}_{choice}".lower().replace(" ", "_")
 
     def data(self) -> dict[str, Any]:
-        return {"speed": 5, "target": list(NEAR if self.error in FAULTS else FAR)}
+        return {"speed": 5, "target": list(NEAR)}
+
+    def far(self) -> dict[str, Any]:
+        return {"target": list(FAR)}
 
     def provocations(self) -> dict[str, Provocation]:
         async def available(_: str) -> None:

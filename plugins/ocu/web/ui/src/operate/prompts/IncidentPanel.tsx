@@ -127,7 +127,9 @@ export function IncidentPanel() {
         {incident.resources.length > 0 && (
           <span>{fill(text.held, { resources: incident.resources.join(", ") })}</span>
         )}
-        {incident.operator_role && <span>{fill(text.decides, { role: incident.operator_role })}</span>}
+        {incident.operator_role && (
+          <span>{fill(text.decides, { role: incident.operator_role })}</span>
+        )}
       </div>
       <p>
         {incident.code}
