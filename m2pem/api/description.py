@@ -378,8 +378,9 @@ def _error_thrown(view: RunView, record: r.ErrorThrown) -> _Sentence:
 def _incident_opened(view: RunView, record: r.IncidentOpened) -> _Sentence:
     held = f"; held for it: {', '.join(record.resources)}" if record.resources else ""
     reason = _after_colon(record.reason)
-    text = f"{view.label(record.element)}: incident {record.incident}, {record.code}{reason}{held}"
-    return text, Importance.ERROR
+    who = f"; for {record.operator_role}" if record.operator_role else ""
+    what = f"incident {record.incident}, {record.code}{reason}{held}{who}"
+    return f"{view.label(record.element)}: {what}", Importance.ERROR
 
 
 def _incident_updated(view: RunView, record: r.IncidentUpdated) -> _Sentence:
