@@ -167,8 +167,8 @@ class Table:
         raise NotImplementedError
 
     def far(self) -> dict[str, Any]:
-        """Return parameters with which a run takes so long that something can be done meanwhile;
-        {}: those of `data` do."""
+        """Return parameters, over those of `data`, with which a behavior takes so long that
+        something can be done to its vehicle meanwhile; {}: it takes long enough."""
         return {}
 
     async def start(self, data: Mapping[str, Any], attributes: str = "") -> str:
@@ -195,13 +195,13 @@ class Table:
         return {
             "a wrong parameter": Provocation("REJECTED", {"speed": "fast"}, mend=self.set_right),
             "an operator takes over": Provocation(
-                "TAKEN_OVER", self.far(), during=self._take, mend=self._give_back
+                "TAKEN_OVER", during=self._take, mend=self._give_back
             ),
             "an operator has it": Provocation(
                 "RESOURCE_UNAVAILABLE", before=self._take, mend=self._give_back
             ),
             "a task takes it": Provocation(
-                "PREEMPTED", self.far(), during=self._preempt, mend=self._end_preemption
+                "PREEMPTED", during=self._preempt, mend=self._end_preemption
             ),
         }
 
@@ -223,16 +223,14 @@ class Table:
     async def _take(self) -> None:
         await self.desk.control.take(self.vehicle, by="ben")
 
-    async def _give_back(self, run: str) -> None:
+    async def _give_back(self, _: str) -> None:
         await self.desk.control.give_back(self.vehicle, by="ben")
-        await self.set_right(run)
 
     async def _preempt(self) -> None:
         self._taker = await self.start(self.data(), 'priority="5"')
 
-    async def _end_preemption(self, run: str) -> None:
+    async def _end_preemption(self, _: str) -> None:
         await self.desk.go_home(self._taker)
-        await self.set_right(run)
 
 
 def act(do: Callable[[], object]) -> Callable[..., Awaitable[None]]:
@@ -249,7 +247,8 @@ async def provoke(table: Table, provocation: Provocation, row: Row) -> OpenIncid
     desk, vehicle = table.desk, table.vehicle
     if provocation.before is not None:
         await provocation.before()
-    row.run = await table.start({**row.data, **provocation.data})
+    far = {} if provocation.during is None else table.far()
+    row.run = await table.start({**row.data, **far, **provocation.data})
     if provocation.during is not None:
         await desk.under_way(row.run)
         await provocation.during()
@@ -257,6 +256,8 @@ async def provoke(table: Table, provocation: Provocation, row: Row) -> OpenIncid
     assert incident.code == provocation.code, incident
     if provocation.mend is not None:
         await provocation.mend(row.run)
+    if far:
+        await table.set_right(row.run)
     begun = bool(requested(await desk.records(row.run)))
     keeps = begun and provocation.code != "PREEMPTED"
     assert incident.resources == ((vehicle,) if keeps else ())

@@ -90,8 +90,8 @@ async def test_a_base_stands_with_an_incident_and_drives_after_a_retry(
 
 # --- every error and every choice -----------------------------------------------------------------
 
-SPEED = 4.0
-NEAR_M, FAR_M = 0.0, 40.0
+SPEED = 2.0
+NEAR_M, FAR_M = 0.0, 24.0
 NO_PATH, TOO_LATE, FAILED_TO = 208, 107, 100
 """Error codes of Nav2."""
 
@@ -107,6 +107,9 @@ class Street(Table):
         north = self.simulation[self.vehicle].vehicle.body.pose.north_m
         to = FAR_M if north < (NEAR_M + FAR_M) / 2 else NEAR_M
         return {"speed": 5, "target": [*Lane(0.0, FAR_M).position(to)]}
+
+    def far(self) -> dict[str, Any]:
+        return {"target": [*Lane(0.0, FAR_M).position(10 * FAR_M)]}
 
     def provocations(self) -> dict[str, Provocation]:
         simulated = self.simulation[self.vehicle]
