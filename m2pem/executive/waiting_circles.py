@@ -1,6 +1,6 @@
 """Circles of runs and tasks that wait for each other: found when they close, said to operators."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.circles import Waiting, circles
@@ -64,7 +64,7 @@ class WaitingCircles:
             Waiting(
                 each.request.id,
                 each.asked.runner.id,
-                tuple(self._needed(role) for role in each.roles),
+                tuple(self._needed(role, each.task.lost) for role in each.roles),
             )
             for each in waiting
             if each.asked.runner.id in idle
@@ -77,11 +77,17 @@ class WaitingCircles:
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
         self._known = {*found, *in_space}
 
-    def _needed(self, role: ConsideredRole) -> tuple[int, tuple[str | None, ...]]:
-        """Return how many resources a role lacks, and the runs that hold one until they go on."""
+    def _needed(
+        self, role: ConsideredRole, lost: Container[str]
+    ) -> tuple[int, tuple[str | None, ...]]:
+        """Return how many resources a role lacks, and the runs that hold one until they go on; None
+        for what may become free by itself, as what the task has lost may return."""
         lacking = max(0, role.options.least - len(role.options.costs_s))
         holders: list[str | None] = []
         for resource in role.resources:
+            if resource in lost:
+                holders.append(None)
+                continue
             if resource in role.excluded or resource not in role.occupied:
                 continue
             holder = role.occupied[resource].holder

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.control import Alert, RunStatus
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.bpmn import parse_mission
 from m2pem.engine import inputs as i
@@ -15,6 +15,7 @@ from m2pem.engine.records import (
     InputIgnored,
     ResourceReturned,
     ResourcesAllocated,
+    RunEnded,
     WorkReassigned,
 )
 from m2pem.engine.run import MissionRun
@@ -127,6 +128,27 @@ def test_the_choice_says_that_the_task_has_lost_a_vehicle(play):
         "resource": "ugv1",
         "excluded": "this task has lost it: BATTERY_LOW (battery at 10%, below 15%)",
     }
+
+
+def test_a_run_that_waits_for_what_it_has_lost_is_no_circle(play):
+    async def story(world: World):
+        alerts = []
+        events = world.executive.control.subscribe()
+        run = await begin(world, goto(NEED + " wait='unlimited'"))
+        await empty_battery(world)
+        await world.fake.until_called("cancel", f"{run}.b1")
+        world.fake.report(f"{run}.b1", BehaviorState.CANCELLED)
+        await world.clock.sleep(5)
+        waiting = await world.executive.control.waiting()
+        await world.executive.control.stop(run)
+        async for event in events:
+            alerts += [event.code] if isinstance(event, Alert) else []
+            if isinstance(getattr(event, "record", None), RunEnded):
+                return waiting, alerts
+
+    waiting, alerts = play(story, "ugv1", watch_links=True)
+    assert [each.task for each in waiting] == ["Go"]
+    assert "WAITING_CIRCLE" not in alerts
 
 
 @pytest.mark.parametrize("wait", ["", " wait='unlimited'"])
