@@ -146,6 +146,8 @@ class VehicleController:
         self._held = False
         if active is not None and held:
             self._work.replace(lambda: self._run(active))
+        elif held:
+            self._work.cancel()  # it may still wait to be received, to be held then
 
     def release(self) -> None:
         """Forget the behavior of a vehicle that is lost; what was seen of it last is reported."""
@@ -317,7 +319,7 @@ class VehicleController:
 
     async def _hold_still(self, active: _ActiveBehavior | None) -> None:
         try:
-            await self._stop()
+            await self._stop_once_received()
             while active is not None and not self._has_restarted():
                 # A vehicle that is held before it has left the ground disarms itself after a while.
                 if not on_the_ground(self.vehicle):
@@ -328,6 +330,26 @@ class VehicleController:
                 self._end(active, BehaviorState.FAILED, error.code, error.reason)
         except ExchangeError as error:
             self._logger.error("%s: cannot be held: %s", self.vehicle.resource, error)
+
+    async def _stop_once_received(self) -> None:
+        """Stop the vehicle. One that is silent may still execute a command from before: it is
+        stopped when it is received, unless a pilot steers it by then."""
+        vehicle = self.vehicle
+        while True:
+            if vehicle.identity is not None:
+                try:
+                    await self._stop()
+                except ExchangeError as error:
+                    if vehicle.is_received:
+                        raise
+                    self._logger.warning(
+                        "%s: not held before it is received again: %s", vehicle.resource, error
+                    )
+                else:
+                    return
+            await vehicle.until(lambda: vehicle.is_received)
+            if vehicle.state.mode is FlightMode.MANUAL:
+                return
 
     async def _cancel(self, active: _ActiveBehavior) -> None:
         stop = asyncio.get_running_loop().create_task(self._stop())

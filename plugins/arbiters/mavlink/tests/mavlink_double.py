@@ -227,6 +227,10 @@ class DoubleVehicle:
         return None if self.state.at_s is None else self.link.now_s() - self.state.at_s
 
     @property
+    def is_received(self) -> bool:
+        return self.silent_s is not None and self.silent_s < 3.0
+
+    @property
     def link_state(self) -> LinkState:
         return LinkState.CONNECTED if self.body.heard_by_us else LinkState.LOST
 

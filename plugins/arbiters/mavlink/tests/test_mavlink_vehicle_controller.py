@@ -150,6 +150,43 @@ def test_a_return_that_a_failsafe_began_before_a_restart_is_not_held() -> None:
     after_a_restart(Body().fly(), "goto", main, meanwhile=low_battery, target=FAR)
 
 
+@pytest.mark.parametrize("mode", [FlightMode.GUIDED, FlightMode.MANUAL, FlightMode.RETURN])
+def test_a_vehicle_that_is_silent_after_a_restart_is_held_when_it_is_back(mode) -> None:
+    """Unless a pilot steers it by then, or it returns by itself."""
+
+    def silent(body) -> None:
+        body.heard_by_us = False
+
+    async def main(bench, reference) -> None:
+        assert (await bench.arbiter.query("r1.b1", reference)).state is BehaviorState.UNKNOWN
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(20)
+        assert bench.body.mode is FlightMode.GUIDED
+        bench.body.mode, bench.body.heard_by_us = mode, True
+        await bench.clock.sleep(5)
+        assert bench.body.mode is (FlightMode.HOLD if mode is FlightMode.GUIDED else mode)
+        assert ("stop" in bench.told) == (mode is FlightMode.GUIDED)
+
+    after_a_restart(Body().fly(), "goto", main, meanwhile=silent, target=FAR)
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+def test_a_vehicle_that_falls_silent_is_held_when_it_is_back_unless_it_was_resumed(resumed) -> None:
+    async def main(bench) -> None:
+        await flying(bench)
+        bench.body.heard_by_us = False
+        await bench.arbiter.hold(V)
+        await bench.clock.sleep(8)
+        if resumed:
+            await bench.arbiter.resume(V)
+        bench.body.heard_by_us = True
+        await bench.clock.sleep(8)
+        assert (bench.body.mode is FlightMode.HOLD) is not resumed
+        assert bench.states_of("r1.b1")[-1] is RUNNING
+
+    play(Body().fly(), main, lost_after_s=60.0)
+
+
 def test_a_mission_that_somebody_else_disarms_fails() -> None:
     async def main(bench) -> None:
         await flying(bench, "goto", target=Point((*at(300, 0), None)))

@@ -82,6 +82,9 @@ _HOME = message_type("HOME_POSITION").id
 
 _WARNING: int = dialect.MAV_SEVERITY_WARNING
 
+RECEIVED_S = 3.0
+"""A vehicle whose last message is older is silent; each sends a heartbeat every second."""
+
 SAID_AGAIN_S = 300.0
 """A warning of the autopilot that comes again within this time is not shown again."""
 
@@ -173,6 +176,11 @@ class Vehicle:
     def silent_s(self) -> float | None:
         """Seconds since the last message; None: no message was ever received."""
         return None if self.state.at_s is None else self.link.now_s() - self.state.at_s
+
+    @property
+    def is_received(self) -> bool:
+        """Whether a message was received just now."""
+        return self.silent_s is not None and self.silent_s < RECEIVED_S
 
     @property
     def link_state(self) -> LinkState:

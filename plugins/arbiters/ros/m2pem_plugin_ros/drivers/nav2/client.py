@@ -72,6 +72,11 @@ class Nav2:
         return not self.problem
 
     @property
+    def is_there(self) -> bool:
+        """Whether an action of Nav2 is discovered, or may go on."""
+        return any(client.there or client.active for client in self._clients())
+
+    @property
     def has_answered(self) -> bool:
         """Whether Nav2 has answered, or had the time to. Answers may be lost during discovery."""
         return bool(self.state) or self._refreshes >= UNANSWERED

@@ -150,6 +150,8 @@ class Nav2Driver:
         self._held = False
         if drive is not None and held:
             self._work.replace(lambda: self._run(drive))
+        elif held:
+            self._work.cancel()  # Nav2 may still be waited for, to be stopped then
 
     async def query(self, order: Order) -> Outcome:
         """Find the goal by its id among those that Nav2 reports."""
@@ -221,12 +223,20 @@ class Nav2Driver:
 
     async def _stand(self, drive: _Drive | None) -> None:
         """Stop Nav2 until another call. If another client sends a goal meanwhile, the order has
-        ended."""
-        stopped = False
+        ended. Nav2 that is not there may still execute a goal of before: it is stopped when it
+        is."""
+        stopped, is_late = False, False
         while not stopped:
+            if self._nav2 is not None and not self._nav2.is_there:
+                is_late = True
+                await self._pause()
+                continue
             try:
                 await self._stop()
-                stopped = True
+                # Not all actions of one that comes late are discovered at once.
+                stopped, is_late = not is_late, False
+                if not stopped:
+                    await self._pause()
             except RosError as error:
                 self._logger.error("%s: cannot be held: %s", self._name, error)
                 await self._setup.context.clock.sleep(AGAIN_S)

@@ -10,7 +10,7 @@ from m2pem_interfaces import msg as interfaces
 from m2pem.api import BehaviorRequest, BehaviorState, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.node.action_link import ActionLink
-from m2pem_plugin_ros.drivers.node.link import NodeLink, Retries
+from m2pem_plugin_ros.drivers.node.link import STILL_S, NodeLink, Retries
 from m2pem_plugin_ros.drivers.node.topic_link import TopicLink
 from m2pem_plugin_ros.interfaces.behavior_command import Verb, adjust_command, vehicle_command
 from m2pem_plugin_ros.interfaces.behavior_status import read_status
@@ -21,7 +21,8 @@ from m2pem_plugin_ros.runtime import qos
 from m2pem_plugin_ros.settings import Via
 
 HOLD_REPEATS = 20
-"""HOLD is repeated for ten seconds at most."""
+"""HOLD is repeated for ten seconds at most while the node is received; one that is silent gets it
+when it is back."""
 
 
 class NodeDriver:
@@ -31,6 +32,7 @@ class NodeDriver:
         self._log_throttle = LogThrottle(setup.context.logger, setup.connection.resource)
         self._holding = Retries(self._clock)
         self._status: VehicleStatus | None = None
+        self._received_us = 0
         self._publisher: Any = None
         self._link: NodeLink | None = None
 
@@ -123,6 +125,7 @@ class NodeDriver:
     def _on_vehicle_status(self, message: Any) -> None:
         self._setup.events.alive()
         self._status = sent = read_vehicle_status(message)
+        self._received_us = self._clock.now_us()
         if sent.vehicle != self._resource:
             self._log_throttle.log(
                 f"the node in {self._name('')} belongs to another vehicle", sent.vehicle
@@ -162,7 +165,7 @@ class NodeDriver:
             agrees = self._status is not None and self._status.held is held
             if not (sent and agrees):
                 self._send(vehicle_command(verb, self._clock.now_us()))
-            sent += 1
+            sent += self._clock.now_us() - self._received_us < STILL_S * 1e6
             return sent < HOLD_REPEATS
 
         self._holding.start("hold", send)

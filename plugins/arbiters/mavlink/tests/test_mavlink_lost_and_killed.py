@@ -1,0 +1,287 @@
+"""A copter is cut off, its executive is killed, and it is back, flying on: real UDP.
+
+Between the simulated autopilot and m2pem is a relay that drops all frames while the link is cut,
+and notes the modes of the copter and what m2pem commands.
+"""
+
+import json
+import select
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+SPEED = "10"
+WITHIN_S = 40
+AUTO = 3
+"""The mode of a copter that flies its uploaded mission."""
+
+MOVES = {"MISSION_COUNT", "MISSION_ITEM_INT", "SET_POSITION_TARGET_GLOBAL_INT"}
+STARTS = {dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_REPOSITION}
+
+FLEET = """
+version: 1
+origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
+vehicles:
+  uav1:
+    domain: air
+    arbiter: mavlink
+    connection: {{url: "udpin://127.0.0.1:{port}", system_id: 1}}
+    lost_after: {lost_after}
+    sitl: true
+routes: {{around: around.geojson}}
+"""
+ROUND = [[-77.3192, 38.1080], [-77.3182, 38.1080], [-77.3182, 38.1090], [-77.3192, 38.1090]]
+AROUND = {"type": "LineString", "coordinates": ROUND * 6}
+
+
+def mission() -> str:
+    """The copter takes off and flies its route; when it is lost, it is to do the rest itself."""
+    return """
+<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="urn:t"
+             xmlns:m2pem="https://m2pem.org/schema/1">
+  <process id="P" isExecutable="true">
+    <startEvent id="S"/>
+    <scriptTask id="Up"><extensionElements><m2pem:behavior type="vehicle" name="takeoff">
+      <m2pem:properties><m2pem:property name="altitude" value="20"/></m2pem:properties>
+      <m2pem:resources><m2pem:role name="pilot" vehicle="uav1"/></m2pem:resources>
+    </m2pem:behavior></extensionElements></scriptTask>
+    <scriptTask id="Fly"><extensionElements>
+      <m2pem:behavior type="vehicle" name="single_vehicle_routing">
+        <m2pem:properties><m2pem:property name="route" value="around"/>
+          <m2pem:property name="speed" value="4 m/s"/></m2pem:properties>
+        <m2pem:resources>
+          <m2pem:role name="pilot" requires="true" onLoss="reassign" wait="unlimited"/>
+        </m2pem:resources>
+      </m2pem:behavior>
+    </extensionElements></scriptTask>
+    <endEvent id="E"/>
+    <sequenceFlow id="f" sourceRef="S" targetRef="Up"/>
+    <sequenceFlow id="g" sourceRef="Up" targetRef="Fly"/>
+    <sequenceFlow id="h" sourceRef="Fly" targetRef="E"/>
+  </process>
+</definitions>
+"""
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port: int = taken.getsockname()[1]
+        return port
+
+
+class Relay:
+    """Between the copter, which sends to `port`, and m2pem at `ground`.
+
+    `seen`: in order, ("mode", mode) of the copter, also while the link is cut, and ("sent", what)
+    for each mode, motion or mission that m2pem sends and that reaches the copter.
+    """
+
+    def __init__(self, ground: int) -> None:
+        self.cut = False
+        self.seen: list[tuple[str, object]] = []
+        self._ground = ("127.0.0.1", ground)
+        self._copter: Any = None
+        self._inner = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._inner.bind(("127.0.0.1", 0))
+        self._outer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._outer.bind(("127.0.0.1", 0))
+        self.port: int = self._inner.getsockname()[1]
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    @property
+    def mode(self) -> object:
+        """The mode of the copter now."""
+        return next((value for what, value in reversed(self.seen) if what == "mode"), None)
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._inner.close()
+        self._outer.close()
+
+    def _run(self) -> None:
+        down, up = dialect.MAVLink(None), dialect.MAVLink(None)
+        down.robust_parsing = up.robust_parsing = True
+        while not self._ended.is_set():
+            ready, _, _ = select.select([self._inner, self._outer], [], [], 0.05)
+            if self._inner in ready:
+                frames, self._copter = self._inner.recvfrom(65536)
+                for each in down.parse_buffer(frames) or []:
+                    self._note_copter(each)
+                if not self.cut:
+                    self._outer.sendto(frames, self._ground)
+            if self._outer in ready:
+                try:
+                    frames, _ = self._outer.recvfrom(65536)
+                except ConnectionError:  # no executive listens now
+                    continue
+                if self.cut or self._copter is None:
+                    continue
+                for each in up.parse_buffer(frames) or []:
+                    self._note_sent(each)
+                self._inner.sendto(frames, self._copter)
+
+    def _note_copter(self, message: Any) -> None:
+        is_of_it = message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1
+        if is_of_it and self.mode != message.custom_mode:
+            self.seen.append(("mode", message.custom_mode))
+
+    def _note_sent(self, message: Any) -> None:
+        name = message.get_type()
+        if name in MOVES:
+            self.seen.append(("sent", name))
+        elif name in ("COMMAND_LONG", "COMMAND_INT"):
+            if message.command == dialect.MAV_CMD_DO_SET_MODE:
+                self.seen.append(("sent", f"mode {int(message.param2)}"))
+            elif message.command in STARTS:
+                self.seen.append(("sent", message.command))
+
+
+class World:
+    """The copter, the relay, and one executive after the other."""
+
+    def __init__(self, folder: Path, lost_after: str) -> None:
+        port = free_port()
+        self.folder = folder
+        fleet = FLEET.format(port=port, lost_after=lost_after)
+        (folder / "fleet.yaml").write_text(fleet, encoding="utf-8")
+        (folder / "around.geojson").write_text(json.dumps(AROUND), encoding="utf-8")
+        (folder / "m.bpmn").write_text(mission(), encoding="utf-8")
+        self.relay = Relay(port)
+        self.records: list[dict[str, Any]] = []
+        self.errors = folder / "errors.txt"
+        self._readers: list[threading.Thread] = []
+        self._programs: list[subprocess.Popen[Any]] = []
+        self._start(
+            *("sim", "mavlink", "--copters", 1, "--speed", SPEED, "--ekf", "6s"),
+            *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{self.relay.port}"),
+            *("--set", "FS_GCS_ENABLE=0"),
+        )
+
+    def _start(self, *words: object) -> subprocess.Popen[Any]:
+        with self.errors.open("a") as errors:
+            program = subprocess.Popen(
+                [sys.executable, "-m", "m2pem", *map(str, words)],
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+            )
+        self._programs.append(program)
+        return program
+
+    def executive(self, *words: object) -> subprocess.Popen[Any]:
+        """Start m2pem; what it prints goes to `records`."""
+        options = ("--ocu", "none", "--format", "json", "--journal", self.folder / "journal.db")
+        program = self._start(*words, *options)
+
+        def read() -> None:
+            for line in program.stdout or ():
+                self.records.append(json.loads(line))
+
+        self._readers.append(threading.Thread(target=read))
+        self._readers[-1].start()
+        return program
+
+    def until(self, true: Callable[[], Any]) -> Any:
+        """Wait for something that happens in other processes."""
+        deadline_s = time.monotonic() + WITHIN_S
+        while not (value := true()):
+            if time.monotonic() > deadline_s:
+                names = " ".join(each["record"] for each in self.records[-20:])
+                said = self.errors.read_text()[-4000:]
+                pytest.fail(f"{names}\n{self.relay.seen}\n{said}")
+            time.sleep(0.02)
+        return value
+
+    def until_record(self, name: str, **fields: object) -> dict[str, Any]:
+        """Wait until such a record is printed."""
+
+        def those() -> list[dict[str, Any]]:
+            wanted = {"record": name, **fields}.items()
+            return [each for each in list(self.records) if wanted <= each.items()]
+
+        self.until(those)
+        return those()[-1]
+
+    def close(self) -> None:
+        for program in reversed(self._programs):
+            program.kill()
+            program.wait()
+        for reader in self._readers:
+            reader.join()
+        for program in self._programs:
+            if program.stdout is not None:
+                program.stdout.close()
+        self.relay.close()
+
+
+@pytest.fixture
+def world(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[World]:
+    made = World(tmp_path, request.param)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def cut_off_and_killed(world: World, *, noticed: bool) -> int:
+    """The copter is cut off on its route, and the executive killed, before or after it has noticed
+    that. The next one begins while the copter is silent. Returns how much was seen by then."""
+    first = world.executive("run", world.folder / "m.bpmn", "--fleet", world.folder / "fleet.yaml",
+                            "--speed", SPEED)  # fmt: skip
+    world.until(lambda: any(each.get("remaining") for each in world.records))
+    world.relay.cut = True
+    if noticed:
+        world.until_record("AllocationDelayed")
+    first.kill()
+    first.wait()
+    world.executive("resume", "r1")
+    world.until_record("RunClaimed")
+    if not noticed:
+        world.until_record("BehaviorUnsettled")
+    assert world.relay.mode == AUTO
+    seen = len(world.relay.seen)
+    world.relay.cut = False
+    return seen
+
+
+def is_stopped(seen: list[tuple[str, object]]) -> bool:
+    """Whether the copter has left its old mission."""
+    return any(what == "mode" and value != AUTO for what, value in seen)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("world", ["20 s"], indirect=True)
+def test_a_copter_whose_loss_was_journaled_is_stopped_before_anything_else(world: World) -> None:
+    before = cut_off_and_killed(world, noticed=True)
+    returned = world.until_record("ResourceReturned")
+    assert (returned["resource"], returned["code"]) == ("uav1", "LINK_LOST")
+    first, *_ = world.relay.seen[before:]
+    assert str(first[1]).startswith("mode "), world.relay.seen
+    assert is_stopped(world.relay.seen[before:])
+    again = world.until_record("BehaviorRequested", element="Fly", behavior="r1.b3")
+    (lost,) = [each for each in world.records if each["record"] == "WorkReassigned"]
+    assert again["parameters"] == lost["parameters"]
+    assert world.records.index(returned) < world.records.index(again)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("world", ["1000 s"], indirect=True)
+def test_a_copter_whose_loss_nothing_had_noticed_is_held_until_an_operator_decides(
+    world: World,
+) -> None:
+    before = cut_off_and_killed(world, noticed=False)
+    world.until(lambda: is_stopped(world.relay.seen[before:]))
+    sent = [value for what, value in world.relay.seen[before:] if what == "sent"]
+    assert all(str(each).startswith("mode ") for each in sent), world.relay.seen
