@@ -162,6 +162,7 @@ def replay_counterexample(
     """Play violation `number` (from 1) of a JSON report. 0: the engine did all of the run."""
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import wants_colour
+    from m2pem.executive.verification import known_ways
     from m2pem.scripting.sources import DEFAULT_FLEET, fleet_of
     from m2pem.verify.conformance_run import ConformanceRun, NotPlayableError
 
@@ -169,7 +170,8 @@ def replay_counterexample(
     violation = _violation(file, report, number)
     mission = _mission(file, report, mission_file)
     fleet = fleet_of(fleet_file or DEFAULT_FLEET, mission)
-    player = ConformanceRun(mission, fleet, report["process"], report["data"])
+    ways = known_ways(fleet)
+    player = ConformanceRun(mission, fleet, report["process"], report["data"], ways)
     lines = LineFormatter(lambda _: mission, colour=wants_colour(sys.stdout))
     _say(output, f"{violation['property']}: {violation['text']}")
     _show(player.steps, lines, output)

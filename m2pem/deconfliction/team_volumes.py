@@ -44,12 +44,7 @@ def member_volume(
 def _march(
     behavior: str, parameters: FlightParameters, lead: Participant | None, index: int
 ) -> Volume:
-    spacing_m = parameters.spacing_m or SPACING_M
-    back, left = slot(parameters.text("shape") or _SHAPES[behavior], index)
-    back_m, left_m = back * spacing_m, left * spacing_m
-    offsets = parameters.text("offsets")
-    if index and offsets and len(given := read_offsets(offsets)) >= index:
-        back_m, left_m = given[index - 1]
+    back_m, left_m = _offset(behavior, parameters, index)
     route = parameters.route
     if route is None or not route.waypoints:
         # To a place beside the lead, whichever way that looks.
@@ -76,6 +71,28 @@ def _march(
     low_m = over.low_m if parameters.vehicle.flies else min(span.low_m for span in spans)
     extra = Piece(detour, low_m, over.high_m)
     return Volume((*volume.pieces, extra), volume.end_m, volume.unknown)
+
+
+def _offset(behavior: str, parameters: FlightParameters, index: int) -> tuple[float, float]:
+    """How far behind the lead and left of it a member goes, in metres."""
+    spacing_m = parameters.spacing_m or SPACING_M
+    back, left = slot(parameters.text("shape") or _SHAPES[behavior], index)
+    offsets = parameters.text("offsets")
+    if index and offsets and len(given := read_offsets(offsets)) >= index:
+        return given[index - 1]
+    return back * spacing_m, left * spacing_m
+
+
+def end_of_member(behavior: str, parameters: FlightParameters, index: int) -> EastNorth | None:
+    """Return where member `index` of a team stands at the end of a route; None: not known."""
+    route = parameters.route
+    if behavior not in _SHAPES or route is None or not route.waypoints:
+        return None
+    places: list[EastNorthUp] = [(*parameters.to_local(each), 0.0) for each in route.waypoints]
+    if len({place[:2] for place in places}) == 1:
+        return None if index else places[0][:2]
+    back_m, left_m = _offset(behavior, parameters, index)
+    return trimmed(shifted(places, left_m), back_m)[-1][:2]
 
 
 def _stop(lead: Participant | None) -> Sequence[EastNorth]:
@@ -106,3 +123,6 @@ _PLANS: Mapping[str, Callable[[FlightParameters], Volume]] = {
     "area_observe": _observe,
     "escort": _escort,
 }
+
+TEAM_BEHAVIORS = frozenset({*_SHAPES, *_PLANS})
+"""Those whose members' volumes are known; of others, each member does that of one vehicle."""

@@ -20,6 +20,7 @@ from m2pem.verify.search.explore import Limits, Progress
 from m2pem.verify.spin.queries import Storage
 from m2pem.verify.translate.context import behavior_of, may_be_preempted
 from m2pem.verify.translate.options import Options
+from m2pem.verify.translate.ways import KnownWays
 
 if TYPE_CHECKING:
     from m2pem.plugins import Plugins
@@ -39,6 +40,16 @@ PREEMPTED_AT_ANY_TIME = (
     "vehicle of a task at any time (PREEMPTED), and what it has taken is free again at once"
 )
 """The note in reports of missions whose tasks may be preempted."""
+
+
+def known_ways(fleet: Fleet) -> KnownWays | None:
+    """Return where the vehicles of a fleet go; None: it has no shared space."""
+    if not fleet.shared_space:
+        return None
+    # Few fleets need it.
+    from m2pem.deconfliction.known_ways import FleetWays  # noqa: PLC0415
+
+    return FleetWays(fleet)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,13 +95,14 @@ def search_request(
     wrong = findings_for(mission, arbiters, plugins, tuple(data), process)
     refuse_errors(f"{mission.file} cannot be verified: `m2pem check` finds errors", wrong)
     writes = plugins.service_writes()
+    fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     options = Options(
         data=data,
         service_writes=writes,
         timers_in_order=timers_in_order,
         catalogue=arbiters.offered if arbiters is not None else None,
+        ways=known_ways(fleet),
     )
-    fleet = arbiters.fleet if arbiters is not None else fleet_for(mission)
     requirements = collect(Names(mission, fleet, writes, data), spec)
     return SearchRequest(mission, fleet, process, data, options, requirements)
 

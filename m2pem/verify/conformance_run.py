@@ -20,7 +20,7 @@ from m2pem.engine import records as r
 from m2pem.engine.arming import definition_of
 from m2pem.engine.data import reader
 from m2pem.engine.run import MissionRun, Step
-from m2pem.engine.state import BehaviorPhase, RunStatus, Token, Wait
+from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus, Token, Wait
 from m2pem.engine.steps import Steps
 from m2pem.errors import ExpressionError
 from m2pem.fleet.fleet import Fleet
@@ -33,6 +33,9 @@ from m2pem.mission.values import ReadValue, Value
 from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import REASSIGNED, Action, Trigger
 from m2pem.verify.translate.domains import constants, representatives
+from m2pem.verify.translate.pools import candidates_of
+from m2pem.verify.translate.space import SpacePlan, space_plan
+from m2pem.verify.translate.ways import KnownWays
 
 _SECOND_US = 1_000_000
 _START_US = 1_767_225_600 * _SECOND_US  # 2026-01-01, as of rehearsals
@@ -86,8 +89,15 @@ class ConformanceRun:
         fleet: Fleet | None,
         process: str,
         data: Mapping[str, Value] | None = None,
+        ways: KnownWays | None = None,
     ) -> None:
-        self.run = _Run(mission, without_space(fleet) if fleet is not None else None)
+        """`ways`: those with which the net was made."""
+        self._space: SpacePlan | None = None
+        if fleet is not None:
+            candidates = candidates_of(mission, fleet, None)
+            self._space = space_plan(mission, mission.process(process), fleet, candidates, ways)
+            fleet = without_space(fleet) if self._space is None else self._space.fleet
+        self.run = _Run(mission, fleet)
         self.steps: list[Step] = []
         self._now_us = _START_US
         self._reports: Counter[str] = Counter()
@@ -108,6 +118,8 @@ class ConformanceRun:
         for action in step["actions"]:
             if action["action"] == Action.ALLOCATED:
                 self._allocate(action["element"], action["detail"])
+            if action["action"] == Action.REFUSED:
+                self._refuse_space(action["element"], action["detail"])
             if action["action"] == "taken":
                 self._expected[action["element"]] += 1
         return self.steps[before:]
@@ -151,8 +163,7 @@ class ConformanceRun:
 
     def _allocate(self, element: str, detail: str) -> None:
         """Answer the request of a task for resources as the allocator does in the step."""
-        asked = self.run.state.allocations.values()
-        request = next((each for each in asked if each.token.node.id == element), None)
+        request = self._request(element)
         if request is None:
             raise NotPlayableError(f"{element} asks for no resources in the engine now")
         if not detail:
@@ -167,7 +178,17 @@ class ConformanceRun:
                     raise NotPlayableError(f"{' and '.join(alike)} are not free in the engine now")
                 given.add(free)
                 chosen[role] = (*chosen.get(role, ()), free)
-        self._give(i.ResourcesChosen(request.id, chosen, {}))
+        self._give(i.ResourcesChosen(request.id, chosen, {"roles": {}, "together_with": []}))
+
+    def _request(self, element: str) -> AllocationRequest | None:
+        asked = self.run.state.allocations.values()
+        return next((each for each in asked if each.token.node.id == element), None)
+
+    def _refuse_space(self, element: str, space: str) -> None:
+        """A shared space is full: a request ends; a behavior begins, and is rejected later."""
+        request = self._request(element)
+        if request is not None:
+            self._give(i.ResourcesNotFree(request.id, f"{space} is full", {}, "REJECTED"))
 
     def _is_free(self, resource: str) -> bool:
         state = self.run.state
@@ -198,6 +219,10 @@ class ConformanceRun:
         self._give(i.BehaviorReported(behavior, self._reports[behavior], state, code))
 
     def _time_is_up(self, element: str) -> None:
+        request = self._request(element)
+        if request is not None and not request.deadline and self._space is not None:
+            wait_s = self._space.wait_s()
+            self._give(i.ResourcesNotFree(request.id, "no space", {}, wait_s=wait_s))
         for _ in range(_MOST_TIMERS):
             due = self.run.next_due_us
             if due is None:

@@ -43,21 +43,21 @@ class Allocator:
     """Answers requests as `m2pem.executive.allocator` does, with dice in place of telemetry."""
 
     def __init__(self, fleet: Fleet, dice: Random) -> None:
-        self._fleet = fleet
+        self.fleet = fleet
         self._dice = dice
         self._graph = ResourceGraph(fleet, offers_all)
-        self._order = {r: n for n, r in enumerate((*fleet.vehicles, *fleet.payloads))}
+        self.order = {r: n for n, r in enumerate((*fleet.vehicles, *fleet.payloads))}
 
     def answer(self, run: MissionRun) -> i.Input | None:
         """The next answer to a request; None: those that are left wait."""
         state = run.state
-        asked = {each.id: self._roles(state, each) for each in state.allocations.values()}
+        asked = {each.id: self.roles_of(state, each) for each in state.allocations.values()}
         ordered = sorted(
             state.allocations.values(),
             key=lambda each: (-self._priority(asked[each.id]), each.at_us, self._dice.random()),
         )
         requests = [Request(each.id, tuple(r.options for r in asked[each.id])) for each in ordered]
-        chosen = assign(requests, self._order)
+        chosen = assign(requests, self.order)
         for each in ordered:
             if each.id in chosen:
                 return self._chosen(each, asked[each.id], chosen[each.id])
@@ -69,13 +69,13 @@ class Allocator:
     def _priority(self, roles: Sequence[ConsideredRole]) -> int:
         return max(each.role.need.priority for each in roles if each.role.need is not None)
 
-    def _roles(self, state: RunState, request: AllocationRequest) -> list[ConsideredRole]:
+    def roles_of(self, state: RunState, request: AllocationRequest) -> list[ConsideredRole]:
         occupied = {
             ResourceId(resource): Occupancy(holders[-1])
             for resource, holders in state.held.items()
             if any(state.behaviors[h].phase is not BehaviorPhase.CANCELLING for h in holders)
         }
-        evaluator = RoleEvaluator(Candidates(self._fleet, self._graph, lambda _: None))
+        evaluator = RoleEvaluator(Candidates(self.fleet, self._graph, lambda _: None))
         behavior = behavior_of(request)
         task = Task(behavior, Place(), reader(request.token), (), occupied)
         found = [evaluator.role(each, task) for each in behavior.roles]
@@ -91,7 +91,7 @@ class Allocator:
         chosen: dict[str, tuple[ResourceId, ...]],
     ) -> i.ResourcesChosen:
         filled = {
-            each.role.name: resources_of(each.role, self._fleet)
+            each.role.name: resources_of(each.role, self.fleet)
             if each.role.resource
             else chosen[each.role.name]
             for each in roles

@@ -88,7 +88,8 @@ class Follower:
                 look[self._paths[each.scope], each.element] += count
         return look
 
-    def _agrees(self, number: int, state: RunState, look: Look) -> bool:
+    def agrees(self, number: int, state: RunState, look: Look) -> bool:
+        """Whether a state of the net looks like the engine's."""
         ends = self.encoding.marking(number).tokens.keys() & self.net.ends
         if state.status is not RunStatus.ENDED:
             return not ends and self.look(number) == look
@@ -143,13 +144,13 @@ class Follower:
         look = look_of_run(state)
         reached = set(self.candidates)
         for _ in range(_MOST_AT_ONCE):
-            found = {each for each in reached if self._agrees(each, state, look)}
+            found = {each for each in reached if self.agrees(each, state, look)}
             if found:
                 more = {
                     each
                     for number in self.candidates
                     for each in self._after(number)
-                    if self._agrees(each, state, look)
+                    if self.agrees(each, state, look)
                 }
                 self.candidates = set(list(found | more)[:_MOST_CANDIDATES])
                 return True

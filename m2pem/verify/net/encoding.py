@@ -60,7 +60,7 @@ class Encoding:
         at = 0
         for place in net.places:
             width = self.wider.get(place.index, SEVERAL_BITS if place.several else 1)
-            width = max(width, len(place.free).bit_length())
+            width = max(width, len(place.free).bit_length(), place.most.bit_length())
             self.offset.append(at)
             self.width.append(width)
             self.mask.append(((1 << width) - 1) << at)

@@ -135,6 +135,13 @@ class Place:
     resets the place copies its token there."""
     holder: int | None = None
     """Of a place with `returns`: the active place of the task that holds the resources."""
+    space: str = ""
+    """A shared space: each token is a vehicle that is in it."""
+    most: int = 0
+    """The most tokens that it can have, if it is known and more than one."""
+    vehicles: tuple[str, ...] = ()
+    """Each token is one of these vehicles, which is in the shared spaces `inside`."""
+    inside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +175,12 @@ class Action(StrEnum):
     TRIGGERED = "triggered"
     THROWN = "thrown"
     """An event throws, or an activity's error propagates."""
+    LEFT = "left"
+    """A vehicle of an activity leaves the shared space of `detail`."""
+    STANDS = "stands"
+    """A vehicle of the process has stopped; `detail` says where it stands in a shared space."""
+    REFUSED = "refused"
+    """An activity may not enter the shared space of `detail`, which is full."""
     ALLOCATED = "allocated"
     """A task gets the resources of `detail` (`m2pem.verify.net.choices`); "": it gets none, because
     too few are free."""

@@ -156,7 +156,7 @@ def _shown(searched: SearchedMission, lost: Sequence[int]) -> int:
         for each in net.transitions
         if any(step.action is Action.ALLOCATED for step in each.steps)
         for place, _ in each.consume
-        if not net.places[place].free and net.places[place].role is Role.CONTROL
+        if net.places[place].element == each.element and net.places[place].role is Role.CONTROL
     }
     for state in lost if asking else ():
         if asking & found.marking(state).tokens.keys() and all(
@@ -246,26 +246,32 @@ def _elements(searched: SearchedMission, transitions: Sequence[int]) -> tuple[st
 def no_livelock(searched: SearchedMission) -> Result:
     """The mission never goes on for ever without a way out."""
     found = searched.found
-    lost = _lost(searched, ends_only=False)
     violations: list[Violation] = []
-    if lost:
-        into, cycle = _into_cycle(searched, lost[0])
+    over: set[int] = set()
+    """States from which something fails, and nothing goes round."""
+    for lost in _lost(searched, ends_only=False):
+        into, cycle = _into_cycle(searched, lost, over=over)
+        if not cycle:
+            continue
         elements = _elements(searched, cycle)
         violations.append(
             Violation(
                 f"goes round {searched.labels(elements)} for ever, with no way out",
                 elements,
-                (*found.run_to(lost[0]), *into),
+                (*found.run_to(lost), *into),
                 cycle,
             )
         )
+        break
     return searched.result("no-livelock", "Nothing goes on for ever without a way out.", violations)
 
 
 def _into_cycle(
-    searched: SearchedMission, start: int, *, asked: bool = False
+    searched: SearchedMission, start: int, *, asked: bool = False, over: set[int] | None = None
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Transitions that lead from a state to a cycle, and those of the cycle. `asked`: as above."""
+    """Transitions that lead from a state to a cycle, and those of the cycle; without a cycle, those
+    to where it ends. `asked`: as above. `over`: states that lead to no cycle; more are added.
+    """
     seen: dict[int, int] = {}
     transitions: list[int] = []
     state = start
@@ -277,6 +283,9 @@ def _into_cycle(
             if not _fails(searched, each[0]) and not (asked and _unasked(searched, each[0]))
         )
         transition, state = next(steps, (-1, -1))
+        if over is not None and (transition < 0 or state in over):
+            over.update(seen)
+            return tuple(transitions), ()
         if transition < 0:
             return tuple(transitions), ()
         transitions.append(transition)

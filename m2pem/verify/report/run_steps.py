@@ -258,6 +258,8 @@ def _same_step(transition: Transition, following: Transition) -> bool:
     if not transition.steps or not following.steps:
         return not transition.steps
     second = following.steps[0]
+    if second.action is Action.STANDS:
+        return True
     before = {step.action for step in transition.steps if step.element == second.element}
     again = second.action is Action.COMPLETED and Action.TRIGGERED in before
     return again and following.trigger is None
@@ -372,6 +374,12 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
             return f"{name} is given {choices.in_words(choices.read(first.detail))}"
         case Action.ALLOCATED:
             return f"{name} gets nothing: too few of what could fill its roles are free"
+        case Action.LEFT:
+            return f"the vehicle of {name} has left {first.detail}"
+        case Action.REFUSED:
+            return f"{name} gets nothing: {first.detail} is full"
+        case Action.STANDS:
+            return first.detail or "a vehicle has stopped"
         case Action.INTERRUPTED:
             return ""
         case Action.THROWN:
@@ -403,6 +411,10 @@ def _besides(
                 continue
             what = element_names.thrown(step.detail) if step.detail else "its error"
             said.append(f"{name} throws {what}")
+        elif step.action is Action.STANDS and step.detail and place:
+            said.append(step.detail)
+        elif step.action is Action.REFUSED and place:
+            said.append(f"{step.detail} is full")
         elif step.action is Action.INTERRUPTED:
             said.append(f"{name} is interrupted")
         elif step.action is Action.TRIGGERED and place and step.element != element:

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from m2pem.mission import elements as e
+from m2pem.verify.net import choices
 from m2pem.verify.net.encoding import Marking
-from m2pem.verify.net.petri_net import Action, PetriNet
+from m2pem.verify.net.petri_net import Action, PetriNet, Transition
 from m2pem.verify.report.run_steps import ElementNames, RunStep, Token
 
 
@@ -52,33 +53,72 @@ def why_stuck(
 def waits_for_resources(
     net: PetriNet, element_names: ElementNames, marking: Marking
 ) -> dict[str, str]:
-    """Say of each task that asks for resources what it waits for, and what has that."""
+    """Say of each task that asks for resources, or for space, what it waits for, and what has
+    that."""
     asked: dict[str, dict[str, None]] = {}
-    asking: set[str] = set()
+    full: dict[str, dict[str, None]] = {}
+    asking: dict[str, None] = {}
     for transition in net.transitions:
         first = transition.steps[0] if transition.steps else None
         if first is None or first.action is not Action.ALLOCATED or not first.detail:
             continue
-        wanted = asked.setdefault(first.element, {})
-        for place, _ in transition.consume:
-            wanted.update(dict.fromkeys(net.places[place].free))
-            if not net.places[place].free and place in marking.tokens:
-                asking.add(first.element)
-    holders = {
-        resource: place.element
-        for place in net.places
-        if place.index in marking.tokens
-        for pool in place.returns
-        for resource in place.resources or net.places[pool].free
-    }
+        places = choices.read(first.detail).values()
+        wanted = (resource for alike in places for pool in alike for resource in pool)
+        asked.setdefault(first.element, {}).update(dict.fromkeys(wanted))
+        own = (p for p, _ in transition.consume if net.places[p].element == first.element)
+        if any(place in marking.tokens for place in own):
+            asking[first.element] = None
+            spaces = full.setdefault(first.element, {})
+            spaces.update(dict.fromkeys(_only_lacks(net, transition, marking)))
+    holders = _holders(net, marking)
     found: dict[str, str] = {}
     for element in asking:
+        if full[element]:
+            said = [_who_is_in(net, element_names, marking, space) for space in full[element]]
+            found[element] = f"waits for {' and '.join(said)}"
+            continue
         held = {r: holders[r] for r in asked[element] if r in holders}
         who = ", ".join(f"{r} is held by {element_names.name(by)}" for r, by in held.items())
         found[element] = (
             f"waits for {_any_of(list(asked[element]))}, {who or 'which it cannot get'}"
         )
     return found
+
+
+def _holders(net: PetriNet, marking: Marking) -> dict[str, str]:
+    """Return, by resource, the task that has it."""
+    found: dict[str, str] = {}
+    for place in net.places:
+        if place.index in marking.tokens:
+            pools = [resource for pool in place.returns for resource in net.places[pool].free]
+            found.update(dict.fromkeys(place.resources or pools, place.element))
+    return found
+
+
+def _only_lacks(net: PetriNet, transition: Transition, marking: Marking) -> list[str]:
+    """Return the shared spaces that have no room for a transition which lacks nothing else."""
+    tokens = marking.tokens
+    if any(tokens.get(place, 0) < count for place, count in transition.consume):
+        return []
+    if any(place not in tokens for place in transition.read):
+        return []
+    if any(place in tokens for place in transition.inhibit):
+        return []
+    over = [place for place, most in transition.at_most if tokens.get(place, 0) > most]
+    return [net.places[p].space for p in over] if all(net.places[p].space for p in over) else []
+
+
+def _who_is_in(net: PetriNet, element_names: ElementNames, marking: Marking, space: str) -> str:
+    """Say who is in a shared space: `bridge, where ugv1 (Cross) is`."""
+    said: list[str] = []
+    for place in net.places:
+        if space in place.inside and place.index in marking.tokens:
+            one = len(place.vehicles) == 1
+            who = place.vehicles[0] if one else f"one of {', '.join(place.vehicles)}"
+            moves = place.element != net.process
+            doing = f" with {element_names.name(place.element)}" if moves else ""
+            said.append(f"{who} is{doing}")
+    return f"{space}, where {' and '.join(said)}" if said else space
 
 
 def _any_of(names: Sequence[str]) -> str:

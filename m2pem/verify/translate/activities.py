@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from m2pem.engine.execution import Waits, waits_when_entered
+from m2pem.fleet.allocation import allocate
 from m2pem.fleet.space import may_wait_for_space
 from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior, OnLoss
@@ -10,6 +11,7 @@ from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.expression import literal
 from m2pem.mission.losses import PREEMPTED
 from m2pem.units import Dimension, UnitError, quantity
+from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import (
     BEGINS,
     UNASKED,
@@ -42,6 +44,15 @@ from m2pem.verify.translate.context import (
     takes_from_pools,
 )
 from m2pem.verify.translate.loops import looped
+from m2pem.verify.translate.moving import (
+    REJECTED,
+    begin_moving,
+    may_be_refused,
+    movers_of,
+    refused_place,
+    stop_moving,
+    without_room,
+)
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
 from m2pem.verify.translate.pools import goes_on
 from m2pem.verify.translate.sequence_flows import leave
@@ -192,7 +203,10 @@ def _behavior(
         return [instance.begin()]
     roles = context.candidates.get(instance.node, ())
     able = [each for role in roles for each in role.resources] or resources(context, behavior)
-    if may_wait_for_space(context.fleet, behavior.type, behavior.name, able or ()):
+    fleet = context.fleet
+    if context.options.ways is not None:
+        fleet = replace(fleet, shared_space={})
+    if may_wait_for_space(fleet, behavior.type, behavior.name, able or ()):
         what = "that it may wait for space, and end without it, is not followed"
         net.approximate(instance.node, Exactness.BOUNDED, what)
     if context.options.failures and any(role.on_loss is OnLoss.ASK for role in behavior.roles):
@@ -229,7 +243,22 @@ def translate_contention(context: TranslationContext) -> None:
             steps=(Step(instance.node.id, Action.ENTERED, "commands"),),
             inhibit=frozenset(holders),
         )
-        context.transitions(product([free], [contender.begins]))
+        asked = contender.kind is Kind.JOIN
+        behavior = behavior_of(instance.node)
+        assert behavior is not None
+        movers = movers_of(context, instance.node, contender.resources)
+        no_room = without_room(context, instance, behavior, movers, awaited=asked)
+        if asked:
+            free = replace(free, steps=(_given(context, instance.node, behavior),))
+            unheard = replace(contender.asks, inhibit=frozenset(holders))
+            fails = failing(context, instance, REJECTED, Flag.UNCAUGHT)
+            context.transitions(product(product([unheard], no_room), fails), Kind.JOIN)
+        begun = product([free], [contender.begins])
+        moved = begin_moving(context, instance, behavior, movers)
+        context.transitions(product(begun, moved), contender.kind)
+        if not asked:
+            refused = Effect(produce=(refused_place(context, instance),)) if no_room else Effect()
+            context.transitions(product(product(begun, no_room), [refused]))
         for holder, resource in holders.items():
             refused = Effect(
                 read=frozenset({holder}),
@@ -237,7 +266,15 @@ def translate_contention(context: TranslationContext) -> None:
                 flagged=resource,
             )
             fails = failing(context, instance, "RESOURCE_UNAVAILABLE", Flag.CONFLICT)
-            context.transitions(product(product([contender.asks], [refused]), fails))
+            effects = product(product([contender.asks], [refused]), fails)
+            context.transitions(effects, contender.kind)
+
+
+def _given(context: TranslationContext, node: e.FlowNode, behavior: Behavior) -> Step:
+    """The step in which a task that names its resources is given them."""
+    roles = allocate(behavior, context.fleet).roles
+    given = {role: [[each] for each in ids] for role, ids in roles.items()}
+    return Step(node.id, Action.ALLOCATED, choices.written(given))
 
 
 def _hold_us(behavior: Behavior) -> int | None:
@@ -263,8 +300,18 @@ def _outside_work(
     """
     net = context.net
     begun = Effect(inhibit=frozenset() if asks is None else frozenset({asks}))
+    rejected: Effect | None = None
+    if may_be_refused(context, instance):
+        refused = refused_place(context, instance)
+        rejected = replace(begun, consume=(instance.active,), read=frozenset({refused}))
+        begun = replace(begun, inhibit=begun.inhibit | {refused})
     well = product([_ended(instance, instance.leave())], [begun])
     badly = replace(begun, consume=(instance.active,))
+    if context.space is not None:
+        well = product(well, [stop_moving(context, instance)])
+    if rejected is not None:
+        for effect in product([rejected], failing(context, instance, REJECTED, Flag.UNCAUGHT)):
+            net.transition(effect, Kind.EXTERNAL, Trigger.FAILS, REJECTED)
     for key in context.data.written_anyhow(instance.node):
         well = context.data.write(well, key, None, instance.outer, instance.node)
     unasked = UNASKED if asks is not None and _goes_on(context, instance) else ""

@@ -21,6 +21,7 @@ from m2pem.mission.behavior import Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
+from m2pem.units import US_PER_S
 from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import (
     REASSIGNED,
@@ -39,6 +40,14 @@ from m2pem.verify.translate.context import (
     TranslationContext,
 )
 from m2pem.verify.translate.data import boxes, constant
+from m2pem.verify.translate.moving import (
+    REJECTED,
+    asks_for_space,
+    begin_moving,
+    movers_of,
+    refused_place,
+    without_room,
+)
 from m2pem.verify.translate.net_builder import Effect, product
 from m2pem.verify.translate.pools import Pool, RoleCandidates
 from m2pem.verify.translate.throwing import failing
@@ -71,7 +80,11 @@ def take_named_resources(
         produce=(_holds_named(context, instance, behavior, named),),
     )
     refused = Effect(consume=(asks, instance.active))
-    context.contended.append(Contender(instance, named, refused, begins))
+    kind = Kind.INTERNAL
+    if asks_for_space(context, instance.node):
+        kind = Kind.JOIN
+        wait_for_space(context, instance)
+    context.contended.append(Contender(instance, named, refused, begins, kind))
     begun = instance.begin().then(Effect(produce=(asks,)))
     assert begun is not None
     return [begun]
@@ -146,15 +159,29 @@ def choose_resources(
     cases = list(_cases(context, instance, roles))
     certain = len(cases) == 1 and not instance.inside.several
     context.asking.append(_asking(context, asks, roles, certain=certain))
+    asks_space = asks_for_space(context, instance.node)
     if waits:
         _wait_limit(context, instance, roles)
+    elif asks_space:
+        wait_for_space(context, instance)
 
     def translate_later() -> None:
         for guard, offered in cases:
             when = Effect(guard=guard)
             for choice in _choices(context, instance, roles, offered, fewest=False):
-                given = _given(context, instance, behavior, choice)
-                context.transitions(product([when], given), Kind.JOIN)
+                given = product([when], _given(context, instance, behavior, choice))
+                movers = movers_of(context, instance.node, (), choice.total)
+                moved = begin_moving(context, instance, behavior, movers)
+                context.transitions(product(given, moved), Kind.JOIN)
+                no_room = without_room(context, instance, behavior, movers, awaited=asks_space)
+                if asks_space:
+                    offered_to = product([when], [_not_taken(context, instance, choice)])
+                    fails = failing(context, instance, REJECTED, Flag.UNCAUGHT)
+                    refused = product(product(offered_to, no_room), fails)
+                else:
+                    rejected = Effect(produce=(refused_place(context, instance),))
+                    refused = product(given, product(no_room, [rejected])) if no_room else []
+                context.transitions(refused, Kind.JOIN)
             if not waits:
                 fewest = _choices(context, instance, roles, offered, fewest=True)
                 for limits in _refusals([each.total for each in fewest]):
@@ -474,6 +501,27 @@ def _refused(
         inhibit=frozenset(place for place, count in places.items() if not count),
         at_most=tuple((place, count) for place, count in places.items() if count),
     )
+
+
+def _not_taken(context: TranslationContext, instance: ActivityInstance, choice: _Choice) -> Effect:
+    """A task could be given what a choice says, and gets nothing."""
+    total = choice.total
+    free = tuple(context.pool_place(pool) for pool, count in total.items() for _ in range(count))
+    asks = asking_place(context, instance)
+    return Effect(consume=(asks, instance.active, *free), produce=free)
+
+
+def wait_for_space(context: TranslationContext, instance: ActivityInstance) -> None:
+    """Translate the end of the wait of a task whose roles do not say how long it waits."""
+    plan = context.space
+    assert plan is not None
+    if not plan.moves(instance.node):
+        return
+    asks = asking_place(context, instance)
+    late = Effect(consume=(instance.active,), read=frozenset({asks}))
+    due = round(plan.wait_s() * US_PER_S)
+    for effect in product([late], failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT_FAILURE)):
+        context.net.transition(effect, Kind.EXTERNAL, Trigger.TIMER, due_us=due)
 
 
 def _wait_limit(

@@ -22,7 +22,9 @@ from m2pem.verify.net.size_limit import SizeLimit
 from m2pem.verify.translate.data import Data, Truth
 from m2pem.verify.translate.net_builder import Effect, NetBuilder, ScopeDraft
 from m2pem.verify.translate.options import Options
+from m2pem.verify.translate.order import forks
 from m2pem.verify.translate.pools import Pool, candidates_of, pools_of, stored_values
+from m2pem.verify.translate.space import space_plan
 
 
 @dataclass(slots=True, eq=False)
@@ -88,12 +90,14 @@ class Contender:
     """A behavior that begins if all its resources are free, and fails at once if one is not.
 
     `asks`: the effect that removes its token from where it asks for them. `begins`: of its begin.
+    `kind`: JOIN, if it waits for space.
     """
 
     instance: ActivityInstance
     resources: tuple[str, ...]
     asks: Effect
     begins: Effect
+    kind: Kind = Kind.INTERNAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +135,16 @@ class TranslationContext:
         self.net = NetBuilder(size_limit)
         self.candidates = candidates_of(mission, fleet, options.catalogue)
         self.data = Data(mission, options, size_limit, stored_values(self.candidates))
+        self.space = space_plan(mission, process, fleet, self.candidates, options.ways)
+        self.moving: dict[tuple[object, int, str], int] = {}
+        """Places of vehicles on their way or just stopped, each with its transitions."""
         self.pool_of = pools_of(
-            mission, fleet, self.candidates, self.data.domains.of, options.distinguished
+            mission,
+            fleet,
+            self.candidates,
+            self.data.domains.of,
+            options.distinguished,
+            self.space.likeness if self.space is not None else lambda _: None,
         )
         self.world = self.net.scope(process, None)
         self.world.path = ()
@@ -250,19 +262,6 @@ def _ends_reached_again(mission: Mission) -> frozenset[e.FlowNode]:
     return frozenset(each for each in reached if isinstance(each, e.EndEvent))
 
 
-def forks(node: e.FlowNode) -> bool:
-    """Whether one token can become several at a node."""
-    if isinstance(node, e.ExclusiveGateway | e.EventBasedGateway):
-        return False
-    if isinstance(node, e.Activity) and (
-        node.completion_quantity > 1 or any(not b.interrupting for b in node.boundary)
-    ):
-        return True
-    if isinstance(node, e.StartEvent) and len(node.container.entries) > 1:
-        return True
-    return len(node.outgoing) > 1
-
-
 def register_catcher(
     context: TranslationContext,
     what: str,
@@ -308,7 +307,7 @@ def held_by_instance(context: TranslationContext, node: e.Activity) -> tuple[tup
 
 def takes_from_pools(context: TranslationContext, node: e.Activity, behavior: Behavior) -> bool:
     """Whether a task chooses its resources, or needs one that another task may choose."""
-    if node in context.candidates:
+    if node in context.candidates or (context.space is not None and context.space.asks(node)):
         return True
     return any(each in context.pool_of for each in resources(context, behavior) or ())
 

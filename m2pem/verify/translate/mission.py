@@ -20,6 +20,7 @@ from m2pem.verify.translate.activities import translate_contention
 from m2pem.verify.translate.compensation import release_claims
 from m2pem.verify.translate.context import Catcher, TranslationContext, what_and_ref
 from m2pem.verify.translate.events import after, awaited
+from m2pem.verify.translate.moving import initial_places
 from m2pem.verify.translate.net_builder import (
     Effect,
     ScopeDraft,
@@ -69,7 +70,8 @@ def translate(
     for other in others:
         _instances(context, other)
     first = begin(context, root, context.root)
-    initial = (context.running, *context.free_resources(), *first.produce)
+    standing = initial_places(context)
+    initial = (context.running, *context.free_resources(), *standing, *first.produce)
     for late in context.later:
         late()
     translate_contention(context)

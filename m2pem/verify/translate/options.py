@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from m2pem.fleet.graph import Catalogue
 from m2pem.mission.expression import Expression
 from m2pem.mission.values import Value
+from m2pem.verify.translate.ways import KnownWays
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +21,8 @@ class Options:
     called within itself. `failures`: behaviors and services may fail. `timers_in_order`: of timers
     that begin to run together, the one that is due first fires first. `catalogue`: what each
     resource offers; None: all that the mission asks for. `distinguished`: resources that
-    requirements are about.
+    requirements are about. `ways`: where vehicles go, so that shared space is followed; None: it is
+    taken to be free.
     """
 
     data: Mapping[str, Value] = field(default_factory=dict)
@@ -34,5 +36,6 @@ class Options:
     """Conditions of requirements on the data of the process that the run begins with."""
     catalogue: Catalogue | None = None
     distinguished: Collection[str] = ()
+    ways: KnownWays | None = None
     most_instances: int = 8
     """Most instances of a number that the mission states; above, `instances` are checked."""

@@ -6,7 +6,7 @@ pool, unless something distinguishes them: a task names one of them, the choice 
 read, or a requirement is about it.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
 
@@ -56,7 +56,7 @@ def candidates_of(mission: Mission, fleet: Fleet, catalogue: Catalogue | None) -
     `catalogue`: what each resource offers; None: each offers all that the mission asks for.
     """
     asking = [
-        (node, behavior) for node, behavior in _behaviors(mission) if behavior.allocated_at_start
+        (node, behavior) for node, behavior in behaviors(mission) if behavior.allocated_at_start
     ]
     if not asking:
         return {}
@@ -67,7 +67,8 @@ def candidates_of(mission: Mission, fleet: Fleet, catalogue: Catalogue | None) -
     }
 
 
-def _behaviors(mission: Mission) -> Iterator[tuple[e.FlowNode, Behavior]]:
+def behaviors(mission: Mission) -> Iterator[tuple[e.FlowNode, Behavior]]:
+    """Yield the tasks that command a behavior, with it."""
     for node in mission.nodes:
         behavior = getattr(node, "behavior", None)
         if isinstance(behavior, Behavior):
@@ -76,7 +77,7 @@ def _behaviors(mission: Mission) -> Iterator[tuple[e.FlowNode, Behavior]]:
 
 def _offers_all(mission: Mission) -> Catalogue:
     """The catalogue of a fleet whose arbiters are not known."""
-    wanted = dict.fromkeys((each.name, each.type) for _, each in _behaviors(mission))
+    wanted = dict.fromkeys((each.name, each.type) for _, each in behaviors(mission))
     offered = [SHARED.get((name, kind)) or BehaviorSpec(name, kind) for name, kind in wanted]
     on_payloads = [each for each in offered if each.type is BehaviorType.PAYLOAD]
     on_vehicles = [each for each in offered if each.type is not BehaviorType.PAYLOAD]
@@ -150,11 +151,12 @@ def pools_of(
     candidates: Candidates,
     followed: Collection[str],
     distinguished: Collection[str],
+    likeness: Callable[[ResourceId], object] = lambda _: None,
 ) -> Mapping[ResourceId, Pool]:
     """Return the pool of each resource that some task may be given.
 
     `followed`: names of data whose values the net distinguishes. `distinguished`: resources that
-    requirements name.
+    requirements name. `likeness`: must be equal of the resources of a pool.
     """
     alone: set[ResourceId] = set()
     roles_of: dict[ResourceId, list[tuple[str, str]]] = {}
@@ -170,7 +172,8 @@ def pools_of(
     alike: dict[object, list[ResourceId]] = {}
     for resource in (*fleet.vehicles, *fleet.payloads):
         if resource in alone or resource in roles_of:
-            key = resource if resource in alone else tuple(roles_of[resource])
+            asked = tuple(roles_of.get(resource, ()))
+            key = resource if resource in alone else (likeness(resource), *asked)
             alike.setdefault(key, []).append(resource)
     return {resource: tuple(pool) for pool in alike.values() for resource in pool}
 
@@ -185,7 +188,7 @@ def _named_with(
         frozenset(
             each for role in behavior.roles if role.resource for each in resources_of(role, fleet)
         )
-        for _, behavior in _behaviors(mission)
+        for _, behavior in behaviors(mission)
         if any(role.resource for role in behavior.roles)
     ]
     found: set[ResourceId] = set()
