@@ -199,19 +199,6 @@ class SpaceHolder:
 
 
 @dataclass(frozen=True, slots=True)
-class SharedSpaceState:
-    """A shared space of the fleet file now: how many vehicles may be in it, and who has a place."""
-
-    name: str
-    capacity: int
-    holders: tuple[SpaceHolder, ...] = ()
-
-    def __str__(self) -> str:
-        who = ", ".join(map(str, self.holders)) or "free"
-        return f"{self.name} ({len(self.holders)} of {self.capacity} taken): {who}"
-
-
-@dataclass(frozen=True, slots=True)
 class WaitingTask:
     """A task that waits for vehicles or payloads that are not free, or for space
     (docs/allocation.md).
@@ -233,6 +220,10 @@ class WaitingTask:
     reason: str
     holders: Mapping[str, str]
 
+    def in_short(self) -> str:
+        """Return which task waits, and since when."""
+        return f"{self.task} of {self.run} waits since {self.waited_s:.0f} s"
+
     def __str__(self) -> str:
         limit = "without a limit" if self.left_s is None else f"for {self.left_s:.0f} s at most"
         priority = f" with priority {self.priority}" if self.priority else ""
@@ -240,6 +231,30 @@ class WaitingTask:
             f"{self.run}: {self.task} waits since {self.waited_s:.0f} s and {limit}{priority}: "
             f"{self.reason}"
         )
+
+
+@dataclass(frozen=True, slots=True)
+class SharedSpaceState:
+    """A shared space of the fleet file now: how many vehicles may be in it, who has a place, and
+    which tasks wait for one, in the order of service."""
+
+    name: str
+    capacity: int
+    holders: tuple[SpaceHolder, ...] = ()
+    waiting: tuple[WaitingTask, ...] = ()
+
+    def __str__(self) -> str:
+        who = ", ".join(map(str, self.holders)) or "free"
+        wait = "".join(f"; {each.in_short()}" for each in self.waiting)
+        return f"{self.name} ({len(self.holders)} of {self.capacity} taken): {who}{wait}"
+
+
+@dataclass(frozen=True, slots=True)
+class SharedSpaceChanged:
+    """Who has places in shared space, or waits for one, has changed; `MissionControl.shared_space`
+    has it. It concerns all runs."""
+
+    run: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,9 +339,11 @@ STARTS_SOON = "STARTS_SOON"
 NOT_STARTED = "NOT_STARTED"
 """The code of alerts about scheduled missions that did not start: missed, refused or held."""
 
-ControlEvent: TypeAlias = Union[StampedRecord, OpenPrompt, PromptClosed, Alert, ScheduleChanged]
+ControlEvent: TypeAlias = Union[
+    StampedRecord, OpenPrompt, PromptClosed, Alert, ScheduleChanged, SharedSpaceChanged
+]
 """What a subscriber gets: records and prompts in order, after they were committed, alerts and
-changes of the schedule at once."""
+changes of the schedule at once, those of shared space within a second."""
 
 
 class MissionControl(Protocol):
@@ -539,7 +556,8 @@ class MissionControl(Protocol):
         ...
 
     async def shared_space(self) -> Sequence[SharedSpaceState]:
-        """Who has places in the shared spaces of the fleet file, in its order."""
+        """Who has places in the shared spaces of the fleet file, in its order, and which tasks wait
+        for one."""
         ...
 
     async def incidents(self) -> Sequence[OpenIncident]:

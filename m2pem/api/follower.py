@@ -20,6 +20,7 @@ from m2pem.api.control import (
     RunId,
     RunStatus,
     RunSummary,
+    SharedSpaceChanged,
     StampedRecord,
 )
 from m2pem.api.run_view import RunView
@@ -73,6 +74,10 @@ class Listener:
 
     def schedule_changed(self) -> None:
         """The schedule has changed; `MissionControl.scheduled` has it."""
+
+    def shared_space_changed(self) -> None:
+        """Who is in shared space, or waits for it, has changed; `MissionControl.shared_space` has
+        it."""
 
 
 class Follower:
@@ -208,6 +213,8 @@ class Follower:
                 self.listener.alerted(event)
             case ScheduleChanged():
                 self.listener.schedule_changed()
+            case SharedSpaceChanged():
+                self.listener.shared_space_changed()
 
     async def _take_record(self, stamped: StampedRecord) -> None:
         view = self.views.get(stamped.run)

@@ -25,6 +25,7 @@ from m2pem.api.control import (
     PromptClosed,
     RunId,
     RunSummary,
+    SharedSpaceChanged,
     SharedSpaceState,
     StampedRecord,
     StartPreview,
@@ -247,7 +248,7 @@ class Operation:
         return method(**{name: getattr(params, name) for name in fields if name in accepted})
 
 
-Event = StampedRecord | OpenPrompt | PromptClosed | Alert | ScheduleChanged
+Event = StampedRecord | OpenPrompt | PromptClosed | Alert | ScheduleChanged | SharedSpaceChanged
 State = VehicleState | PayloadState | TeamState
 STREAMED: dict[str, type] = {kind.__name__: kind for kind in get_args(Event | State)}
 """What streams consist of, by the `kind` that a notification names."""

@@ -183,10 +183,15 @@ class Holding:
         ]
         if self.shared_space:
             spaces = [
-                (each.name, str(each.capacity), ", ".join(map(str, each.holders)) or "free")
+                (
+                    each.name,
+                    str(each.capacity),
+                    ", ".join(map(str, each.holders)) or "free",
+                    ", ".join(task.in_short() for task in each.waiting) or "-",
+                )
                 for each in self.shared_space
             ]
-            parts.append(table(("SHARED SPACE", "CAPACITY", "TAKEN BY"), spaces))
+            parts.append(table(("SHARED SPACE", "CAPACITY", "TAKEN BY", "WAITING"), spaces))
         if self.waiting:
             rows = [
                 (

@@ -434,7 +434,7 @@ class Control:
         return waiting_tasks(supervisor.runners.values(), supervisor.clock.now_us())
 
     async def shared_space(self) -> Sequence[SharedSpaceState]:
-        """Who has places in the shared spaces of the fleet file."""
+        """Who has places in the shared spaces of the fleet file, and who waits for one."""
         return self._supervisor.shared_space()
 
     async def incidents(self) -> Sequence[OpenIncident]:

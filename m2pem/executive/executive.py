@@ -26,6 +26,7 @@ from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.scheduler import Scheduler
+from m2pem.executive.shared_space_watch import watch_shared_space
 from m2pem.executive.supervisor import RunSettings, Supervisor
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.findings import Finding
@@ -146,6 +147,10 @@ class Executive:
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
+        if self._supervisor.fleet.shared_space and isinstance(self.clock, SystemClock):
+            spaces, publish = self._supervisor.shared_space, self.events.publish
+            watching = partial(watch_shared_space, self.clock, spaces, publish)
+            self._listen(group, "watch of shared space", watching)
         if self._watch_links:
             # On a fast clock a delay of this process would look like the silence of a vehicle.
             bounds_s = self._connections.lost_after_s(max(1.0, self._speed))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.clock import Clock
-from m2pem.api.control import SharedSpaceState, SpaceHolder
+from m2pem.api.control import SharedSpaceState, SpaceHolder, WaitingTask
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorSpec
@@ -55,13 +55,15 @@ class VehicleSeparation:
         now_us = self._clock.now_us()
         return reservations.reserve(request, spec.type, now_us, takes_altitude=takes_altitude)
 
-    def shared_space(self) -> list[SharedSpaceState]:
-        """Return who has places in the shared spaces of the fleet."""
+    def shared_space(self, waiting: Sequence[WaitingTask] = ()) -> list[SharedSpaceState]:
+        """Return who has places in the shared spaces of the fleet. `waiting`: all tasks that wait,
+        for whatever."""
         return [
             SharedSpaceState(
                 space.name,
                 space.capacity,
                 tuple(SpaceHolder(each.vehicle, each.behavior, each.lost) for each in holders),
+                tuple(each for each in waiting if space.name in each.holders),
             )
             for space, holders in self.reservations.places(self._clock.now_us())
         ]

@@ -49,6 +49,7 @@ from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
+from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.fleet import Fleet, dump, real_resources
@@ -189,8 +190,11 @@ class Supervisor:
         return SpaceAllocation(separation)
 
     def shared_space(self) -> list[SharedSpaceState]:
-        """Return who has places in the shared spaces of the fleet."""
-        return [] if self._separation is None else self._separation.shared_space()
+        """Return who has places in the shared spaces of the fleet, and which tasks wait for one."""
+        if self._separation is None:
+            return []
+        waiting = waiting_tasks(self.runners.values(), self.clock.now_us())
+        return self._separation.shared_space(waiting)
 
     # --- life -----------------------------------------------------------------------------------
 

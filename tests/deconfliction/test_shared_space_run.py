@@ -94,7 +94,10 @@ def test_who_comes_second_waits_and_goes_when_the_other_has_left_the_bridge(play
         assert "bridge (capacity 1)" in waiting.reason
         assert 0 < waiting.left_s <= 600
         (bridge,) = await world.executive.control.shared_space()
-        assert str(bridge) == "bridge (1 of 1 taken): one (r1.b1)"
+        (task,) = bridge.waiting
+        assert (task.run, task.allocation) == (second, f"{second}.a1")
+        taken = "bridge (1 of 1 taken): one (r1.b1)"
+        assert str(bridge) == f"{taken}; {task.task} of {second} waits since {task.waited_s:.0f} s"
         over = False
         while not world.states(f"{second}.b1"):
             await world.clock.sleep(0.1)

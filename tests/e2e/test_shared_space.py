@@ -26,7 +26,9 @@ def test_who_waited_for_the_bridge_when_the_executive_was_killed_crosses_it_afte
     status, running, _ = m2pem.run("fleet", "--running")
     assert status == 0
     assert "two would enter bridge (capacity 1)" in running
-    assert re.search(r"^bridge +1 +one \(r1\.b1\)$", running, re.MULTILINE)
+    assert re.search(
+        r"^bridge +1 +one \(r1\.b1\) +\w+ of r1 waits since \d+ s$", running, re.MULTILINE
+    )
     program.kill()
     again = m2pem.start("resume", "r1", *words)
     status, errors = again.rest()

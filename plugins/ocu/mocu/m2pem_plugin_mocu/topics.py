@@ -30,6 +30,7 @@ from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import incidents, messages
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
 from m2pem_plugin_mocu.schedule import ScheduleTopics
+from m2pem_plugin_mocu.shared_space import SharedSpaceTopic
 
 PROMPT_EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -77,6 +78,7 @@ class Topics(Listener):
         self._active = publisher(msg.ActiveElements, "active_elements", qos.STATUS)
         self._events = publisher(msg.MissionEvent, "events", qos.EVENTS)
         self.schedule = ScheduleTopics(ros, control, now_us)
+        self.shared_space = SharedSpaceTopic(ros, control, now_us)
         self._waiting: deque[tuple[RunView, StampedRecord, int]] = deque()
         self._some_wait = asyncio.Event()
         self.left_out = 0
@@ -96,6 +98,7 @@ class Topics(Listener):
                 group.create_task(throttle.run())
             group.create_task(self._send_events())
             group.create_task(self.schedule.run())
+            group.create_task(self.shared_space.run())
 
     async def flush(self) -> None:
         """Publish the last state, and give clients the time to receive it."""
@@ -187,6 +190,10 @@ class Topics(Listener):
     def schedule_changed(self) -> None:
         """Publish the schedule soon."""
         self.schedule.mark_changed()
+
+    def shared_space_changed(self) -> None:
+        """Publish shared space soon."""
+        self.shared_space.mark_changed()
 
     def alerted(self, alert: Alert) -> None:
         """Log it in ROS, whose topic `/rosout` operators read."""

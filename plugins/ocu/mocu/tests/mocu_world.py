@@ -172,8 +172,8 @@ class World:
 
 
 @asynccontextmanager
-async def staged(domain: int, **options: Any) -> AsyncIterator[World]:
-    """A world whose unit serves."""
+async def staged(domain: int, of: Fleet | None = None, **options: Any) -> AsyncIterator[World]:
+    """A world whose unit serves. `of`: its fleet, in place of `fleet`."""
     lent: list[ArbiterContext] = []
 
     def simulated(
@@ -183,7 +183,7 @@ async def staged(domain: int, **options: Any) -> AsyncIterator[World]:
         return SimArbiter(connections, context)
 
     arbiters = {"sim": simulated}
-    async with run_executive(fleet(), speed=20.0, arbiters=arbiters, **options) as control:
+    async with run_executive(of or fleet(), speed=20.0, arbiters=arbiters, **options) as control:
         world = World(control, lent[0].bus, domain)
         world.begin()
         try:

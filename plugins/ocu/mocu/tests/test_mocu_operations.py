@@ -58,6 +58,7 @@ SENT = {
 
 SERVED_OTHERWISE = {
     "start": "service start_mission brings the BPMN, or names a file of the executive's machine",
+    "shared_space": "topic shared_spaces",
     "scheduled": "service list_schedule, and topic schedule",
     "runs": "service list_runs, and topic status",
     "mission_time_s": "a field of the runs of list_runs and of topic status",
@@ -79,7 +80,6 @@ NOT_SERVED = {
     "holders": "no message has them; a refused take_vehicle names the holder",
     "holder_labels": "no message has them; topic events says what each task has",
     "unavailable": "no message has it; diagnostics say why a vehicle is not ready",
-    "shared_space": "no message has them; topic events says what a task waits for",
     "waiting": "no message has them; topic events says what a task waits for",
     "records": "a client has them from topic events on; older ones are in the journal",
     "wait": "topic status shows that a run has ended",

@@ -136,6 +136,10 @@ class Hub(Listener):
         """Send at once that the schedule is to be read again."""
         self._send_to_all(messages.schedule_changed())
 
+    def shared_space_changed(self) -> None:
+        """Send at once that shared space is to be read again."""
+        self._send_to_all(messages.shared_space_changed())
+
     def announce(self, text: str) -> None:
         """Send a text to all operators."""
         self._send_to_all(messages.fault(text))

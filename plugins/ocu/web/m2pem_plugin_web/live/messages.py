@@ -89,6 +89,11 @@ def schedule_changed() -> dict[str, Any]:
     return {"type": "schedule"}
 
 
+def shared_space_changed() -> dict[str, Any]:
+    """Return the message that shared space is to be read again: `GET /api/resources`."""
+    return {"type": "shared_space"}
+
+
 def alive() -> dict[str, Any]:
     """Return the message that an answer takes longer."""
     return {"type": "alive"}

@@ -1,9 +1,15 @@
 """/api/runs/{run}/..., /api/prompts, /api/resources: what operators do with runs and vehicles."""
 
+from typing import Any
+
 from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
+from m2pem.api.control import SharedSpaceState
+from m2pem.fleet.fleet import Fleet
+from m2pem.geo.geojson import as_geojson
+from m2pem.mission.geometry import Area, Route
 from m2pem_plugin_web.access.permissions import Operator, Stopper, Viewer
 from m2pem_plugin_web.access.requests import LATEST_S, age_s
 from m2pem_plugin_web.access.roles import Person
@@ -151,11 +157,33 @@ class SpaceHolderModel(BaseModel):
 
 
 class SharedSpaceModel(BaseModel):
-    """A shared space of the fleet file: `MissionControl.shared_space`."""
+    """A shared space of the fleet file: `MissionControl.shared_space`. `geometry` (GeoJSON): an
+    area, or a route with a corridor of `width_m`. `waiting`: the tasks that wait for a place."""
 
     name: str
     capacity: int
+    geometry: dict[str, Any]
+    width_m: float | None
     holders: list[SpaceHolderModel]
+    waiting: list[WaitingTaskModel]
+
+
+def space_model(fleet: Fleet, state: SharedSpaceState) -> SharedSpaceModel:
+    """A shared space as JSON."""
+    geometry = fleet.geometries[state.name]
+    assert isinstance(geometry, Area | Route)
+    return SharedSpaceModel(
+        name=state.name,
+        capacity=state.capacity,
+        geometry=as_geojson(geometry)["geometry"],
+        width_m=fleet.shared_space[state.name].width_m,
+        holders=[
+            SpaceHolderModel.model_validate(each, from_attributes=True) for each in state.holders
+        ],
+        waiting=[
+            WaitingTaskModel.model_validate(each, from_attributes=True) for each in state.waiting
+        ],
+    )
 
 
 class HoldersModel(BaseModel):
@@ -190,8 +218,7 @@ def resource_router(control: MissionControl) -> APIRouter:
                 for each in await control.waiting()
             ],
             shared_space=[
-                SharedSpaceModel.model_validate(each, from_attributes=True)
-                for each in await control.shared_space()
+                space_model(control.fleet(), each) for each in await control.shared_space()
             ],
             unavailable={str(each): why for each, why in (await control.unavailable()).items()},
         )

@@ -921,6 +921,8 @@ export const strings = {
       },
     },
     map: {
+      space: "{name}: {taken} of {capacity}",
+      spaceWaiting: "{count} waiting",
       label: "Map of the fleet",
       fitAll: "Show all",
       follow: "Follow",
@@ -1048,6 +1050,17 @@ export const strings = {
       gap: "gap {metres} m",
       inPlace: "in place",
       teams: "Teams",
+      space: {
+        title: "Shared space",
+        name: "Space",
+        inside: "In it",
+        waiting: "Waiting",
+        taken: "{taken} of {capacity}",
+        free: "free",
+        lost: "lost",
+        stands: "stands there",
+        waits: "{task} of {run}, {seconds} s",
+      },
     },
     log: {
       filter: "Filter",

@@ -72,6 +72,9 @@ const client = new LiveClient(browser, {
 /** Rises when the schedule is to be read again. */
 export const scheduleChanges = signal(0);
 
+/** Rises when shared space is to be read again. */
+export const spaceChanges = signal(0);
+
 export const connect = (): void => client.start();
 export const disconnect = (): void => client.stop();
 export const watch = (run: string | null): void => client.watch(run);
@@ -93,6 +96,7 @@ function take(message: ServerMessage): void {
   switch (message.type) {
     case "snapshot":
       scheduleChanges.value += 1;
+      spaceChanges.value += 1;
       runs.value = message.runs;
       prompts.value = message.prompts;
       holders.value = message.holders;
@@ -134,6 +138,9 @@ function take(message: ServerMessage): void {
       break;
     case "schedule":
       scheduleChanges.value += 1;
+      break;
+    case "shared_space":
+      spaceChanges.value += 1;
       break;
     case "alive":
     case "log":

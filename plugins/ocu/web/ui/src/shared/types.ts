@@ -184,6 +184,31 @@ export interface Schedule {
   entries: ScheduledMission[];
 }
 
+export interface SpaceHolder {
+  vehicle: string;
+  /** "": it stands there. */
+  behavior: string;
+  lost: boolean;
+}
+
+export interface WaitingTask {
+  run: string;
+  allocation: string;
+  task: string;
+  waited_s: number;
+  reason: string;
+}
+
+/** An area, or a corridor of `width_m` along a route, in which few vehicles may be at a time. */
+export interface SharedSpace {
+  name: string;
+  capacity: number;
+  geometry: GeoJSON.Geometry;
+  width_m: number | null;
+  holders: SpaceHolder[];
+  waiting: WaitingTask[];
+}
+
 export type LogKind = "run" | "tokens" | "behaviors" | "prompts" | "events" | "data" | "operators";
 
 /** What a record changes in the view of its run; null: it is there no more. */
@@ -315,5 +340,6 @@ export type ServerMessage =
   | { type: "fault"; seq: number; text: string }
   | { type: "notice"; seq: number; text: string }
   | { type: "schedule"; seq: number }
+  | { type: "shared_space"; seq: number }
   | { type: "alive"; seq: number }
   | { type: "log"; seq: number; records: RunRecord[] };

@@ -8,6 +8,7 @@ import { fill, strings } from "../../strings";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { STALE_S } from "../vehicles/VehiclesPane";
+import { sharedSpaces } from "../vehicles/sharedSpaces";
 import { workOf } from "../vehicles/work";
 import { DrawForm } from "./DrawForm";
 import { added, draftOf, emptyDraft, moved, type Kind } from "./draft";
@@ -50,6 +51,7 @@ export function MapPane({ formInside }: { formInside: boolean }) {
         made.showGeometries(now);
         if (!fitted) made.fitAll();
       }),
+      sharedSpaces.subscribe((now) => made.showSpaces(now)),
       scene.vehicles.subscribe((states) => {
         made.vehicles.vehicles(states, scene.pace.peek());
         if (!fitted && made.vehicles.positions().length > 0) {

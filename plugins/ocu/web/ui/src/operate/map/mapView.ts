@@ -1,9 +1,12 @@
 // The map, without Preact: Leaflet with no tiles but local ones.
 import L from "leaflet";
-import type { Fleet, Geometry } from "../../shared/types";
+import type { Fleet, Geometry, SharedSpace } from "../../shared/types";
 import type { Draft, Vertex } from "./draft";
 import { Graticule } from "./graticule";
+import { fill, strings } from "../../strings";
 import { VehicleLayer } from "./vehicleLayer";
+
+const text = strings.operate.map;
 
 export interface Tiles {
   max_zoom: number;
@@ -24,14 +27,22 @@ const FENCE = "#c2262e";
 /** From how large on a geometry's name is shown. */
 const NAMED_PX = 120;
 const NAMED_ZOOM = 17;
+const FREE = "#1f7a3d";
+const FULL = "#b35c00";
+const EQUATOR_M = 40_075_017;
+const TILE_PX = 256;
+/** A label of a space stands so far above its middle: names of routes are there. */
+const LABEL_PX = 14;
 const DRAFT = "#0b63ce";
 
 export class MapView {
   readonly vehicles: VehicleLayer;
   private readonly map: L.Map;
   private readonly geometries = L.layerGroup();
+  private readonly spaces = L.layerGroup();
   private readonly drafted = L.layerGroup();
   private readonly observer: ResizeObserver;
+  private readonly corridors = new WeakMap<L.Layer, number | null>();
   private isDrawing = false;
 
   constructor(
@@ -64,8 +75,12 @@ export class MapView {
       const style = { color: FENCE, weight: 2, dashArray: "6 6", fill: false, interactive: false };
       L.geoJSON(fleet.fence, { style }).addTo(this.map);
     }
+    this.spaces.addTo(this.map);
     this.geometries.addTo(this.map);
-    this.map.on("zoomend", () => this.nameGeometries());
+    this.map.on("zoomend", () => {
+      this.nameGeometries();
+      this.widenCorridors();
+    });
     this.drafted.addTo(this.map);
     this.vehicles = new VehicleLayer(this.map, fleet, (resource) => listener.chosen(resource));
     this.map.on("click", ({ latlng }) => {
@@ -89,6 +104,46 @@ export class MapView {
         .addTo(this.geometries);
     }
     this.nameGeometries();
+  }
+
+  /** Full ones stand out; each has who is in it, and how many wait, beside its name. */
+  showSpaces(spaces: readonly SharedSpace[]): void {
+    this.spaces.clearLayers();
+    for (const space of spaces) {
+      const { name, capacity, holders, waiting, geometry, width_m } = space;
+      const color = holders.length >= capacity ? FULL : FREE;
+      const style = { color, weight: 2, fillOpacity: 0.18, interactive: false };
+      const corridor = { ...style, opacity: 0.35, lineCap: "butt" as const };
+      const layer = L.geoJSON(geometry, { style: width_m === null ? style : corridor });
+      this.corridors.set(layer, width_m);
+      const label = [
+        fill(text.space, { name, taken: holders.length, capacity }),
+        holders.map(({ vehicle }) => vehicle).join(", "),
+        waiting.length > 0 ? fill(text.spaceWaiting, { count: waiting.length }) : "",
+      ];
+      layer
+        .bindTooltip(escaped(label.filter(Boolean).join(" · ")), {
+          permanent: true,
+          direction: "top",
+          offset: [0, -LABEL_PX],
+          className: "map-name map-space",
+        })
+        .addTo(this.spaces);
+    }
+    this.widenCorridors();
+  }
+
+  /** A corridor is as wide on the map as it is on the ground. */
+  private widenCorridors(): void {
+    const [at, zoom] = [this.map.getCenter(), this.map.getZoom()];
+    const metres_per_px =
+      (Math.cos((at.lat * Math.PI) / 180) * EQUATOR_M) / (TILE_PX * 2 ** zoom);
+    this.spaces.eachLayer((layer) => {
+      const width_m = this.corridors.get(layer) ?? null;
+      if (width_m !== null && layer instanceof L.GeoJSON) {
+        layer.setStyle({ weight: Math.max(2, width_m / metres_per_px) });
+      }
+    });
   }
 
   /** Names of what is small would lie on top of each other. */

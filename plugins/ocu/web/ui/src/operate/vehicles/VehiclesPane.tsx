@@ -9,6 +9,7 @@ import type { Fleet, PayloadState, VehicleState } from "../../shared/types";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { DomainSymbol } from "./DomainSymbol";
+import { SharedSpaces } from "./SharedSpaces";
 import { Teams } from "./Teams";
 import { heldElsewhere, isOperator, payloadsOf, workOf } from "./work";
 import "./vehicles.css";
@@ -41,6 +42,7 @@ export function VehiclesPane() {
         ))}
       </ul>
       <Teams />
+      <SharedSpaces />
     </Pane>
   );
 }
