@@ -22,6 +22,7 @@ from m2pem.api.data_text import named_value
 from m2pem.api.operator import operator_name
 from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem_plugin_terminal import incidents
+from m2pem_plugin_terminal.alerts import TITLE as TITLE_ALERTS
 from m2pem_plugin_terminal.dialogs import Ask, Choice, Choose, Confirm, Read, help_text
 from m2pem_plugin_terminal.display import Display
 from m2pem_plugin_terminal.handover import (
@@ -37,6 +38,8 @@ from m2pem_plugin_terminal.missions import NO_MISSIONS, ChooseMission, preview_t
 from m2pem_plugin_terminal.missions import TITLE as TITLE_MISSIONS
 from m2pem_plugin_terminal.schedule import ALL, NOTHING_SCHEDULED, entry_choices, schedule_choices
 from m2pem_plugin_terminal.schedule import TITLE as TITLE_SCHEDULE
+from m2pem_plugin_terminal.shared_space import TITLE as TITLE_SPACE
+from m2pem_plugin_terminal.shared_space import space_text
 from m2pem_plugin_terminal.status_lines import STOP_ALL
 
 
@@ -58,6 +61,8 @@ class TerminalApp(Display):
         Binding("i", "incidents"),
         Binding("r", "runs"),
         Binding("c", "schedule"),
+        Binding("f", "space"),
+        Binding("a", "alerts"),
         Binding("slash", "filter"),
         Binding("question_mark", "help"),
         Binding("q", "leave"),
@@ -444,6 +449,21 @@ class TerminalApp(Display):
             self.say(str(error), alarm=True)
         else:
             self.look_at(run)
+
+    async def action_space(self) -> None:
+        """Show who is in shared space, and which tasks wait for what."""
+        try:
+            spaces, waiting = await self.control.shared_space(), await self.control.waiting()
+        except M2pemError as error:
+            self.say(str(error), alarm=True)
+            return
+        await self.push_screen(Read(TITLE_SPACE, space_text(spaces, waiting)))
+        self.show()
+
+    async def action_alerts(self) -> None:
+        """Show all alerts; those that are shown have been seen."""
+        await self.push_screen(Read(TITLE_ALERTS, self.alerts.see()))
+        self.show()
 
     def action_filter(self) -> None:
         """Let the operator type a text; only log lines with it are shown."""

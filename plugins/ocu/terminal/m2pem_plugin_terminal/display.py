@@ -24,9 +24,10 @@ from m2pem.api import (
     StampedRecord,
     follow,
 )
-from m2pem.api.control import LOGGED
+from m2pem.api.control import LOGGED, SCHEDULE
 from m2pem.api.run_view import Behavior, FinishedToken
 from m2pem.errors import M2pemError
+from m2pem_plugin_terminal.alerts import Alerts
 from m2pem_plugin_terminal.formatting import clock_time
 from m2pem_plugin_terminal.handover import taken
 from m2pem_plugin_terminal.log_pane import Line, LogPane, line_of
@@ -116,7 +117,8 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._mission = VerticalScroll(self._tree, id="mission", can_focus=False)
         self._fleet = Static(id="fleet")
         self._around = VerticalScroll(self._fleet, id="vehicles", can_focus=False)
-        self._notice = NoticeLine(now)
+        self.alerts = Alerts(lambda: time.strftime("%H:%M:%S"))
+        self._notice = NoticeLine(now, self.alerts.hint)
         self.prompt_pane = PromptPane(now)
         self.log_pane = LogPane()
 
@@ -280,10 +282,14 @@ class Display(App[None], Listener, inherit_bindings=False):
         self.show()
 
     def alerted(self, alert: Alert) -> None:
-        """Show an alert as an alarm, unless the log shows it. The log of its run has it whole."""
+        """Show an alert as an alarm, unless the log shows it, and keep it until it is seen. The log
+        of its run has it whole."""
+        text = f"{alert.run}: {alert.text}" if alert.run else alert.text
+        if alert.code != SCHEDULE:
+            self.alerts.add(text)
         if alert.code == LOGGED:
             return
-        self.say(f"{alert.run}: {alert.text}" if alert.run else alert.text, alarm=True)
+        self.say(text, alarm=True)
         if (view := self.follower.views.get(alert.run)) is not None:
             line = Line(clock_time(view.t_s), alert.text, Importance.WARNING)
             self._run_log(alert.run).lines.append(line)

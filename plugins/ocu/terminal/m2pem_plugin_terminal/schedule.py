@@ -30,6 +30,6 @@ def entry_choices(mission: ScheduledMission) -> list[Choice]:
     hold = Choice("release", "Release it") if held else Choice("hold", "Hold it")
     return [
         hold,
-        Choice("start", "Start it now, whatever it waits for"),
         Choice("cancel", "Cancel it: it starts nothing any more"),
+        Choice("start", "Start it now, whatever it waits for"),
     ]

@@ -71,11 +71,13 @@ def header(view: RunView | None, others: int, time_s: float, width: int) -> Text
 
 
 class NoticeLine(Static):
-    """Shows the newest notice. Without one the line stays empty, so that the panes do not move."""
+    """Shows the newest notice; without one, what `standing` returns. An empty line stays, so that
+    the panes do not move."""
 
-    def __init__(self, now: Callable[[], float]) -> None:
+    def __init__(self, now: Callable[[], float], standing: Callable[[], str]) -> None:
         super().__init__(id="notice")
         self._now = now
+        self._standing = standing
         self._text = ""
         self._alarm = False
         self._since = 0.0
@@ -89,8 +91,9 @@ class NoticeLine(Static):
         """Clear a text that has expired."""
         if self._now() - self._since >= SHOWN_FOR_S:
             self._text = ""
-        style = "bold #e07a6a" if self._alarm else "#e8c468"
-        self.update(Text(f" {shortened(self._text, self.size.width - 2)}", style))
+        text = self._text or self._standing()
+        style = "bold #e07a6a" if self._alarm or not self._text else "#e8c468"
+        self.update(Text(f" {shortened(text, self.size.width - 2)}", style))
 
 
 class DoublePress:

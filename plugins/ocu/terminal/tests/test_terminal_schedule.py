@@ -18,7 +18,7 @@ async def test_entries_are_listed_held_released_and_cancelled(world: World) -> N
         await terminal.press("c")
         await terminal.until_shown("1 s1 patrol, by cron 0 8 * * * (UTC)  scheduled")
         await terminal.press("1")
-        await terminal.until_shown("Hold it", "2 Cancel it")
+        await terminal.until_shown("Hold it", "2 Cancel it", "3 Start it now")
         await terminal.press("1")
         await terminal.until_shown("s1 is held by anna@gcs1")
         await terminal.press("c")

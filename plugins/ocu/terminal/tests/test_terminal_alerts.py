@@ -1,0 +1,31 @@
+"""Alerts in the terminal: they stay until an operator has seen them."""
+
+from terminal_world import World
+
+from m2pem.api import Alert
+from m2pem.api.control import LOGGED, SCHEDULE
+
+
+async def test_alerts_of_no_run_stay_until_they_are_seen(world: World) -> None:
+    publish = world.executive.events.publish
+    async with world.terminal() as terminal:
+        await terminal.press("a")
+        await terminal.until_shown("There are no alerts.")
+        await terminal.press("escape")
+        publish(Alert("", "JOURNAL", "the journal does not write"))
+        publish(Alert("", LOGGED, "uav: compass variance"))
+        publish(Alert("", LOGGED, "uav: compass variance"))
+        publish(Alert("", SCHEDULE, "s1 is scheduled by bob"))
+        await terminal.until_shown("s1 is scheduled by bob")
+        for _ in range(8):  # each takes a second: the notice gets old
+            await terminal.press("escape")
+        await terminal.until_shown("2 alerts (a)")
+        await terminal.press("a")
+        await terminal.until_shown("the journal does not write", "compass variance (2 times)")
+        assert terminal.line("journal does not write").count("!") == 1
+        assert not terminal.shows("s1 is scheduled")
+        await terminal.press("escape")
+        await terminal.until_gone("2 alerts (a)")
+        await terminal.press("a")
+        await terminal.until_shown("the journal does not write")
+        assert "!" not in terminal.line("journal does not write")
