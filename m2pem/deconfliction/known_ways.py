@@ -66,6 +66,7 @@ class FleetWays:
         self._frame = LocalFrame(fleet.origin)
         self._regions = regions_of(fleet, self._frame)
         self._known: dict[tuple[object, ...], Way] = {}
+        self._parameters: dict[int, tuple[Behavior, Mapping[str, ResolvedValue] | None]] = {}
 
     def home(self, vehicle: ResourceId) -> Stand:
         """Where the fleet file says that a simulated vehicle stands."""
@@ -106,6 +107,7 @@ class FleetWays:
             homes = ()
         key = (id(behavior), self._domain(vehicles[0]), homes, tuple(indexes), station)
         if key not in self._known:
+            self._values(behavior)  # which keeps it
             ways = [self._way(behavior, vehicles[0], homes, each, station) for each in indexes]
             self._known[key] = _any_of(ways)
         return self._known[key]
@@ -141,10 +143,10 @@ class FleetWays:
             return volume_of(behavior.name, parameters, 0.0)
 
         first = _first_place(parameters_at(station.hull or ((0.0, 0.0),)), behavior, homes)
-        sure = None if first is None else volume_from((first,))
         whole = None if station.hull is None else volume_from(station.hull)
         several_homes = behavior.name == "return_to_launch" and len(homes) != 1
         exact = station.hull is not None and len(station.hull) == 1 and not several_homes
+        sure = None if first is None or exact else volume_from((first,))
         enters: dict[str, bool | None] = {}
         for shared in regions:
             if whole is not None and not shared.entered_by(whole):
@@ -221,6 +223,11 @@ class FleetWays:
     def _values(self, behavior: Behavior) -> Mapping[str, ResolvedValue] | None:
         """The parameters of a behavior; None: not known, or wrong. What operators may hand over is
         not known."""
+        if id(behavior) not in self._parameters:  # it is kept, so that its id stays its own
+            self._parameters[id(behavior)] = behavior, self._read(behavior)
+        return self._parameters[id(behavior)][1]
+
+    def _read(self, behavior: Behavior) -> Mapping[str, ResolvedValue] | None:
         spec = SHARED.get((behavior.name, behavior.type)) or SHARED.get(
             (behavior.name, BehaviorType.VEHICLE)
         )
