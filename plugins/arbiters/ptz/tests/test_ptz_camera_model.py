@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pymap3d
 import pyproj
 import pytest
 from geographiclib.geodesic import Geodesic
@@ -15,7 +16,13 @@ from m2pem_plugin_ptz.camera_model.field_of_view import (
     ranges_m,
     visible,
 )
-from m2pem_plugin_ptz.camera_model.frames import angle_between, ecef, enu_of_deck, geodetic
+from m2pem_plugin_ptz.camera_model.frames import (
+    angle_between,
+    ecef,
+    enu_of_deck,
+    geodetic,
+    up_and_heights_m,
+)
 from m2pem_plugin_ptz.camera_model.pose import VehiclePose, camera_pose, mount_frame
 from m2pem_plugin_ptz.settings import Mounting
 from ptz_fake_camera import rad
@@ -226,3 +233,22 @@ def _lat_lon(position):
 
 def _azimuth(position):
     return Geodesic.WGS84.Inverse(38.0, -77.0, *_lat_lon(position))["azi1"]
+
+
+def test_places_are_those_of_pymap3d_everywhere() -> None:
+    dice = np.random.default_rng(1)
+    latitude = np.array([90.0, -90.0, 0.0, *dice.uniform(-90, 90, 200)])
+    longitude = dice.uniform(-180, 180, 203)
+    height = dice.uniform(-400, 10_000, 203)
+    places = np.column_stack(pymap3d.geodetic2ecef(latitude, longitude, height))
+    up, heights_m = up_and_heights_m(places)
+    assert heights_m == pytest.approx(height, abs=1e-6)
+    lat, lon = np.radians(latitude), np.radians(longitude)
+    assert up[:, 0] == pytest.approx(np.cos(lat) * np.cos(lon), abs=1e-9)
+    assert up[:, 1] == pytest.approx(np.cos(lat) * np.sin(lon), abs=1e-9)
+    assert up[:, 2] == pytest.approx(np.sin(lat), abs=1e-9)
+    for place, *expected in zip(places[3:], latitude[3:], longitude[3:], height[3:], strict=True):
+        found = geodetic(place)
+        assert ecef(found) == pytest.approx(place, abs=1e-6)
+        assert (found.latitude_deg, found.longitude_deg) == pytest.approx(expected[:2], abs=1e-9)
+        assert found.altitude_m == pytest.approx(expected[2], abs=1e-6)
