@@ -496,3 +496,9 @@ def test_it_is_said_that_no_operator_is_asked_about_a_loss(role: str) -> None:
     report = report_of(row(_task("A", role)), uav1="red", uav2="red")
     (found,) = [each for each in report.net.approximations if "operator is asked" in each.what]
     assert (found.element, found.exactness) == ("A", Exactness.BOUNDED)
+
+
+def test_that_a_vehicle_is_kept_between_tasks_is_said_not_to_be_followed() -> None:
+    report = report_of(row(_task("A", f"{AIR};keep=process")), uav1="red", uav2="red")
+    (found,) = [each for each in report.net.approximations if "keeps" in each.what]
+    assert (found.element, found.exactness) == ("A", Exactness.BOUNDED)

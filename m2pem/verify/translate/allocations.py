@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from m2pem.fleet.facts import vehicle_of
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.behavior import Behavior, OnLoss
+from m2pem.mission.behavior import Behavior, Keep, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
@@ -265,6 +265,8 @@ def _note_approximations(
         same = each.role.need.same if each.role.need is not None else ""
         if same and context.data.values_of(same, instance.outer, instance.node) is None:
             bounded(f"role '{each.role.name}': '{same}' is not followed, so it may be any resource")
+        if each.role.keep in (Keep.PROCESS, Keep.SUBPROCESS):
+            bounded(f"role '{each.role.name}': between tasks, what it keeps is taken to be free")
     wanted = sum(_least(each) for each in roles)
     others = [other for other in context.candidates if other is not instance.node]
     if waits and wanted > 1 and others:
