@@ -120,7 +120,7 @@ if TYPE_CHECKING:
     from m2pem.geo.geojson import as_geojson, parse_geojson
     from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
     from m2pem.geo.local_frame import EastNorth, LatLon, LocalFrame, distance_m, offset
-    from m2pem.geo.polygon import edges_enclose, middle_of
+    from m2pem.geo.polygon import convex_hull, edges_enclose, middle_of
     from m2pem.geo.polyline import Polyline, Segment
     from m2pem.geo.survey_tracks import SurveyTracks
     from m2pem.mission.behavior import BehaviorType, Decision
@@ -202,7 +202,7 @@ _MODULES = {
     "m2pem.geo.geojson": "as_geojson parse_geojson",
     "m2pem.geo.lawn_mower": "lawn_mower longest_edge_yaw strip_width_m",
     "m2pem.geo.local_frame": "EastNorth LatLon LocalFrame distance_m offset",
-    "m2pem.geo.polygon": "edges_enclose middle_of",
+    "m2pem.geo.polygon": "convex_hull edges_enclose middle_of",
     "m2pem.geo.polyline": "Polyline Segment",
     "m2pem.geo.survey_tracks": "SurveyTracks",
     "m2pem.suggestions": "did_you_mean",
@@ -339,6 +339,7 @@ __all__ = [
     "describe",
     "did_you_mean",
     "distance_m",
+    "convex_hull",
     "edges_enclose",
     "encode_parameters",
     "follow",

@@ -9,7 +9,13 @@ import logging
 from dataclasses import dataclass
 
 from m2pem.api import BehaviorId, BehaviorState, BehaviorTracker, LatestTask, Limits
-from m2pem_plugin_ptz.behaviors.behavior import TICK_S, Behavior, BehaviorFailedError
+from m2pem_plugin_ptz.behaviors.behavior import (
+    LEAST_SHARE,
+    REPORTED_SHARE,
+    TICK_S,
+    Behavior,
+    BehaviorFailedError,
+)
 from m2pem_plugin_ptz.camera_model.model import CameraModel
 from m2pem_plugin_ptz.drivers.driver import CameraError
 
@@ -97,7 +103,9 @@ class CameraController:
         self._held = False
 
     def drop(self) -> None:
-        """Drop the behavior of a camera that is lost."""
+        """Drop the behavior of a camera that is lost; what was seen of it last is reported."""
+        if self._task is not None:
+            self._report_left(self._task, LEAST_SHARE)
         self._task = None
         self._replaced.clear()
         self._held = False
@@ -135,8 +143,14 @@ class CameraController:
             began_us = self.model.now_us
             if await task.behavior.step(task.elapsed_s):
                 return
+            self._report_left(task)
             await self._clock.sleep(TICK_S)
             task.elapsed_s += (self.model.now_us - began_us) / 1e6
+
+    def _report_left(self, task: _Task, least: float = REPORTED_SHARE) -> None:
+        left = task.behavior.left(least)
+        if left is not None:
+            self._tracker.remains(task.id, left)
 
     async def _wait_while_held(self) -> None:
         while self._held:
@@ -191,4 +205,6 @@ class CameraController:
     def _end(self, task: _Task, state: BehaviorState, code: str = "", reason: str = "") -> None:
         if self._task is task:
             self._task = None
+        if state is BehaviorState.FAILED:
+            self._report_left(task, LEAST_SHARE)
         self._tracker.end(task.id, state, code, reason, task.behavior.outputs())

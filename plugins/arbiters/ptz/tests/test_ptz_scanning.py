@@ -14,7 +14,7 @@ from m2pem_plugin_ptz.settings import Mounting
 from ptz_fake_camera import ORIGIN, Gimbal, rad
 from ptz_world import CAMERA, area, play
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, parse_geojson
 
 VIEW = (rad(60), rad(34))
 SQUARE = ((-40, 60), (40, 60), (40, 140), (-40, 140))
@@ -296,3 +296,54 @@ def test_without_an_elevation_it_looks_as_high_as_before():
     gimbal.tilt = rad(-12)
     sector({"heading": 0.0, "sector": rad(60)}, gimbal)
     assert gimbal.tilt == pytest.approx(rad(-12), abs=rad(0.5))
+
+
+def test_what_is_left_of_a_sector_is_reported_to_its_far_edge():
+    async def main(world):
+        sector = {"heading": rad(90), "sector": rad(80)}
+        end = await world.do("ptz_scan_sector", **sector, speed=rad(10))
+        assert end.state is BehaviorState.SUCCEEDED, end
+        return [each.remaining for each in world.bench.of("r1.b1")]
+
+    said = [each for each in play(main, Gimbal()) if each is not None]
+    left = [float(each["sector"].removesuffix(" deg")) for each in said]
+    middles = [float(each["heading"].removesuffix(" deg")) for each in said]
+    assert 5 < len(left) < 40
+    assert left == sorted(left, reverse=True)
+    far = {round(middle + rest / 2, 1) for middle, rest in zip(middles, left, strict=True)}
+    far |= {round(middle - rest / 2, 1) for middle, rest in zip(middles, left, strict=True)}
+    assert far & {50.0, 130.0}, "one end of what is left is always an edge of the sector"
+
+
+def scan_until(silent_at_s, ring, witness):
+    """Scan an area with a camera that falls silent; returns what it has left."""
+
+    async def main(world):
+        await world.bench.start("r1.b1", "ptz_scan_polygon", CAMERA, area=area(*ring))
+        while world.seconds < silent_at_s:
+            witness.ptz(world)
+            await world.clock.sleep(0.05)
+        world.gimbal.audible = False
+        return (await world.bench.ended("r1.b1", 60)).remaining
+
+    reach = {"tilt": ["-90 deg", "90 deg"], "view": ["60 deg", "34 deg"], "zoom_max": 30}
+    return play(main, Gimbal(), reach=reach)
+
+
+def test_another_camera_scans_what_one_that_was_lost_has_left():
+    witness = Witness(FIELD)
+    left = scan_until(3.0, FIELD, witness)
+    done = witness.share
+    rest = parse_geojson(left["area"])
+    assert 0.1 < done < 0.9
+    east, north, _ = pymap3d.geodetic2enu(
+        *np.array([(*corner[:2], ORIGIN[2]) for corner in rest.rings[0]]).T, *ORIGIN
+    )
+    ring = tuple(zip(east.tolist(), north.tolist(), strict=True))
+    end, _, _ = scan(ring[:-1], witness=witness)
+    assert end.state is BehaviorState.SUCCEEDED
+    assert witness.share > 0.98
+
+
+def test_all_is_left_of_an_area_that_is_not_convex():
+    assert scan_until(3.0, CONCAVE, Witness(CONCAVE)) is None

@@ -360,6 +360,8 @@ class RosArbiter:
         if outcome.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
             self._tracker.adopt(behavior, checkpoint.resources, reference)
             vehicle.adopt(order)
+            if outcome.remaining is not None:
+                vehicle.remains(order.goal, outcome.remaining)
             return replace(self._tracker.last(behavior), held=outcome.held)
         if outcome.state is BehaviorState.UNKNOWN:
             vehicle.mark_unresolved(order)

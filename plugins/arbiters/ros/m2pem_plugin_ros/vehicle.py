@@ -23,6 +23,7 @@ from m2pem.api import (
     ResolvedValue,
     ResourceId,
     Route,
+    Value,
     VehiclePosition,
     VehicleState,
     raw_parameters,
@@ -45,6 +46,9 @@ RECLAIM_WITHIN_S = 5.0
 """In real time. A vehicle that has not acknowledged a CANCEL by then is also sent HOLD."""
 
 CLOSE_WITHIN_S = 5.0
+LEFT_EVERY_S = 1.0
+"""Of what its node reports that is left, the newest is journaled once in that time."""
+
 LEAST_PROGRESS_M = 1.0
 """What is left of a route that fails or is lost is reported if so much was driven since."""
 
@@ -89,6 +93,8 @@ class Vehicle:
         self._behaviors: dict[UUID, BehaviorId] = {}
         self._order: Order | None = None
         self._route: RemainingRoute | None = None
+        self._left: Mapping[str, Value] | None = None
+        self._left_us = 0
         self._adopted = False
         self._cancelled: BehaviorId = ""
         self._broken = ""
@@ -283,6 +289,13 @@ class Vehicle:
         if (behavior := self._behavior(goal)) is not None:
             self._tracker.progress(behavior)
 
+    def remains(self, goal: UUID, remaining: Mapping[str, Value]) -> None:
+        behavior = self._behavior(goal)
+        if behavior is None or self._order is None or self._order.goal != goal:
+            return
+        self._left, self._route = dict(remaining), None
+        self._report_left(behavior)
+
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         was_left = self._unresolved.pop(goal, None) is not None
         self._resolved.set()
@@ -366,7 +379,15 @@ class Vehicle:
         self._refusal = wrong
 
     def _report_left(self, behavior: BehaviorId, least_m: float | None = None) -> None:
-        """Report the rest of a route, by the position: so for every driver."""
+        """Report what is left: as its node says it, else of a route, by the position. `least_m`:
+        what was driven since the last report; None: it is not the last one."""
+        if self._left is not None:
+            now_us = self._context.clock.now_us()
+            if least_m is not None or now_us - self._left_us >= LEFT_EVERY_S * 1e6:
+                self._left_us = now_us
+                self._tracker.remains(behavior, self._left)
+                self._left = None
+            return
         position, route = self._ros_connection.sensors.localization.position, self._route
         if route is None or position is None:
             return
@@ -408,6 +429,7 @@ class Vehicle:
     def _keep(self, order: Order) -> None:
         self._order = order
         self._route, self._adopted = _route_of(order), False
+        self._left, self._left_us = None, 0
         self._behaviors.pop(order.goal, None)
         self._behaviors[order.goal] = order.request.id
         if len(self._behaviors) > REMEMBERED:

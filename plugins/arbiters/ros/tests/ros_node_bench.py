@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, cast
 from uuid import UUID, uuid4, uuid5
@@ -13,7 +13,7 @@ from m2pem_plugin_ros.drivers.node import NodeDriver
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import Settings, Via
 
-from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId
+from m2pem.api import ArbiterContext, BehaviorRequest, BehaviorState, Connection, ResourceId, Value
 from m2pem.api.clock import SystemClock
 
 AMPLE_S = 40.0
@@ -26,6 +26,7 @@ class RecordedEvents:
     def __init__(self) -> None:
         self.times_heard = 0
         self.begun: list[UUID] = []
+        self.left: list[tuple[UUID, Mapping[str, Value]]] = []
         self.ends: list[tuple[UUID, Outcome]] = []
 
     def alive(self) -> None:
@@ -34,6 +35,9 @@ class RecordedEvents:
     def progress(self, goal: UUID) -> None:
         if goal not in self.begun:
             self.begun.append(goal)
+
+    def remains(self, goal: UUID, remaining: Mapping[str, Value]) -> None:
+        self.left.append((goal, remaining))
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         self.ends.append((goal, outcome))

@@ -2,7 +2,8 @@
 
 `hold` takes its duration, and does not go on while it is held; `drive_stop` succeeds at once;
 `reverse` fails; `follow` ends when its target is known; the others go on until they are ended, or
-adjusted to a speed above 5 m/s. Its mode is how often it has begun something.
+adjusted to a speed above 5 m/s, and say that REST is left if they are to `loop`. Its mode is how
+often it has begun something.
 """
 
 import asyncio
@@ -22,6 +23,7 @@ from m2pem.api import (
 
 TICK_S = 0.01
 DONE = Outcome(BehaviorState.SUCCEEDED)
+REST = {"route": "rest", "speed": 2.0}
 
 
 class ScriptedDriver:
@@ -62,6 +64,8 @@ class ScriptedDriver:
             self._over(DONE)
         elif order.request.behavior == "reverse":
             self._over(Outcome(BehaviorState.FAILED, "ROUTE_BLOCKED", "a wall"))
+        elif order.request.parameters.get("loop") is True:
+            self.events.remains(order.goal, REST)
 
     def end(self, goal: object) -> None:
         if self._order is not None and self._order.goal == goal:

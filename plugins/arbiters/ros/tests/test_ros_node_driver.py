@@ -18,6 +18,7 @@ from ros_node_bench import (
     Bench,
     bench,
 )
+from ros_scripted_driver import REST
 
 from m2pem.api import Point, Route
 
@@ -50,6 +51,14 @@ async def test_a_behavior_runs_and_succeeds(one: Bench) -> None:
     order = one.begin("hold", duration=0.2)
     await one.running(order)
     assert (await one.end_of(order)).state is SUCCEEDED
+
+
+async def test_what_is_left_is_what_the_node_says(one: Bench) -> None:
+    order = one.begin("single_vehicle_routing", route=ROUTE, loop=True)
+    await one.until(lambda: one.events.left)
+    assert one.events.left == [(order.goal, REST)]
+    one.driver.end(order.goal)
+    await one.end_of(order)
 
 
 async def test_a_behavior_that_fails_says_with_which_code(one: Bench) -> None:
@@ -172,14 +181,16 @@ async def test_another_driver_finds_what_runs_and_what_has_ended(
 ) -> None:
     ended = one.begin("reverse")
     await one.end_of(ended)
-    order = one.begin("single_vehicle_routing", route=ROUTE)
+    order = one.begin("single_vehicle_routing", route=ROUTE, loop=True)
     await one.running(order)
     await one.later()
     begun = one.begun
     await one.driver.close()
     async with bench(domain, "evsg1", via, SPEED) as other:
         await other.later()
-        assert (await other.driver.query(order)).state is RUNNING
+        running = await other.driver.query(order)
+        assert running.state is RUNNING
+        assert running.remaining == (REST if via is Via.TOPICS else None)
         found = await other.driver.query(ended)
         assert (found.state, found.code) == (FAILED, "ROUTE_BLOCKED")
         assert (await other.driver.query(other.order("drive_stop"))).state is UNKNOWN

@@ -31,6 +31,25 @@ def test_a_behavior_is_accepted_runs_and_ends_with_numbers_that_rise() -> None:
     assert book.last("a") == said[-1]
 
 
+def test_what_is_left_is_said_when_it_has_changed_while_it_runs() -> None:
+    said: list[Status] = []
+    book = BehaviorJournal(said.append)
+    book.accept("a")
+    book.remains("a", {"area": "all"})
+    book.progress("a")
+    for left in ("most", "most", "rest"):
+        book.remains("a", {"area": left})
+    book.remains("b", {"area": "most"})
+    book.end("a", BehaviorState.CANCELLED)
+    book.remains("a", {"area": "all"})
+    assert [(each.number, each.remaining) for each in said[1:]] == [
+        (2, None),
+        (3, {"area": "most"}),
+        (4, {"area": "rest"}),
+        (5, None),
+    ]
+
+
 def test_who_takes_over_ends_what_went_on() -> None:
     said: list[Status] = []
     book = BehaviorJournal(said.append)

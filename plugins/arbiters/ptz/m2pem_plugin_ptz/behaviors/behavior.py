@@ -12,6 +12,13 @@ TICK_S = 0.05
 """Period of the commands to a camera while a behavior points it."""
 
 
+REPORTED_SHARE = 0.05
+"""What is left is worth its record when that share of the whole was done since the last one."""
+
+LEAST_SHARE = 0.01
+"""The same of the last report, when a behavior fails or its camera is lost."""
+
+
 class BehaviorFailedError(Exception):
     """The behavior cannot be done, or cannot be continued. `code` is an error code of
     docs/missions.md."""
@@ -65,6 +72,12 @@ class Behavior(ABC):
     def outputs(self) -> Mapping[str, Value]:
         """Return what the behavior writes to the mission's data store. Call it after `leave`."""
         return {}
+
+    def left(self, least: float = REPORTED_SHARE) -> Mapping[str, Value] | None:
+        """Return the parameters, of those that differ, by which another camera would do what is
+        left; None: the share `least` of the whole has not been done since it was last returned, or
+        parameters cannot say it."""
+        return None
 
     def state_after_restart(self) -> BehaviorState:
         """Return RUNNING, SUCCEEDED or UNKNOWN after a restart, by the direction of the camera."""

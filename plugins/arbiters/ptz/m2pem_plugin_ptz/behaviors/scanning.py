@@ -1,12 +1,18 @@
 """The behaviors `ptz_scan_sector` and `ptz_scan_polygon`."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
+import pymap3d
 from numpy.typing import NDArray
 
-from m2pem.api import Area
-from m2pem_plugin_ptz.behaviors.behavior import BehaviorContext, BehaviorFailedError
+from m2pem.api import Area, Value, convex_hull, raw_parameters
+from m2pem_plugin_ptz.behaviors.behavior import (
+    REPORTED_SHARE,
+    BehaviorContext,
+    BehaviorFailedError,
+)
 from m2pem_plugin_ptz.behaviors.pointing import THERE_RAD, Pointing
 from m2pem_plugin_ptz.camera_model.coverage import next_row, points_in_area
 from m2pem_plugin_ptz.camera_model.field_of_view import FieldOfView, visible
@@ -104,6 +110,8 @@ class ScanSector(Sweep):
     the vehicle turns."""
 
     name = "ptz_scan_sector"
+    _reported_rad = 0.0
+    """How much was left when that was last reported."""
 
     def refusal(self) -> str:
         """Return which heading of the sector is not within reach."""
@@ -126,6 +134,7 @@ class ScanSector(Sweep):
         here, _ = self.heading()
         away = math.remainder(here - middle, math.tau)
         near = math.copysign(half, away)
+        self._reported_rad = 2 * half
         if half > math.pi - 1e-6:
             self.start_sweep(here, here + math.tau, elevation)  # all round, from where it looks
             return
@@ -134,6 +143,18 @@ class ScanSector(Sweep):
     async def step(self, elapsed_s: float) -> bool:
         """Return whether the sweep has reached the other edge."""
         return self.sweep(elapsed_s)
+
+    def left(self, least: float = REPORTED_SHARE) -> Mapping[str, Value] | None:
+        """Return the sector from the present heading to the other edge."""
+        left_rad = abs(self._end_rad - self._heading_rad)
+        if self._reported_rad - left_rad < least * 2 * self._sector()[1]:
+            return None
+        self._reported_rad = left_rad
+        middle_rad = (self._heading_rad + self._end_rad) / 2
+        return {
+            "heading": f"{math.degrees(middle_rad) % 360:.3f} deg",
+            "sector": f"{math.degrees(left_rad):.3f} deg",
+        }
 
     def _sector(self) -> tuple[float, float]:
         parameters = self.context.parameters
@@ -176,6 +197,7 @@ class ScanPolygon(Sweep):
         self._row: NDArray[np.intp] | None = None
         self._left_at_start = 0
         self._planned_from: Vector = np.zeros(3)
+        self._reported = 0.0
 
     def refusal(self) -> str:
         """Return why too much of the area is out of reach from the current pose."""
@@ -220,6 +242,22 @@ class ScanPolygon(Sweep):
                 self._given_up[row] = True
             self._row = None
         return False
+
+    def left(self, least: float = REPORTED_SHARE) -> Mapping[str, Value] | None:
+        """Return the area around what was not seen. Of an area that is not convex, that would reach
+        beyond it: all is left."""
+        area = self.context.parameters.area
+        share = float(self._seen.mean()) if len(self._seen) else 0.0
+        if not isinstance(area, Area) or share - self._reported < least or not _is_convex(area):
+            return None
+        latitudes, longitudes, _ = pymap3d.ecef2geodetic(*self._points[~self._seen].T)
+        hull = convex_hull(zip(latitudes.tolist(), longitudes.tolist(), strict=True))
+        if len(hull) < 3:
+            return None
+        self._reported = share
+        up_m = area.rings[0][0][2]
+        ring = tuple((*corner, up_m) for corner in (*hull, hull[0]))
+        return raw_parameters({"area": Area((ring,), area.altitude_frame)})
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -300,6 +338,12 @@ class ScanPolygon(Sweep):
         raise BehaviorFailedError(
             f"only {_percent(share)} of the area could be scanned: the rest is out of reach"
         )
+
+
+def _is_convex(area: Area) -> bool:
+    """Whether an area has no hole, and all of its corners are on its convex hull."""
+    corners = {corner[:2] for corner in area.rings[0]}
+    return len(area.rings) == 1 and len(convex_hull(corners)) == len(corners)
 
 
 def _percent(share: float) -> str:

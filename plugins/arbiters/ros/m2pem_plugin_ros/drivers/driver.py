@@ -41,13 +41,14 @@ class Order:
 class Outcome:
     """The state of a goal on the vehicle. UNKNOWN: the vehicle does not know the goal. `outputs` of
     a goal that has ended go to the mission's data store. `held`: the vehicle reports that it is
-    held."""
+    held. `remaining`: what it last reported that is left; None: nothing."""
 
     state: BehaviorState
     code: str = ""
     reason: str = ""
     outputs: Mapping[str, Value] = field(default_factory=dict)
     held: bool = False
+    remaining: Mapping[str, Value] | None = None
 
     @property
     def is_end(self) -> bool:
@@ -75,6 +76,11 @@ class DriverEvents(Protocol):
 
     def progress(self, goal: UUID) -> None:
         """The vehicle executes the goal."""
+        ...
+
+    def remains(self, goal: UUID, remaining: Mapping[str, Value]) -> None:
+        """The vehicle reports what is left of the goal: the parameters by which another one would
+        do it. Of routes, the arbiter knows it without that."""
         ...
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:

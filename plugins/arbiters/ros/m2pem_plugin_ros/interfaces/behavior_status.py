@@ -32,7 +32,8 @@ LONGEST_REASON = 2000
 @dataclass(frozen=True, slots=True)
 class Status:
     """The status of a behavior. `number` rises with each change, from 1; UNKNOWN has 0. `outputs`
-    of a behavior that has ended go to the mission's data store."""
+    of a behavior that has ended go to the mission's data store. `remaining` of one that is RUNNING:
+    the parameters by which another vehicle would do what is left; None: not said."""
 
     id: str
     number: int
@@ -41,6 +42,7 @@ class Status:
     reason: str = ""
     native_ref: str = ""
     outputs: Mapping[str, Value] = field(default_factory=dict)
+    remaining: Mapping[str, Value] | None = None
 
 
 def read_status(message: Any) -> Status:
@@ -67,6 +69,7 @@ def read_status(message: Any) -> Status:
         reason[:LONGEST_REASON],
         message.native_ref,
         outputs if state in ENDS else {},
+        outputs if state is BehaviorState.RUNNING and outputs and not wrong else None,
     )
 
 
@@ -79,6 +82,6 @@ def write_status(message: Any, status: Status, make_pair: Callable[..., Any]) ->
     message.code = status.code
     message.reason = status.reason
     message.native_ref = status.native_ref
-    pairs = encode_outputs(status.outputs)
+    pairs = encode_outputs(status.outputs if status.remaining is None else status.remaining)
     message.outputs = [make_pair(key=key, value=value) for key, value in pairs]
     return message

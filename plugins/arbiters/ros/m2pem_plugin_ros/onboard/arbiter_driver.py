@@ -166,6 +166,8 @@ class ArbiterDriver:
             goal = UUID(report.id)
             if report.state is BehaviorState.RUNNING:
                 self._events.progress(goal)
+                if report.remaining is not None:
+                    self._events.remains(goal, report.remaining)
             elif report.state.terminal:
                 if goal == self._current:
                     self._current = None

@@ -1,6 +1,7 @@
 """The behaviors of an m2pem node and their statuses. It needs neither ROS nor a clock."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from m2pem.api import BehaviorState, Value
 from m2pem_plugin_ros.interfaces.behavior_status import Status
@@ -64,6 +65,14 @@ class BehaviorJournal:
         """Publish RUNNING once."""
         if id_ == self._current and self._last[id_].state is BehaviorState.ACCEPTED:
             self._note(Status(id_, 2, BehaviorState.RUNNING))
+
+    def remains(self, id_: str, remaining: Mapping[str, Value]) -> None:
+        """Publish what is left of the current behavior, where that has changed."""
+        last = self._last.get(id_)
+        if last is None or id_ != self._current or last.state is not BehaviorState.RUNNING:
+            return
+        if last.remaining != remaining:
+            self._note(replace(last, number=last.number + 1, remaining=dict(remaining)))
 
     def end(
         self,

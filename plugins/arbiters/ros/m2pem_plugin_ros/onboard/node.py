@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 from uuid import UUID, uuid5
@@ -17,6 +17,7 @@ from m2pem.api import (
     Clock,
     FleetBus,
     PayloadState,
+    Value,
 )
 from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
@@ -273,6 +274,10 @@ class OnboardNode:
         if goal in self._ids:
             self._journal.progress(self._ids[goal])
 
+    def remains(self, goal: UUID, remaining: Mapping[str, Value]) -> None:
+        if goal in self._ids:
+            self._journal.remains(self._ids[goal], remaining)
+
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         if goal in self._ids:
             reason = outcome.reason or (ENDED if self._ending else "")
@@ -337,6 +342,7 @@ class _Events:
     def __init__(self, node: OnboardNode) -> None:
         self.alive = node.alive
         self.progress = node.progress
+        self.remains = node.remains
         self.ended = node.ended
 
 

@@ -193,6 +193,8 @@ class ActionLink:
         pending.number = status.number
         if status.state is BehaviorState.RUNNING:
             self._setup.events.progress(goal)
+            if status.remaining is not None:
+                self._setup.events.remains(goal, status.remaining)
 
     # --- one goal -------------------------------------------------------------------------------
 

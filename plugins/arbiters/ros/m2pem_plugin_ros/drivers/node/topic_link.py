@@ -141,7 +141,7 @@ class TopicLink:
         status = answer.result()
         if status.state in _GOES_ON:
             self._adopt(order, status)
-            return Outcome(BehaviorState.RUNNING)
+            return Outcome(BehaviorState.RUNNING, remaining=status.remaining)
         if status.state is BehaviorState.UNKNOWN:
             return Outcome(BehaviorState.UNKNOWN, reason=RESTARTED)
         return _outcome(status)
@@ -181,6 +181,8 @@ class TopicLink:
                 self._over(pending, _outcome(status))
             elif status.state is BehaviorState.RUNNING:
                 self._setup.events.progress(pending.goal)
+                if status.remaining is not None:
+                    self._setup.events.remains(pending.goal, status.remaining)
 
     def _unknown(self, pending: _PendingGoal) -> None:
         if pending.shown_us is not None and self._waited_since_s(pending.shown_us) < STILL_S:

@@ -11,7 +11,7 @@ from uuid import UUID, uuid4
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from m2pem.api import BehaviorRequest, BehaviorState, Point, ResolvedValue, ResourceId, Route
+from m2pem.api import BehaviorRequest, BehaviorState, Point, ResolvedValue, ResourceId, Route, Value
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
 from m2pem_plugin_ros.frames import Origin, to_geodetic
 from m2pem_plugin_ros.pose import Pose
@@ -150,6 +150,8 @@ class BaseOrders:
     def alive(self) -> None: ...
 
     def progress(self, goal: UUID) -> None: ...
+
+    def remains(self, goal: UUID, remaining: Mapping[str, Value]) -> None: ...
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         waiting = self._waiting.get(goal)
