@@ -47,7 +47,8 @@ def fleet_file(folder: Path, simulator: Simulator) -> Path:
     vehicles = "".join(
         f"  {name}:\n    domain: ground\n    arbiter: mavlink\n    lost_after: 20 s\n"
         f"    connection: {{url: 'udpout://{host}:{port}', system_id: {number}}}\n"
-        "    payloads: {ptz: {arbiter: ptz, connection: {driver: mavlink, stabilized: true}}}\n"
+        "    payloads: {ptz: {arbiter: ptz, connection: {driver: mavlink, stabilized: true, "
+        f"pictures: '{folder / 'pictures'}'}}}}}}\n"
         for number, name in VEHICLES.items()
         for host, port in [simulator[number].address]
     )
