@@ -42,7 +42,7 @@ class _Slot:
 
     request: str
     role: RoleOptions
-    options: Mapping[ResourceId, float]
+    options: Collection[ResourceId]
 
 
 class _Matching:
@@ -51,25 +51,33 @@ class _Matching:
     def __init__(self) -> None:
         self.slots: list[_Slot] = []
         self._slot_of: dict[ResourceId, int] = {}
+        self._full: set[ResourceId] = set()
 
     def add(self, slots: Sequence[_Slot]) -> bool:
         """Add slots if all can be filled beside those that were added before."""
-        before, count = dict(self._slot_of), len(self.slots)
+        if len(slots) == 1 and self._full.issuperset(slots[0].options):
+            return False
+        before = dict(self._slot_of) if len(slots) > 1 else self._slot_of
+        count = len(self.slots)
         for slot in slots:
             self.slots.append(slot)
-            if not self._fill(len(self.slots) - 1):
+            if not self._fill(len(self.slots) - 1, is_first=slot is slots[0]):
                 self._slot_of = before
                 del self.slots[count:]
                 return False
         return True
 
-    def _fill(self, index: int) -> bool:
-        """Find an augmenting path from an empty slot, breadth first."""
+    def _fill(self, index: int, *, is_first: bool) -> bool:
+        """Find an augmenting path from an empty slot, breadth first.
+
+        What a search in vain has reached is left out of all later ones: the slots that have it can
+        have nothing else. `is_first`: the matching is not taken back if there is no path.
+        """
         came_from: dict[ResourceId, tuple[int, ResourceId | None]] = {}
         queue: list[tuple[int, ResourceId | None]] = [(index, None)]
         for slot, through in queue:
             for resource in self.slots[slot].options:
-                if resource in came_from:
+                if resource in came_from or resource in self._full:
                     continue
                 came_from[resource] = (slot, through)
                 owner = self._slot_of.get(resource)
@@ -82,6 +90,8 @@ class _Matching:
                     self._slot_of[step] = filled
                     step = before
                 return True
+        if is_first:
+            self._full.update(came_from)
         return False
 
     def resources_of(self, request: str) -> list[ResourceId]:
@@ -116,7 +126,7 @@ def assign(
     for request in served:
         for role in request.roles:
             options = _without(role.costs_s, kept)
-            while sum(slot.role is role for slot in matching.slots) < role.most:
+            for _ in range(role.most - role.least):
                 if not matching.add([_Slot(request.id, role, options)]):
                     break
     return _of_least_cost(matching.slots, order)
@@ -130,11 +140,9 @@ def _slots(request: Request, kept: Collection[ResourceId]) -> Iterator[_Slot]:
 
 
 def _without(
-    costs_s: Mapping[ResourceId, float], kept: Collection[ResourceId]
-) -> Mapping[ResourceId, float]:
-    if not kept:
-        return costs_s
-    return {each: cost for each, cost in costs_s.items() if each not in kept}
+    resources: Collection[ResourceId], kept: Collection[ResourceId]
+) -> Collection[ResourceId]:
+    return [each for each in resources if each not in kept] if kept else resources
 
 
 def _kept_for(
@@ -146,23 +154,28 @@ def _kept_for(
     """
     if sum(role.least for role in request.roles) == 1:
         return ()  # nothing that could fill its one place is free
-    alone = _Matching()
     taken = set(matching.resources_of_all())
+    free = {each for role in request.roles for each in role.costs_s} - taken
+    if free <= set(kept):
+        return ()
+    alone = _Matching()
     slots = [
         _Slot(
             request.id,
             role,
-            {
-                **{e: c for e, c in _without(role.costs_s, kept).items() if e not in taken},
-                **dict.fromkeys((*role.busy, *(taken & role.costs_s.keys())), MAX_COST_S),
-            },
+            dict.fromkeys(
+                (
+                    *(each for each in _without(role.costs_s, kept) if each not in taken),
+                    *role.busy,
+                    *(each for each in role.costs_s if each in taken),
+                )
+            ),
         )
         for role in request.roles
         for _ in range(role.least)
     ]
     if not alone.add(slots):
         return ()
-    free = {each for role in request.roles for each in role.costs_s} - taken
     return [each for each in alone.resources_of(request.id) if each in free]
 
 
@@ -176,13 +189,17 @@ def _of_least_cost(
     import numpy as np  # noqa: PLC0415
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
 
-    resources = sorted({each for slot in slots for each in slot.options}, key=order.__getitem__)
+    every = set[ResourceId]().union(*(slot.options for slot in slots))
+    resources = sorted(every, key=order.__getitem__)
     column = {resource: place for place, resource in enumerate(resources)}
     costs = np.full((len(slots), len(resources)), np.inf)
     for row, slot in enumerate(slots):
-        for resource, cost_s in slot.options.items():
-            place = column[resource]
-            costs[row, place] = _whole_ms(cost_s) * len(resources) + place
+        known_s, options = slot.role.costs_s, slot.options
+        values = known_s.values() if options is known_s else map(known_s.__getitem__, options)
+        places = np.fromiter(map(column.__getitem__, options), np.intp, len(options))
+        costs_s = np.fromiter(values, np.float64, len(options))
+        whole_ms = np.rint(np.clip(costs_s, -MAX_COST_S, MAX_COST_S) * MILLISECONDS)
+        costs[row, places] = whole_ms * len(resources) + places
     rows, columns = linear_sum_assignment(costs)
     chosen: dict[str, dict[str, list[ResourceId]]] = {}
     for row, place in zip(rows.tolist(), columns.tolist(), strict=True):
@@ -192,7 +209,3 @@ def _of_least_cost(
         request: {role: tuple(sorted(ids, key=order.__getitem__)) for role, ids in roles.items()}
         for request, roles in chosen.items()
     }
-
-
-def _whole_ms(cost_s: float) -> int:
-    return round(max(-MAX_COST_S, min(cost_s, MAX_COST_S)) * MILLISECONDS)

@@ -1,8 +1,7 @@
 """The facts of vehicles and payloads at one moment (`m2pem.mission.candidate_facts`)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from m2pem.api.telemetry import PayloadState, VehicleState
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     Numbers: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    Places: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 LatestState = Callable[[ResourceId], VehicleState | PayloadState | None]
 """The newest telemetry of a resource; None before the first."""
@@ -58,23 +58,53 @@ class Group:
 
 
 class Candidates:
-    """A snapshot of the fleet: what is known of each resource now. Made for one decision."""
+    """A snapshot of the fleet: what is known of each resource. It holds for one decision: before
+    the next one, `look_again` takes over what has changed."""
 
     def __init__(self, fleet: Fleet, graph: ResourceGraph, latest: LatestState) -> None:
         self.fleet = fleet
         self.graph = graph
-        self._latest = cache(latest)
+        self._newest = latest
+        self._states: dict[ResourceId, VehicleState | PayloadState | None] = {}
         self._frame = LocalFrame(fleet.origin)
+        self._fleet_facts: dict[ResourceId, dict[str, Value]] = {}
         self._facts: dict[ResourceId, dict[str, Value]] = {}
         self._groups: dict[bool, Group] = {}
         self._distances_m: dict[tuple[object, ...], Numbers] = {}
+
+    def look_again(self) -> Collection[ResourceId]:
+        """Take over the newest telemetry. Returns what has changed: vehicles and their payloads."""
+        newest, changed = self._newest, list[ResourceId]()
+        for resource, before in self._states.items():
+            state = newest(resource)
+            if state is not before:
+                self._states[resource] = state
+                vehicle = self.fleet.vehicles.get(resource)
+                changed += [resource, *(() if vehicle is None else vehicle.payloads)]
+        if changed:
+            self._distances_m.clear()
+        for resource in changed:
+            self._facts.pop(resource, None)
+            for group in self._groups.values():
+                if (place := group.index.get(resource)) is not None:
+                    numbers = self._numbers(vehicle_of(self.fleet, resource))
+                    group.east_m[place], group.north_m[place], group.charge[place], _ = numbers
+        return changed
+
+    def _latest(self, resource: ResourceId) -> VehicleState | PayloadState | None:
+        if resource not in self._states:
+            self._states[resource] = self._newest(resource)
+        return self._states[resource]
 
     def facts(self, resource: ResourceId) -> Facts:
         """Return the facts of a vehicle or payload that hold wherever its task is."""
         known = self._facts.get(resource)
         if known is None:
-            known = fleet_facts(self.fleet, self.graph, resource)
-            known |= self._telemetry_facts(vehicle_of(self.fleet, resource))
+            of_fleet = self._fleet_facts.get(resource)
+            if of_fleet is None:
+                of_fleet = fleet_facts(self.fleet, self.graph, resource)
+                self._fleet_facts[resource] = of_fleet
+            known = of_fleet | self._telemetry_facts(vehicle_of(self.fleet, resource))
             self._facts[resource] = known
         return known
 

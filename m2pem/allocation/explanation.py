@@ -1,6 +1,8 @@
 """Says why resources were chosen, for record `ResourcesAllocated`, and why a task has none."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, islice
 
 from m2pem.allocation.needs import ConsideredRole, Occupancy
 from m2pem.mission.catalogue import ResourceId
@@ -34,26 +36,35 @@ def what_was_considered(
 
 
 def _role(considered: ConsideredRole, chosen: Sequence[ResourceId]) -> Value:
-    ranked = sorted(considered.resources, key=lambda each: _rank(considered, each, chosen))
+    ranked = _ranked(considered, chosen)
     return {
         "chosen": list(chosen),
-        "candidates": [_candidate(considered, each) for each in ranked[:MAX_LISTED]],
-        "not_listed": max(0, len(ranked) - MAX_LISTED),
+        "candidates": [_candidate(considered, each) for each in ranked],
+        "not_listed": max(0, len(considered.resources) - MAX_LISTED),
     }
 
 
-def _rank(
-    considered: ConsideredRole, resource: ResourceId, chosen: Sequence[ResourceId]
-) -> tuple[int, float]:
-    """The chosen ones first, then what was free by its cost, what was held, what was excluded."""
-    if resource in chosen:
-        return 0, 0.0
-    if resource in considered.excluded:
-        return 4, 0.0
-    occupancy = considered.occupied.get(resource)
-    if occupancy is not None and occupancy.withdrawn:
-        return 3, 0.0
-    return (1 if occupancy is None else 2), considered.total_s(resource)
+def _ranked(considered: ConsideredRole, chosen: Sequence[ResourceId]) -> list[ResourceId]:
+    """Return what is listed: the chosen ones first, then what was free by its cost, what was held
+    by its cost, what was withdrawn, and what was excluded."""
+    found, occupied = considered.candidacy, considered.occupied
+    ranked = [each for each in found.resources if each in chosen]
+    ranked += _cheapest(considered, [each for each in found.free if each not in chosen])
+    if len(ranked) < MAX_LISTED:
+        ranked += _cheapest(considered, [each for each in found.busy if each not in chosen])
+    if len(ranked) < MAX_LISTED:
+        withdrawn = (each for each in found.able if each in occupied and occupied[each].withdrawn)
+        excluded = (each for each in found.resources if each in found.excluded)
+        rest = (each for each in chain(withdrawn, excluded) if each not in chosen)
+        ranked += islice(rest, MAX_LISTED)
+    return ranked[:MAX_LISTED]
+
+
+def _cheapest(considered: ConsideredRole, resources: Sequence[ResourceId]) -> Iterable[ResourceId]:
+    """Return as many as may be listed, by their cost."""
+    index = considered.costs.group.index
+    totals_s = considered.costs.parts.total_s[[index[each] for each in resources]]
+    return (resources[place] for place in totals_s.argsort(kind="stable")[:MAX_LISTED])
 
 
 def _candidate(considered: ConsideredRole, resource: ResourceId) -> Value:
@@ -100,17 +111,25 @@ def _why(considered: ConsideredRole, given: Mapping[ResourceId, Occupancy]) -> s
     name = considered.role.name
     if not considered.resources:
         return f"role '{name}': the fleet has nothing that could fill it"
-    # What may be free soon says more than what is excluded.
-    ranked = sorted(considered.resources, key=lambda each: each in considered.excluded)
-    said = [f"{each} {_state(considered, each, given)}" for each in ranked[:MAX_NAMED]]
+    said = [f"{each} {_state(considered, each, given)}" for each in named(considered, MAX_NAMED)]
     count = f"{len(free)} of {options.least} free: " if options.least > 1 else ""
-    others = len(ranked) - len(said)
+    others = len(considered.resources) - len(said)
     more = f" and {others} others" if others else ""
     return f"role '{name}': {count}{', '.join(said)}{more}"
 
 
 MAX_NAMED = 6
 """Candidates that a reason names; it counts the others."""
+
+
+def named(considered: ConsideredRole, most: int) -> list[ResourceId]:
+    """Return the first candidates; what may be free soon says more than what is excluded."""
+    found = considered.candidacy
+    first = list(found.able[:most])
+    if len(first) < most:
+        rest = (each for each in found.resources if each in found.excluded)
+        first += islice(rest, most - len(first))
+    return first
 
 
 def _state(
@@ -124,3 +143,29 @@ def _state(
         return f"is unavailable ({occupancy.withdrawn})"
     holder = occupancy.label or occupancy.holder
     return f"is held by {holder}" if holder else "is free"
+
+
+@dataclass(frozen=True, slots=True)
+class Lack:
+    """What a task lacks, without the values of telemetry, which change all the time. `holders`: who
+    has what it could use, by resource. `without`: what cannot fill its roles, or nobody gets."""
+
+    holders: dict[str, str]
+    without: tuple[tuple[ResourceId, bool], ...]
+
+
+def lack(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, Occupancy]) -> Lack:
+    """Return what a task lacks, of the first `MAX_LISTED` candidates of each role; `given`: as in
+    `reason`."""
+    holders: dict[str, str] = {}
+    without: list[tuple[ResourceId, bool]] = []
+    for role in roles:
+        excluded, occupied = role.excluded, role.occupied
+        for resource in named(role, MAX_LISTED):
+            found = given.get(resource, Occupancy())
+            found = occupied.get(resource, found)
+            if resource in excluded or found.withdrawn:
+                without.append((resource, resource in excluded))
+            elif found.holder:
+                holders[resource] = found.holder
+    return Lack(holders, tuple(without))

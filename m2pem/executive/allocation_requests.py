@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from m2pem.allocation.needs import ConsideredRole, RoleEvaluator, Task
+from m2pem.allocation.needs import ConsideredRole, RoleEvaluator, Task, reads_candidate_alone
 from m2pem.api.arbiter import BehaviorRequest
+from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.inputs import ResourcesChosen
 from m2pem.engine.state import AllocationRequest
 from m2pem.executive.preemption import priority_of
@@ -16,12 +17,25 @@ from m2pem.mission.losses import TAKEN_OVER, may_return
 class AskedFor:
     """A request that has no behavior yet. `chosen`: its resources are held for it. `lacks`: what
     its run knows that it lacks, without the values of telemetry, which change all the time.
-    `preempts`: what is taken from other runs for it, and given when their behaviors have ended."""
+    `preempts`: what is taken from other runs for it, and given when their behaviors have ended.
+    `place`: its place in the order in which requests are served; None: it was not looked at yet.
+    `need`: what its task waits for, equal for all that wait for the same; None: what it needs may
+    be another at each decision."""
 
     runner: Runner
     chosen: bool = False
     lacks: object = None
     preempts: "Preempting | None" = None
+    place: tuple[int, int, str] | None = None
+    need: tuple[object, ...] | None = None
+
+    def look_at(self, request: AllocationRequest) -> tuple[int, int, str]:
+        """Find its place in the order, and what it needs, once. Returns its place."""
+        if self.place is None:
+            roles = behavior_of(request).roles
+            self.place = -priority_of(roles), request.at_us, request.id
+            self.need = _constant_need(request)
+        return self.place
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,14 +79,14 @@ class ConsideredRequest:
 
         Of a vehicle that a pilot has taken, not an operator, it is not known when it is given back.
         """
+        if self.request.token.lost_work is None:
+            return False
         lost, taken = self.task.lost, self.asked.runner.run.state.taken
         returns = {
             name
             for name, loss in lost.items()
             if may_return(loss.code) and (loss.code != TAKEN_OVER or name in taken)
         }
-        if self.request.token.lost_work is None:
-            return False
         for considered in self.roles:
             role = considered.role
             if considered.named:
@@ -83,3 +97,35 @@ class ConsideredRequest:
             if len(able) < considered.options.least:
                 return True
         return False
+
+
+@dataclass(slots=True)
+class Queue:
+    """Requests that wait for one resource each, and that the same resources can serve. Of those
+    that a decision has found free, every request served takes one. So no more of the queue have to
+    be looked at than are free, and one, to know why it waits."""
+
+    first: ConsideredRequest
+    looked_at: int = 1
+
+    @property
+    def is_done(self) -> bool:
+        """Whether none of those behind can be served."""
+        return self.looked_at >= len(self.first.roles[0].options.costs_s)
+
+
+def _constant_need(request: AllocationRequest) -> tuple[object, ...] | None:
+    """Return what a request needs if that is one resource, depends on facts of the candidates alone
+    and not on the task's place, and its task waits."""
+    behavior = behavior_of(request)
+    token = request.token
+    if len(behavior.roles) != 1 or token.lost_work is not None or token.replacements:
+        return None
+    role = behavior.roles[0]
+    need = role.need
+    if role.resource or role.optional or need is None or need.least != 1 or need.same:
+        return None
+    waits = need.waits or request.deadline != 0
+    if not waits or not all(map(reads_candidate_alone, need.expressions)):
+        return None
+    return role.name, role.kind, need.condition, need.preference, behavior.name, behavior.type

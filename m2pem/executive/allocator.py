@@ -13,12 +13,15 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from heapq import merge
+from itertools import chain
+from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.assignment import Request, assign
 from m2pem.allocation.candidates import Candidates, LatestState, Place
-from m2pem.allocation.explanation import reason, what_was_considered
+from m2pem.allocation.explanation import Lack, lack, reason, what_was_considered
 from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
 from m2pem.api.clock import Clock
@@ -28,9 +31,9 @@ from m2pem.engine.data import reader
 from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.inputs import BehaviorPreempted, ResourcesChosen, ResourcesNotFree
 from m2pem.engine.keeping import may_use
-from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus
+from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunState, RunStatus
 from m2pem.errors import ExpressionError
-from m2pem.executive.allocation_requests import AskedFor, ConsideredRequest, Preempting
+from m2pem.executive.allocation_requests import AskedFor, ConsideredRequest, Preempting, Queue
 from m2pem.executive.dispatcher import Geometries
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.preemption import Holder, choose, preemptible
@@ -60,7 +63,12 @@ LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
 
 
-_MAY_FREE = (r.RunResumed, r.ResourceReturned, r.OperatorGaveControlBack)
+_MAY_FREE = (
+    r.RunResumed,
+    r.ResourceReturned,
+    r.OperatorGaveControlBack,
+    r.BehaviorCancelRequested,
+)
 """Records after which a task of the run may get what it could not get before."""
 
 
@@ -96,6 +104,11 @@ class Allocator:
         self._later: asyncio.Task[None] | None = None
         self._looked_us = 0
         self._circles = WaitingCircles(runners, arbiters.graph, publish)
+        self._evaluator: RoleEvaluator | None = None
+        self._holders: dict[str, Occupancy] = {}
+        self._named_holders: set[str] = set()
+        self._must_look = True
+        self._reads_telemetry = True
         fleet = arbiters.fleet
         self._order = {each: place for place, each in enumerate((*fleet.vehicles, *fleet.payloads))}
 
@@ -127,6 +140,8 @@ class Allocator:
         for record in records:
             if isinstance(record, r.BehaviorRequested):
                 if self._asked.pop(record.allocation, None) is not None:
+                    # Tasks that wait were told that the request has its resources.
+                    self._must_look |= record.allocation in self._named_holders
                     self._availability.hand_on(record.allocation, record.behavior)
                     if self._space is not None:
                         self._space.hand_on(record.allocation, record.behavior)
@@ -150,8 +165,10 @@ class Allocator:
             self._decide_soon()
 
     def on_telemetry(self) -> None:
-        """Look again at what waits, `LOOK_AGAIN_US` after the last time."""
-        if any(not each.chosen for each in self._asked.values()):
+        """Look again at what waits, `LOOK_AGAIN_US` after the last time, if telemetry may decide
+        what it gets."""
+        may_decide = self._must_look or self._reads_telemetry
+        if may_decide and any(not each.chosen for each in self._asked.values()):
             self._look_after(LOOK_AGAIN_US)
 
     def _look_after(self, wait_us: int) -> None:
@@ -161,7 +178,10 @@ class Allocator:
     async def _look_later(self, wait_us: int) -> None:
         await self._clock.sleep_until(self._looked_us + wait_us)
         self._later = None
-        self.resources_changed()
+        self._looked_us = self._clock.now_us()
+        evaluator = self._evaluator
+        if self._must_look or evaluator is None or evaluator.telemetry_changes_candidates():
+            self.resources_changed()
 
     def close(self) -> None:
         """Look no more."""
@@ -191,11 +211,12 @@ class Allocator:
             self._look_after(LOOK_AGAIN_US // 5)
             return
         self._give_preempted()
-        evaluator = RoleEvaluator(
-            Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
-        )
-        waiting = self._consider(evaluator)
-        waiting.sort(key=lambda each: (-each.priority, each.request.at_us, each.request.id))
+        if self._evaluator is None:
+            candidates = Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
+            self._evaluator = RoleEvaluator(candidates)
+        evaluator = self._evaluator
+        evaluator.look_again()
+        waiting, behind = self._consider(evaluator)
         requests = {
             each.request.id: Request(each.request.id, tuple(role.options for role in each.roles))
             for each in waiting
@@ -225,14 +246,28 @@ class Allocator:
                 ):  # else it is said when those behaviors are requested, by their names
                     self._refuse_space(each, refusal)
         left = [each for each in waiting if each.request.id not in chosen]
+        considered = [role for each in (*left, *behind) for role in each.roles]
+        self._reads_telemetry = any(role.reads_telemetry for role in considered)
+        self._must_look = (
+            self._space is not None
+            or self._arbiters.fleet.preemption
+            or any(role.reads_task for role in considered)
+        )
+        self._named_holders.clear()
         lacking = [each for each in left if each.request.id not in refusals]
-        for each, why in self._preempt(lacking, set(given)):
-            if why is not None and why.wait_s is not None:
-                refusals[each.request.id] = why
-                self._refuse_space(each, why)
+        for each, no_space in self._preempt(lacking, set(given)):
+            if no_space is not None and no_space.wait_s is not None:
+                refusals[each.request.id] = no_space
+                self._refuse_space(each, no_space)
             else:
-                self._refuse(each, given, evaluator, why)
-        self._circles.look(left, refusals)
+                self._refuse(each, self._lack(each, given), given, evaluator, no_space)
+        of_queues: dict[int, Lack] = {}
+        for each in behind:
+            roles = id(each.roles)
+            if roles not in of_queues:
+                of_queues[roles] = self._lack(each, given)
+            self._refuse(each, of_queues[roles], given, evaluator)
+        self._circles.look(list(merge(left, behind, key=_place)), refusals)
 
     def _assign(
         self, waiting: Sequence[ConsideredRequest], requests: dict[str, Request]
@@ -260,7 +295,7 @@ class Allocator:
                 refusal = self._without_space(each, chosen[number])
                 if refusal is not None:
                     refusals.setdefault(number, {})[refusal.vehicle] = refusal
-                    requests[number] = _without(requests[number], refusal.vehicle)
+                    requests[number] = _not_free(requests[number], refusal.vehicle)
                     break
             else:
                 for number in chosen:
@@ -297,25 +332,59 @@ class Allocator:
         number = BehaviorId(each.request.id)
         return BehaviorRequest(number, 0, behavior.name, parameters, resources, roles), spec
 
-    def _consider(self, evaluator: RoleEvaluator) -> list[ConsideredRequest]:
+    def _consider(
+        self, evaluator: RoleEvaluator
+    ) -> tuple[list[ConsideredRequest], list[ConsideredRequest]]:
+        """Return the requests that are looked at, in their order, and those that are not: as many
+        as there are free resources are before them and need the same."""
         found: list[ConsideredRequest] = []
+        behind: list[ConsideredRequest] = []
         occupied = self._occupied()
-        for allocation, asked in self._asked.items():
+        of_runs: dict[RunId, Mapping[ResourceId, Occupancy]] = {}
+        queues: dict[tuple[object, ...], Queue] = {}
+        # What has no space, or takes from other runs, may be served before what needs the same.
+        may_queue = self._space is None and not self._arbiters.fleet.preemption
+        for _, asked, request in self._open_requests():
             state = asked.runner.run.state
-            request = state.allocations.get(allocation)
-            if asked.chosen or request is None or state.status is not RunStatus.RUNNING:
+            if state.run not in of_runs:
+                of_runs[state.run] = _without(occupied, _ending(state))
+            free_of = of_runs[state.run]
+            if state.kept:  # it has what its run keeps for it
+                own = {each.id for each in state.kept.values() if may_use(each, request.token)}
+                free_of = _without(free_of, own)
+            may_queue_here = may_queue and free_of is occupied
+            need = asked.need if may_queue_here else None
+            queue = queues.get(need) if need is not None else None
+            if queue is not None and queue.is_done:
+                first = queue.first
+                behind.append(ConsideredRequest(asked, request, first.task, first.roles))
                 continue
             try:
-                task = self._task(evaluator, asked.runner, request, occupied)
+                task = self._task(evaluator, asked.runner, request, free_of)
                 roles = tuple(evaluator.role(role, task) for role in task.behavior.roles)
             except ExpressionError as error:
-                asked.runner.post(ResourcesNotFree(allocation, str(error), code="EXPRESSION"))
+                asked.runner.post(ResourcesNotFree(request.id, str(error), code="EXPRESSION"))
                 continue
             except Exception as error:
-                log.exception("%s: a bug in m2pem", allocation)
+                log.exception("%s: a bug in m2pem", request.id)
                 asked.runner.fail(error)
                 continue
             found.append(ConsideredRequest(asked, request, task, roles))
+            if queue is not None:
+                queue.looked_at += 1
+            elif need is not None:
+                queues[need] = Queue(found[-1])
+        return found, behind
+
+    def _open_requests(self) -> "list[tuple[tuple[int, int, str], AskedFor, AllocationRequest]]":
+        """Return all that nothing was chosen for, with its place, in the order of service."""
+        found = []
+        for allocation, asked in self._asked.items():
+            state = asked.runner.run.state
+            request = state.allocations.get(allocation)
+            if not asked.chosen and request is not None and state.status is RunStatus.RUNNING:
+                found.append((asked.look_at(request), asked, request))
+        found.sort(key=itemgetter(0))
         return found
 
     def _task(
@@ -325,22 +394,12 @@ class Allocator:
         request: AllocationRequest,
         occupied: Mapping[ResourceId, Occupancy],
     ) -> Task:
-        behavior, state = behavior_of(request), runner.run.state
-        ending = {
-            each.id for each in state.behaviors.values() if each.phase is BehaviorPhase.CANCELLING
-        }
-        # The run may preempt what it has cancelled itself, and has what it keeps for this task.
-        ending |= {each.id for each in state.kept.values() if may_use(each, request.token)}
-        if ending:
-            occupied = {
-                each: found for each, found in occupied.items() if found.holder not in ending
-            }
-        lost = request.token.lost_work
+        behavior, lost = behavior_of(request), request.token.lost_work
         return Task(
             behavior,
-            self._place(evaluator.candidates, runner.id, behavior, request),
+            lambda: self._place(evaluator.candidates, runner, behavior, request),
             reader(request.token),
-            state.commanded,
+            runner.run.state.commanded,
             occupied,
             {} if lost is None else lost.resources,
             request.token.replacements or {},
@@ -349,21 +408,25 @@ class Allocator:
     def _occupied(self) -> dict[ResourceId, Occupancy]:
         """Return what is not free, and why; also what behaviors have been given that wait for
         their turn in the dispatcher."""
+        found = {
+            each: Occupancy(withdrawn=why) for each, why in self._availability.withdrawn().items()
+        }
         requested = {
-            resource: holders[-1]
+            ResourceId(resource): holders[-1]
             for runner in self._runners.values()
             for resource, holders in runner.run.state.held.items()
         }
-        found: dict[ResourceId, Occupancy] = {}
-        for resource in self._order:
-            if withdrawn := self._availability.reason(resource):
-                found[resource] = Occupancy(withdrawn=withdrawn)
+        known: dict[str, Occupancy] = {}
+        for resource, holder in chain(self._availability.held(), requested.items()):
+            if resource in found:
                 continue
-            holder = self._availability.holder(resource)
-            if not is_behavior(holder):
-                holder = requested.get(resource) or holder
-            if holder:
-                found[resource] = Occupancy(holder, label=self._label(holder))
+            by = holder if is_behavior(holder) else requested.get(resource, holder)
+            if by not in known:
+                before = self._holders.get(by)
+                label = before.label if before is not None else ""
+                known[by] = Occupancy(by, label=label or self._label(by))
+            found[resource] = known[by]
+        self._holders = known
         return found
 
     def _label(self, holder: str) -> str:
@@ -372,7 +435,11 @@ class Allocator:
         return f"{label} ({holder})" if label else ""
 
     def _place(
-        self, candidates: Candidates, run: RunId, behavior: Behavior, request: AllocationRequest
+        self,
+        candidates: Candidates,
+        runner: Runner,
+        behavior: Behavior,
+        request: AllocationRequest,
     ) -> Place:
         """Return where the task begins; anywhere, if its parameters make no sense: its behavior is
         refused later, with the reason."""
@@ -380,8 +447,12 @@ class Allocator:
         if spec is None:
             return Place()
         try:
-            return candidates.place_of(self._parameters(spec, run, request))
+            return candidates.place_of(self._parameters(spec, runner.id, request))
         except ParameterError:
+            return Place()
+        except Exception as error:  # a bug in m2pem holds this run, not all that asks
+            log.exception("%s: a bug in m2pem", request.id)
+            runner.fail(error)
             return Place()
 
     def _parameters(
@@ -452,31 +523,30 @@ class Allocator:
             )
         )
 
+    def _lack(self, each: ConsideredRequest, given: Mapping[ResourceId, Occupancy]) -> Lack:
+        lacks = lack(each.roles, given)
+        self._named_holders.update(lacks.holders.values())
+        return lacks
+
     def _refuse(
         self,
         each: ConsideredRequest,
+        lacks: Lack,
         given: Mapping[ResourceId, Occupancy],
         evaluator: RoleEvaluator,
         without_space: "Refusal | None" = None,
     ) -> None:
         """Let a task wait for its resources, or throw its error. `without_space`: why it takes none
         from other runs."""
-        holders = {
-            str(resource): holder
-            for role in each.roles
-            for resource in (*role.options.busy, *role.options.costs_s)
-            if (holder := _holder(role, resource) or given.get(resource, Occupancy()).holder)
-        }
-        why = reason(each.roles, given)
-        if without_space is not None:
-            why = f"{why}; {without_space.vehicle} is not taken: {without_space.reason}"
-        lacks = (holders, [(frozenset(role.excluded), _withdrawn(role)) for role in each.roles])
         waits = each.waits and not each.is_hopeless(evaluator)
         if waits and each.asked.lacks == lacks:
             return
         each.asked.lacks = lacks
         code = "" if waits else UNAVAILABLE
-        each.asked.runner.post(ResourcesNotFree(each.request.id, why, holders, code))
+        why = reason(each.roles, given)
+        if without_space is not None:
+            why = f"{why}; {without_space.vehicle} is not taken: {without_space.reason}"
+        each.asked.runner.post(ResourcesNotFree(each.request.id, why, lacks.holders, code))
 
     # --- preemption -------------------------------------------------------------------------------
 
@@ -591,6 +661,10 @@ class Allocator:
         return self._space.refusal_after(*preempts.wanted, (), ()) is None
 
 
+def _place(each: ConsideredRequest) -> tuple[int, int, str]:
+    return each.asked.look_at(each.request)
+
+
 def _foremost(refusals: "Sequence[Refusal]") -> "Refusal":
     """Return which refusal a task gets: of the best vehicle for which it may wait, if any."""
     return next((each for each in refusals if each.wait_s is not None), refusals[0])
@@ -601,10 +675,10 @@ def _excluding(
 ) -> ConsideredRole:
     """Return a role whose candidates without space are excluded."""
     reasons = {each: why.reason for each, why in without_space.items() if each in role.resources}
-    return replace(role, excluded={**role.excluded, **reasons}) if reasons else role
+    return role.excluding(reasons) if reasons else role
 
 
-def _without(request: Request, vehicle: ResourceId) -> Request:
+def _not_free(request: Request, vehicle: ResourceId) -> Request:
     """Return a request for which a vehicle is not free."""
     roles = tuple(
         replace(
@@ -619,10 +693,16 @@ def _without(request: Request, vehicle: ResourceId) -> Request:
     return Request(request.id, roles)
 
 
-def _withdrawn(role: ConsideredRole) -> frozenset[ResourceId]:
-    return frozenset(each for each, found in role.occupied.items() if found.withdrawn)
+def _ending(state: RunState) -> set[str]:
+    """Return the behaviors that a run has cancelled: it may preempt these itself."""
+    behaviors = state.behaviors.values()
+    return {each.id for each in behaviors if each.phase is BehaviorPhase.CANCELLING}
 
 
-def _holder(role: ConsideredRole, resource: ResourceId) -> str:
-    occupancy = role.occupied.get(resource)
-    return occupancy.holder if occupancy is not None else ""
+def _without(
+    occupied: Mapping[ResourceId, Occupancy], holders: set[str]
+) -> Mapping[ResourceId, Occupancy]:
+    """Return what is not free for a task that may have what some holders have."""
+    if not holders:
+        return occupied
+    return {each: found for each, found in occupied.items() if found.holder not in holders}

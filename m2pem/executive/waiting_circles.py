@@ -44,7 +44,7 @@ class WaitingCircles:
         resources.
         """
         waiting = [each for each in left if each.request.id not in refusals]
-        requests = {each.request.id: each for each in left}
+        requests = {each.request.id: each for each in left} if refusals else {}
         vehicles = {number: each.named_vehicles for number, each in requests.items()}
         certain = {  # a task that may get another vehicle need not wait for ever
             number: refusal
@@ -59,40 +59,14 @@ class WaitingCircles:
                 for run in sorted({requests[number].asked.runner.id for number in circle}):
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
         runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
-        idle = {run for run, runner in runners.items() if self._is_idle(runner)}
-        asked = [
-            Waiting(
-                each.request.id,
-                each.asked.runner.id,
-                tuple(self._needed(role, each.task.lost) for role in each.roles),
-            )
-            for each in waiting
-            if each.asked.runner.id in idle
-        ]
-        found = circles(asked)
+        idle = {run: runner for run, runner in runners.items() if self._is_idle(runner)}
+        found = circles(_asked(waiting, idle))
         for circle in found:
             if circle not in self._known:
                 text = self._text([each for each in waiting if each.asked.runner.id in circle])
                 for run in sorted(circle):
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
         self._known = {*found, *in_space}
-
-    def _needed(
-        self, role: ConsideredRole, lost: Container[str]
-    ) -> tuple[int, tuple[str | None, ...]]:
-        """Return how many resources a role lacks, and the runs that hold one until they go on; None
-        for what may become free by itself, as what the task has lost may return."""
-        lacking = max(0, role.options.least - len(role.options.costs_s))
-        holders: list[str | None] = []
-        for resource in role.resources:
-            if resource in lost:
-                holders.append(None)
-                continue
-            if resource in role.excluded or resource not in role.occupied:
-                continue
-            holder = role.occupied[resource].holder
-            holders.append(holder.partition(".")[0] if self._goes_on(holder) else None)
-        return lacking, tuple(holders)
 
     def _goes_on(self, holder: str) -> bool:
         """Whether a behavior ends only when its run ends it, as what a run keeps does."""
@@ -137,3 +111,48 @@ class WaitingCircles:
             f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
             f"{runs[-1]}`), or take what it has and give it back"
         )
+
+
+def _asked(waiting: Sequence[ConsideredRequest], idle: Mapping[RunId, Runner]) -> list[Waiting]:
+    """Return the requests of runs that can go on only by getting what idle runs hold.
+
+    `idle`: the runs that can go on only by getting what they asked for. A run that goes on as soon
+    as the behaviors of other runs end is left out: nobody waits for it for ever.
+    """
+    kept = {
+        holder: run
+        for run, each in idle.items()
+        for state in (each.run.state,)
+        for holder in (*state.behaviors, *(kept.id for kept in state.kept.values()))
+    }
+    known: dict[int, tuple[int, tuple[str | None, ...]]] = {}
+
+    def needed(
+        role: ConsideredRole, lost: Container[str]
+    ) -> tuple[int, int, tuple[str | None, ...]]:
+        """How many it lacks, how many may be free by themselves, and who holds each. What the task
+        has lost may return by itself; it shares its candidates with no other task."""
+        found = role.candidacy
+        if id(found) not in known:
+            holders = tuple(
+                None if each in lost else kept.get(found.occupied[each].holder)
+                for each in found.resources
+                if each in lost or (each in found.occupied and each not in found.excluded)
+            )
+            known[id(found)] = holders.count(None), holders
+        lacking = max(0, role.options.least - len(role.options.costs_s))
+        return lacking, *known[id(found)]
+
+    asked: dict[RunId, list[Waiting]] = {}
+    going_on: set[RunId] = set()
+    for each in waiting:
+        run = each.asked.runner.id
+        if run not in idle or run in going_on:
+            continue
+        roles = [needed(role, each.task.lost) for role in each.roles]
+        if all(ending >= lacking for lacking, ending, _ in roles):
+            going_on.add(run)
+            continue
+        needs = tuple((lacking, holders) for lacking, _, holders in roles)
+        asked.setdefault(run, []).append(Waiting(each.request.id, run, needs))
+    return [each for run, all_of in asked.items() if run not in going_on for each in all_of]

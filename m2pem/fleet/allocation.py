@@ -136,6 +136,16 @@ class Availability:
         holders = self._holders.get(resource)
         return holders[-1] if holders else None
 
+    def withdrawn(self) -> Mapping[ResourceId, str]:
+        """Return what is unavailable, and why."""
+        return self._unavailable
+
+    def held(self) -> Iterator[tuple[ResourceId, str]]:
+        """Yield each resource that something holds, and what holds it."""
+        for resource, holders in self._holders.items():
+            if holders:
+                yield resource, holders[-1]
+
     def is_held(self, behavior: str) -> bool:
         """Whether a behavior has not ended, even if what it held has passed on to another one."""
         return any(behavior in holders for holders in self._holders.values())

@@ -8,7 +8,7 @@ payload OFFERS a capability. The graph never changes; `allocation` says which re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import rustworkx
 
@@ -37,8 +37,7 @@ class ResourceNode:
     id: str
 
 
-@dataclass(frozen=True, slots=True)
-class Capability:
+class Capability(NamedTuple):
     """A behavior that a resource offers."""
 
     name: str
@@ -59,6 +58,8 @@ class ResourceGraph:
         self.fleet = fleet
         self._graph: rustworkx.PyDiGraph = rustworkx.PyDiGraph()
         self._index: dict[Capability | str, int] = {}
+        self._offers: dict[str, tuple[BehaviorSpec, ...]] = {}
+        self._sorted: dict[tuple[int, ...], tuple[BehaviorSpec, ...]] = {}
         for vehicle in fleet.vehicles.values():
             self._add(BehaviorType.VEHICLE, vehicle.id)
             self._add_offers(vehicle, catalogue)
@@ -77,9 +78,17 @@ class ResourceGraph:
         return index
 
     def _add_offers(self, resource: Vehicle | Payload, catalogue: Catalogue) -> None:
-        for spec in catalogue(resource.id):
-            if resource.behaviors is not None and spec.name not in resource.behaviors:
-                continue
+        offered = [
+            spec
+            for spec in catalogue(resource.id)
+            if resource.behaviors is None or spec.name in resource.behaviors
+        ]
+        # Most vehicles of a fleet offer the same: it is sorted once.
+        same = tuple(map(id, offered))
+        if same not in self._sorted:
+            self._sorted[same] = tuple(sorted(offered, key=lambda spec: (spec.name, spec.type)))
+        self._offers[resource.id] = self._sorted[same]
+        for spec in offered:
             capability = Capability(spec.name, spec.type)
             if capability not in self._index:
                 self._index[capability] = self._graph.add_node(capability)
@@ -131,11 +140,7 @@ class ResourceGraph:
             names = [spec.name for spec in self.offers(lead) if spec.type is team]
             found = (self.spec(resource, name, team) for name in names)
             return tuple(spec for spec in found if spec is not None)
-        if resource not in self._index:
-            return ()
-        edges = self._graph.out_edges(self._index[resource])
-        specs = [data.spec for _, _, data in edges if isinstance(data, _Offer)]
-        return tuple(sorted(specs, key=lambda spec: (spec.name, spec.type)))
+        return self._offers.get(resource, ())
 
     def offering(self, name: str, type_: BehaviorType) -> tuple[str, ...]:
         """The vehicles, payloads or (for a team behavior) teams that take a behavior."""

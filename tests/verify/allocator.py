@@ -77,7 +77,7 @@ class Allocator:
         }
         evaluator = RoleEvaluator(Candidates(self.fleet, self._graph, lambda _: None))
         behavior = behavior_of(request)
-        task = Task(behavior, Place(), reader(request.token), (), occupied)
+        task = Task(behavior, Place, reader(request.token), (), occupied)
         found = [evaluator.role(each, task) for each in behavior.roles]
         return [replace(each, options=self._with_dice(each.options)) for each in found]
 
