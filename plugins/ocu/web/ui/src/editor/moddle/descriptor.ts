@@ -90,7 +90,11 @@ export const m2pemDescriptor = {
       extends: ["bpmn:MultiInstanceLoopCharacteristics"],
       properties: ["collection", "elementVariable"].map(attribute),
     },
-    { name: "Errors", extends: ["bpmn:Process"], properties: [attribute("onError")] },
+    {
+      name: "Errors",
+      extends: ["bpmn:Process"],
+      properties: ["onError", "incidentRole"].map(attribute),
+    },
     {
       name: "Choice",
       extends: ["bpmn:AdHocSubProcess"],
