@@ -69,15 +69,15 @@ def test_the_program_tells_states_times_and_the_verdict(how: str) -> None:
 
 def test_a_requirement_is_asked_of_branches() -> None:
     case = Case(2, "reduced", requirement="<> completed(t0_0)")
-    assert measuring.search(case, enough_s=0.0).verdict == "holds"
+    assert measuring.search(case).verdict == "holds"
     never = Case(2, "reduced", requirement="[] !completed(t0_0)")
-    assert measuring.search(never, enough_s=0.0).wrong == "violated, and should be: holds"
+    assert measuring.search(never).wrong == "violated, and should be: holds"
 
 
 def test_a_broken_mission_is_told_as_m2pem_verify_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measuring, "spin_is_here", lambda: False)
     subject = next(each for each in subjects() if each.file.endswith("dead_task.bpmn"))
-    (seen,) = measuring.verify(subject, enough_s=0.0).values()
+    (seen,) = measuring.verify(subject).values()
     assert seen.verdict == "violated: no-dead-element; warning: failures-handled"
 
 

@@ -117,7 +117,7 @@ def test_one_of_two_runs_that_wait_for_each_other_is_stopped_and_the_other_compl
     for run in ("r1", "r2"):
         server.type(f"signal {run} {GO}")
     alert = said(server, NONE_GOES_ON)
-    assert "r1 waits at Need for ugv2 (r2.b1); r2 waits at Need for ugv1 (r1.b1)" in alert
+    assert "Need of r1 (r1) waits for ugv2 (held by Hold of r2 (r2)); Need of r2 (r2)" in alert
     (named,) = re.findall("`m2pem (stop r2)`", alert)
     if stops == "command":
         assert m2pem.run(*named.split()) == (0, "", "stopped: r2\n")

@@ -21,7 +21,8 @@ async def test_an_operator_stops_one_of_two_runs_that_wait_for_each_other(
     first, second = runs
     assert (await client.call("send_signal", signal=GO))["success"]
     alert = await client.hears("rosout", lambda each: NONE_GOES_ON in each["msg"])
-    assert f"{first} waits at Need for ugv2 ({second}.b1)" in alert["msg"]
+    held = f"held by Hold of {second} (ugv2)"
+    assert f"Need of {first} (ugv1) waits for ugv2 ({held})" in alert["msg"]
     assert f"`m2pem stop {second}`" in alert["msg"]
     assert (await client.call("control_run", verb=STOP, run=second, by="anna"))["success"]
     assert (await world.control.wait(second)).status is RunStatus.STOPPED

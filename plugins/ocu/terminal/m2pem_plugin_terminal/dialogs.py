@@ -161,7 +161,7 @@ KEYS = (
     ("t", "take a vehicle to steer by hand, or give it back"),
     ("i", "decide about an error that stops a task (!)"),
     ("r", "look at another run"),
-    ("c", "the schedule: hold, release, cancel or start an entry"),
+    ("c", "the schedule: start, hold, release, cancel"),
     ("f", "who is in shared space, and which tasks wait"),
     ("a", "alerts, which stay until they are seen here"),
     ("/", "log: only lines with a text; Esc: all"),
@@ -176,7 +176,7 @@ def help_text() -> Text:
     for key, what in KEYS:
         text.append(f"{key:<11}", "bold #c8d0d9")
         text.append(f"{what}\n", "#9aa4af")
-    text.append("\n●", "#7fc8a9")
+    text.append("●", "#7fc8a9")
     text.append(" at work   ", "#9aa4af")
     text.append("?", "bold #e8c468")
     text.append(" asks   ", "#9aa4af")

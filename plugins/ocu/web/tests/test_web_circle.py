@@ -22,7 +22,8 @@ async def test_an_operator_stops_one_of_two_runs_that_wait_for_each_other(desk: 
     await desk.until("/api/resources", lambda said: said["holders"]["evsg2"] == f"{second}.b1")
     await desk.ask("POST", "/api/signals", {"signal": GO})
     alert = page.get_by_role("alert").filter(has_text=NONE_GOES_ON).first
-    await expect(alert).to_contain_text(f"{first} waits at Need for evsg2 ({second}.b1)")
+    held = f"held by Hold of {second} (evsg2)"
+    await expect(alert).to_contain_text(f"Need of {first} (evsg1) waits for evsg2 ({held})")
     await expect(alert).to_contain_text(f"m2pem stop {second}")
     await page.get_by_role("button", name="Stop this run").hover()
     await page.mouse.down()

@@ -33,6 +33,6 @@ async def test_the_page_shows_who_is_on_the_bridge_and_who_waits_for_it(
             await expect(row).to_contain_text("1 of 1")
             await expect(row).to_contain_text(f"one {run}.b1")
             await expect(row).to_contain_text(f"West of {run}, ")
-            name = it.page.locator(".map-space")
+            name = it.page.locator(".map-space").last  # those before fade out
             await expect(name).to_have_text("bridge: 1 of 1 · one · 1 waiting")
             it.assert_well()
