@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from m2pem.api import Clock, MissionControl, OpenIncident, OpenPrompt, ResourceId, RunId, RunStatus
 from m2pem.api.authoring import MissionFiles
 from m2pem.cli.replay import Verification
+from m2pem.control_socket.client import ask
 from m2pem.control_socket.paths import live_sockets
 from m2pem.control_socket.remote import RemoteControl
 from m2pem.control_socket.server import ControlSocket
@@ -312,11 +313,18 @@ async def verify_replays(journal: Journal, runs: Iterable[str]) -> None:
 
 @asynccontextmanager
 async def served(journal: Path) -> AsyncIterator[MissionControl]:
-    """What operators have of the executive that writes to a journal, when it is there."""
+    """What operators have of the executive that writes to a journal, when it has connected."""
     while not (sockets := list(live_sockets(journal))):  # noqa: ASYNC110  # no event tells of it
+        await asyncio.sleep(0.02)
+    while not await asyncio.to_thread(_connected, sockets[0]):  # noqa: ASYNC110  # nor of that
         await asyncio.sleep(0.02)
     async with RemoteControl(sockets[0]) as control:
         yield control
+
+
+def _connected(path: Path) -> bool:
+    found = {each["name"]: each["status"] for each in ask(path, "health")}
+    return found["arbiters"] == "ok"
 
 
 async def decide_after_kill(

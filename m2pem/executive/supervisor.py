@@ -130,6 +130,7 @@ class Supervisor:
         self._separation = separation_for(self.fleet, clock)
         self.marks = StopMarks(journal.file, journal.identity)
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
+        self._group: asyncio.TaskGroup | None = None
         # Of two starts at once the second must see what the first one takes.
         self._starting = asyncio.Lock()
         self.dispatcher = Dispatcher(
@@ -199,8 +200,20 @@ class Supervisor:
     # --- life -----------------------------------------------------------------------------------
 
     def begin_tasks_in(self, group: asyncio.TaskGroup) -> None:
-        """Say in which task group the runs are driven."""
+        """Say in which task group the runs are driven; the arbiters are connected."""
         self._group = group
+
+    def _refuse_unconnected(self) -> None:
+        """Check that runs can be driven.
+
+        Raises:
+            OperatorError: the arbiters are not connected yet.
+        """
+        if self._group is None:
+            raise OperatorError(
+                "no run begins: the executive is not connected to its vehicles yet; try again in a "
+                "few seconds"
+            )
 
     async def stop_all(self, reason: str) -> None:
         """Stop what still runs and wait for it.
@@ -321,8 +334,10 @@ class Supervisor:
         may begin, asked when the journal has created it.
 
         Raises:
+            OperatorError: the arbiters are not connected yet.
             NotBegunError: a run that the schedule starts was created, and has not begun.
         """
+        self._refuse_unconnected()
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -437,8 +452,9 @@ class Supervisor:
 
         Raises:
             JournalError: there is no such run, or an executive that is alive drives it.
-            OperatorError: it has ended.
+            OperatorError: it has ended, or the arbiters are not connected yet.
         """
+        self._refuse_unconnected()
         lines = {line.run: line for line in await self.journal.runs()}
         line = lines.get(number)
         if line is None:
@@ -493,6 +509,7 @@ class Supervisor:
         return runner
 
     def _drive(self, runner: Runner) -> None:
+        assert self._group is not None
         self._tasks[runner.id] = self._group.create_task(self._drive_and_release(runner))
 
     async def _drive_and_release(self, runner: Runner) -> None:

@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from m2pem.api.clock import SystemClock
 from m2pem.api.control import OpenPrompt, RunStatus, StampedRecord
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import BehaviorEnded, ErrorThrown, RunEnded
@@ -15,10 +16,22 @@ from m2pem.errors import (
     OperatorError,
     PluginError,
 )
+from m2pem.executive.executive import Executive
+from m2pem.journal.memory import MemoryJournal
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.testing.fake_arbiter import FakeArbiter
 
-from .conftest import World, behavior, flow, mission, question, sequence
+from .conftest import (
+    FakePlugins,
+    Fakes,
+    World,
+    behavior,
+    fleet,
+    flow,
+    mission,
+    question,
+    sequence,
+)
 
 DRIVE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
 
@@ -36,6 +49,16 @@ def test_a_behavior_is_started_and_its_success_completes_the_mission(play):
     summary = play(story, "ugv1")
     assert summary.status is RunStatus.COMPLETED
     assert summary.run == "r1"
+
+
+async def test_no_run_begins_before_the_vehicles_are_connected():
+    journal = MemoryJournal()
+    executive = Executive(fleet("ugv1"), journal, FakePlugins(Fakes(), []), SystemClock())
+    for begun in (executive.control.start(DRIVE), executive.resume("r1")):
+        with pytest.raises(OperatorError, match="not connected to its vehicles yet; try again"):
+            await begun
+    assert not await journal.runs()
+    assert not executive.runners
 
 
 def test_stop_cancels_the_behavior_once_and_waits_for_its_release(play):
