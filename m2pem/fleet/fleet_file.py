@@ -122,7 +122,7 @@ def _check_incident_role(source: YamlSource) -> None:
     role, operators = source.mapping().get("incident_role"), source.mapping("operators")
     if isinstance(role, str) and operators and role not in operators:
         hint = suggest(role, operators, "roles")
-        message = f"'operators' names nobody with the role '{role}'"
+        message = f"'operators' names no operator with the role '{role}'"
         source.error(("incident_role",), "no-operator", message, hint)
 
 

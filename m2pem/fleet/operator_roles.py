@@ -55,7 +55,6 @@ def _unknown(
         element.line,
         element.id,
         "no-operator",
-        f"{key}='{role}': {fleet.file} names no operator with that role, so that nobody could "
-        "decide",
+        f"{key}='{role}': {fleet.file} names no operator with that role, who could decide",
         suggest(role, list(fleet.operators), "roles"),
     )

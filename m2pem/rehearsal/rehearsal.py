@@ -252,7 +252,7 @@ class _Rehearsal:
     ) -> RunSummary:
         journal = _NotifyingJournal(self._on_record)
         seen = {"telemetry_hz": SPACE_HZ} if waits_for_space(self._fleet) else {}
-        # Who answers is a script: it stands for whoever may.
+        # A script answers: it may answer what any operator may.
         fleet = replace(self._fleet, operators={})
         executive = Executive(
             simulated_fleet(fleet, {**SETTINGS, **seen}),

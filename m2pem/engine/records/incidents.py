@@ -43,7 +43,7 @@ class IncidentUpdated(BaseRecord, frozen=True):
 class IncidentResolved(BaseRecord, frozen=True):
     """An operator has decided about an incident. `to`: the element or sequence flow to which the
     token moves. `roles`: who fills roles of the behavior that starts again; those by need that are
-    left out are chosen anew; empty: as the mission says. `resources`: what is free now, unless the
+    left out are chosen again; empty: as the mission says. `resources`: what is free now, unless the
     behavior takes it again.
     """
 
