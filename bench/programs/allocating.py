@@ -23,7 +23,7 @@ from m2pem.allocation.assignment import Request, RoleOptions, assign
 from m2pem.allocation.candidates import Candidates, Place
 from m2pem.allocation.needs import Occupancy, RoleEvaluator, Task
 from m2pem.api.clock import VirtualClock, run_virtual
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.engine.records import AllocationRequested, Record, ResourcesAllocated
 from m2pem.executive.executive import Executive

@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 
 from m2pem import load_fleet
+from m2pem.api import MissionControl, OpenPrompt, RunSummary
 from m2pem.api.clock import VirtualClock, run_virtual
-from m2pem.api.control import MissionControl, OpenPrompt, RunSummary
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import simulated_fleet
 from m2pem.journal import MemoryJournal

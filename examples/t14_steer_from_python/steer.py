@@ -8,8 +8,8 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from m2pem import load_fleet
+from m2pem.api import ControlEvent, RunSummary, StampedRecord
 from m2pem.api.clock import Clock, run_virtual
-from m2pem.api.control import ControlEvent, RunSummary, StampedRecord
 from m2pem.engine.records import Record
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import simulated_fleet

@@ -48,24 +48,7 @@ if TYPE_CHECKING:
     from m2pem.api.clock import Clock, SystemClock
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.connection_reader import ConnectionReader
-    from m2pem.api.control import (
-        SCHEDULE,
-        Alert,
-        ControlEvent,
-        HandedOver,
-        IncidentPreview,
-        IncidentVerdict,
-        MissionControl,
-        OpenIncident,
-        OpenPrompt,
-        PromptClosed,
-        RunId,
-        RunStatus,
-        RunSummary,
-        SimulationResult,
-        StampedRecord,
-        TelemetrySample,
-    )
+    from m2pem.api.control import ControlEvent, MissionControl
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
@@ -87,6 +70,22 @@ if TYPE_CHECKING:
         restored_work,
     )
     from m2pem.api.run_view import RunView
+    from m2pem.api.runs import (
+        SCHEDULE,
+        Alert,
+        HandedOver,
+        IncidentPreview,
+        IncidentVerdict,
+        OpenIncident,
+        OpenPrompt,
+        PromptClosed,
+        RunId,
+        RunStatus,
+        RunSummary,
+        SimulationResult,
+        StampedRecord,
+        TelemetrySample,
+    )
     from m2pem.api.schedule import (
         WHEN_FREE,
         Concurrency,
@@ -155,11 +154,7 @@ _MODULES = {
     "m2pem.api.clock": "Clock SystemClock",
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
-    "m2pem.api.control": (
-        "SCHEDULE Alert ControlEvent HandedOver IncidentPreview IncidentVerdict MissionControl"
-        " OpenIncident OpenPrompt PromptClosed RunId RunStatus RunSummary SimulationResult"
-        " StampedRecord TelemetrySample"
-    ),
+    "m2pem.api.control": "ControlEvent MissionControl",
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
@@ -176,6 +171,10 @@ _MODULES = {
         "RemainingRoute RemainingSurvey RemainingWork raw_parameters restored_work"
     ),
     "m2pem.api.run_view": "RunView",
+    "m2pem.api.runs": (
+        "SCHEDULE Alert HandedOver IncidentPreview IncidentVerdict OpenIncident OpenPrompt"
+        " PromptClosed RunId RunStatus RunSummary SimulationResult StampedRecord TelemetrySample"
+    ),
     "m2pem.api.schedule": (
         "WHEN_FREE Concurrency EntryId Missed Schedule ScheduleChanged ScheduledMission"
         " ScheduledStatus SettledTime Settlement When"

@@ -1,11 +1,16 @@
 """MissionControl: the one face of the executive to operators, scripts and OCU plugins."""
 
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, Union
 
+from m2pem.api.allocation import (
+    SharedSpaceChanged,
+    SharedSpaceState,
+    StartPreview,
+    TakeEffect,
+    WaitingTask,
+)
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
     Draft,
@@ -16,328 +21,27 @@ from m2pem.api.authoring import (
     SearchProgress,
 )
 from m2pem.api.health import HealthCheck
+from m2pem.api.runs import (
+    Alert,
+    HandedOver,
+    IncidentPreview,
+    OpenIncident,
+    OpenPrompt,
+    PromptClosed,
+    RunId,
+    RunSummary,
+    SimulationResult,
+    StampedRecord,
+)
 from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, ScheduleChanged, When
-from m2pem.api.telemetry import PayloadState, Telemetry, VehicleState
-from m2pem.engine.records import Record
-from m2pem.findings import Finding, has_errors
-from m2pem.mission.behavior import Decision
+from m2pem.api.telemetry import Telemetry
+from m2pem.findings import Finding
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
-from m2pem.mission.library import MissionFile
 from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet
     from m2pem.mission.mission import Mission
-
-RunId: TypeAlias = str
-"""r1, r2, ... in a journal."""
-
-
-class RunStatus(StrEnum):
-    """The status of a run. INTERRUPTED: it has not ended, and no executive drives it."""
-
-    RUNNING = "running"
-    PAUSED = "paused"
-    INTERRUPTED = "interrupted"
-    COMPLETED = "completed"
-    TERMINATED = "terminated"
-    FAILED = "failed"
-    STOPPED = "stopped"
-
-    @property
-    def ended(self) -> bool:
-        """Whether nothing more will happen in it."""
-        return self in (
-            RunStatus.COMPLETED,
-            RunStatus.TERMINATED,
-            RunStatus.FAILED,
-            RunStatus.STOPPED,
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class RunSummary:
-    """One line of `m2pem runs`. Times are microseconds since the Unix epoch.
-
-    `started_us` and `ended_us` are by the executive's clock, which `--speed` takes ahead of the
-    wall clock; `began_us` is by that one. 0: not known.
-    """
-
-    run: RunId
-    mission: str
-    process: str
-    status: RunStatus
-    started_us: int
-    ended_us: int | None = None
-    records: int = 0
-    detail: str = ""
-    began_us: int = 0
-
-    @property
-    def took_s(self) -> float | None:
-        """Seconds of the executive's clock from start to end, pauses too; None: not ended."""
-        if self.ended_us is None:
-            return None
-        return max(0, self.ended_us - self.started_us) / 1_000_000
-
-
-class StampedRecord(NamedTuple):
-    """A record with its position: `seq` counts from 1 in its run; `t_s` is mission time."""
-
-    run: RunId
-    seq: int
-    t_s: float
-    record: Record
-
-
-@dataclass(frozen=True, slots=True)
-class OpenPrompt:
-    """A question that is open. The first answer to it wins."""
-
-    run: RunId
-    prompt: str
-    element: str
-    text: str
-    decisions: tuple[Decision, ...]
-    role: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class PromptClosed:
-    """A question is closed: `decision` and `by` are "" when it was withdrawn."""
-
-    run: RunId
-    prompt: str
-    decision: str = ""
-    by: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class TakeEffect:
-    """What taking a resource would end now: a behavior of a task ends with error TAKEN_OVER.
-
-    `task` is the task's label. `caught_by`: the label of the event that catches the error, where
-    the mission goes on; "": no event catches it, and the run fails. `reassigned`: the error comes
-    only if no other can do the rest of the task. `asks`: an incident opens in its place.
-    """
-
-    run: RunId
-    behavior: str
-    element: str
-    task: str
-    caught_by: str = ""
-    reassigned: bool = False
-    asks: bool = False
-
-    def __str__(self) -> str:
-        if self.asks:
-            return f"{self.run}: an incident opens, which asks what is done with {self.task}"
-        ends = f"{self.run}: {self.task} ends with error TAKEN_OVER"
-        if self.reassigned:
-            ends = f"{self.run}: another does the rest of {self.task}, or it"
-            ends += " ends with error TAKEN_OVER"
-        if self.caught_by:
-            return f"{ends}; the mission goes on at {self.caught_by}"
-        return f"{ends}. TAKEN_OVER is not handled: the mission will fail"
-
-
-@dataclass(frozen=True, slots=True)
-class RoleAssignment:
-    """What a role of a mission runs on in a fleet.
-
-    `resource`: the vehicle, payload or team that the mission names; "": what fills the role is
-    chosen when its task starts. `resources`: those of the fleet; empty: the fleet lacks it.
-    """
-
-    role: str
-    resource: str
-    resources: tuple[ResourceId, ...]
-
-    def __str__(self) -> str:
-        if not self.resource:
-            return f"{self.role}: chosen when its task starts"
-        if not self.resources:
-            return f"{self.role}: {self.resource}, which the fleet lacks"
-        team = "" if self.resources == (self.resource,) else f"{self.resource}: "
-        return f"{self.role}: {team}{', '.join(self.resources)}"
-
-
-@dataclass(frozen=True, slots=True)
-class StartPreview:
-    """What would begin with a mission: `file` as it was given, and its process with its name.
-
-    `findings`: those of `MissionControl.check`; an error among them refuses the start. `busy`: the
-    reason why the start has to be confirmed, which says who has what; "" when all is free. `name`
-    and `process` are "" if the mission cannot be read.
-    """
-
-    file: str
-    name: str = ""
-    process: str = ""
-    findings: tuple[Finding, ...] = ()
-    roles: tuple[RoleAssignment, ...] = ()
-    busy: str = ""
-
-    @property
-    def refused(self) -> bool:
-        """Whether the mission cannot start."""
-        return has_errors(self.findings)
-
-
-@dataclass(frozen=True, slots=True)
-class SpaceHolder:
-    """A vehicle that has a place in a shared space. `behavior`: "" if it stands there; `lost`:
-    nothing is received from it."""
-
-    vehicle: ResourceId
-    behavior: str = ""
-    lost: bool = False
-
-    def __str__(self) -> str:
-        what = "lost" if self.lost else self.behavior or "stands there"
-        return f"{self.vehicle} ({what})"
-
-
-@dataclass(frozen=True, slots=True)
-class WaitingTask:
-    """A task that waits for vehicles or payloads that are not free, or for space
-    (docs/allocation.md).
-
-    `allocation`: the id of its request. `task` is the task's label. Times are seconds: since it
-    asked, and until it gives up (None: it waits without a limit, or its run is about to answer).
-    `holders`: the behaviors, requests and operators who have what it could use, by resource; or
-    who has the space that it needs, by the name of the shared space or of the vehicle in its way.
-    """
-
-    run: RunId
-    allocation: str
-    element: str
-    task: str
-    behavior: str
-    waited_s: float
-    left_s: float | None
-    priority: int
-    reason: str
-    holders: Mapping[str, str]
-
-    def in_short(self) -> str:
-        """Return which task waits, and since when."""
-        return f"{self.task} of {self.run} waits since {self.waited_s:.0f} s"
-
-    def __str__(self) -> str:
-        limit = "without a limit" if self.left_s is None else f"for {self.left_s:.0f} s at most"
-        priority = f" with priority {self.priority}" if self.priority else ""
-        return (
-            f"{self.run}: {self.task} waits since {self.waited_s:.0f} s and {limit}{priority}: "
-            f"{self.reason}"
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class SharedSpaceState:
-    """A shared space of the fleet file now: how many vehicles may be in it, who has a place, and
-    which tasks wait for one, in the order of service."""
-
-    name: str
-    capacity: int
-    holders: tuple[SpaceHolder, ...] = ()
-    waiting: tuple[WaitingTask, ...] = ()
-
-    def __str__(self) -> str:
-        who = ", ".join(map(str, self.holders)) or "free"
-        wait = "".join(f"; {each.in_short()}" for each in self.waiting)
-        return f"{self.name} ({len(self.holders)} of {self.capacity} taken): {who}{wait}"
-
-
-@dataclass(frozen=True, slots=True)
-class SharedSpaceChanged:
-    """Who has places in shared space, or waits for one, has changed; `MissionControl.shared_space`
-    has it. It concerns all runs."""
-
-    run: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class OpenIncident:
-    """An error that no event catches, about which an operator decides (docs/incidents.md).
-
-    `task`: the element's label. `choices`: what can be chosen, of `retry`, `retry_with`, `skip`,
-    `set_data`, `move` and `end`. `resources`: what is held for it. `roles`: those of the behavior,
-    with who had each. `targets`: where the token can move, by id, with labels. `operator_role`:
-    which operators may decide; "": all.
-    """
-
-    run: RunId
-    incident: str
-    element: str
-    task: str
-    code: str
-    reason: str
-    choices: tuple[str, ...]
-    resources: tuple[str, ...] = ()
-    roles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    targets: Mapping[str, str] = field(default_factory=dict)
-    operator_role: str = ""
-
-    def __str__(self) -> str:
-        held = f"; held for it: {', '.join(self.resources)}" if self.resources else ""
-        reason = f": {self.reason}" if self.reason else ""
-        who = f"; for {self.operator_role}" if self.operator_role else ""
-        return f"{self.incident}: {self.task}: {self.code}{reason}{held}{who}"
-
-
-class IncidentVerdict(StrEnum):
-    """What the checker says of a mission after a choice about an incident."""
-
-    COMPLETES = "completes"
-    MAY_NOT_COMPLETE = "may not complete"
-    CANNOT_COMPLETE = "cannot complete"
-    UNKNOWN = "not known"
-
-
-@dataclass(frozen=True, slots=True)
-class IncidentPreview:
-    """What follows a choice about an incident, explored from the run's present state."""
-
-    verdict: IncidentVerdict
-    reason: str = ""
-
-    def __str__(self) -> str:
-        reason = f": {self.reason}" if self.reason else ""
-        return f"the mission {_VERDICTS[self.verdict]}{reason}"
-
-
-_VERDICTS = {
-    IncidentVerdict.COMPLETES: "completes on all paths from there",
-    IncidentVerdict.MAY_NOT_COMPLETE: "may not complete from there",
-    IncidentVerdict.CANNOT_COMPLETE: "cannot complete from there",
-    IncidentVerdict.UNKNOWN: "may or may not complete from there, which is not known",
-}
-
-
-LOGGED = "LOGGED"
-"""The code of alerts that are also logged: what an arbiter warns of, for instance. Who shows the
-log to an operator need not show them again."""
-LEFT_ARMED = "LEFT_ARMED"
-"""The code of the alert that says which vehicles stay armed when a run has ended."""
-
-
-@dataclass(frozen=True, slots=True)
-class Alert:
-    """A warning which no record has: a vehicle that did not take STOP, what an autopilot warns of,
-    a journal that does not write, a plugin that blocks. `run` "": it concerns all of them."""
-
-    run: RunId
-    code: str
-    text: str
-
-
-SCHEDULE = "SCHEDULE"
-"""The code of alerts that say what operators, or the schedule itself, have done with it."""
-STARTS_SOON = "STARTS_SOON"
-"""The code of the alert before each start of a scheduled mission."""
-NOT_STARTED = "NOT_STARTED"
-"""The code of alerts about scheduled missions that did not start: missed, refused or held."""
 
 ControlEvent: TypeAlias = Union[
     StampedRecord, OpenPrompt, PromptClosed, Alert, ScheduleChanged, SharedSpaceChanged
@@ -679,7 +383,7 @@ class MissionControl(Protocol):
         """
         ...
 
-    async def simulate(self, mission: MissionSource, **options: Any) -> "SimulationResult":
+    async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock. Cancelling ends it.
 
         Options: `process`, `data`, `answers` (path of an answers file, or its text as bytes),
@@ -732,41 +436,10 @@ class MissionControl(Protocol):
         """
         ...
 
-    def geometries(self) -> Mapping[str, "HandedOver"]:
+    def geometries(self) -> Mapping[str, HandedOver]:
         """The routes, areas and points that operators have handed over for all runs."""
         ...
 
     def services(self) -> Mapping[str, Sequence[str]]:
         """The service-task classes that there are, with the names of data that each writes."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class HandedOver:
-    """A geometry (GeoJSON) from an operator, `at_us` microseconds since the Unix epoch."""
-
-    geometry: Mapping[str, Value]
-    by: str
-    at_us: int
-
-
-@dataclass(frozen=True, slots=True)
-class TelemetrySample:
-    """The states of vehicles and payloads of a rehearsal at one mission time."""
-
-    t_s: float
-    vehicles: Mapping[ResourceId, VehicleState]
-    payloads: Mapping[ResourceId, PayloadState] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class SimulationResult:
-    """What a rehearsal did. `telemetry`: at even intervals; long ones have longer intervals.
-
-    `files`: of the mission, its own first.
-    """
-
-    summary: RunSummary
-    records: Sequence[StampedRecord] = field(default_factory=tuple)
-    telemetry: Sequence[TelemetrySample] = field(default_factory=tuple)
-    files: Sequence[MissionFile] = field(default_factory=tuple)

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from m2pem.api import records as r
 from m2pem.api.choices import choice_sentence
-from m2pem.api.control import StampedRecord
 from m2pem.api.run_view import RunView
+from m2pem.api.runs import StampedRecord
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.losses import BATTERY_LOW
 

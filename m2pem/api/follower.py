@@ -11,19 +11,18 @@ from collections.abc import AsyncIterator
 from dataclasses import replace
 
 from m2pem.api import records as r
-from m2pem.api.control import (
+from m2pem.api.allocation import SharedSpaceChanged
+from m2pem.api.control import ControlEvent, MissionControl
+from m2pem.api.run_view import RunView
+from m2pem.api.runs import (
     Alert,
-    ControlEvent,
-    MissionControl,
     OpenPrompt,
     PromptClosed,
     RunId,
     RunStatus,
     RunSummary,
-    SharedSpaceChanged,
     StampedRecord,
 )
-from m2pem.api.run_view import RunView
 from m2pem.api.schedule import ScheduleChanged
 from m2pem.errors import JournalError, M2pemError, OperatorError
 

@@ -15,24 +15,26 @@ from typing import Any, get_args
 
 import msgspec
 
+from m2pem.api.allocation import (
+    SharedSpaceChanged,
+    SharedSpaceState,
+    StartPreview,
+    TakeEffect,
+    WaitingTask,
+)
 from m2pem.api.authoring import MissionFiles
-from m2pem.api.control import (
+from m2pem.api.control import MissionControl
+from m2pem.api.health import HealthCheck
+from m2pem.api.runs import (
     Alert,
     IncidentPreview,
-    MissionControl,
     OpenIncident,
     OpenPrompt,
     PromptClosed,
     RunId,
     RunSummary,
-    SharedSpaceChanged,
-    SharedSpaceState,
     StampedRecord,
-    StartPreview,
-    TakeEffect,
-    WaitingTask,
 )
-from m2pem.api.health import HealthCheck
 from m2pem.api.schedule import EntryId, Schedule, ScheduleChanged, When
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
 from m2pem.findings import Finding

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import msgspec
 
 from m2pem.api import records as r
-from m2pem.api.control import RunId, RunStatus, RunSummary, StampedRecord
+from m2pem.api.runs import RunId, RunStatus, RunSummary, StampedRecord
 from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@ def attach(
 async def _attach(
     run: str | None, journal_url: str | None, ocu_names: str | None, search_path: tuple[Path, ...]
 ) -> None:
-    from m2pem.api.control import RunStatus
+    from m2pem.api.runs import RunStatus
     from m2pem.cli.notes import note
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.session import what_goes_on

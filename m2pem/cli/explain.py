@@ -37,8 +37,8 @@ def explain(run_id: str, element: str, journal: str | None, output: str) -> None
 
 
 async def _explain(run_id: str, name: str, url: str | None, output: str) -> None:
-    from m2pem.api.control import StampedRecord
     from m2pem.api.run_view import RunView
+    from m2pem.api.runs import StampedRecord
     from m2pem.cli.journals import find_run, journal_to_read
     from m2pem.executive.control import summary
     from m2pem.journal.mission import mission_of

@@ -11,7 +11,7 @@ from m2pem.cli.completers import file_or
 from m2pem.cli.options import as_json, example, format_option, journal_option
 
 if TYPE_CHECKING:
-    from m2pem.api.control import SharedSpaceState, WaitingTask
+    from m2pem.api.allocation import SharedSpaceState, WaitingTask
     from m2pem.executive.fleet_connections import FleetArbiters
 
 
@@ -221,7 +221,7 @@ def _show_running(journal: str | None, output: str) -> None:
     """Print who holds what in the executives that serve a journal, and which tasks wait."""
     import msgspec
 
-    from m2pem.api.control import SharedSpaceState, WaitingTask
+    from m2pem.api.allocation import SharedSpaceState, WaitingTask
     from m2pem.cli.run_control import journal_file
     from m2pem.control_socket.client import ask, executives, fleet_name
 

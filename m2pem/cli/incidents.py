@@ -15,7 +15,7 @@ from m2pem.cli.options import (
 from m2pem.cli.run_control import by_option, journal_file, steer
 
 if TYPE_CHECKING:
-    from m2pem.api.control import OpenIncident
+    from m2pem.api.runs import OpenIncident
     from m2pem.mission.values import Value
 
 LONG_TIMEOUT_S = 120.0
@@ -32,7 +32,7 @@ def incidents(journal: str | None, output: str) -> None:
     """
     import msgspec
 
-    from m2pem.api.control import OpenIncident
+    from m2pem.api.runs import OpenIncident
     from m2pem.control_socket.client import ask, executives
 
     found = [
@@ -131,7 +131,7 @@ def resolve(
 def _preview(journal: str | None, run: str, params: dict[str, Any]) -> None:
     import msgspec
 
-    from m2pem.api.control import IncidentPreview
+    from m2pem.api.runs import IncidentPreview
     from m2pem.cli.run_control import explain
     from m2pem.control_socket.client import ask_driver
     from m2pem.errors import NotDrivenError

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import click
 
 from m2pem.api import records as r
-from m2pem.api.control import RunId, RunStatus, RunSummary, StampedRecord
 from m2pem.api.description import Description, Importance, Kind, describe
 from m2pem.api.run_view import Allocation, Behavior, RunView
+from m2pem.api.runs import RunId, RunStatus, RunSummary, StampedRecord
 from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.state import RunState
 from m2pem.mission.elements import Activity, Event

@@ -7,16 +7,10 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from m2pem.api.control import (
-    MissionControl,
-    OpenPrompt,
-    PromptClosed,
-    RunId,
-    RunStatus,
-    StampedRecord,
-)
+from m2pem.api.control import MissionControl
 from m2pem.api.description import printable
 from m2pem.api.foreground import Lines
+from m2pem.api.runs import OpenPrompt, PromptClosed, RunId, RunStatus, StampedRecord
 from m2pem.api.schedule import When
 from m2pem.cli.standard_streams import writer_for
 from m2pem.engine.records import IncidentOpened, RunClaimed, RunEnded, RunStarted

@@ -109,7 +109,7 @@ async def _replay(run_id: str, url: str | None, verify: bool, state_only: bool, 
 async def _print(
     journal: "Journal", line: "RunInfo", state_only: bool, output: str, done: Callable[[int], None]
 ) -> int:
-    from m2pem.api.control import StampedRecord
+    from m2pem.api.runs import StampedRecord
     from m2pem.cli.line_formatter import LineFormatter
     from m2pem.cli.output import wants_colour
     from m2pem.cli.status import RunStatusView
@@ -201,7 +201,7 @@ def _say(output: str, text: str) -> None:
 
 
 def _show(steps: "Sequence[Step]", lines: "LineFormatter", output: str) -> None:
-    from m2pem.api.control import StampedRecord
+    from m2pem.api.runs import StampedRecord
     from m2pem.journal.codec import record_line
     from m2pem.units import US_PER_S
 

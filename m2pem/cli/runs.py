@@ -11,7 +11,7 @@ from m2pem.cli.options import as_json, example, format_option, journal_option
 from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
-    from m2pem.api.control import RunSummary
+    from m2pem.api.runs import RunSummary
     from m2pem.journal.base import Journal, RunInfo
 
 

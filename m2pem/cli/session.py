@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 import click
 
 from m2pem.api.clock import SystemClock
-from m2pem.api.control import RunId, RunStatus, SimulationResult
+from m2pem.api.runs import RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
 from m2pem.cli.journals import url_of
 from m2pem.cli.notes import note

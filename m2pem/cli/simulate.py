@@ -20,7 +20,7 @@ from m2pem.cli.options import (
 from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
-    from m2pem.api.control import StampedRecord
+    from m2pem.api.runs import StampedRecord
     from m2pem.fleet.fleet import Fleet
     from m2pem.mission.values import Value
 

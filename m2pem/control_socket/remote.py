@@ -9,9 +9,11 @@ from typing import Any, cast
 
 import msgspec
 
+from m2pem.api.allocation import StartPreview
 from m2pem.api.authoring import MissionFiles, MissionSource, file_of
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StartPreview
+from m2pem.api.control import MissionControl
 from m2pem.api.operations import OPERATIONS, STREAMED, Operation, mission_files
+from m2pem.api.runs import OpenPrompt, PromptClosed, RunId
 from m2pem.api.schedule import EntryId
 from m2pem.bpmn import parse_mission
 from m2pem.control_socket.client import LONG_TIMEOUT_S, ask

@@ -25,7 +25,7 @@ from m2pem.allocation.explanation import Lack, lack, reason, what_was_considered
 from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
 from m2pem.api.clock import Clock
-from m2pem.api.control import Alert, RunId
+from m2pem.api.runs import Alert, RunId
 from m2pem.engine import records as r
 from m2pem.engine.data import reader
 from m2pem.engine.elements.allocations import behavior_of

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from m2pem.api.control import RunId
+from m2pem.api.runs import RunId
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.inputs import ResourceFault
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus

@@ -6,6 +6,13 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
+from m2pem.api.allocation import (
+    RoleAssignment,
+    SharedSpaceState,
+    StartPreview,
+    TakeEffect,
+    WaitingTask,
+)
 from m2pem.api.authoring import (
     DEFAULT_LIMITS,
     Draft,
@@ -16,25 +23,20 @@ from m2pem.api.authoring import (
     SearchProgress,
     file_of,
 )
-from m2pem.api.control import (
-    ControlEvent,
+from m2pem.api.control import ControlEvent
+from m2pem.api.health import HealthCheck
+from m2pem.api.runs import (
     HandedOver,
     IncidentPreview,
     IncidentVerdict,
     OpenIncident,
     OpenPrompt,
-    RoleAssignment,
     RunId,
     RunStatus,
     RunSummary,
-    SharedSpaceState,
     SimulationResult,
     StampedRecord,
-    StartPreview,
-    TakeEffect,
-    WaitingTask,
 )
-from m2pem.api.health import HealthCheck
 from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When, host_time_zone
 from m2pem.api.telemetry import Telemetry
 from m2pem.bpmn.search_path import mission_files_in

@@ -14,7 +14,8 @@ from queue import Full, Queue
 from types import TracebackType
 from typing import Self
 
-from m2pem.api.control import LOGGED, Alert, ControlEvent, RunId
+from m2pem.api.control import ControlEvent
+from m2pem.api.runs import LOGGED, Alert, RunId
 from m2pem.engine.records import Record
 from m2pem.errors import OperatorError
 

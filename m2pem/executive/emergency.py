@@ -16,7 +16,7 @@ from pathlib import Path
 from queue import Queue
 from uuid import UUID
 
-from m2pem.api.control import Alert, RunId
+from m2pem.api.runs import Alert, RunId
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step

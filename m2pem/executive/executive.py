@@ -17,7 +17,7 @@ from typing import Self
 
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock, SystemClock
-from m2pem.api.control import RunId
+from m2pem.api.runs import RunId
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control, Foresee, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers

@@ -6,7 +6,7 @@ While an operator has a resource, no mission gets it; every run's journal says s
 from collections.abc import Callable, Container, Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from m2pem.api.control import TakeEffect
+from m2pem.api.allocation import TakeEffect
 from m2pem.engine.elements.behaviors import preview_control_taken
 from m2pem.engine.incidents import error_policy
 from m2pem.engine.inputs import ControlReturned, ControlTaken

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from m2pem.api.control import OpenIncident
+from m2pem.api.runs import OpenIncident
 from m2pem.engine.incidents import behavior_at, move_targets
 from m2pem.engine.inputs import IncidentChoice, ResolveIncident
 from m2pem.engine.resolving import replaced_roles, why_refused

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Mapping, Sequence
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
-from m2pem.api.control import OpenPrompt, PromptClosed, RunId
+from m2pem.api.runs import OpenPrompt, PromptClosed, RunId
 from m2pem.engine.commands import RunService
 from m2pem.engine.inputs import BehaviorMissing, Input
 from m2pem.engine.records import BehaviorRequested, Record, RunEnded, RunResumed

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from m2pem.api.control import IncidentPreview, IncidentVerdict
+from m2pem.api.runs import IncidentPreview, IncidentVerdict
 from m2pem.engine.inputs import Input, ResolveIncident
 from m2pem.engine.run import MissionRun
 from m2pem.executive.subprocess_worker import SendProgress, run_in_subprocess, serve

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Self
 
-from m2pem.api.control import Alert
+from m2pem.api.runs import Alert
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.journal.storage_checks import space_shortage

@@ -4,7 +4,7 @@ battery is charged again. Tasks that wait for someone to do their rest may then 
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from m2pem.api.control import RunId
+from m2pem.api.runs import RunId
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine import records as r
 from m2pem.engine.inputs import ResourceReturned

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from m2pem.api.clock import Clock
-from m2pem.api.control import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
+from m2pem.api.runs import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
 from m2pem.engine import commands as c
 from m2pem.engine import records as r
 from m2pem.engine.inputs import (

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from m2pem.allocation.candidates import Facts
 from m2pem.api.clock import Clock
-from m2pem.api.control import RunId
+from m2pem.api.runs import RunId
 from m2pem.errors import ExpressionError, JournalError, M2pemError
 from m2pem.fleet.allocation import resources_of_mission
 from m2pem.fleet.fleet import Fleet

@@ -21,7 +21,7 @@ from collections.abc import Callable
 import msgspec
 
 from m2pem.api.clock import SystemClock
-from m2pem.api.control import NOT_STARTED, SCHEDULE, STARTS_SOON, Alert, RunId
+from m2pem.api.runs import NOT_STARTED, SCHEDULE, STARTS_SOON, Alert, RunId
 from m2pem.api.schedule import (
     Schedule,
     ScheduleChanged,

@@ -6,9 +6,9 @@ The reservation waits until the positions of the vehicles are known.
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
+from m2pem.api.allocation import SharedSpaceState, SpaceHolder, WaitingTask
 from m2pem.api.arbiter import BehaviorRequest
 from m2pem.api.clock import Clock
-from m2pem.api.control import SharedSpaceState, SpaceHolder, WaitingTask
 from m2pem.api.telemetry import VehicleState
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.catalogue import BehaviorSpec

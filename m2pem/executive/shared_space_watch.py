@@ -5,8 +5,8 @@ Vehicles enter and leave it as they move, which no record has: it is looked at o
 
 from collections.abc import Callable, Hashable, Sequence
 
+from m2pem.api.allocation import SharedSpaceChanged, SharedSpaceState
 from m2pem.api.clock import Clock
-from m2pem.api.control import SharedSpaceChanged, SharedSpaceState
 
 LOOK_EVERY_S = 1.0
 

@@ -13,10 +13,11 @@ from pathlib import Path
 
 from m2pem.allocation.assignment import load_solver
 from m2pem.allocation.candidates import Candidates, Facts
+from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.authoring import MissionFiles, MissionSource
 from m2pem.api.clock import Clock
-from m2pem.api.control import LEFT_ARMED, Alert, HandedOver, RunId, SharedSpaceState
+from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState, Telemetry
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from m2pem.allocation.circles import Waiting, circles
 from m2pem.allocation.needs import ConsideredRole
-from m2pem.api.control import Alert, RunId
+from m2pem.api.runs import Alert, RunId
 from m2pem.engine.state import BehaviorPhase
 from m2pem.executive.allocation_requests import ConsideredRequest
 from m2pem.executive.runner import Runner

@@ -4,7 +4,8 @@ and which task has what they wait for."""
 from collections.abc import Iterable, Mapping
 from pathlib import PurePath
 
-from m2pem.api.control import RunId, WaitingTask
+from m2pem.api.allocation import WaitingTask
+from m2pem.api.runs import RunId
 from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.state import AllocationRequest, RunState
 from m2pem.executive.runner import Runner

@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from m2pem.api.clock import Clock
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed, RunId, StampedRecord
+from m2pem.api.control import MissionControl
+from m2pem.api.runs import OpenPrompt, PromptClosed, RunId, StampedRecord
 from m2pem.engine.inputs import MessageReceived, SignalReceived
 from m2pem.engine.records import (
     BehaviorRequested,

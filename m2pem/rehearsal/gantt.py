@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.runs import StampedRecord
 from m2pem.diagram.style import cut, width_of
 from m2pem.diagram.svg import Drawing, Group
 from m2pem.fleet.fleet import Fleet

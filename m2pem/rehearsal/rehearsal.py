@@ -8,13 +8,7 @@ from pathlib import Path
 
 from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import VirtualClock, run_virtual
-from m2pem.api.control import (
-    RunStatus,
-    RunSummary,
-    SimulationResult,
-    StampedRecord,
-    TelemetrySample,
-)
+from m2pem.api.runs import RunStatus, RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.api.telemetry import PayloadState, VehicleState
 from m2pem.engine.inputs import GiveUp
 from m2pem.engine.run import MissionRun

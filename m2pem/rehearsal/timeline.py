@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.runs import StampedRecord
 from m2pem.engine import records as r
 from m2pem.mission.catalogue import BehaviorState
 

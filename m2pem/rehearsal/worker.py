@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from m2pem.api.authoring import MissionSource
-from m2pem.api.control import RunSummary, SimulationResult, StampedRecord, TelemetrySample
+from m2pem.api.runs import RunSummary, SimulationResult, StampedRecord, TelemetrySample
 from m2pem.errors import OperatorError
 from m2pem.executive.subprocess_worker import (
     EncodedSource,

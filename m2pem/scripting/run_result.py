@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from m2pem.api.control import RunStatus, RunSummary, StampedRecord, TelemetrySample
+from m2pem.api.runs import RunStatus, RunSummary, StampedRecord, TelemetrySample
 from m2pem.diagram.mission_files import draw_mission
 from m2pem.diagram.overlays import Overlays
 from m2pem.engine import records as r

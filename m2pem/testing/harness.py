@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from m2pem.api.clock import Clock, SystemClock
-from m2pem.api.control import MissionControl, OpenPrompt, RunSummary, StampedRecord
+from m2pem.api.control import MissionControl
+from m2pem.api.runs import OpenPrompt, RunSummary, StampedRecord
 from m2pem.engine.records import Record, TokenEntered
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Fleet, simulated_fleet

@@ -1,6 +1,6 @@
 import pytest
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.runs import StampedRecord
 from m2pem.bpmn import parse_mission
 from m2pem.cli.line_formatter import LineFormatter
 from m2pem.engine import records as r

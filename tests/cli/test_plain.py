@@ -8,15 +8,8 @@ from typing import Any, cast
 
 import pytest
 
-from m2pem.api.control import (
-    ControlEvent,
-    MissionControl,
-    OpenPrompt,
-    PromptClosed,
-    RunStatus,
-    RunSummary,
-    StampedRecord,
-)
+from m2pem.api.control import ControlEvent, MissionControl
+from m2pem.api.runs import OpenPrompt, PromptClosed, RunStatus, RunSummary, StampedRecord
 from m2pem.cli import plain
 from m2pem.cli.plain import PlainOcu
 from m2pem.cli.standard_streams import writer_for

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from m2pem.api.control import MissionControl, OpenPrompt
+from m2pem.api.control import MissionControl
 from m2pem.api.foreground import Lines
 from m2pem.api.ocu import Ocu
+from m2pem.api.runs import OpenPrompt
 from m2pem.cli.plain import PlainOcu
 from m2pem.testing.contracts.ocu import MakeOcu, OcuContract, Operate, Operator
 

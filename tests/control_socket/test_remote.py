@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.api.control import OpenPrompt, PromptClosed, StampedRecord
+from m2pem.api.runs import OpenPrompt, PromptClosed, StampedRecord
 from m2pem.api.telemetry import (
     Detection,
     GeoPosition,

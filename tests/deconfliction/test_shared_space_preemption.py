@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.engine.records import BehaviorRequested, ErrorThrown
 from m2pem.fleet.fleet import Domain, OnConflict, SharedSpace
 

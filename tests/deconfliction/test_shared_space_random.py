@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.fleet.fleet import SharedSpace
 from tests.seeds import seeds_for
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import Alert, RunStatus
+from m2pem.api.runs import Alert, RunStatus
 from m2pem.engine.records import (
     AllocationDelayed,
     AllocationEnded,

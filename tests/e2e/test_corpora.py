@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus, StampedRecord
+from m2pem.api.runs import RunStatus, StampedRecord
 from m2pem.bpmn import parse_mission
 from m2pem.errors import MissionError
 from m2pem.findings import has_errors

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.runs import StampedRecord
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal.codec import record_line
 from m2pem.plugins import PluginManager

@@ -11,7 +11,7 @@ import pytest
 from m2pem import load_fleet
 from m2pem.api.arbiter import ArbiterContext
 from m2pem.api.clock import VirtualClock, run_virtual
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.bpmn import parse_mission
 from m2pem.engine import records as r
 from m2pem.executive.fleet_connections import FleetArbiters

@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse

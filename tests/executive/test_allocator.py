@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from m2pem.api.control import LOGGED, Alert, RunStatus
+from m2pem.api.runs import LOGGED, Alert, RunStatus
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import Input, StartRun

@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.engine.records import (
     BehaviorCancelRequested,

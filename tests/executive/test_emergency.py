@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from m2pem.api.control import Alert, RunStatus
+from m2pem.api.runs import Alert, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunPaused
 from m2pem.errors import OperatorError
 from m2pem.executive import process_monitors

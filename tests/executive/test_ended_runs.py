@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.engine.records import RunOutcome
 from m2pem.errors import NotDrivenError, OperatorError
 from m2pem.executive.ended_runs import describe_end

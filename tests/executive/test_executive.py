@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from m2pem.api.clock import SystemClock
-from m2pem.api.control import OpenPrompt, RunStatus, StampedRecord
+from m2pem.api.runs import OpenPrompt, RunStatus, StampedRecord
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import BehaviorEnded, ErrorThrown, RunEnded
 from m2pem.errors import (

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.api.telemetry import LinkState
 from m2pem.engine.inputs import BehaviorReported
 from m2pem.engine.records import (

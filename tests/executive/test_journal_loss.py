@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.control import PromptClosed, RunStatus
+from m2pem.api.runs import PromptClosed, RunStatus
 from m2pem.engine.records import BehaviorRequested, RunClaimed
 from m2pem.errors import OperatorError
 from m2pem.journal.base import Loss

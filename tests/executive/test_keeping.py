@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import Alert, RunStatus
+from m2pem.api.runs import Alert, RunStatus
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import BehaviorReported, ResourcesChosen, StartRun
 from m2pem.engine.records import KeepingEnded

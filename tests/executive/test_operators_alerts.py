@@ -3,7 +3,7 @@
 import asyncio
 import logging
 
-from m2pem.api.control import LOGGED, Alert
+from m2pem.api.runs import LOGGED, Alert
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.control import Alert, RunStatus
+from m2pem.api.runs import Alert, RunStatus
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import BehaviorPreempted, ResourcesChosen, ResourcesNotFree, StartRun

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.api.control import Alert
+from m2pem.api.runs import Alert
 from m2pem.executive import process_monitors as space
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.process_monitors import watch_space

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import Alert, RunStatus
+from m2pem.api.runs import Alert, RunStatus
 from m2pem.api.telemetry import LinkState, VehicleState
 from m2pem.bpmn import parse_mission
 from m2pem.engine import inputs as i

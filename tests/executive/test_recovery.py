@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.api.telemetry import VehicleState
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import (

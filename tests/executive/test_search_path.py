@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from m2pem.api.authoring import Draft
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.journal import MemoryJournal
 
 from .conftest import World, mission, question, sequence

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from m2pem.api.allocation import SharedSpaceState, SpaceHolder, WaitingTask
 from m2pem.api.clock import run_virtual
-from m2pem.api.control import SharedSpaceState, SpaceHolder, WaitingTask
 from m2pem.executive.shared_space_watch import watch_shared_space
 from m2pem.mission.catalogue import ResourceId
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.clock import VirtualClock, run_virtual
-from m2pem.api.control import (
+from m2pem.api.runs import (
     OpenIncident,
     OpenPrompt,
     PromptClosed,

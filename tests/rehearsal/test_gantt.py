@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.runs import StampedRecord
 from m2pem.diagram.style import width_of
 from m2pem.engine import records as r
 from m2pem.fleet.fleet import Domain, Fleet, Vehicle

@@ -5,7 +5,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.bpmn import parse_mission
 from m2pem.engine import records as r
 from m2pem.errors import AnswersError

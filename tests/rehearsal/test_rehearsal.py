@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.clock import run_virtual
-from m2pem.api.control import RunStatus, StampedRecord
+from m2pem.api.runs import RunStatus, StampedRecord
 from m2pem.api.telemetry import VehicleState
 from m2pem.engine.records import (
     BehaviorEnded,

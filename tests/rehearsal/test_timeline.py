@@ -2,7 +2,7 @@
 
 import pytest
 
-from m2pem.api.control import StampedRecord
+from m2pem.api.runs import StampedRecord
 from m2pem.engine import records as r
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.rehearsal.timeline import Mark, Outcome, Span, Timeline, read_timeline

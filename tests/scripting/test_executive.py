@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import m2pem
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.engine.records import RunEnded, RunStarted
 from m2pem.errors import BusyError, OperatorError
 from m2pem.fleet.default_fleet import fleet_for

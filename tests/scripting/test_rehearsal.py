@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import m2pem
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from tests.command_line import FLEET, MISSION
 from tests.console import REPOSITORY
 

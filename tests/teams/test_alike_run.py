@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.mission.catalogue import BehaviorState
 from tests.executive.conftest import mission, sequence
 

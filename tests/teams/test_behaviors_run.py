@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.api.telemetry import TeamState, VehicleState
 from m2pem.engine.records import BehaviorProgressed
 from m2pem.fleet.fleet import Domain

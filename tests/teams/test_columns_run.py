@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 
 from .carts import Yard
 from .conftest import Play, World, one_task, route

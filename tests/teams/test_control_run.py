@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.arbiter import Limits
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.engine.records import BehaviorEnded, BehaviorProgressed
 from m2pem.fleet.fleet import Domain, Fleet, LostMemberPolicy, Team, Vehicle
 from m2pem.mission.catalogue import BehaviorState, ResourceId

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.mission.catalogue import BehaviorState
 from tests.executive.conftest import behavior, mission, sequence
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import pytest
 
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.engine.records import BehaviorEnded
 from m2pem.executive.dispatcher import CALL_TIMEOUT_S
 from m2pem.mission.catalogue import BehaviorState, ResourceId

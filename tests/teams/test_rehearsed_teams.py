@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.errors import MissionError
 from m2pem.fleet.fleet import LostMemberPolicy
 from m2pem.mission.catalogue import BehaviorState, ResourceId

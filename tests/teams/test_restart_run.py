@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.control import OpenPrompt, RunStatus
+from m2pem.api.runs import OpenPrompt, RunStatus
 from m2pem.engine.records import BehaviorEnded
 from m2pem.fleet.fleet import LostMemberPolicy
 from m2pem.journal import MemoryJournal

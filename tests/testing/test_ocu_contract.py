@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from m2pem.api.control import MissionControl, OpenPrompt, PromptClosed
+from m2pem.api.control import MissionControl
+from m2pem.api.runs import OpenPrompt, PromptClosed
 from m2pem.errors import M2pemError
 from m2pem.testing.contracts import ocu_harness
 from m2pem.testing.contracts.ocu import OcuContract

@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import cache
 from pathlib import Path
 
-from m2pem.api.control import RunStatus, StampedRecord
+from m2pem.api.runs import RunStatus, StampedRecord
 from m2pem.bpmn import NO_BPMN_RULES
 from m2pem.errors import FleetError, MissionError
 from m2pem.executive.loading import findings_for, load_source

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import pytest
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.errors import OperatorError
 from m2pem.testing import scenarios
 from m2pem.testing.contracts.contract import Contract, needs

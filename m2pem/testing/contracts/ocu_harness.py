@@ -6,8 +6,9 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from contextvars import ContextVar, copy_context
 from typing import Any, Protocol
 
-from m2pem.api.control import MissionControl, OpenPrompt, RunId, RunStatus
+from m2pem.api.control import MissionControl
 from m2pem.api.ocu import Ocu
+from m2pem.api.runs import OpenPrompt, RunId, RunStatus
 from m2pem.engine.records import BehaviorProgressed, PromptAnswered
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing import scenarios

@@ -9,7 +9,7 @@ from test_mavlink_demo import FLEETS
 
 from m2pem import load_fleet
 from m2pem.api import distance_m
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.rehearsal import rehearse
 

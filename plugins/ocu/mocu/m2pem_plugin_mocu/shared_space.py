@@ -8,7 +8,7 @@ from m2pem_interfaces import msg
 from m2pem_plugin_ros import RosRuntime, qos
 
 from m2pem.api import MissionControl
-from m2pem.api.control import SharedSpaceState, WaitingTask
+from m2pem.api.allocation import SharedSpaceState, WaitingTask
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import as_geojson
 from m2pem.mission.geometry import Area, Route

@@ -17,9 +17,10 @@ from m2pem.api import (
     ScheduledMission,
     ScheduledStatus,
 )
-from m2pem.api.control import MissionControl, RunId, RunStatus
+from m2pem.api.control import MissionControl
 from m2pem.api.data_text import named_value
 from m2pem.api.operator import operator_name
+from m2pem.api.runs import RunId, RunStatus
 from m2pem.errors import BusyError, M2pemError, OperatorError
 from m2pem_plugin_terminal import incidents
 from m2pem_plugin_terminal.alerts import TITLE as TITLE_ALERTS

@@ -24,8 +24,8 @@ from m2pem.api import (
     StampedRecord,
     follow,
 )
-from m2pem.api.control import LOGGED, SCHEDULE
 from m2pem.api.run_view import Behavior, FinishedToken
+from m2pem.api.runs import LOGGED, SCHEDULE
 from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.alerts import Alerts
 from m2pem_plugin_terminal.formatting import clock_time

@@ -11,7 +11,7 @@ from m2pem_plugin_terminal.formatting import shortened
 
 if TYPE_CHECKING:
     from m2pem.api import ResourceId
-    from m2pem.api.control import TakeEffect
+    from m2pem.api.allocation import TakeEffect
     from m2pem.fleet.fleet import Fleet
 
 TITLE = "Take, or give back"

@@ -16,7 +16,7 @@ from m2pem.errors import M2pemError
 from m2pem_plugin_terminal.dialogs import Choice, Choose
 
 if TYPE_CHECKING:
-    from m2pem.api.control import StartPreview
+    from m2pem.api.allocation import StartPreview
 
 TITLE = "Start a mission"
 NO_MISSIONS = (

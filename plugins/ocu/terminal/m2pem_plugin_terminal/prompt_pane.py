@@ -7,7 +7,7 @@ from textual.app import ComposeResult
 from textual.containers import Vertical, VerticalScroll
 from textual.widgets import Static
 
-from m2pem.api.control import OpenPrompt, RunId
+from m2pem.api.runs import OpenPrompt, RunId
 
 SETTLES_IN_S = 0.7
 """Seconds in which a new prompt ignores keys: they may be meant for the prompt before it."""

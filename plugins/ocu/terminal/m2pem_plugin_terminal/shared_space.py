@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from m2pem.api.control import SharedSpaceState, WaitingTask
+from m2pem.api.allocation import SharedSpaceState, WaitingTask
 
 TITLE = "Shared space and waiting tasks"
 NOTHING = "The fleet has no shared space, and no task waits."

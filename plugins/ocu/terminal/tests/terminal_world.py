@@ -14,7 +14,8 @@ from m2pem_plugin_terminal.app import TerminalApp
 from textual.pilot import Pilot
 
 from m2pem.api.arbiter import ArbiterContext, Connection
-from m2pem.api.control import MissionControl, RunId
+from m2pem.api.control import MissionControl
+from m2pem.api.runs import RunId
 from m2pem.api.telemetry import GeoPosition, VehicleState
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet import Domain, Fleet, Payload, Vehicle

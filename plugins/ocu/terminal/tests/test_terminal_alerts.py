@@ -3,7 +3,7 @@
 from terminal_world import World
 
 from m2pem.api import Alert
-from m2pem.api.control import LOGGED, SCHEDULE
+from m2pem.api.runs import LOGGED, SCHEDULE
 
 
 async def test_alerts_of_no_run_stay_until_they_are_seen(world: World) -> None:

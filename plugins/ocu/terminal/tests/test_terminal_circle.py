@@ -3,7 +3,7 @@
 from m2pem_plugin_terminal.app import TerminalApp
 from terminal_world import SIZE, Hand, Terminal
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.testing import scenarios
 from m2pem.testing.harness import run_executive
 from tests.waiting_circle import GO, NONE_GOES_ON, holding_and_waiting

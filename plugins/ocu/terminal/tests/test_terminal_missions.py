@@ -6,7 +6,7 @@ import pytest
 from m2pem_plugin_terminal.missions import preview_text
 from terminal_world import MISSION, World
 
-from m2pem.api.control import RoleAssignment, StartPreview
+from m2pem.api.allocation import RoleAssignment, StartPreview
 from m2pem.findings import Finding, Severity
 
 BROKEN = MISSION.read_text("utf-8").replace('vehicle="scout"', 'vehicle="scuot"')

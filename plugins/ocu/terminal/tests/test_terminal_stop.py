@@ -3,7 +3,7 @@
 import pytest
 from terminal_world import World
 
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 
 
 async def status(world: World, run: str) -> RunStatus:

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel
 
 from m2pem.api import MissionControl
-from m2pem.api.control import SharedSpaceState
+from m2pem.api.allocation import SharedSpaceState
 from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import as_geojson
 from m2pem.mission.geometry import Area, Route

@@ -1,0 +1,206 @@
+"""Runs as operators see them: their status, records, prompts, incidents and alerts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import NamedTuple, TypeAlias
+
+from m2pem.api.telemetry import PayloadState, VehicleState
+from m2pem.engine.records import Record
+from m2pem.mission.behavior import Decision
+from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.library import MissionFile
+from m2pem.mission.values import Value
+
+RunId: TypeAlias = str
+"""r1, r2, ... in a journal."""
+
+
+class RunStatus(StrEnum):
+    """The status of a run. INTERRUPTED: it has not ended, and no executive drives it."""
+
+    RUNNING = "running"
+    PAUSED = "paused"
+    INTERRUPTED = "interrupted"
+    COMPLETED = "completed"
+    TERMINATED = "terminated"
+    FAILED = "failed"
+    STOPPED = "stopped"
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more will happen in it."""
+        return self in (
+            RunStatus.COMPLETED,
+            RunStatus.TERMINATED,
+            RunStatus.FAILED,
+            RunStatus.STOPPED,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """One line of `m2pem runs`. Times are microseconds since the Unix epoch.
+
+    `started_us` and `ended_us` are by the executive's clock, which `--speed` takes ahead of the
+    wall clock; `began_us` is by that one. 0: not known.
+    """
+
+    run: RunId
+    mission: str
+    process: str
+    status: RunStatus
+    started_us: int
+    ended_us: int | None = None
+    records: int = 0
+    detail: str = ""
+    began_us: int = 0
+
+    @property
+    def took_s(self) -> float | None:
+        """Seconds of the executive's clock from start to end, pauses too; None: not ended."""
+        if self.ended_us is None:
+            return None
+        return max(0, self.ended_us - self.started_us) / 1_000_000
+
+
+class StampedRecord(NamedTuple):
+    """A record with its position: `seq` counts from 1 in its run; `t_s` is mission time."""
+
+    run: RunId
+    seq: int
+    t_s: float
+    record: Record
+
+
+@dataclass(frozen=True, slots=True)
+class OpenPrompt:
+    """A question that is open. The first answer to it wins."""
+
+    run: RunId
+    prompt: str
+    element: str
+    text: str
+    decisions: tuple[Decision, ...]
+    role: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PromptClosed:
+    """A question is closed: `decision` and `by` are "" when it was withdrawn."""
+
+    run: RunId
+    prompt: str
+    decision: str = ""
+    by: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenIncident:
+    """An error that no event catches, about which an operator decides (docs/incidents.md).
+
+    `task`: the element's label. `choices`: what can be chosen, of `retry`, `retry_with`, `skip`,
+    `set_data`, `move` and `end`. `resources`: what is held for it. `roles`: those of the behavior,
+    with who had each. `targets`: where the token can move, by id, with labels. `operator_role`:
+    which operators may decide; "": all.
+    """
+
+    run: RunId
+    incident: str
+    element: str
+    task: str
+    code: str
+    reason: str
+    choices: tuple[str, ...]
+    resources: tuple[str, ...] = ()
+    roles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    targets: Mapping[str, str] = field(default_factory=dict)
+    operator_role: str = ""
+
+    def __str__(self) -> str:
+        held = f"; held for it: {', '.join(self.resources)}" if self.resources else ""
+        reason = f": {self.reason}" if self.reason else ""
+        who = f"; for {self.operator_role}" if self.operator_role else ""
+        return f"{self.incident}: {self.task}: {self.code}{reason}{held}{who}"
+
+
+class IncidentVerdict(StrEnum):
+    """What the checker says of a mission after a choice about an incident."""
+
+    COMPLETES = "completes"
+    MAY_NOT_COMPLETE = "may not complete"
+    CANNOT_COMPLETE = "cannot complete"
+    UNKNOWN = "not known"
+
+
+@dataclass(frozen=True, slots=True)
+class IncidentPreview:
+    """What follows a choice about an incident, explored from the run's present state."""
+
+    verdict: IncidentVerdict
+    reason: str = ""
+
+    def __str__(self) -> str:
+        reason = f": {self.reason}" if self.reason else ""
+        return f"the mission {_VERDICTS[self.verdict]}{reason}"
+
+
+_VERDICTS = {
+    IncidentVerdict.COMPLETES: "completes on all paths from there",
+    IncidentVerdict.MAY_NOT_COMPLETE: "may not complete from there",
+    IncidentVerdict.CANNOT_COMPLETE: "cannot complete from there",
+    IncidentVerdict.UNKNOWN: "may or may not complete from there, which is not known",
+}
+
+LOGGED = "LOGGED"
+"""The code of alerts that are also logged: what an arbiter warns of, for instance. Who shows the
+log to an operator need not show them again."""
+LEFT_ARMED = "LEFT_ARMED"
+"""The code of the alert that says which vehicles stay armed when a run has ended."""
+SCHEDULE = "SCHEDULE"
+"""The code of alerts that say what operators, or the schedule itself, have done with it."""
+STARTS_SOON = "STARTS_SOON"
+"""The code of the alert before each start of a scheduled mission."""
+NOT_STARTED = "NOT_STARTED"
+"""The code of alerts about scheduled missions that did not start: missed, refused or held."""
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """A warning which no record has: a vehicle that did not take STOP, what an autopilot warns of,
+    a journal that does not write, a plugin that blocks. `run` "": it concerns all of them."""
+
+    run: RunId
+    code: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class HandedOver:
+    """A geometry (GeoJSON) from an operator, `at_us` microseconds since the Unix epoch."""
+
+    geometry: Mapping[str, Value]
+    by: str
+    at_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class TelemetrySample:
+    """The states of vehicles and payloads of a rehearsal at one mission time."""
+
+    t_s: float
+    vehicles: Mapping[ResourceId, VehicleState]
+    payloads: Mapping[ResourceId, PayloadState] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationResult:
+    """What a rehearsal did. `telemetry`: at even intervals; long ones have longer intervals.
+
+    `files`: of the mission, its own first.
+    """
+
+    summary: RunSummary
+    records: Sequence[StampedRecord] = field(default_factory=tuple)
+    telemetry: Sequence[TelemetrySample] = field(default_factory=tuple)
+    files: Sequence[MissionFile] = field(default_factory=tuple)
