@@ -82,6 +82,7 @@ async def _resume(
             SystemClock(header.speed, start_us),
             answers=answers,
         )
+        executive.expect_interrupted([run_id])
         with output_of(output) as out:
 
             async def take_up() -> str:

@@ -115,6 +115,7 @@ async def _serve(
         mine, _ = await interrupted_runs(journal, fleet, speed)
         clock = SystemClock(speed, await _start_us(journal, mine, speed))
         executive = make_executive(fleet, journal, plugins, clock, search_path=search_path)
+        executive.expect_interrupted([line.run for line in mine])
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:
                 who = ", ".join(operators.names) or "none"
@@ -183,10 +184,6 @@ async def _start_us(journal: "Journal", lines: "list[RunInfo]", speed: float) ->
 
 
 async def _take_up(executive: "Executive", lines: "list[RunInfo]") -> None:
-    from m2pem.errors import M2pemError
-
-    for line in lines:
-        try:
-            await executive.resume(line.run)
-        except M2pemError as error:
-            click.echo(f"m2pem: {line.run} cannot be taken up: {error}", err=True)
+    refused = await executive.resume_all([line.run for line in lines])
+    for run, error in refused.items():
+        click.echo(f"m2pem: {run} cannot be taken up: {error}", err=True)

@@ -185,7 +185,9 @@ class Control:
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
-        emergency = self._supervisor.emergency
+        emergency, interrupted = self._supervisor.emergency, self._supervisor.interrupted
+        if run not in self._supervisor.runners and interrupted.stop(run, by, reason):
+            return
         async with self._explain_end("stop", run):
             asked = emergency.stop(self._supervisor.runner(run), by, reason)
             self._scheduler.run_stopping(run, by)
@@ -194,11 +196,12 @@ class Control:
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended, and hold the schedule."""
         asked = self._supervisor.emergency.stop_all(self._supervisor.runners.values(), by, reason)
+        interrupted = self._supervisor.interrupted.stop_all(by, reason)
         hold = self._scheduler.hold_at_once(by, f"STOP of all{f': {reason}' if reason else ''}")
         await self._supervisor.emergency.written("stop", asked)
         if hold is not None:
             await self._scheduler.written(hold)
-        return list(asked)
+        return list(dict.fromkeys((*asked, *interrupted)))
 
     # --- the schedule ---------------------------------------------------------------------------
 

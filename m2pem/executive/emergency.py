@@ -164,7 +164,8 @@ class StopMark:
 
 
 class StopMarks:
-    """The marks of one journal. `file`: where the journal is; None: in memory, no mark is kept.
+    """The marks of one journal. `file`: where the journal is; None: in memory, as the marks
+    are then.
 
     `identity`: of the journal, so that the marks of a removed journal do not stop the runs of the
     next one at its place.
@@ -172,6 +173,7 @@ class StopMarks:
 
     def __init__(self, file: Path | None, identity: UUID) -> None:
         self._identity = str(identity)
+        self._put: dict[str, StopMark] = {}
         self._places: dict[str, Queue[tuple[Path, bytes | None]]] = {}
         if file is not None:
             self._places[f"{file}-stopped-"] = Queue()
@@ -181,16 +183,20 @@ class StopMarks:
 
     def put(self, run: str, mark: StopMark) -> None:
         """Have a mark written; returns at once."""
+        self._put[run] = mark
         content = {"journal": self._identity, "by": mark.by, "reason": mark.reason}
         self._queue(run, json.dumps(content).encode())
 
     def remove(self, run: str) -> None:
         """Have the mark of a run removed: the journal has the stop; returns at once."""
+        self._put.pop(run, None)
         if self._started:
             self._queue(run, None)
 
     def get(self, run: str) -> StopMark | None:
         """The mark of a run that was left without an end; None: it was not stopped."""
+        if (mark := self._put.get(run)) is not None:
+            return mark
         for place in self._places:
             try:
                 content = json.loads(Path(f"{place}{run}").read_bytes())

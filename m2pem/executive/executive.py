@@ -18,6 +18,7 @@ from typing import Self
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
+from m2pem.errors import M2pemError
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control, Foresee, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
@@ -254,9 +255,23 @@ class Executive:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable."""
         return await self._supervisor.begin(loaded, process_id, data, by)
 
+    def expect_interrupted(self, runs: Sequence[RunId]) -> None:
+        """Say, before it connects, which runs are taken up first: none begins before that."""
+        self._supervisor.interrupted.expect(runs)
+
+    async def resume_all(self, runs: Sequence[RunId]) -> Mapping[RunId, M2pemError]:
+        """Take up runs that their executive left without ending them; returns why some are not."""
+        return await self._supervisor.resume(runs)
+
     async def resume(self, run: RunId) -> None:
-        """Take up a run that its executive left without ending it; errors as in `Supervisor`."""
-        await self._supervisor.resume(run)
+        """Take up one run.
+
+        Raises:
+            JournalError: there is no such run, or an executive that is alive drives it.
+            OperatorError: it has ended, or the arbiters are not connected yet.
+        """
+        for error in (await self.resume_all([run])).values():
+            raise error
 
     async def stop_all(self, reason: str) -> None:
         """Stop what still runs and wait for it."""

@@ -6,12 +6,20 @@ running is asked for at its arbiter. Nothing is sent again that may have been do
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport
 from m2pem.engine import commands as c
-from m2pem.engine.inputs import BehaviorMissing, ClaimRun, Input, PauseRun, ResourceFault
+from m2pem.engine.inputs import (
+    BehaviorMissing,
+    ClaimRun,
+    ControlTaken,
+    GeometrySet,
+    Input,
+    PauseRun,
+    ResourceFault,
+)
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
 from m2pem.executive.behavior_reports import reported, spec_of
@@ -47,6 +55,23 @@ async def replay(journal: Journal, run: MissionRun, on_records: OnRecords | None
     return last_us
 
 
+def claim(
+    runner: Runner, loss: Loss | None, taken: Mapping[ResourceId, str], given: Iterable[GeometrySet]
+) -> None:
+    """Post the first inputs of a replayed run under its new epoch.
+
+    `taken`, `given`: what operators have taken and handed over, of which it may not know.
+    """
+    runner.post(ClaimRun(runner.epoch, lost=loss.records if loss is not None else 0))
+    if loss is not None:
+        runner.post(PauseRun(paused_by(loss)))
+    for resource, operator in taken.items():
+        if resource not in runner.run.state.taken:
+            runner.post(ControlTaken(resource, operator))
+    for geometry in given:
+        runner.post(geometry)
+
+
 async def take_over(
     runner: Runner,
     arbiters: FleetArbiters,
@@ -54,8 +79,11 @@ async def take_over(
     outage_s: float,
     lost: Callable[[ResourceId, str], None],
     loss: Loss | None = None,
-) -> None:
-    """Bring a replayed and claimed run back to life. Its task must not run yet.
+) -> list[c.Command]:
+    """Give a replayed and claimed run what it commanded. Its task must not run yet.
+
+    Returns the commands that are still to be carried out: when every interrupted run has what it
+    commanded, as they may be for a vehicle that another one has.
 
     `outage_s`: for how long no executive drove it. Longer than the fleet's `max_outage`, every
     behavior is held and an operator is asked. `lost`: is called for each resource whose arbiter
@@ -64,9 +92,6 @@ async def take_over(
     `JournalLossPrompts`).
     """
     state = runner.run.state
-    runner.post(ClaimRun(runner.epoch, lost=loss.records if loss is not None else 0))
-    if loss is not None:
-        runner.post(PauseRun(paused_by(loss)))
     max_outage_s = arbiters.fleet.max_outage_s
     too_long = max_outage_s is not None and outage_s > max_outage_s
     # The run's inputs are decided after this; a paused one defers what is restarted.
@@ -115,7 +140,7 @@ async def take_over(
             case _:
                 return True
 
-    runner.take_up([command for command in runner.run.outstanding() if is_due(command)])
+    return [command for command in runner.run.outstanding() if is_due(command)]
 
 
 def _recall(runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher) -> None:

@@ -20,6 +20,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState, Telemetry
+from m2pem.engine.commands import Command
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import MissionRun
@@ -40,10 +41,11 @@ from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.emergency import EmergencyCommands, StopMarks
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover, refuse_busy_resources
+from m2pem.executive.interrupted_runs import InterruptedRuns
 from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_resources import LostResources
-from m2pem.executive.recovery import replay, take_over
+from m2pem.executive.recovery import claim, replay, take_over
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.scheduled_start import NotBegunError
@@ -130,6 +132,7 @@ class Supervisor:
         self._observers = observers
         self._separation = separation_for(self.fleet, clock)
         self.marks = StopMarks(journal.file, journal.identity)
+        self.interrupted = InterruptedRuns(self.marks)
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
         # Of two starts at once the second must see what the first one takes.
@@ -335,10 +338,12 @@ class Supervisor:
         may begin, asked when the journal has created it.
 
         Raises:
-            OperatorError: the arbiters are not connected yet.
+            OperatorError: the arbiters are not connected yet, or interrupted runs do not have their
+                vehicles yet.
             NotBegunError: a run that the schedule starts was created, and has not begun.
         """
         self._refuse_unconnected()
+        self.interrupted.refuse_start()
         header = RunHeader(
             loaded.file,
             loaded.source,
@@ -357,8 +362,8 @@ class Supervisor:
         run = MissionRun(loaded, self.fleet, number, self.settings.steps_at_once)
         runner = self._runner(run, 1)
         begun = runner.submit(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
-        for name, given in self.handed_over.items():
-            runner.post(GeometrySet(name, dict(given.geometry), given.by))
+        for geometry in self._geometries_given():
+            runner.post(geometry)
         self._drive(runner)
         try:
             await begun
@@ -448,14 +453,36 @@ class Supervisor:
         """The facts of a vehicle now, as conditions of the schedule read them."""
         return Candidates(self.fleet, self.arbiters.graph, self._bus.latest).facts(vehicle)
 
-    async def resume(self, number: RunId) -> None:
-        """Take up a run that its executive left without ending it.
+    async def resume(self, runs: Sequence[RunId]) -> dict[RunId, M2pemError]:
+        """Take up runs that their executive left without ending them.
+
+        Each is given what it commanded before any of them commands anything new.
+
+        Returns why some are not taken up: a JournalError if there is no such run, or an executive
+        that is alive drives it; an OperatorError if it has ended.
 
         Raises:
-            JournalError: there is no such run, or an executive that is alive drives it.
-            OperatorError: it has ended, or the arbiters are not connected yet.
+            OperatorError: the arbiters are not connected yet.
         """
         self._refuse_unconnected()
+        self.interrupted.expect(runs)
+        refused: dict[RunId, M2pemError] = {}
+        taken_over: list[tuple[Runner, list[Command]]] = []
+        try:
+            for run in runs:
+                try:
+                    taken_over.append(await self._take_over(run))
+                except M2pemError as error:
+                    refused[run] = error
+        finally:
+            self.interrupted.expect(())
+            for runner, commands in taken_over:
+                runner.take_up(commands)
+                self._drive(runner)
+        return refused
+
+    async def _take_over(self, number: RunId) -> tuple[Runner, list[Command]]:
+        """Give an interrupted run what it commanded; returns what it still has to command."""
         lines = {line.run: line for line in await self.journal.runs()}
         line = lines.get(number)
         if line is None:
@@ -481,17 +508,25 @@ class Supervisor:
         runner = self._runner(run, epoch)
         self.handover.take_up(run.state.taken)
         outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
+        claim(runner, line.loss, self.handover.taken, self._geometries_given())
         mark = self.marks.get(number)
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)
             runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
-        await take_over(runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss)
+        commands = await take_over(
+            runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss
+        )
         self._returns.take_up(runner)
         for name, was in still_lost(run.state).items():
             self._lost_resources.lost_before(ResourceId(name), was.behavior, was.native_ref)
         if line.loss is not None:
             await self.losses.ask(runner, line.loss)
-        self._drive(runner)
+        return runner, commands
+
+    def _geometries_given(self) -> list[GeometrySet]:
+        """Return the inputs that hand over what operators have handed over for all runs."""
+        given = self.handed_over.items()
+        return [GeometrySet(name, dict(each.geometry), each.by) for name, each in given]
 
     def _runner(self, run: MissionRun, epoch: int) -> Runner:
         context = RunContext(

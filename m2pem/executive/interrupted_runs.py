@@ -1,0 +1,45 @@
+"""The runs that an executive takes up when it begins, until it drives them.
+
+Until all of them have their vehicles again no run begins: it could get the vehicle of one of them.
+An operator's STOP counts for them as for any other run.
+"""
+
+from collections.abc import Iterable
+
+from m2pem.api.control import RunId
+from m2pem.errors import OperatorError
+from m2pem.executive.emergency import StopMark, StopMarks
+
+
+class InterruptedRuns:
+    """The runs that are to be taken up, and are not driven yet. `marks` keep a stop of one."""
+
+    def __init__(self, marks: StopMarks) -> None:
+        self._marks = marks
+        self._runs: tuple[RunId, ...] = ()
+
+    def expect(self, runs: Iterable[RunId]) -> None:
+        """Say which are to be taken up; none: all are driven, or cannot be taken up."""
+        self._runs = tuple(runs)
+
+    def refuse_start(self) -> None:
+        """Check that a run may begin.
+
+        Raises:
+            OperatorError: interrupted runs do not have their vehicles yet.
+        """
+        if self._runs:
+            raise OperatorError(
+                f"no run begins: {', '.join(self._runs)} was interrupted, and is just taken up "
+                "with its vehicles; try again in a few seconds"
+            )
+
+    def stop(self, run: RunId, by: str, reason: str) -> bool:
+        """Stop a run as soon as it is driven. Returns whether it is one of these."""
+        if run in self._runs:
+            self._marks.put(run, StopMark(by, reason))
+        return run in self._runs
+
+    def stop_all(self, by: str, reason: str) -> list[RunId]:
+        """Stop all as soon as they are driven; returns them."""
+        return [run for run in self._runs if self.stop(run, by, reason)]

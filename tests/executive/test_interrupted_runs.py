@@ -1,0 +1,163 @@
+"""Operators' requests between the connection to the vehicles and the taking up of interrupted runs;
+and what interrupted runs take of each other."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.control import RunStatus
+from m2pem.bpmn import parse_mission
+from m2pem.engine.inputs import BehaviorReported, Input, StartRun
+from m2pem.engine.run import MissionRun
+from m2pem.errors import BusyError, OperatorError
+from m2pem.fleet.fleet import dump
+from m2pem.journal import MemoryJournal
+from m2pem.journal.base import Entry, RunHeader
+from m2pem.mission.catalogue import BehaviorState
+
+from .conftest import START_US, World, behavior, fleet, mission, sequence, task
+
+DRIVE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
+BY_NEED = mission(sequence(("Drive", task("Drive", "requires='true' wait='unlimited'"))))
+VEHICLES = fleet("ugv1", "ugv2")
+OUTAGE_US = 60_000_000
+POINT = {"type": "Point", "coordinates": [-77.3, 38.1]}
+
+
+async def leave(journal: MemoryJournal, source: bytes, *inputs: Callable[[str], Input]) -> str:
+    """Leave a run behind that got `inputs`, each made with the run's number, a second apart."""
+    run = await journal.create(RunHeader("m.bpmn", source, "P", dump(VEHICLES)))
+    mission_run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), VEHICLES, run)
+    for second, make in enumerate((lambda _: StartRun("P"), *inputs)):
+        item, at_us = make(run), START_US + second * 1_000_000
+        step = mission_run.receive(item, at_us)
+        await journal.append([Entry(run, 1, step.seq, at_us, step.t_us, item, tuple(step.records))])
+    await journal.release(run)
+    return run
+
+
+def accepted(run: str) -> Input:
+    return BehaviorReported(f"{run}.b1", 1, BehaviorState.ACCEPTED)
+
+
+def running(run: str) -> Input:
+    return BehaviorReported(f"{run}.b1", 2, BehaviorState.RUNNING, native_ref="native")
+
+
+def after_a_crash(play: Any, story: Any, *left: tuple[bytes, ...]) -> Any:
+    """Play `story(world, runs)` on an executive that has connected, and has taken up nothing."""
+
+    async def leave_all() -> tuple[MemoryJournal, list[str]]:
+        journal = MemoryJournal()
+        return journal, [await leave(journal, *each) for each in left]
+
+    journal, runs = asyncio.run(leave_all())
+
+    async def all_of_it(world: World) -> Any:
+        world.executive.expect_interrupted(runs)
+        for run in runs:
+            known = BehaviorReport(f"{run}.b1", 2, BehaviorState.RUNNING)
+            if any(item is running for item in left[runs.index(run)]):
+                world.fake.known[known.id] = known
+        return await story(world, runs)
+
+    return play(all_of_it, fleet=VEHICLES, journal=journal, start_us=START_US + OUTAGE_US)
+
+
+@pytest.mark.parametrize("source", [DRIVE, BY_NEED], ids=["named", "by need"])
+def test_no_run_begins_before_interrupted_runs_have_their_vehicles_again(play, source):
+    async def story(world: World, runs):
+        control = world.executive.control
+        with pytest.raises(OperatorError, match="r1 was interrupted, and is just taken up"):
+            await control.start(source)
+        assert [line.run for line in await world.journal.runs()] == ["r1"]
+        await world.executive.resume_all(runs)
+        if source is DRIVE:
+            with pytest.raises(BusyError, match="run r1 uses ugv1"):
+                await control.start(source)
+            return
+        begun = await control.start(source)
+        await world.fake.until_called("start", f"{begun}.b1")
+        assert world.fake.requests[f"{begun}.b1"].resources == ("ugv2",)
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+def test_runs_begin_again_though_an_interrupted_run_cannot_be_taken_up(play):
+    async def story(world: World, runs):
+        refused = await world.executive.resume_all(["r7", *runs])
+        assert "there is no run r7" in str(refused["r7"])
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        await world.executive.control.wait("r1")
+        assert await world.executive.control.start(DRIVE)
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+OTHER = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv2"))))
+BOTH_DRIVE = ((DRIVE, accepted, running), (OTHER, accepted, running))
+
+
+def test_a_task_that_waits_gets_nothing_of_runs_that_are_taken_up_after_its_own(play):
+    async def story(world: World, runs):
+        await world.executive.resume_all(runs)
+        await world.clock.sleep(5.0)
+        assert world.fake.count("start") == 0
+        world.fake.report("r2.b1", BehaviorState.SUCCEEDED)
+        await world.fake.until_called("start", "r1.b1")
+        assert world.fake.requests["r1.b1"].resources == ("ugv1",)
+
+    after_a_crash(play, story, (BY_NEED,), *BOTH_DRIVE)
+
+
+def test_a_start_that_was_not_sent_is_refused_if_a_run_taken_up_later_has_its_vehicle(play):
+    async def story(world: World, runs):
+        await world.executive.resume_all(runs)
+        summary = await world.executive.control.wait("r1")
+        assert "RESOURCE_UNAVAILABLE" in summary.detail
+        assert "r2.b1" in summary.detail
+        assert world.fake.count("start") == 0
+
+    after_a_crash(play, story, (DRIVE,), *BOTH_DRIVE)
+
+
+@pytest.mark.parametrize("of_all", [True, False])
+def test_stop_counts_for_a_run_that_is_not_taken_up_yet(play, of_all):
+    async def story(world: World, runs):
+        control = world.executive.control
+        if of_all:
+            assert await control.stop_all(by="anna", reason="smoke") == runs
+        else:
+            await control.stop("r1", by="anna", reason="smoke")
+        await world.executive.resume_all(runs)
+        await world.fake.until_called("cancel", "r1.b1")
+        world.fake.report("r1.b1", BehaviorState.CANCELLED)
+        summary = await control.wait("r1")
+        assert summary.status is RunStatus.STOPPED
+        assert "smoke" in summary.detail
+        assert world.fake.count("start") == 0
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+def test_what_operators_take_before_a_run_is_taken_up_is_taken_from_it(play):
+    async def story(world: World, runs):
+        await world.executive.control.take("ugv1", by="anna")
+        await world.executive.resume_all(runs)
+        await world.fake.until_called("cancel", "r1.b1")
+        assert world.executive.runner("r1").run.state.taken == {"ugv1": "anna"}
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+def test_a_run_knows_the_geometries_that_were_handed_over_before_it_was_taken_up(play):
+    async def story(world: World, runs):
+        await world.executive.control.set_geometry("Route", POINT, by="anna")
+        await world.executive.resume_all(runs)
+        await world.clock.sleep(1.0)
+        assert dict(world.executive.runner("r1").run.state.geometries["Route"]) == POINT
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
