@@ -6,7 +6,7 @@ An operator's STOP counts for them as for any other run.
 
 from collections.abc import Iterable
 
-from m2pem.api.control import RunId
+from m2pem.api.runs import RunId
 from m2pem.errors import OperatorError
 from m2pem.executive.emergency import StopMark, StopMarks
 
