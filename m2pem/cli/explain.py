@@ -40,7 +40,7 @@ async def _explain(run_id: str, name: str, url: str | None, output: str) -> None
     from m2pem.api.run_view import RunView
     from m2pem.api.runs import StampedRecord
     from m2pem.cli.journals import find_run, journal_to_read
-    from m2pem.executive.control import summary
+    from m2pem.executive.run_summary import summary
     from m2pem.journal.mission import mission_of
 
     async with journal_to_read(url) as journal:

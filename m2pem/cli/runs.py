@@ -88,7 +88,7 @@ async def _runs(
     url: str | None, run_ids: tuple[str, ...], accept_loss: str | None
 ) -> "list[RunSummary]":
     from m2pem.cli.journals import accept, existing_journal, find_run, journal_to_read
-    from m2pem.executive.control import summary
+    from m2pem.executive.run_summary import summary
 
     async with journal_to_read(url) if accept_loss is None else existing_journal(url) as journal:
         if accept_loss is not None:

@@ -8,7 +8,7 @@ from m2pem.api.description import waiting
 from m2pem.cli.table import table
 from m2pem.engine.records import DataWritten, Record
 from m2pem.engine.run import MissionRun
-from m2pem.executive.control import summary
+from m2pem.executive.run_summary import summary
 from m2pem.journal.base import RunInfo
 from m2pem.journal.mission import fleet_of, mission_of
 from m2pem.mission.values import Value

@@ -32,12 +32,11 @@ from m2pem.api.runs import (
     OpenIncident,
     OpenPrompt,
     RunId,
-    RunStatus,
     RunSummary,
     SimulationResult,
     StampedRecord,
 )
-from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When, host_time_zone
+from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When
 from m2pem.api.telemetry import Telemetry
 from m2pem.bpmn.search_path import mission_files_in
 from m2pem.editing.editable import editable
@@ -47,41 +46,33 @@ from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import (
     BusyError,
-    ExpressionError,
     MissionError,
     OperatorError,
-    ScheduleError,
     StuckError,
 )
 from m2pem.executive.ended_runs import describe_end, in_words
 from m2pem.executive.health import ExecutiveHealth
-from m2pem.executive.incidents import choice_input, open_incidents, refuse_wrong_choice
+from m2pem.executive.incidents import Foresee, IncidentChoices, open_incidents
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
+from m2pem.executive.run_summary import summary
 from m2pem.executive.runner import Runner
-from m2pem.executive.scheduled_start import vehicles_of
+from m2pem.executive.schedule_admission import planned
+from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.executive.waiting_tasks import holder_label, waiting_tasks
 from m2pem.findings import Finding
-from m2pem.fleet.allocation import resources_of, resources_of_mission, roles_of_mission
-from m2pem.fleet.facts import fleet_facts
+from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.operator_roles import why_not_allowed
-from m2pem.journal.base import Entry, RunInfo
 from m2pem.journal.mission import mission_of
-from m2pem.mission.candidate_facts import FLEET_FACTS
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
-from m2pem.mission.expression import Expression
-from m2pem.mission.expression.partial import possible_truth
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import MAX_DEPTH, Value, is_too_deep
-from m2pem.scheduling.entry import SchedulePlan
-from m2pem.scheduling.times import condition_of, resolved
-from m2pem.suggestions import did_you_mean
 from m2pem.telemetry.bus import Bus
 
 
@@ -95,23 +86,6 @@ class Rehearse(Protocol):
         ...
 
 
-class Foresee(Protocol):
-    """Explores what follows a choice about an incident: `outlook_in_subprocess`."""
-
-    async def __call__(
-        self,
-        run: RunId,
-        mission: Mission,
-        fleet: Fleet,
-        entries: Sequence[Entry],
-        choice: i.ResolveIncident,
-        now_us: int,
-        writers: Sequence[str],
-    ) -> IncidentPreview:
-        """Return whether a run completes after a choice."""
-        ...
-
-
 class Control:
     """Implements `m2pem.api.control.MissionControl`; see there for every promise."""
 
@@ -120,16 +94,18 @@ class Control:
         supervisor: Supervisor,
         bus: Bus,
         health: ExecutiveHealth,
+        schedule: ScheduleEntries,
         scheduler: Scheduler,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
     ) -> None:
-        self._foresee = foresee
         self._supervisor = supervisor
+        self._schedule = schedule
         self._scheduler = scheduler
         self._bus = bus
         self._health = health
         self._rehearse = rehearse
+        self._choices = IncidentChoices(supervisor, foresee)
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -190,17 +166,17 @@ class Control:
             return
         async with self._explain_end("stop", run):
             asked = emergency.stop(self._supervisor.runner(run), by, reason)
-            self._scheduler.run_stopping(run, by)
+            self._schedule.run_stopping(run, by)
             await emergency.written("stop", {run: asked})
 
     async def stop_all(self, *, by: str = "", reason: str = "") -> Sequence[RunId]:
         """Stop every run that has not ended, and hold the schedule."""
         asked = self._supervisor.emergency.stop_all(self._supervisor.runners.values(), by, reason)
         interrupted = self._supervisor.interrupted.stop_all(by, reason)
-        hold = self._scheduler.hold_at_once(by, f"STOP of all{f': {reason}' if reason else ''}")
+        hold = self._schedule.hold_at_once(by, f"STOP of all{f': {reason}' if reason else ''}")
         await self._supervisor.emergency.written("stop", asked)
         if hold is not None:
-            await self._scheduler.written(hold)
+            await self._schedule.written(hold)
         return list(dict.fromkeys((*asked, *interrupted)))
 
     # --- the schedule ---------------------------------------------------------------------------
@@ -216,91 +192,23 @@ class Control:
         by: str = "",
     ) -> EntryId:
         """Have a mission started later."""
-        supervisor, given = self._supervisor, _bounded(data)
-        if not self._scheduler.served:
+        if not self._schedule.served:
             raise OperatorError(
                 "this executive starts no scheduled missions: `m2pem serve` is one that does"
             )
-        supervisor.refuse_unattended()
-        now_us, holds = supervisor.clock.now_us(), self._scheduler.holds
-        when = resolved(when, now_us, host_time_zone())
-        loaded, process_id = await asyncio.to_thread(supervisor.load, mission, process, given)
-        named = resources_of_mission(loaded, supervisor.fleet)
-        await self._refuse_unknown(when, named)
-        plan = SchedulePlan(
-            loaded.file,
-            loaded.source,
-            process_id,
-            supervisor.fleet.name,
-            now_us,
-            when,
-            loaded.library,
-            given,
-            supervisor.arbiters.nothing_is_real,
-            priority,
-            by,
+        holds, known = self._schedule.holds, self._schedule.by_id
+        plan, resources = await planned(
+            self._supervisor, known, mission, when, process, _bounded(data), priority, by
         )
-        return await self._scheduler.schedule(plan, named, holds)
-
-    async def _refuse_unknown(self, when: When, named: Sequence[ResourceId]) -> None:
-        """Check that the vehicles of a condition, and what it comes after, are there.
-
-        Raises:
-            ScheduleError: they are not.
-        """
-        vehicles = self._supervisor.fleet.vehicles
-        for name in when.vehicles:
-            if name not in vehicles:
-                hint = did_you_mean(name, vehicles) or f"it has {', '.join(vehicles)}"
-                raise ScheduleError(
-                    f"vehicles (--of): the fleet has no {name!r}; {hint}", "vehicles"
-                )
-        if when.condition and not when.vehicles and not vehicles_of(named):
-            raise ScheduleError(
-                "the mission names no vehicle: say of which the condition is to hold "
-                "(vehicles, --of)",
-                "vehicles",
-            )
-        if when.condition:
-            for name in when.vehicles or vehicles_of(named):
-                self._refuse_impossible(condition_of(when.condition), ResourceId(name))
-        if when.after and not self._scheduler.has(when.after):
-            runs = await self._supervisor.journal.runs()
-            if when.after not in {line.run for line in runs}:
-                raise ScheduleError(
-                    f"after: there is no run and no entry of the schedule {when.after!r} to come "
-                    "after; `m2pem runs` and `m2pem schedule --all` list them",
-                    "after",
-                )
-
-    def _refuse_impossible(self, condition: Expression, vehicle: ResourceId) -> None:
-        """Check that a condition can hold of a vehicle, as far as the fleet file says.
-
-        Raises:
-            ScheduleError: it cannot.
-        """
-        fleet = self._supervisor.fleet
-        facts = fleet_facts(fleet, self._supervisor.arbiters.graph, vehicle)
-        try:
-            holds = possible_truth(condition, FLEET_FACTS.__contains__, facts.get)
-        except ExpressionError as error:
-            raise ScheduleError(
-                f"condition: {error}; write for example vehicle.battery > 0.9", "condition"
-            ) from error
-        if holds is False:
-            raise ScheduleError(
-                f"condition: {condition.text!r} never holds of {vehicle}: change it, or name "
-                "other vehicles (vehicles, --of)",
-                "condition",
-            )
+        return await self._schedule.schedule(plan, resources, holds)
 
     async def scheduled(self) -> Schedule:
         """What starts when, and what it waits for."""
-        return self._scheduler.view()
+        return self._schedule.view()
 
     async def unschedule(self, entry: EntryId, *, by: str = "") -> None:
         """Cancel an entry."""
-        await self._scheduler.cancel(entry, by)
+        await self._schedule.cancel(entry, by)
 
     async def start_scheduled(self, entry: EntryId, *, by: str = "") -> RunId:
         """Start the mission of an entry now."""
@@ -310,11 +218,11 @@ class Control:
         self, entry: EntryId | None = None, *, by: str = "", reason: str = ""
     ) -> None:
         """Let an entry, or the whole schedule, start nothing until it is released."""
-        await self._scheduler.hold(entry, by, reason)
+        await self._schedule.hold(entry, by, reason)
 
     async def release_schedule(self, entry: EntryId | None = None, *, by: str = "") -> None:
         """Let an entry, or the whole schedule, start missions again."""
-        await self._scheduler.release(entry, by)
+        await self._schedule.release(entry, by)
 
     # --- what operators do in runs --------------------------------------------------------------
 
@@ -459,33 +367,8 @@ class Control:
         """Whether the mission still completes after a choice about an incident."""
         async with self._explain_end("preview_incident", run):
             self._refuse_ended(run)
-            item = self._choice(run, incident, choice, data, to, roles, "")
-        return await self._outlook(run, item)
-
-    async def _outlook(self, run: RunId, item: i.ResolveIncident) -> IncidentPreview:
-        """Explore what follows a choice, if this executive can."""
-        if self._foresee is None:
-            return IncidentPreview(IncidentVerdict.UNKNOWN, "it is not explored here")
-        supervisor = self._supervisor
-        state = supervisor.runner(run).run.state
-        entries = [entry async for entry in supervisor.journal.read(run)]
-        if sum(len(entry.records) for entry in entries) < state.seq:
-            return IncidentPreview(IncidentVerdict.UNKNOWN, "the journal does not have all of it")
-        writers = {
-            spec.name
-            for specs in supervisor.arbiters.catalogue().values()
-            for spec in specs
-            if spec.writes
-        }
-        return await self._foresee(
-            run,
-            state.mission,
-            supervisor.fleet,
-            entries,
-            item,
-            supervisor.clock.now_us(),
-            sorted(writers),
-        )
+            item = self._choices.checked(run, incident, choice, _bounded(data), to, roles or {})
+        return await self._choices.outlook(run, item)
 
     async def resolve_incident(
         self,
@@ -502,38 +385,15 @@ class Control:
         """Decide about an incident."""
         async with self._explain_end("resolve_incident", run):
             self._refuse_ended(run)
-            item = self._choice(run, incident, choice, data, to, roles, by)
+            item = self._choices.checked(run, incident, choice, _bounded(data), to, roles or {}, by)
             known = self._supervisor.runner(run).run.state.incidents[item.incident]
             self._refuse_others(item.incident, known.operator_role, by)
         ends_or_stays = item.choice in (i.IncidentChoice.END, i.IncidentChoice.SET_DATA)
-        if self._foresee is not None and not (even_if_stuck or ends_or_stays):
-            preview = await self._outlook(run, item)
+        if not (even_if_stuck or ends_or_stays):
+            preview = await self._choices.outlook(run, item)
             if preview.verdict is IncidentVerdict.CANNOT_COMPLETE:
                 raise StuckError(f"{run}: {choice} was not done: {preview}")
         await self._ask("resolve_incident", run, item)
-
-    def _choice(
-        self,
-        run: RunId,
-        incident: str,
-        choice: str,
-        data: Mapping[str, Value] | None,
-        to: str,
-        roles: Mapping[str, Sequence[str]] | None,
-        by: str,
-    ) -> i.ResolveIncident:
-        """Return an operator's choice, which was checked.
-
-        Raises:
-            OperatorError: it is wrong.
-        """
-        supervisor = self._supervisor
-        given = _bounded(data)
-        incident = incident if "." in incident else f"{run}.{incident}"
-        item = choice_input(incident, choice, given, to, roles or {}, by, supervisor.fleet)
-        runner, arbiters = supervisor.runner(run), supervisor.arbiters
-        refuse_wrong_choice(runner, item, arbiters, supervisor.availability)
-        return item
 
     def _refuse_others(self, what: str, role: str, by: str) -> None:
         """Check that an operator has the role of those who decide about something.
@@ -778,27 +638,3 @@ def _named(name: str, signals: Mapping[str, Signal]) -> list[str]:
     if name in signals:
         return [name]
     return [key for key, signal in signals.items() if name and signal.name == name]
-
-
-def summary(line: RunInfo) -> RunSummary:
-    """A journal's line as operators see it."""
-    if line.outcome is not None:
-        status = RunStatus(line.outcome.value)
-    elif not line.driven:
-        status = RunStatus.INTERRUPTED
-    else:
-        status = RunStatus.PAUSED if line.paused else RunStatus.RUNNING
-    detail = line.detail
-    if line.loss is not None:
-        detail = f"{line.loss}; {detail}" if detail else str(line.loss)
-    return RunSummary(
-        line.run,
-        line.header.mission_name,
-        line.header.process,
-        status,
-        line.started_us,
-        line.ended_us,
-        line.last_seq,
-        detail,
-        line.header.created_us,
-    )

@@ -20,12 +20,14 @@ from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
 from m2pem.errors import M2pemError
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
-from m2pem.executive.control import Control, Foresee, Rehearse
+from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
+from m2pem.executive.incidents import Foresee
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
+from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.shared_space_watch import watch_shared_space
 from m2pem.executive.supervisor import RunSettings, Supervisor
@@ -105,15 +107,22 @@ class Executive:
             self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
         )
         self.health = ExecutiveHealth(journal)
-        self.scheduler = Scheduler(
+        self._schedule = ScheduleEntries(
             self._supervisor,
             self.events.publish,
             self._supervisor.marks,
             real=not self.arbiters.nothing_is_real,
         )
-        self._supervisor.on_change = self.scheduler.changed
+        self._scheduler = Scheduler(self._supervisor, self._schedule)
+        self._supervisor.on_change = self._schedule.changed.set
         self.control = Control(
-            self._supervisor, self.bus, self.health, self.scheduler, rehearse, foresee
+            self._supervisor,
+            self.bus,
+            self.health,
+            self._schedule,
+            self._scheduler,
+            rehearse,
+            foresee,
         )
         self._scheduling: asyncio.Task[None] | None = None
         self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file), journal.file)
@@ -191,12 +200,12 @@ class Executive:
         Raises:
             JournalError: the schedule cannot be read or written.
         """
-        await self.scheduler.load()
+        await self._schedule.load()
 
     def serve_schedule(self) -> None:
         """Start what is scheduled, from now on, once interrupted runs are taken up."""
-        self.scheduler.served = True
-        self._scheduling = asyncio.create_task(self.scheduler.serve(), name="schedule")
+        self._schedule.served = True
+        self._scheduling = asyncio.create_task(self._scheduler.serve(), name="schedule")
         self._scheduling.add_done_callback(self._schedule_ended)
 
     def _schedule_ended(self, task: asyncio.Task[None]) -> None:

@@ -1,23 +1,25 @@
-"""Open incidents as operators see them, and their choices, checked against run and fleet."""
+"""Open incidents as operators see them; their choices, checked against run and fleet, and what
+follows them."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from m2pem.api.runs import OpenIncident
+from m2pem.api.runs import IncidentPreview, IncidentVerdict, OpenIncident, RunId
 from m2pem.engine.incidents import behavior_at, move_targets
 from m2pem.engine.inputs import IncidentChoice, ResolveIncident
 from m2pem.engine.resolving import replaced_roles, why_refused
 from m2pem.engine.state import Behavior, BehaviorPhase, Incident, RunState
 from m2pem.errors import OperatorError
+from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.runner import Runner
+from m2pem.executive.supervisor import Supervisor
 from m2pem.fleet.allocation import Availability, resources_of, spelled_out
 from m2pem.fleet.fleet import Fleet
+from m2pem.journal.base import Entry
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.suggestions import suggest_or
-
-if TYPE_CHECKING:
-    from m2pem.executive.fleet_connections import FleetArbiters
 
 
 def open_incidents(runners: Iterable[Runner], fleet: Fleet) -> list[OpenIncident]:
@@ -51,26 +53,88 @@ def _described(state: RunState, incident: Incident, fleet: Fleet) -> OpenInciden
     )
 
 
-def choice_input(
-    incident: str,
-    choice: str,
-    data: Mapping[str, Value],
-    to: str,
-    roles: Mapping[str, Sequence[str]],
-    by: str,
-    fleet: Fleet,
-) -> ResolveIncident:
-    """Return the input of an operator's choice.
+class Foresee(Protocol):
+    """Explores what follows a choice about an incident: `outlook_in_subprocess`."""
 
-    Raises:
-        OperatorError: there is no such choice.
+    async def __call__(
+        self,
+        run: RunId,
+        mission: Mission,
+        fleet: Fleet,
+        entries: Sequence[Entry],
+        choice: ResolveIncident,
+        now_us: int,
+        writers: Sequence[str],
+    ) -> IncidentPreview:
+        """Return whether a run completes after a choice."""
+        ...
+
+
+class IncidentChoices:
+    """Checks what operators choose about incidents, and explores what follows.
+
+    `foresee`: what explores it; None: it is not known.
     """
-    if choice not in list(IncidentChoice):
-        otherwise = f"choices are: {', '.join(IncidentChoice)}"
-        hint = suggest_or(choice, list(IncidentChoice), otherwise)
-        raise OperatorError(f"{choice!r} is no choice about an incident; {hint}")
-    replaced = {role: _members(names, fleet) for role, names in roles.items()}
-    return ResolveIncident(incident, IncidentChoice(choice), by, dict(data), to, replaced)
+
+    def __init__(self, supervisor: Supervisor, foresee: Foresee | None) -> None:
+        self._supervisor = supervisor
+        self._foresee = foresee
+
+    def checked(
+        self,
+        run: RunId,
+        incident: str,
+        choice: str,
+        data: dict[str, Value],
+        to: str,
+        roles: Mapping[str, Sequence[str]],
+        by: str = "",
+    ) -> ResolveIncident:
+        """Return the input of an operator's choice, checked by the run and by the fleet as it is
+        now, before it is journaled. `incident`: its id, with or without the run's.
+
+        Raises:
+            OperatorError: the choice is wrong; the error says what would be right.
+        """
+        if choice not in list(IncidentChoice):
+            otherwise = f"choices are: {', '.join(IncidentChoice)}"
+            hint = suggest_or(choice, list(IncidentChoice), otherwise)
+            raise OperatorError(f"{choice!r} is no choice about an incident; {hint}")
+        fleet, state = self._supervisor.fleet, self._supervisor.runner(run).run.state
+        replaced = {role: _members(names, fleet) for role, names in roles.items()}
+        incident = incident if "." in incident else f"{run}.{incident}"
+        item = ResolveIncident(incident, IncidentChoice(choice), by, data, to, replaced)
+        refusal = why_refused(state, fleet, item)
+        if not refusal and item.choice is IncidentChoice.RETRY_WITH:
+            refusal = _unfit(state, item, self._supervisor.arbiters, self._supervisor.availability)
+        if refusal:
+            raise OperatorError(f"{run}: {refusal}")
+        return item
+
+    async def outlook(self, run: RunId, item: ResolveIncident) -> IncidentPreview:
+        """Explore whether a run completes after a choice, if this executive can."""
+        if self._foresee is None:
+            return IncidentPreview(IncidentVerdict.UNKNOWN, "it is not explored here")
+        supervisor = self._supervisor
+        state = supervisor.runner(run).run.state
+        entries = [entry async for entry in supervisor.journal.read(run)]
+        if sum(len(entry.records) for entry in entries) < state.seq:
+            return IncidentPreview(IncidentVerdict.UNKNOWN, "the journal does not have all of it")
+        writers = {
+            spec.name
+            for specs in supervisor.arbiters.catalogue().values()
+            for spec in specs
+            if spec.writes
+        }
+        return await self._foresee(
+            run,
+            state.mission,
+            supervisor.fleet,
+            entries,
+            item,
+            supervisor.clock.now_us(),
+            sorted(writers),
+        )
 
 
 def _members(names: Sequence[str], fleet: Fleet) -> tuple[str, ...]:
@@ -81,24 +145,8 @@ def _members(names: Sequence[str], fleet: Fleet) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def refuse_wrong_choice(
-    runner: Runner, item: ResolveIncident, arbiters: "FleetArbiters", availability: Availability
-) -> None:
-    """Check a choice before it is journaled: by the run, and by the fleet as it is now.
-
-    Raises:
-        OperatorError: it is wrong; the error says what would be right.
-    """
-    state = runner.run.state
-    refusal = why_refused(state, arbiters.fleet, item)
-    if not refusal and item.choice is IncidentChoice.RETRY_WITH:
-        refusal = _unfit(state, item, arbiters, availability)
-    if refusal:
-        raise OperatorError(f"{runner.id}: {refusal}")
-
-
 def _unfit(
-    state: RunState, item: ResolveIncident, arbiters: "FleetArbiters", availability: Availability
+    state: RunState, item: ResolveIncident, arbiters: FleetArbiters, availability: Availability
 ) -> str:
     """Return why resources cannot fill the roles of a behavior now; "" if they can."""
     incident = state.incidents[item.incident]

@@ -10,33 +10,21 @@ The laws, in their order:
 4. `check` has the last word: a mission is checked when it is scheduled, and before each start.
 5. Operators are warned before each start, and can cancel it.
 
-When an entry is due says `m2pem.scheduling`; what its start waits for, `scheduled_start`.
+When an entry is due says `m2pem.scheduling`; what its start waits for, `scheduled_start`; what
+operators do with entries, `schedule_entries`.
 """
 
 import asyncio
 import logging
 import time
-from collections.abc import Callable
 
 import msgspec
 
 from m2pem.api.clock import SystemClock
-from m2pem.api.runs import NOT_STARTED, SCHEDULE, STARTS_SOON, Alert, RunId
-from m2pem.api.schedule import (
-    Schedule,
-    ScheduleChanged,
-    ScheduledMission,
-    time_in,
-)
-from m2pem.errors import (
-    BusyError,
-    JournalError,
-    M2pemError,
-    OperatorError,
-    StaleEntryError,
-)
-from m2pem.executive.emergency import WRITTEN_WITHIN_S, StopMark, StopMarks
-from m2pem.executive.schedule_view import scheduled_mission
+from m2pem.api.runs import NOT_STARTED, STARTS_SOON, RunId
+from m2pem.api.schedule import time_in
+from m2pem.errors import BusyError, JournalError, M2pemError, OperatorError, StaleEntryError
+from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduled_start import (
     ASK_AGAIN_S,
     LOOK_AGAIN_S,
@@ -55,13 +43,10 @@ from m2pem.scheduling.entry import (
     Concurrency,
     EntryChange,
     EntryId,
-    EntryState,
     Hold,
     ScheduleEntry,
-    SchedulePlan,
     SettledTime,
     Settlement,
-    entry_number,
 )
 from m2pem.scheduling.times import Due
 from m2pem.units import US_PER_S
@@ -72,393 +57,87 @@ LONGEST_SLEEP_S = 600.0
 
 CLOCKS_APART_S = 5.0
 
-KEPT_ENTRIES = 200
-"""Entries that have ended and are kept; of more, the oldest are removed."""
-
-MARK = "schedule"
-"""The name of the mark that keeps a STOP of all until the journal has the hold."""
-
 
 class Scheduler:
-    """The schedule of one executive's fleet. `real`: whether something in the fleet is real.
+    """Starts the missions of a schedule when they are due, or when an operator says so."""
 
-    `publish`: takes alerts for operators and says that the schedule has changed. `marks`: keep a
-    STOP of all until the journal has the hold.
-    """
-
-    def __init__(
-        self,
-        starter: Starter,
-        publish: Callable[[Alert | ScheduleChanged], None],
-        marks: StopMarks,
-        *,
-        real: bool,
-    ) -> None:
+    def __init__(self, starter: Starter, entries: ScheduleEntries) -> None:
         self._starter = starter
-        self._publish = publish
-        self._marks = marks
-        self._real = real
-        self._entries: dict[EntryId, ScheduleEntry] = {}
-        self._looks: dict[EntryId, Look] = {}
-        self._hold: Hold | None = None
-        self._unwritten: Hold | None = None
-        """The hold of the whole schedule that the journal does not have yet."""
-        self._stopped: set[EntryId] = set()
-        """Entries that an operator cancels or holds, before the journal has it."""
-        self._to_hold: dict[EntryId, Hold] = {}
-        """Entries whose run is stopped, before the journal has their hold."""
-        self._runs: dict[RunId, EntryId] = {}
-        self._conditions = StartConditions(starter, self._entries)
-        self._lock = asyncio.Lock()
-        self._wake = asyncio.Event()
+        self._entries = entries
+        self._conditions = StartConditions(starter, entries.by_id)
         self._clocks_apart = False
-        self.holds = 0
-        """How often all was stopped or held."""
-        self.served = False
-
-    # --- life -----------------------------------------------------------------------------------
-
-    async def load(self) -> None:
-        """Read the schedule, and take back starts whose runs never began: they come again.
-
-        It comes before runs are taken up.
-
-        Raises:
-            JournalError: the journal cannot be read or written.
-        """
-        journal, fleet = self._starter.journal, self._starter.fleet
-        mark = self._marks.get(MARK)
-        self._hold = await journal.schedule_hold(fleet.name)
-        if mark is not None and self._hold is None:
-            self._hold = Hold(mark.by, mark.reason, self._starter.clock.now_us())
-            await journal.hold_schedule(fleet.name, self._hold)
-        self._marks.remove(MARK)
-        lines = {line.run: line for line in await journal.runs()}
-        for entry in await journal.entries():
-            if self._belongs_here(entry.plan):
-                started = [each.run for each in entry.state.times[-1:] if each.run]
-                line = lines.get(started[0]) if started else None
-                never_began = line and not (line.gone or line.last_seq or line.driven)
-                self._add(await self._take_back(entry) if never_began else entry)
-
-    async def _take_back(self, entry: ScheduleEntry) -> ScheduleEntry:
-        run = entry.state.times[-1].run
-        change = EntryChange(entry.id, times.withdrawn(entry.state))
-        await self._starter.journal.change_entry(change, deletes=run)
-        log.warning(
-            "%s: %s was created for it and never began: its time counts again", entry.id, run
-        )
-        return msgspec.structs.replace(entry, state=change.state)
-
-    def _belongs_here(self, plan: SchedulePlan) -> bool:
-        # What was scheduled in a simulation must never start a real vehicle.
-        return plan.fleet == self._starter.fleet.name and plan.simulated is not self._real
-
-    def _add(self, entry: ScheduleEntry) -> None:
-        self._entries[entry.id] = entry
-        self._looks.setdefault(entry.id, Look())
-        if entry.state.run:
-            self._runs[entry.state.run] = entry.id
 
     async def serve(self) -> None:
-        """Start what is due, for ever. `load` comes before."""
-        if self._hold is not None and self._active():
-            self._say_held()
+        """Start what is due, for ever. The entries are loaded before."""
+        if self._entries.hold_of_all is not None and self._entries.active():
+            self._entries.say_held()
         try:
             while True:
-                self._wake.clear()
-                async with self._lock:
+                self._entries.changed.clear()
+                async with self._entries.lock:
                     next_us = await self._look()
                 await self._sleep_until(next_us)
         finally:
-            self.served = False
-
-    def changed(self) -> None:
-        """Look again: a run has ended, or vehicles are free."""
-        self._wake.set()
+            self._entries.served = False
 
     async def _sleep_until(self, next_us: int | None) -> None:
         if next_us is None:
-            await self._wake.wait()
+            await self._entries.changed.wait()
             return
         clock = self._starter.clock
         latest_us = clock.now_us() + round(LONGEST_SLEEP_S * US_PER_S)
         sleeping = asyncio.ensure_future(clock.sleep_until(min(next_us, latest_us)))
-        waking = asyncio.ensure_future(self._wake.wait())
+        waking = asyncio.ensure_future(self._entries.changed.wait())
         try:
             await asyncio.wait((sleeping, waking), return_when=asyncio.FIRST_COMPLETED)
         finally:
             sleeping.cancel()
             waking.cancel()
 
-    # --- what operators do ----------------------------------------------------------------------
-
-    async def schedule(
-        self, plan: SchedulePlan, resources: tuple[ResourceId, ...], holds: int = 0
-    ) -> EntryId:
-        """Add an entry, of a mission that was checked and names `resources`.
-
-        `holds`: the property `holds` as it was when the operator asked.
-
-        Raises:
-            OperatorError: all was stopped or held since: what was asked for before does not count.
-        """
-        async with self._lock:
-            if holds != self.holds:
-                raise OperatorError("all was stopped or held meanwhile; schedule it again")
-            state = EntryState(plan.scheduled_us - 1 if not plan.when.cron else plan.scheduled_us)
-            entry = await self._starter.journal.schedule(plan, state)
-            self._add(entry)
-            self._looks[entry.id].resources = resources
-            await self._forget_old()
-        self._say(f"{entry.id} is scheduled by {plan.by or 'an operator'}: {self._named(entry)}")
-        self._wake.set()
-        return entry.id
-
-    async def _forget_old(self) -> None:
-        over = [entry.id for entry in self._entries.values() if not entry.state.active]
-        if old := over[:-KEPT_ENTRIES]:
-            await self._starter.journal.remove_entries(old)
-            for each in old:
-                del self._entries[each], self._looks[each]
-
-    async def cancel(self, number: EntryId, by: str) -> None:
-        """Cancel an entry.
-
-        Raises:
-            OperatorError: there is none, or it is over.
-        """
-        entry, who = self._active_entry(number), by or "an operator"
-        self._stopped.add(number)
-        try:
-            async with self._lock:
-                found = self._active_entry(number)
-                await self._write(found, found.state.cancelled(by))
-        finally:
-            self._stopped.discard(number)
-        self._say(f"{number} is cancelled by {who}: {entry.plan.mission_name} is not started")
-
-    def hold_at_once(self, by: str, reason: str) -> Hold | None:
-        """Hold the whole schedule, if it has anything; the journal follows with `written`."""
-        self.holds += 1
-        if not self._active():
-            return None
-        self._hold = self._unwritten = Hold(by, reason, self._starter.clock.now_us())
-        self._marks.put(MARK, StopMark(by, reason))
-        self._say_held()
-        return self._hold
-
-    def _say_held(self) -> None:
-        self._say(f"the schedule is {self._hold}; nothing starts until it is released", NOT_STARTED)
-
-    async def written(self, hold: Hold) -> None:
-        """Write a hold of the whole schedule to the journal.
-
-        Raises:
-            OperatorError: it has not written it within `WRITTEN_WITHIN_S`; the hold stands.
-        """
-        writing = self._starter.journal.hold_schedule(self._starter.fleet.name, hold)
-        try:
-            await asyncio.wait_for(asyncio.shield(asyncio.ensure_future(writing)), WRITTEN_WITHIN_S)
-        except (TimeoutError, JournalError) as error:
-            raise OperatorError(
-                "the schedule is held, but the journal does not write: it has not been recorded"
-                f"{f' ({error})' if str(error) else ''}"
-            ) from error
-        self._marks.remove(MARK)
-        if self._unwritten is hold:
-            self._unwritten = None
-
-    async def hold(self, number: EntryId | None, by: str, reason: str) -> None:
-        """Hold an entry, or the whole schedule.
-
-        Raises:
-            OperatorError: there is no such entry, it is over; or the journal does not write.
-        """
-        if number is None:
-            hold = self.hold_at_once(by, reason)
-            if hold is None:
-                raise OperatorError("nothing is scheduled")
-            await self.written(hold)
-            return
-        self._active_entry(number)
-        self._stopped.add(number)
-        hold = Hold(by, reason, self._starter.clock.now_us())
-        try:
-            async with self._lock:
-                await self._change(self._active_entry(number), hold=hold)
-        finally:
-            self._stopped.discard(number)
-        self._say(f"{number} is {hold}; it starts nothing until it is released")
-
-    async def release(self, number: EntryId | None, by: str) -> None:
-        """Let an entry, or the whole schedule, start missions again.
-
-        Raises:
-            OperatorError: it is not held.
-        """
-        who = by or "an operator"
-        if number is None:
-            async with self._lock:
-                if self._hold is None:
-                    await self._read_hold()
-                held = self._hold
-                if held is None:
-                    raise OperatorError("the schedule is not held")
-                await self._starter.journal.hold_schedule(self._starter.fleet.name, None)
-                if self._hold is not held:  # by a STOP that came meanwhile, written after this
-                    raise OperatorError(f"not released: the schedule is {self._hold}")
-                self._marks.remove(MARK)
-                self._hold = self._unwritten = None
-            self._say(f"the schedule is released by {who}")
-        else:
-            async with self._lock:
-                entry = self._active_entry(number)
-                if entry.state.hold is None:
-                    raise OperatorError(f"{number} is not held")
-                await self._change(entry, hold=None)
-            self._say(f"{number} is released by {who}")
-        for look in self._looks.values():
-            look.warned_due_us = look.starts_us = None
-        self._wake.set()
-
-    async def start(self, number: EntryId, by: str) -> RunId:
-        """Start the mission of an entry now; the start stands for the time that has come, or for
-        the only one that is to come. Times of cron that are to come stay.
-
-        Raises:
-            MissionError: `check` refuses it; the entry is as before.
-            BusyError: its vehicles are not free.
-            OperatorError: there is no such entry, it is over or held, its last run goes on, or a
-                run that was interrupted may command its vehicles.
-        """
-        async with self._lock:
-            await self._read_hold()
-            entry = self._active_entry(number)
-            if held := self._why_held(entry):
-                raise OperatorError(f"{number} is not started: {held}; release it first")
-            now_us = self._starter.clock.now_us()
-            entry, found = await self._settle_passed(entry, now_us)
-            if not entry.state.active:
-                raise OperatorError(f"{number} is {entry.state.status.value}")
-            forbids = entry.plan.when.concurrency is Concurrency.FORBID
-            if forbids and entry.state.run and self._conditions.outcome(entry.state.run) == "":
-                raise OperatorError(f"{number} is not started: its run {entry.state.run} goes on")
-            loaded, process = await asyncio.to_thread(self._starter.admitted, entry.plan)
-            resources = resources_of_mission(loaded, self._starter.fleet)
-            if why := await self._conditions.interrupted(resources):
-                raise OperatorError(f"{number} is not started: {why}")
-            extra = bool(entry.plan.when.cron) and found.due_us is None
-            due_us = now_us if extra else found.due_us or found.next_us or now_us
-            settled = SettledTime(due_us, now_us, Settlement.STARTED, owed=found.owed)
-            who = f"{entry.id}, started by {by or 'an operator'}"
-            try:
-                run = await self._begin(entry, loaded, process, who, settled)
-            except NotBegunError as error:
-                await self._not_begun(entry, self._started(entry, settled, error.run), str(error))
-                raise OperatorError(f"{number} is not started: {error}") from error
-        self._wake.set()
-        return run
-
-    def run_stopping(self, run: RunId, by: str) -> None:
-        """An operator stops a run: the entry that would start its mission again is held."""
-        number = self._runs.get(run)
-        if number is not None and self._entries[number].state.active:
-            now_us = self._starter.clock.now_us()
-            self._to_hold[number] = Hold(by, f"its run {run} was stopped", now_us)
-            self._wake.set()
-
-    def has(self, number: EntryId) -> bool:
-        """Whether there is such an entry."""
-        return number in self._entries
-
-    def _active(self) -> list[ScheduleEntry]:
-        return [entry for entry in self._entries.values() if entry.state.active]
-
-    def _active_entry(self, number: EntryId) -> ScheduleEntry:
-        entry = self._entries.get(number)
-        if entry is None:
-            known = ", ".join(each.id for each in self._active()) or "none"
-            raise OperatorError(f"there is no entry {number!r} in the schedule; it has {known}")
-        if not entry.state.active:
-            detail = entry.state.detail or f"it has started {entry.state.run}"
-            raise OperatorError(f"{number} is {entry.state.status.value}: {detail}")
-        return entry
-
-    async def _change(self, entry: ScheduleEntry, **fields: object) -> ScheduleEntry:
-        return await self._write(entry, entry.state.changed(**fields))
-
-    async def _write(self, entry: ScheduleEntry, state: EntryState) -> ScheduleEntry:
-        await self._starter.journal.change_entry(EntryChange(entry.id, state))
-        changed = msgspec.structs.replace(entry, state=state)
-        self._entries[entry.id] = changed
-        self._publish(ScheduleChanged())
-        return changed
-
-    def _say(self, text: str, code: str = SCHEDULE) -> None:
-        log.info("%s", text)
-        self._publish(Alert("", code, text))
-        self._publish(ScheduleChanged())
-
     # --- what is due ----------------------------------------------------------------------------
 
     async def _look(self) -> int | None:
         """Start what can start now; returns when to look again."""
         try:
-            await self._read_hold()
-            await self._conditions.ask_journal(self._active())
+            await self._entries.read_hold()
+            await self._conditions.ask_journal(self._entries.active())
             await self._judge_runs()
         except JournalError as error:
             log.warning("the schedule cannot be read or written: %s", error)
             return self._in(ASK_AGAIN_S)
         self._compare_clocks()
-        order = sorted(self._active(), key=self._rank)
         kept: dict[ResourceId, EntryId] = {}
         wakes: list[int] = []
-        for entry in order:
+        for entry in self._entries.in_order():
             try:
                 again_us = await self._look_at(entry, kept)
             except StaleEntryError:
-                await self._reload(entry.id)
+                await self._entries.reload(entry.id)
                 again_us = self._starter.clock.now_us()
             except JournalError as error:
-                look = self._looks[entry.id]
+                look = self._entries.looks[entry.id]
                 if look.reason != str(error):
                     look.reason = str(error)
-                    self._say(
+                    self._entries.say(
                         f"{entry.id} cannot start {entry.plan.mission_name}: {error}", NOT_STARTED
                     )
                 again_us = self._in(ASK_AGAIN_S)
             if again_us is not None:
                 wakes.append(again_us)
-        if self._starter.journal.file is not None and (self._active() or self._hold):
+        if self._starter.journal.file is not None and (
+            self._entries.active() or self._entries.hold_of_all
+        ):
             wakes.append(self._in(ASK_AGAIN_S))  # another executive may hold the schedule
         return min(wakes, default=None)
-
-    async def _read_hold(self) -> None:
-        """Take over what another executive on the journal has held or released.
-
-        Raises:
-            JournalError: the journal cannot be read.
-        """
-        before = self._hold
-        found = await self._starter.journal.schedule_hold(self._starter.fleet.name)
-        if self._hold is not before or self._unwritten is not None or found == before:
-            return
-        self._hold = found
-        if found is None:
-            self._say("the schedule is released by another executive's operator")
-        else:
-            self._say_held()
 
     def _compare_clocks(self) -> None:
         """Say once when the computer's clock was set: dates do not mean what people read."""
         clock = self._starter.clock
-        if not isinstance(clock, SystemClock) or clock.speed != 1.0 or not self._active():
+        if not isinstance(clock, SystemClock) or clock.speed != 1.0 or not self._entries.active():
             return
         apart_s = abs(time.time() - clock.now_us() / US_PER_S)
         if apart_s > CLOCKS_APART_S and not self._clocks_apart:
-            self._say(
+            self._entries.say(
                 f"the computer's clock was set: it is {apart_s:.0f} s from that of the executive, "
                 "by which the schedule goes; start the executive again",
                 NOT_STARTED,
@@ -470,8 +149,8 @@ class Scheduler:
 
         Of an entry that starts nothing any more there is nothing to hold.
         """
-        for entry in self._active():
-            hold = self._to_hold.get(entry.id)
+        for entry in self._entries.active():
+            hold = self._entries.to_hold.get(entry.id)
             run, judged = entry.state.run, entry.state.judged_run
             if hold is None and run and run != judged:
                 judged, outcome = run, self._conditions.outcome(run)
@@ -487,25 +166,13 @@ class Scheduler:
             if entry.state.hold is None and hold is not None:
                 fields["hold"] = hold
             try:
-                await self._change(entry, **fields)
+                await self._entries.change(entry, **fields)
             except StaleEntryError:
-                await self._reload(entry.id)
+                await self._entries.reload(entry.id)
                 continue
             if "hold" in fields:
-                self._say(f"{entry.id} is {hold}; it starts nothing until it is released")
-            self._to_hold.pop(entry.id, None)
-
-    def _rank(self, entry: ScheduleEntry) -> tuple[int, int, int]:
-        found = times.due(entry.plan, entry.state, self._starter.clock.now_us())
-        due_us = found.due_us or found.next_us or 0
-        return -entry.plan.priority, due_us, entry_number(entry.id) or 0
-
-    async def _reload(self, number: EntryId) -> None:
-        for entry in await self._starter.journal.entries():
-            if entry.id == number:
-                self._add(entry)
-                return
-        self._entries.pop(number, None)
+                self._entries.say(f"{entry.id} is {hold}; it starts nothing until it is released")
+            self._entries.to_hold.pop(entry.id, None)
 
     def _in(self, seconds: float) -> int:
         return self._starter.clock.now_us() + round(seconds * US_PER_S)
@@ -520,23 +187,23 @@ class Scheduler:
         `kept`: what entries before it wait for.
         """
         now_us = self._starter.clock.now_us()
-        look = self._looks[entry.id]
+        look = self._entries.looks[entry.id]
         entry, found = await self._settle_passed(entry, now_us)
         if not entry.state.active:
             return None
         if found.due_us is None:
             return self._before(entry, look, found, now_us)
-        if look.resources is None and not self._why_held(entry):
+        if look.resources is None and not self._entries.why_held(entry):
             loaded = await self._admitted(entry, found.due_us)
             if loaded is None:
                 return None
             look.resources = resources_of_mission(loaded[0], self._starter.fleet)
-        held = self._why_held(entry)
+        held = self._entries.why_held(entry)
         wait = Wait(held) if held else self._conditions.wait(entry, look, now_us, kept)
         if wait is None:
             wait = await self._ready(entry, look, found, now_us)
         if wait is None:
-            entry = self._entries[entry.id]
+            entry = self._entries.by_id[entry.id]
             return now_us if entry.state.active else None
         if wait.never:
             await self._missed(entry, found.due_us, 1, owed=found.owed, ends=wait.reason)
@@ -572,7 +239,7 @@ class Scheduler:
         warn_us = found.next_us - self._warning_us
         if now_us < warn_us:
             return warn_us
-        if look.warned_due_us != found.next_us and not self._why_held(entry):
+        if look.warned_due_us != found.next_us and not self._entries.why_held(entry):
             look.warned_due_us, look.warned_us = found.next_us, now_us
             look.starts_us = found.next_us
             self._warn(entry, found.next_us)
@@ -581,7 +248,7 @@ class Scheduler:
     def _warn(self, entry: ScheduleEntry, starts_us: int) -> None:
         left_s = (starts_us - self._starter.clock.now_us()) / US_PER_S
         who = f"{entry.id}, scheduled by {entry.plan.by or 'an operator'}"
-        self._say(
+        self._entries.say(
             f"{entry.plan.mission_name} starts in {left_s:.0f} s ({who}); "
             f"`m2pem schedule cancel {entry.id}` or hold keeps it from that",
             STARTS_SOON,
@@ -593,40 +260,35 @@ class Scheduler:
             return
         if look.starts_us is not None and not wait.reason.startswith(STARTING):
             look.starts_us = look.warned_due_us = None
-            self._say(
+            self._entries.say(
                 f"{entry.id} does not start {entry.plan.mission_name} yet: {wait.reason}",
                 NOT_STARTED,
             )
-        look.reason = wait.reason
-        self._publish(ScheduleChanged())
+        self._entries.note(entry.id, wait.reason)
 
     async def _missed(
         self, entry: ScheduleEntry, due_us: int, number: int, *, owed: bool, ends: str = ""
     ) -> ScheduleEntry:
         """Settle times that were missed, and tell operators. `owed`: it had been missed before, and
         the start that stands for it does not come any more."""
-        look, plan = self._looks[entry.id], entry.plan
-        why = ends or self._why_held(entry) or look.reason or "it was not served at that time"
+        look, plan = self._entries.looks[entry.id], entry.plan
+        why = (
+            ends or self._entries.why_held(entry) or look.reason or "it was not served at that time"
+        )
         now_us = self._starter.clock.now_us()
         settled = SettledTime(due_us, now_us, Settlement.MISSED, text=why, times=number, owed=owed)
-        changed = await self._write(entry, times.settle(plan, entry.state, settled, ends=ends))
+        changed = await self._entries.write(
+            entry, times.settle(plan, entry.state, settled, ends=ends)
+        )
         look.warned_due_us = look.starts_us = None
         at = time_in(due_us, plan.when.time_zone)
         least = "at least " if number >= times.COUNTED_TIMES - 1 else ""
         many = f"{least}{number} starts, the last at" if number > 1 else "the start at"
         then = "; it starts once as soon as it can" if changed.state.owed_us else ""
-        self._say(f"{entry.id} missed {many} {at} of {plan.mission_name}: {why}{then}", NOT_STARTED)
+        self._entries.say(
+            f"{entry.id} missed {many} {at} of {plan.mission_name}: {why}{then}", NOT_STARTED
+        )
         return changed
-
-    # --- what a start waits for -----------------------------------------------------------------
-
-    def _why_held(self, entry: ScheduleEntry) -> str:
-        if self._hold is not None:
-            return f"the schedule is {self._hold}"
-        hold = entry.state.hold or self._to_hold.get(entry.id)
-        if hold is not None:
-            return str(hold)
-        return "held" if entry.id in self._stopped else ""
 
     # --- starting -------------------------------------------------------------------------------
 
@@ -671,6 +333,44 @@ class Scheduler:
             return Wait(str(error), self._in(LOOK_AGAIN_S), for_resources=True)
         return None
 
+    async def start(self, number: EntryId, by: str) -> RunId:
+        """Start the mission of an entry now; the start stands for the time that has come, or for
+        the only one that is to come. Times of cron that are to come stay.
+
+        Raises:
+            MissionError: `check` refuses it; the entry is as before.
+            BusyError: its vehicles are not free.
+            OperatorError: there is no such entry, it is over or held, its last run goes on, or a
+                run that was interrupted may command its vehicles.
+        """
+        async with self._entries.lock:
+            await self._entries.read_hold()
+            entry = self._entries.active_entry(number)
+            if held := self._entries.why_held(entry):
+                raise OperatorError(f"{number} is not started: {held}; release it first")
+            now_us = self._starter.clock.now_us()
+            entry, found = await self._settle_passed(entry, now_us)
+            if not entry.state.active:
+                raise OperatorError(f"{number} is {entry.state.status.value}")
+            forbids = entry.plan.when.concurrency is Concurrency.FORBID
+            if forbids and entry.state.run and self._conditions.outcome(entry.state.run) == "":
+                raise OperatorError(f"{number} is not started: its run {entry.state.run} goes on")
+            loaded, process = await asyncio.to_thread(self._starter.admitted, entry.plan)
+            resources = resources_of_mission(loaded, self._starter.fleet)
+            if why := await self._conditions.interrupted(resources):
+                raise OperatorError(f"{number} is not started: {why}")
+            extra = bool(entry.plan.when.cron) and found.due_us is None
+            due_us = now_us if extra else found.due_us or found.next_us or now_us
+            settled = SettledTime(due_us, now_us, Settlement.STARTED, owed=found.owed)
+            who = f"{entry.id}, started by {by or 'an operator'}"
+            try:
+                run = await self._begin(entry, loaded, process, who, settled)
+            except NotBegunError as error:
+                await self._not_begun(entry, self._started(entry, settled, error.run), str(error))
+                raise OperatorError(f"{number} is not started: {error}") from error
+        self._entries.changed.set()
+        return run
+
     async def _begin(
         self, entry: ScheduleEntry, loaded: Mission, process: str, by: str, settled: SettledTime
     ) -> RunId:
@@ -680,15 +380,15 @@ class Scheduler:
             NotBegunError: it was created, and nothing of it has begun.
             M2pemError: nothing was written.
         """
-        plan, look = entry.plan, self._looks[entry.id]
+        plan, look = entry.plan, self._entries.looks[entry.id]
         change = EntryChange(entry.id, times.settle(plan, entry.state, settled))
         run = await self._starter.begin_scheduled(
-            loaded, process, plan, by, change, lambda: not self._why_held(entry)
+            loaded, process, plan, by, change, lambda: not self._entries.why_held(entry)
         )
-        self._add(msgspec.structs.replace(entry, state=change.with_run(run).state))
+        self._entries.add(msgspec.structs.replace(entry, state=change.with_run(run).state))
         look.reason, look.starts_us, look.warned_due_us = "", None, None
         look.true_since_us = None
-        self._say(f"{entry.id} has started {plan.mission_name} as {run}")
+        self._entries.say(f"{entry.id} has started {plan.mission_name} as {run}")
         return run
 
     @staticmethod
@@ -699,15 +399,15 @@ class Scheduler:
     async def _not_begun(self, entry: ScheduleEntry, change: EntryChange, why: str) -> Wait | None:
         """Take a start back of which nothing has begun: its time counts again."""
         created = msgspec.structs.replace(entry, state=change.state)
-        self._entries[entry.id] = created
+        self._entries.by_id[entry.id] = created
         try:
-            self._entries[entry.id] = await self._take_back(created)
+            self._entries.by_id[entry.id] = await self._entries.take_back(created)
         except JournalError as error:
-            self._add(created)
+            self._entries.add(created)
             text = (
                 f"{entry.id}: {created.state.run} was created and could not begin: {why}; {error}"
             )
-            self._say(f"{text}. When the executive is started again, its time counts again")
+            self._entries.say(f"{text}. When the executive is started again, its time counts again")
             return None
         return Wait(why, self._in(ASK_AGAIN_S))
 
@@ -722,27 +422,5 @@ class Scheduler:
     async def _refused(self, entry: ScheduleEntry, due_us: int, why: str) -> None:
         now_us = self._starter.clock.now_us()
         settled = SettledTime(due_us, now_us, Settlement.REFUSED, text=why)
-        await self._write(entry, times.settle(entry.plan, entry.state, settled))
-        self._say(f"{entry.id} failed, and starts nothing any more: {why}", NOT_STARTED)
-
-    # --- showing --------------------------------------------------------------------------------
-
-    def view(self) -> Schedule:
-        """Return the schedule as operators see it."""
-        active = sorted(self._active(), key=self._rank)
-        over = [entry for entry in self._entries.values() if not entry.state.active]
-        return Schedule(
-            tuple(self._seen(entry) for entry in (*active, *over)),
-            str(self._hold) if self._hold is not None else "",
-            self.served,
-            self._starter.fleet.start_warning_s,
-        )
-
-    def _seen(self, entry: ScheduleEntry) -> ScheduledMission:
-        held = self._why_held(entry) if entry.state.active else ""
-        now_us = self._starter.clock.now_us()
-        return scheduled_mission(entry, self._looks[entry.id], held, now_us)
-
-    @staticmethod
-    def _named(entry: ScheduleEntry) -> str:
-        return f"{entry.plan.mission_name} {times.described(entry.plan.when)}"
+        await self._entries.write(entry, times.settle(entry.plan, entry.state, settled))
+        self._entries.say(f"{entry.id} failed, and starts nothing any more: {why}", NOT_STARTED)

@@ -412,7 +412,7 @@ class Supervisor:
         started: EntryChange,
         still: Callable[[], bool],
     ) -> RunId:
-        """Begin the run of an entry of the schedule; see `scheduler.Starter`."""
+        """Begin the run of an entry of the schedule; see `scheduled_start.Starter`."""
         async with self._starting:
             self.refuse_busy(loaded)
             return await self.begin(loaded, process, plan.data, by, started=started, still=still)

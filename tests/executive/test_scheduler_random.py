@@ -19,6 +19,7 @@ from m2pem.engine.inputs import Tick
 from m2pem.engine.records import RunEnded, RunOutcome, RunStarted
 from m2pem.errors import ScheduleError
 from m2pem.executive.emergency import StopMarks
+from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.scheduler import Scheduler
 from m2pem.fleet.fleet import Fleet
@@ -170,14 +171,14 @@ class Played:
         for line in await self.journal.runs():  # a killed executive holds no run any more
             await self.journal.release(line.run)
         marks = StopMarks(None, self.journal.identity)
-        scheduler = Scheduler(starts, self.publish, marks, real=False)
-        await scheduler.load()
+        entries = ScheduleEntries(starts, self.publish, marks, real=False)
+        await entries.load()
         await self.take_up()
-        scheduler.served = True
+        entries.served = True
         if not await self.journal.entries():
-            await self.schedule(scheduler, whens)
-        await self.operate(scheduler, operator)
-        serving = asyncio.create_task(scheduler.serve())
+            await self.schedule(entries, whens)
+        await self.operate(entries, operator)
+        serving = asyncio.create_task(Scheduler(starts, entries).serve())
         await asyncio.wait([serving], timeout=seconds)
         if serving.done():
             assert isinstance(serving.exception(), KilledError)
@@ -198,28 +199,28 @@ class Played:
                 await self.journal.append([entry])
                 await self.journal.release(line.run)
 
-    async def schedule(self, scheduler: Scheduler, whens: list[When]) -> None:
+    async def schedule(self, entries: ScheduleEntries, whens: list[When]) -> None:
         for when in whens:
             now_us = self.clock.now_us()
             with suppress(ScheduleError):  # its time has passed
                 wanted = resolved(when, now_us, "UTC")
                 plan = SchedulePlan("m.bpmn", ASK, "P", "test", now_us, wanted)
-                await scheduler.schedule(plan, ())
+                await entries.schedule(plan, ())
 
-    async def operate(self, scheduler: Scheduler, operator: str) -> None:
+    async def operate(self, entries: ScheduleEntries, operator: str) -> None:
         for entry in await self.journal.entries():
             held = entry.state.hold is not None
             if operator == "hold" and entry.state.active and not held:
-                await scheduler.hold(entry.id, "ada", "")
+                await entries.hold(entry.id, "ada", "")
             elif operator == "release" and entry.state.active and held:
-                await scheduler.release(entry.id, "ada")
+                await entries.release(entry.id, "ada")
 
     async def check(self) -> None:
         """A last executive reads the journal; each start that it knows is a run that has begun."""
         for line in await self.journal.runs():
             await self.journal.release(line.run)
         starts, marks = Starts(self.clock, self.journal), StopMarks(None, self.journal.identity)
-        await Scheduler(starts, self.publish, marks, real=False).load()
+        await ScheduleEntries(starts, self.publish, marks, real=False).load()
         begun = {line.run for line in await self.journal.runs() if line.last_seq}
         known: set[str] = set()
         for entry in await self.journal.entries():

@@ -1,0 +1,376 @@
+"""The entries of a schedule, and what operators do with them: add, cancel, hold and release.
+
+Each change is written to the journal before it counts. A hold is the exception: it acts at once.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import msgspec
+
+from m2pem.api.runs import NOT_STARTED, SCHEDULE, Alert, RunId
+from m2pem.api.schedule import Schedule, ScheduleChanged, ScheduledMission
+from m2pem.errors import JournalError, OperatorError
+from m2pem.executive.emergency import WRITTEN_WITHIN_S, StopMark, StopMarks
+from m2pem.executive.schedule_view import scheduled_mission
+from m2pem.executive.scheduled_start import Look, Starter
+from m2pem.mission.catalogue import ResourceId
+from m2pem.scheduling import times
+from m2pem.scheduling.entry import (
+    EntryChange,
+    EntryId,
+    EntryState,
+    Hold,
+    ScheduleEntry,
+    SchedulePlan,
+    entry_number,
+)
+
+log = logging.getLogger("m2pem.schedule")
+
+KEPT_ENTRIES = 200
+"""Entries that have ended and are kept; of more, the oldest are removed."""
+
+MARK = "schedule"
+"""The name of the mark that keeps a STOP of all until the journal has the hold."""
+
+
+class ScheduleEntries:
+    """The schedule of one executive's fleet. `real`: whether something in the fleet is real.
+
+    `publish`: takes alerts for operators and says that the schedule has changed. `marks`: keep a
+    STOP of all until the journal has the hold.
+    """
+
+    def __init__(
+        self,
+        starter: Starter,
+        publish: Callable[[Alert | ScheduleChanged], None],
+        marks: StopMarks,
+        *,
+        real: bool,
+    ) -> None:
+        self._starter = starter
+        self._publish = publish
+        self._marks = marks
+        self._real = real
+        self.by_id: dict[EntryId, ScheduleEntry] = {}
+        self.looks: dict[EntryId, Look] = {}
+        self.hold_of_all: Hold | None = None
+        """The hold of the whole schedule."""
+        self.holds = 0
+        """How often all was stopped or held."""
+        self.served = False
+        """Whether due missions are started."""
+        self.lock = asyncio.Lock()
+        """Held while entries are looked at and changed."""
+        self.changed = asyncio.Event()
+        """Set when something may start that could not before."""
+        self._unwritten: Hold | None = None
+        """The hold of the whole schedule that the journal does not have yet."""
+        self._stopped: set[EntryId] = set()
+        """Entries that an operator cancels or holds, before the journal has it."""
+        self.to_hold: dict[EntryId, Hold] = {}
+        """Entries whose run is stopped, before the journal has their hold."""
+        self._runs: dict[RunId, EntryId] = {}
+
+    # --- the entries ----------------------------------------------------------------------------
+
+    async def load(self) -> None:
+        """Read the schedule, and take back starts whose runs never began: they come again.
+
+        It comes before runs are taken up.
+
+        Raises:
+            JournalError: the journal cannot be read or written.
+        """
+        journal, fleet = self._starter.journal, self._starter.fleet
+        mark = self._marks.get(MARK)
+        self.hold_of_all = await journal.schedule_hold(fleet.name)
+        if mark is not None and self.hold_of_all is None:
+            self.hold_of_all = Hold(mark.by, mark.reason, self._starter.clock.now_us())
+            await journal.hold_schedule(fleet.name, self.hold_of_all)
+        self._marks.remove(MARK)
+        lines = {line.run: line for line in await journal.runs()}
+        for entry in await journal.entries():
+            if self._belongs_here(entry.plan):
+                started = [each.run for each in entry.state.times[-1:] if each.run]
+                line = lines.get(started[0]) if started else None
+                never_began = line and not (line.gone or line.last_seq or line.driven)
+                self.add(await self.take_back(entry) if never_began else entry)
+
+    def _belongs_here(self, plan: SchedulePlan) -> bool:
+        # What was scheduled in a simulation must never start a real vehicle.
+        return plan.fleet == self._starter.fleet.name and plan.simulated is not self._real
+
+    async def take_back(self, entry: ScheduleEntry) -> ScheduleEntry:
+        """Take back the last start of an entry, whose run never began.
+
+        Raises:
+            JournalError: the journal cannot be written.
+        """
+        run = entry.state.times[-1].run
+        change = EntryChange(entry.id, times.withdrawn(entry.state))
+        await self._starter.journal.change_entry(change, deletes=run)
+        log.warning(
+            "%s: %s was created for it and never began: its time counts again", entry.id, run
+        )
+        return msgspec.structs.replace(entry, state=change.state)
+
+    def add(self, entry: ScheduleEntry) -> None:
+        """Take over an entry as the journal has it."""
+        self.by_id[entry.id] = entry
+        self.looks.setdefault(entry.id, Look())
+        if entry.state.run:
+            self._runs[entry.state.run] = entry.id
+
+    async def reload(self, number: EntryId) -> None:
+        """Read an entry again, which another executive has changed."""
+        for entry in await self._starter.journal.entries():
+            if entry.id == number:
+                self.add(entry)
+                return
+        self.by_id.pop(number, None)
+
+    def active(self) -> list[ScheduleEntry]:
+        """Return the entries that may still start something."""
+        return [entry for entry in self.by_id.values() if entry.state.active]
+
+    def in_order(self) -> list[ScheduleEntry]:
+        """Return the entries that may still start something, in the order of service."""
+        return sorted(self.active(), key=self._rank)
+
+    def _rank(self, entry: ScheduleEntry) -> tuple[int, int, int]:
+        found = times.due(entry.plan, entry.state, self._starter.clock.now_us())
+        due_us = found.due_us or found.next_us or 0
+        return -entry.plan.priority, due_us, entry_number(entry.id) or 0
+
+    def active_entry(self, number: EntryId) -> ScheduleEntry:
+        """Return an entry that may still start something.
+
+        Raises:
+            OperatorError: there is none, or it is over.
+        """
+        entry = self.by_id.get(number)
+        if entry is None:
+            known = ", ".join(each.id for each in self.active()) or "none"
+            raise OperatorError(f"there is no entry {number!r} in the schedule; it has {known}")
+        if not entry.state.active:
+            detail = entry.state.detail or f"it has started {entry.state.run}"
+            raise OperatorError(f"{number} is {entry.state.status.value}: {detail}")
+        return entry
+
+    async def change(self, entry: ScheduleEntry, **fields: object) -> ScheduleEntry:
+        """Write an entry with other values of some fields of its state; returns it."""
+        return await self.write(entry, entry.state.changed(**fields))
+
+    async def write(self, entry: ScheduleEntry, state: EntryState) -> ScheduleEntry:
+        """Write a new state of an entry; returns the entry.
+
+        Raises:
+            JournalError: the journal cannot be written; `StaleEntryError` among them: another
+                executive has changed the entry.
+        """
+        await self._starter.journal.change_entry(EntryChange(entry.id, state))
+        changed = msgspec.structs.replace(entry, state=state)
+        self.by_id[entry.id] = changed
+        self._publish(ScheduleChanged())
+        return changed
+
+    def note(self, number: EntryId, reason: str) -> None:
+        """Keep why an entry waits."""
+        self.looks[number].reason = reason
+        self._publish(ScheduleChanged())
+
+    def say(self, text: str, code: str = SCHEDULE) -> None:
+        """Tell operators what was done with the schedule."""
+        log.info("%s", text)
+        self._publish(Alert("", code, text))
+        self._publish(ScheduleChanged())
+
+    def view(self) -> Schedule:
+        """Return the schedule as operators see it."""
+        over = [entry for entry in self.by_id.values() if not entry.state.active]
+        return Schedule(
+            tuple(self._seen(entry) for entry in (*self.in_order(), *over)),
+            str(self.hold_of_all) if self.hold_of_all is not None else "",
+            self.served,
+            self._starter.fleet.start_warning_s,
+        )
+
+    def _seen(self, entry: ScheduleEntry) -> ScheduledMission:
+        held = self.why_held(entry) if entry.state.active else ""
+        now_us = self._starter.clock.now_us()
+        return scheduled_mission(entry, self.looks[entry.id], held, now_us)
+
+    # --- what operators do ----------------------------------------------------------------------
+
+    async def schedule(
+        self, plan: SchedulePlan, resources: tuple[ResourceId, ...], holds: int = 0
+    ) -> EntryId:
+        """Add an entry, of a mission that was checked and names `resources`.
+
+        `holds`: the attribute `holds` as it was when the operator asked.
+
+        Raises:
+            OperatorError: all was stopped or held since: what was asked for before does not count.
+        """
+        async with self.lock:
+            if holds != self.holds:
+                raise OperatorError("all was stopped or held meanwhile; schedule it again")
+            state = EntryState(plan.scheduled_us - 1 if not plan.when.cron else plan.scheduled_us)
+            entry = await self._starter.journal.schedule(plan, state)
+            self.add(entry)
+            self.looks[entry.id].resources = resources
+            await self._forget_old()
+        what = f"{plan.mission_name} {times.described(plan.when)}"
+        self.say(f"{entry.id} is scheduled by {plan.by or 'an operator'}: {what}")
+        self.changed.set()
+        return entry.id
+
+    async def _forget_old(self) -> None:
+        over = [entry.id for entry in self.by_id.values() if not entry.state.active]
+        if old := over[:-KEPT_ENTRIES]:
+            await self._starter.journal.remove_entries(old)
+            for each in old:
+                del self.by_id[each], self.looks[each]
+
+    async def cancel(self, number: EntryId, by: str) -> None:
+        """Cancel an entry.
+
+        Raises:
+            OperatorError: there is none, or it is over.
+        """
+        entry, who = self.active_entry(number), by or "an operator"
+        with self._stopping(number):
+            async with self.lock:
+                found = self.active_entry(number)
+                await self.write(found, found.state.cancelled(by))
+        self.say(f"{number} is cancelled by {who}: {entry.plan.mission_name} is not started")
+
+    @contextmanager
+    def _stopping(self, number: EntryId) -> Iterator[None]:
+        """Let an entry start nothing, before the journal has why."""
+        self._stopped.add(number)
+        try:
+            yield
+        finally:
+            self._stopped.discard(number)
+
+    def hold_at_once(self, by: str, reason: str) -> Hold | None:
+        """Hold the whole schedule, if it has anything; the journal follows with `written`."""
+        self.holds += 1
+        if not self.active():
+            return None
+        self.hold_of_all = self._unwritten = Hold(by, reason, self._starter.clock.now_us())
+        self._marks.put(MARK, StopMark(by, reason))
+        self.say_held()
+        return self.hold_of_all
+
+    def say_held(self) -> None:
+        """Tell operators that the whole schedule is held."""
+        text = f"the schedule is {self.hold_of_all}; nothing starts until it is released"
+        self.say(text, NOT_STARTED)
+
+    async def written(self, hold: Hold) -> None:
+        """Write a hold of the whole schedule to the journal.
+
+        Raises:
+            OperatorError: it has not written it within `WRITTEN_WITHIN_S`; the hold stands.
+        """
+        writing = self._starter.journal.hold_schedule(self._starter.fleet.name, hold)
+        try:
+            await asyncio.wait_for(asyncio.shield(asyncio.ensure_future(writing)), WRITTEN_WITHIN_S)
+        except (TimeoutError, JournalError) as error:
+            raise OperatorError(
+                "the schedule is held, but the journal does not write: it has not been recorded"
+                f"{f' ({error})' if str(error) else ''}"
+            ) from error
+        self._marks.remove(MARK)
+        if self._unwritten is hold:
+            self._unwritten = None
+
+    async def read_hold(self) -> None:
+        """Take over what another executive on the journal has held or released.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
+        before = self.hold_of_all
+        found = await self._starter.journal.schedule_hold(self._starter.fleet.name)
+        if self.hold_of_all is not before or self._unwritten is not None or found == before:
+            return
+        self.hold_of_all = found
+        if found is None:
+            self.say("the schedule is released by another executive's operator")
+        else:
+            self.say_held()
+
+    async def hold(self, number: EntryId | None, by: str, reason: str) -> None:
+        """Hold an entry, or the whole schedule.
+
+        Raises:
+            OperatorError: there is no such entry, it is over; or the journal does not write.
+        """
+        if number is None:
+            hold = self.hold_at_once(by, reason)
+            if hold is None:
+                raise OperatorError("nothing is scheduled")
+            await self.written(hold)
+            return
+        self.active_entry(number)
+        hold = Hold(by, reason, self._starter.clock.now_us())
+        with self._stopping(number):
+            async with self.lock:
+                await self.change(self.active_entry(number), hold=hold)
+        self.say(f"{number} is {hold}; it starts nothing until it is released")
+
+    async def release(self, number: EntryId | None, by: str) -> None:
+        """Let an entry, or the whole schedule, start missions again.
+
+        Raises:
+            OperatorError: it is not held.
+        """
+        async with self.lock:
+            if number is None:
+                await self._release_all()
+            else:
+                entry = self.active_entry(number)
+                if entry.state.hold is None:
+                    raise OperatorError(f"{number} is not held")
+                await self.change(entry, hold=None)
+        self.say(f"{number or 'the schedule'} is released by {by or 'an operator'}")
+        for look in self.looks.values():
+            look.warned_due_us = look.starts_us = None
+        self.changed.set()
+
+    async def _release_all(self) -> None:
+        if self.hold_of_all is None:
+            await self.read_hold()
+        held = self.hold_of_all
+        if held is None:
+            raise OperatorError("the schedule is not held")
+        await self._starter.journal.hold_schedule(self._starter.fleet.name, None)
+        if self.hold_of_all is not held:  # by a STOP that came meanwhile, written after this
+            raise OperatorError(f"not released: the schedule is {self.hold_of_all}")
+        self._marks.remove(MARK)
+        self.hold_of_all = self._unwritten = None
+
+    def run_stopping(self, run: RunId, by: str) -> None:
+        """An operator stops a run: the entry that would start its mission again is held."""
+        number = self._runs.get(run)
+        if number is not None and self.by_id[number].state.active:
+            now_us = self._starter.clock.now_us()
+            self.to_hold[number] = Hold(by, f"its run {run} was stopped", now_us)
+            self.changed.set()
+
+    def why_held(self, entry: ScheduleEntry) -> str:
+        """Return by whom an entry or the whole schedule is held, and why; "": it is not."""
+        if self.hold_of_all is not None:
+            return f"the schedule is {self.hold_of_all}"
+        hold = entry.state.hold or self.to_hold.get(entry.id)
+        if hold is not None:
+            return str(hold)
+        return "held" if entry.id in self._stopped else ""
