@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.control import RunStatus
+from m2pem.api.runs import RunStatus
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import BehaviorReported, Input, StartRun
 from m2pem.engine.run import MissionRun
