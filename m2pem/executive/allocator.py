@@ -14,7 +14,6 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from heapq import merge
-from itertools import chain
 from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -411,16 +410,19 @@ class Allocator:
         found = {
             each: Occupancy(withdrawn=why) for each, why in self._availability.withdrawn().items()
         }
+        held = dict(self._availability.held())
         requested = {
-            ResourceId(resource): holders[-1]
+            ResourceId(resource): behaviors
             for runner in self._runners.values()
-            for resource, holders in runner.run.state.held.items()
+            for resource, behaviors in runner.run.state.held.items()
         }
         known: dict[str, Occupancy] = {}
-        for resource, holder in chain(self._availability.held(), requested.items()):
+        for resource in held | requested:
             if resource in found:
                 continue
-            by = holder if is_behavior(holder) else requested.get(resource, holder)
+            by, behaviors = held.get(resource, ""), requested.get(resource, [])
+            if behaviors and (by in behaviors or not is_behavior(by)):
+                by = behaviors[-1]  # it waits until the one before it has ended
             if by not in known:
                 before = self._holders.get(by)
                 label = before.label if before is not None else ""

@@ -43,6 +43,16 @@ def both(first: str, second: str, *, name: str = "drive_stop") -> bytes:
 
 TO_GATE = '<m2pem:property name="target" value="[0.01, 0.0, 0]"/>'
 
+TAKEN_OVER_AND_WAITED_FOR = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'
+    f"""{task("A", "vehicle='ugv1'")}{task("C", "vehicle='ugv1'")}"""
+    f"""{task("B", "requires='true' wait='unlimited'")}"""
+    '<boundaryEvent id="T" attachedToRef="A"><timerEventDefinition><timeDuration>PT10S'
+    "</timeDuration></timerEventDefinition></boundaryEvent>"
+    f"{flow('S', 'F')}{flow('F', 'A')}{flow('F', 'B')}{flow('T', 'C')}</process>"
+)
+"""A timer interrupts task A, and task C gets its vehicle, for which task B waits."""
+
 
 def state(vehicle: str, latitude_deg: float, battery: float = 1.0) -> VehicleState:
     place = GeoPosition(latitude_deg, 0.0, 0.0)
@@ -397,3 +407,19 @@ def test_an_exception_while_choosing_holds_the_runs_that_ask_and_tells_operators
     assert "ZeroDivisionError: a bug. Commanded to hold: ugv1" in alert.text
     assert status is RunStatus.COMPLETED
     assert held == 0
+
+
+def test_a_vehicle_that_a_task_takes_over_by_name_is_not_chosen_for_another_task_of_the_run(play):
+    async def story(world: World):
+        control = world.executive.control
+        run = await control.start(TAKEN_OVER_AND_WAITED_FOR)
+        await world.fake.until_called("start", f"{run}.b1")
+        world.fake.report(f"{run}.b1", BehaviorState.ACCEPTED)
+        await world.fake.until_called("start", f"{run}.b2")
+        world.fake.report(f"{run}.b1", BehaviorState.CANCELLED)
+        world.fake.report(f"{run}.b2", SUCCEEDED)
+        await world.fake.until_called("start", f"{run}.b3")
+        world.fake.report(f"{run}.b3", SUCCEEDED)
+        return (await control.wait(run)).status, list(given(world))
+
+    assert play(story, "ugv1") == (RunStatus.COMPLETED, ["A", "C", "B"])
