@@ -15,7 +15,6 @@ A loss is what the mark file says was acknowledged and the journal does not have
 """
 
 import os
-import sqlite3
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,6 +26,7 @@ from uuid import UUID
 from m2pem.errors import JournalError
 from m2pem.journal.base import Loss
 from m2pem.journal.hash_chain import HASH_BYTES
+from m2pem.journal.storage import Connection
 
 _MAGIC = b"m2pem mark 1\n\0\0\0"
 _SLOT_BYTES = 128
@@ -198,7 +198,7 @@ def of_another_journal(path: Path) -> JournalError:
 _POSITIONS = "SELECT run, epoch, last_seq, hash, outcome FROM standings"
 
 
-def find_losses(connection: sqlite3.Connection, marks: Mapping[int, Mark]) -> dict[int, Loss]:
+def find_losses(connection: Connection, marks: Mapping[int, Mark]) -> dict[int, Loss]:
     """Return the losses by run number. Read the marks first: both grow meanwhile."""
     rows = {row[0]: row[1:] for row in connection.execute(_POSITIONS)}
     found = {
@@ -207,7 +207,7 @@ def find_losses(connection: sqlite3.Connection, marks: Mapping[int, Mark]) -> di
     return {number: loss for number, loss in found.items() if loss is not None}
 
 
-def find_loss(connection: sqlite3.Connection, number: int, mark: Mark | None) -> Loss | None:
+def find_loss(connection: Connection, number: int, mark: Mark | None) -> Loss | None:
     """Return what one run has lost."""
     if mark is None:
         return None
@@ -216,7 +216,7 @@ def find_loss(connection: sqlite3.Connection, number: int, mark: Mark | None) ->
 
 
 def _loss(
-    connection: sqlite3.Connection,
+    connection: Connection,
     number: int,
     position: tuple[int, int, bytes | None, str | None] | None,
     mark: Mark,
@@ -243,7 +243,7 @@ def _loss(
     return Loss(mark.seq, last_seq, resumable=last_seq > 0 and outcome is None)
 
 
-def _is_deleted(connection: sqlite3.Connection, number: int, mark: Mark) -> bool:
+def _is_deleted(connection: Connection, number: int, mark: Mark) -> bool:
     """Whether the run was deleted on request, with all that had been acknowledged."""
     row = connection.execute(
         "SELECT epoch, last_seq, hash FROM deletions WHERE run = ?", (number,)

@@ -1,69 +1,130 @@
 """The journal in an SQLite file, for any number of executives on one host."""
 
-import asyncio
 import logging
 import sqlite3
-import struct
-import time
-from collections.abc import AsyncIterator, Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing, suppress
-from functools import partial
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, suppress
+from functools import cache
+from itertools import chain
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from uuid import UUID
 
 from m2pem.errors import JournalError
-from m2pem.journal.base import Deletion, Entry, Loss, RunHeader, RunInfo
-from m2pem.journal.codec import (
-    decode_body,
-    decode_library,
-    decode_part,
-    encode_body,
-    encode_part,
-    run_id,
-    run_number,
+from m2pem.journal.codec import run_id
+from m2pem.journal.database import (
+    explained_error,
+    is_transient,
+    open_for_reading,
+    open_for_writing,
 )
-from m2pem.journal.database import explained_error, open_for_reading, open_for_writing
-from m2pem.journal.hash_chain import entry_hash, header_hash
+from m2pem.journal.database_journal import DatabaseJournal
 from m2pem.journal.marks import MarkFile, find_losses, identity_in, of_another_journal
+from m2pem.journal.position import RunPosition
 from m2pem.journal.run_locks import RunLocks, run_locks
 from m2pem.journal.storage_checks import OpenFiles, min_free_mb
-from m2pem.journal.transaction import (
-    EntryRow,
-    WriteTransaction,
-    deletions_in,
-    mark_of,
-    no_run,
-    position_from,
-)
-from m2pem.journal.writer import GroupWriter
-from m2pem.scheduling.entry import (
-    EntryChange,
-    EntryState,
-    Hold,
-    ScheduleEntry,
-    SchedulePlan,
-    entry_id,
-)
-
-T = TypeVar("T")
+from m2pem.journal.transaction import mark_of, position_columns, position_from
 
 log = logging.getLogger("m2pem.journal")
 
-_BATCH_BYTES = 1 << 20
-_BATCH_ENTRIES = 500
-_POSITION_COLUMNS = 11
-NO_HEADER = RunHeader("", b"", "")
-"""The header of a run that the journal has lost whole."""
+_ROWS = 90
+"""To a statement: SQLite before 3.32 takes 999 parameters."""
 
 
-class SqliteJournal:
+class SqliteStorage:
+    """The file of an open journal, and its locks; see `Storage`."""
+
+    errors: tuple[type[Exception], ...] = (sqlite3.Error,)
+
+    def __init__(
+        self, path: Path, connection: sqlite3.Connection, locks: RunLocks, mark: Path
+    ) -> None:
+        self.place = str(path)
+        self.connection = connection
+        self.owners = locks
+        self._path = path
+        self._files = OpenFiles([path, _beside(path, "wal"), _beside(path, "lock"), mark])
+        self._data_version = 0
+
+    def begin(self) -> bool:
+        """See `Storage.begin`: whether no other process has written since."""
+        self.connection.execute("BEGIN IMMEDIATE")
+        (version,) = self.connection.execute("PRAGMA data_version").fetchone()
+        before, self._data_version = self._data_version, version
+        return bool(version == before)
+
+    def exclude_others(self) -> None:
+        """See `Storage.exclude_others`: a transaction of SQLite excludes all others."""
+
+    def driver(self, number: int, position: RunPosition) -> str:
+        """See `Storage.driver`."""
+        return f"process {position.pid}" if self.owners.held(number) else ""
+
+    def refuse_lost(self, number: int) -> None:
+        """See `Storage.refuse_lost`: the kernel takes no lock from a living process."""
+
+    def give_up(self, number: int) -> bool:
+        """See `Storage.give_up`: its lock is noted elsewhere."""
+        return False
+
+    def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:
+        """See `Storage.add_to_schedule`."""
+        added = self.connection.execute(
+            "INSERT INTO schedule (fleet, plan, state, revision) VALUES (?, ?, ?, ?)",
+            (fleet, plan, state, revision),
+        )
+        return added.lastrowid or 0
+
+    def commit(
+        self, entries: Sequence[tuple[Any, ...]], positions: Mapping[int, RunPosition], wrote: bool
+    ) -> None:
+        """See `Storage.commit`."""
+        self._write("INSERT INTO entries", entries)
+        changed = [position_columns(*each) for each in positions.items()]
+        self._write("REPLACE INTO standings", changed)
+        self.connection.execute("COMMIT")
+
+    def _write(self, into: str, rows: Sequence[tuple[Any, ...]]) -> None:
+        # Many rows to a statement: each execution releases the interpreter's lock, and with a busy
+        # event loop it takes 5 ms to acquire it again.
+        for first in range(0, len(rows), _ROWS):
+            some = rows[first : first + _ROWS]
+            statement = f"{into} VALUES {_placeholders(len(some), len(some[0]))}"
+            self.connection.execute(statement, tuple(chain.from_iterable(some)))
+
+    def rollback(self) -> None:
+        """See `Storage.rollback`."""
+        if self.connection.in_transaction:
+            self.connection.execute("ROLLBACK")
+
+    def check(self) -> None:
+        """See `Storage.check`."""
+        self._files.check()
+
+    def explained(self, error: Exception) -> JournalError:
+        """See `Storage.explained`."""
+        assert isinstance(error, sqlite3.Error)
+        return explained_error(error, self._path)
+
+    def is_transient(self, error: Exception) -> bool:
+        """See `Storage.is_transient`."""
+        assert isinstance(error, sqlite3.Error)
+        return is_transient(error)
+
+    def is_worth_a_retry(self, error: Exception) -> bool:
+        """See `Storage.is_worth_a_retry`: SQLite itself has waited."""
+        return False
+
+
+class SqliteJournal(DatabaseJournal):
     """WAL and `synchronous=FULL`: an append that returned survives a power cut.
 
-    One thread writes, another reads; the event loop never waits for the disk. Beside the
-    file, `FILE-lock` locks the runs that are driven and `FILE-mark` has what was acknowledged last.
+    Beside the file, `FILE-lock` locks the runs that are driven and `FILE-mark` has what was
+    acknowledged last.
     """
+
+    # The body is a text in the file; one that a flipped bit has damaged is no UTF-8.
+    body_column = "CAST(body AS BLOB)"
 
     def __init__(
         self,
@@ -74,18 +135,11 @@ class SqliteJournal:
         marks: MarkFile,
         identity: UUID,
     ) -> None:
-        self._path = path
-        self._identity = identity
         self._locks = locks
-        self._marks = marks
         self._writing = writing
-        self._reading = reading
-        open_files = OpenFiles([path, _beside(path, "wal"), _beside(path, "lock"), marks.path])
-        transaction = WriteTransaction(writing, locks, marks, open_files)
-        self._writer = GroupWriter(transaction, path, finish=self._finish)
-        self._reader = ThreadPoolExecutor(1, thread_name_prefix=f"reading {path}")
-        self._closed = False
-        self._writer.start()
+        self._closing = reading.close
+        storage = SqliteStorage(path, writing, locks, marks.path)
+        super().__init__(path, identity, storage, reading, marks)
 
     @classmethod
     def open(cls, path: Path) -> "SqliteJournal":
@@ -122,306 +176,19 @@ class SqliteJournal:
             undo.pop_all()
         return cls(path, writing, reading, locks, marks, identity)
 
-    @property
-    def identity(self) -> UUID:
-        """See `Journal.identity`. A copy of the file has it, too: use one of the two."""
-        return self._identity
-
-    @property
-    def file(self) -> Path | None:
-        """See `Journal.file`."""
-        return self._path
-
-    @property
-    def commits(self) -> int:
-        """How many transactions have been written since it was opened."""
-        return self._writer.commits
-
-    async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
-        """See `Journal.create`."""
-        return await self._holding(
-            lambda transaction: transaction.create(header, started), run_number
-        )
-
-    async def claim(self, run: str) -> int:
-        """See `Journal.claim`."""
-        number = run_number(run)
-        return await self._holding(lambda transaction: transaction.claim(number), lambda _: number)
-
-    async def _holding(
-        self, work: Callable[[WriteTransaction], T], number_of: Callable[[T], int]
-    ) -> T:
-        """Carry out what takes a run's lock; if the caller is cancelled meanwhile, release it."""
-        self._check_open()
-        taking = self._writer.submit(work)
-
-        def release(taken: asyncio.Future[T]) -> None:
-            if taken.exception() is None:
-                self._release(number_of(taken.result()))
-
-        try:
-            return await asyncio.shield(taking)
-        except asyncio.CancelledError:
-            taking.add_done_callback(release)
-            raise
-
-    async def release(self, run: str) -> None:
-        """See `Journal.release`; what was submitted before is written first."""
-        self._check_open()
-        await asyncio.wait([self._release(run_number(run))])
-
-    def _release(self, number: int) -> asyncio.Future[None]:
-        forgotten = self._writer.submit(lambda transaction: transaction.forget(number))
-
-        def unlock(forgotten: asyncio.Future[None]) -> None:
-            # Looked at so that asyncio doesn't report it: a failed journal lets go all the same.
-            forgotten.exception()
-            self._locks.release(number)
-
-        forgotten.add_done_callback(unlock)
-        return forgotten
-
-    async def append(self, entries: Sequence[Entry]) -> None:
-        """See `Journal.append`. A cancelled call may or may not be written, but never in part."""
-        self._check_open()
-        if entries:
-            rows = [EntryRow(run_number(e.run), e, encode_body(e)) for e in entries]
-            await self._writer.submit(partial(WriteTransaction.append, rows=rows))
-
-    async def check(self) -> None:
-        """See `Journal.check`; it waits for its turn, as what is written does."""
-        self._check_open()
-        await self._writer.submit(WriteTransaction.check)
-
-    async def read(self, run: str, after_seq: int = 0) -> AsyncIterator[Entry]:
-        """See `Journal.read`; entries that are appended meanwhile are included."""
-        number = run_number(run)
-        before: bytes | None = None
-        first = True
-        while True:
-            batch, before = await self._read(
-                partial(self._batch, number, after_seq, before, first=first)
-            )
-            for entry in batch:
-                yield entry
-            if not batch:
-                return
-            after_seq, first = batch[-1].seq, False
-
-    def _batch(
-        self, number: int, after_seq: int, before: bytes | None, *, first: bool
-    ) -> tuple[list[Entry], bytes | None]:
-        """`before`: the hash of the entry before; None: no entry before has one."""
+    @contextmanager
+    def _snapshot(self) -> Iterator[None]:
         self._reading.execute("BEGIN")
         try:
-            if first:
-                before = self._hash_up_to(number, after_seq)
-            entries, before = self._next(number, after_seq, before)
-            if not entries:
-                self._check_end(number, before)
+            yield
         finally:
             self._reading.execute("ROLLBACK")
-        return entries, before
 
-    def _next(
-        self, number: int, after_seq: int, before: bytes | None
-    ) -> tuple[list[Entry], bytes | None]:
-        entries: list[Entry] = []
-        size = 0
-        rows = self._reading.execute(
-            "SELECT seq, epoch, at_us, t_us, CAST(body AS BLOB), hash FROM entries"
-            " WHERE run = ? AND seq > ? ORDER BY seq LIMIT ?",
-            (number, after_seq, _BATCH_ENTRIES),
-        )
-        with closing(rows):
-            for seq, epoch, at_us, t_us, body, hash_ in rows:
-                if hash_ is not None:
-                    expected = entry_hash(
-                        before or self._header_hash(number), seq, epoch, at_us, t_us, body
-                    )
-                if hash_ != (None if before is None and hash_ is None else expected):
-                    raise self._damaged(
-                        number, seq, "it does not follow from what was before it (its hash differs)"
-                    )
-                before = hash_
-                try:
-                    content = decode_body(body)
-                except JournalError as error:
-                    raise self._damaged(number, seq, str(error)) from error
-                entries.append(Entry(run_id(number), epoch, seq, at_us, t_us, *content))
-                size += len(body)
-                if size > _BATCH_BYTES:
-                    break
-        return entries, before
-
-    def _hash_up_to(self, number: int, seq: int) -> bytes | None:
-        row = self._reading.execute(
-            "SELECT hash FROM entries WHERE run = ? AND seq <= ? ORDER BY seq DESC LIMIT 1",
-            (number, seq),
-        ).fetchone()
-        return None if row is None else row[0]
-
-    def _header_hash(self, number: int) -> bytes:
-        row = self._reading.execute("SELECT * FROM runs WHERE run = ?", (number,)).fetchone()
-        if row is None:
-            raise no_run(self._reading, number)
-        return header_hash(row)
-
-    def _check_end(self, number: int, before: bytes | None) -> None:
-        query = "SELECT * FROM standings JOIN runs USING (run) WHERE run = ?"
-        row = self._reading.execute(query, (number,)).fetchone()
-        if row is None:
-            raise no_run(self._reading, number)
-        position = position_from(row[:_POSITION_COLUMNS])
-        if position.hash is not None and position.hash != (before or self._header_hash(number)):
-            raise self._damaged(
-                number, position.last_seq, "it, or what was before it, is missing or was changed"
-            )
-
-    def _damaged(self, number: int, seq: int, why: str) -> JournalError:
-        return JournalError(f"{self._path}: {run_id(number)}, record {seq}: {why}")
-
-    async def runs(self) -> Sequence[RunInfo]:
-        """See `Journal.runs`."""
-        return await self._read(self._infos)
-
-    def _infos(self) -> list[RunInfo]:
-        marks = self._marks.read()
-        self._reading.execute("BEGIN")
-        try:
-            lost = find_losses(self._reading, marks)
-            rows = self._reading.execute(
-                "SELECT * FROM standings JOIN runs USING (run) ORDER BY run"
-            ).fetchall()
-        finally:
-            self._reading.execute("ROLLBACK")
-        infos = {row[0]: self._info(row, lost.pop(row[0], None)) for row in rows}
-        for number, loss in lost.items():
-            mark = marks[number]
-            infos[number] = RunInfo(run_id(number), NO_HEADER, mark.epoch, 0, 0, loss=loss)
-        return [infos[number] for number in sorted(infos)]
-
-    def _info(self, row: Sequence[Any], loss: Loss | None) -> RunInfo:
-        mission_name, mission, process, fleet, simulated, speed, created_us, library = row[
-            _POSITION_COLUMNS:
-        ]
-        header = RunHeader(
-            mission_name=mission_name,
-            mission=mission,
-            process=process,
-            fleet=fleet,
-            simulated=bool(simulated),
-            speed=speed,
-            created_us=created_us,
-            library=decode_library(library),
-        )
-        number = row[0]
-        position = position_from(row[:_POSITION_COLUMNS])
-        return position.info(run_id(number), header, self._locks.held(number), loss)
-
-    async def accept_loss(self, run: str) -> None:
-        """Note that an operator accepts the loss of a run that cannot be resumed: new runs may
-        begin.
-
-        Raises:
-            JournalError: the run has lost nothing, or can be resumed, which asks the operator.
-        """
-        self._check_open()
-        await self._writer.submit(partial(WriteTransaction.accept_loss, number=run_number(run)))
-
-    async def delete(self, runs: Sequence[str], *, by: str, unended: bool = False) -> None:
-        """See `Journal.delete`. The file keeps its size: `compact` makes it smaller."""
-        self._check_open()
-        numbers = [run_number(run) for run in dict.fromkeys(runs)]
-        now_us = time.time_ns() // 1000
-        await self._writer.submit(
-            lambda transaction: transaction.delete(numbers, by, now_us, unended=unended)
-        )
-        # Also what an earlier deletion has left, if it was ended by a crash.
-        while await self._writer.submit(WriteTransaction.empty):
-            pass
-
-    async def deletions(self) -> Sequence[Deletion]:
-        """See `Journal.deletions`."""
-        return await self._read(lambda: deletions_in(self._reading))
-
-    # --- the schedule ---------------------------------------------------------------------------
-
-    async def schedule(self, plan: SchedulePlan, state: EntryState) -> ScheduleEntry:
-        """See `Journal.schedule`."""
-        self._check_open()
-        text = encode_part(plan)
-        return await self._writer.submit(
-            lambda transaction: transaction.schedule(plan, text, state)
-        )
-
-    async def change_entry(self, change: EntryChange, *, deletes: str = "") -> None:
-        """See `Journal.change_entry`."""
-        self._check_open()
-        now_us = time.time_ns() // 1000
-        await self._writer.submit(
-            lambda transaction: transaction.change_entry(change, deletes, now_us)
-        )
-
-    async def entries(self) -> Sequence[ScheduleEntry]:
-        """See `Journal.entries`."""
-        return await self._read(self._entries)
-
-    def _entries(self) -> list[ScheduleEntry]:
-        rows = self._reading.execute("SELECT entry, plan, state FROM schedule ORDER BY entry")
-        return [
-            ScheduleEntry(
-                entry_id(number), decode_part(plan, SchedulePlan), decode_part(state, EntryState)
-            )
-            for number, plan, state in rows
-        ]
-
-    async def remove_entries(self, entries: Sequence[str]) -> None:
-        """See `Journal.remove_entries`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.remove_entries(entries))
-
-    async def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
-        """See `Journal.hold_schedule`."""
-        self._check_open()
-        await self._writer.submit(lambda transaction: transaction.hold_schedule(fleet, hold))
-
-    async def schedule_hold(self, fleet: str) -> Hold | None:
-        """See `Journal.schedule_hold`."""
-        return await self._read(lambda: self._schedule_hold(fleet))
-
-    def _schedule_hold(self, fleet: str) -> Hold | None:
-        row = self._reading.execute(
-            "SELECT hold FROM schedule_holds WHERE fleet = ?", (fleet,)
-        ).fetchone()
-        return None if row is None else decode_part(row[0], Hold)
-
-    async def _read(self, work: Callable[[], T]) -> T:
-        self._check_open()
-        try:
-            return await asyncio.get_running_loop().run_in_executor(self._reader, work)
-        except sqlite3.Error as error:
-            raise explained_error(error, self._path) from error
-        except (TypeError, ValueError, struct.error) as error:
-            # A flipped bit may make a text of a number.
-            raise JournalError(f"{self._path}: it is damaged: {error}") from error
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise JournalError(f"{self._path}: the journal has been closed")
-
-    async def close(self) -> None:
-        """See `Journal.close`; closing it again does nothing."""
-        if self._closed:
-            return
-        self._closed = True
-        stopped = self._writer.stop()
-        # Looked at so that asyncio doesn't report it: a journal that has failed has said so.
-        stopped.add_done_callback(asyncio.Future.exception)
-        await asyncio.wait([stopped])
+    def _driven(self, numbers: Collection[int]) -> Collection[int]:
+        return {number for number in numbers if self._locks.held(number)}
 
     def _finish(self) -> None:
-        self._reader.submit(self._reading.close)
+        self._reader.submit(self._closing)
         self._reader.shutdown()
         # What can't be moved from the log into the file now is moved when it is opened next.
         with suppress(sqlite3.Error):
@@ -471,3 +238,8 @@ def _begin_marks(connection: sqlite3.Connection, marks: MarkFile) -> None:
             marks.write({row[0]: mark_of(position_from(row)) for row in rows})
     finally:
         connection.execute("ROLLBACK")
+
+
+@cache
+def _placeholders(rows: int, columns: int) -> str:
+    return ", ".join([f"({', '.join('?' * columns)})"] * rows)

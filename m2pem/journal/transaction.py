@@ -1,16 +1,14 @@
-"""Write transactions of the SQLite journal. Used by the writing thread alone.
+"""Write transactions of a journal in a database. Used by the writing thread alone.
 
 Every call is checked before anything of it is written. A refused call therefore leaves nothing
-behind, and the others of its group are written. An SQLite error ends the whole transaction.
+behind, and the others of its group are written. An error of the database ends the whole
+transaction.
 """
 
 import os
-import sqlite3
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import chain
 from typing import Any
 
 from m2pem.engine.records import RunOutcome
@@ -29,8 +27,8 @@ from m2pem.journal.codec import (
 from m2pem.journal.hash_chain import entry_hash, header_hash, position_seal
 from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState, find_loss, find_losses
 from m2pem.journal.position import RunPosition
-from m2pem.journal.run_locks import RunLocks
-from m2pem.journal.storage_checks import OpenFiles, space_shortage
+from m2pem.journal.storage import Connection, Storage
+from m2pem.journal.storage_checks import space_shortage
 from m2pem.scheduling.entry import (
     EntryChange,
     EntryId,
@@ -62,55 +60,42 @@ class EntryRow:
         return self.number, entry.seq, entry.epoch, entry.at_us, entry.t_us, body, hash_
 
 
-_ROWS = 90
-"""To a statement: SQLite before 3.32 takes 999 parameters."""
-
-
 _EMPTIED_ENTRIES = 2000
 """To a transaction: inputs of runs under way wait for it."""
 
 
 class WriteTransaction:
-    """Transactions, one after the other: `begin`, any number of calls, `commit` or `rollback`.
+    """Transactions, one after the other: `begin`, any number of calls, `commit` or `rollback`."""
 
-    `open_files`: whether the journal's files are still where they were opened.
-    """
-
-    def __init__(
-        self,
-        connection: sqlite3.Connection,
-        locks: RunLocks,
-        marks: MarkFile,
-        open_files: OpenFiles,
-    ) -> None:
-        self._connection = connection
-        self._locks = locks
+    def __init__(self, storage: Storage, marks: MarkFile) -> None:
+        self._storage = storage
+        self._owners = storage.owners
         self._marks = marks
-        self._presence = open_files
         self._known: dict[int, RunPosition] = {}
-        self._data_version = 0
         self._changed: dict[int, RunPosition] = {}
         self._rows: list[tuple[Any, ...]] = []
-        self._locked: list[int] = []
+        self._taken: list[int] = []
         self._appended: set[int] = set()
         self._lossy: set[int] = set()
         self._wrote = False
 
+    @property
+    def _connection(self) -> Connection:
+        return self._storage.connection
+
     def begin(self) -> None:
         """Start a transaction; it sees what another process has committed before."""
-        self._connection.execute("BEGIN IMMEDIATE")
-        (version,) = self._connection.execute("PRAGMA data_version").fetchone()
-        if version != self._data_version:
+        if not self._storage.begin():
             self._known.clear()
-            self._data_version = version
 
     def check(self) -> None:
         """Check that the files are where they were opened, and that there is room for a run."""
-        self._presence.check()
+        self._storage.check()
         self._refuse_while_short()
 
     def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """Add a run that is claimed with epoch 1, and return its id."""
+        self._storage.exclude_others()
         if started is not None:
             self._refuse_stale(started)
             self._refuse_held(started.entry)
@@ -118,7 +103,8 @@ class WriteTransaction:
         marks = self._marks.read()
         self._refuse_while_lossy(marks)
         last = self._connection.execute(
-            "SELECT max(run) FROM (SELECT run FROM runs UNION ALL SELECT run FROM deletions)"
+            "SELECT max(run) FROM"
+            " (SELECT run FROM runs UNION ALL SELECT run FROM deletions) AS given"
         ).fetchone()[0]
         number = 1 + max(last or 0, *marks, 0)
         row = (
@@ -127,7 +113,7 @@ class WriteTransaction:
             header.mission,
             header.process,
             header.fleet,
-            header.simulated,
+            int(header.simulated),
             float(header.speed),
             header.created_us,
             encode_library(header.library),
@@ -162,6 +148,7 @@ class WriteTransaction:
 
     def claim(self, number: int) -> int:
         """Take a run's lock and raise its epoch, which is returned."""
+        self._storage.exclude_others()
         position = self._position(number)
         self._take(number, position)
         # With the lock, no other process writes the mark.
@@ -189,11 +176,13 @@ class WriteTransaction:
 
         No other process takes a run's lock meanwhile: it does so in a transaction, too.
         """
+        self._storage.exclude_others()
         for number in numbers:
             self._refuse_deletion(number, unended=unended)
         for number in numbers:
+            self._connection.execute("DELETE FROM deletions WHERE run = ?", (number,))
             self._connection.execute(
-                "REPLACE INTO deletions SELECT run, epoch, last_seq, hash, ?, ?, 0 FROM standings"
+                "INSERT INTO deletions SELECT run, epoch, last_seq, hash, ?, ?, 0 FROM standings"
                 " WHERE run = ?",
                 (now_us, by, number),
             )
@@ -205,9 +194,9 @@ class WriteTransaction:
     def _refuse_deletion(self, number: int, *, unended: bool) -> None:
         run = run_id(number)
         position = self._position(number)
-        if self._locks.held(number):
+        if driver := self._storage.driver(number, position):
             raise JournalError(
-                f"{run} is not deleted: it is driven by process {position.pid}, which is alive; "
+                f"{run} is not deleted: it is driven by {driver}, which is alive; "
                 f"`m2pem stop {run}` ends the run"
             )
         if (loss := find_loss(self._connection, number, self._marks.of(number))) is not None:
@@ -217,8 +206,9 @@ class WriteTransaction:
 
     def empty(self) -> bool:
         """Remove some entries of deleted runs; False: there were none left."""
+        self._storage.exclude_others()
         found = self._connection.execute(
-            "SELECT run FROM deletions WHERE NOT emptied LIMIT 1"
+            "SELECT run FROM deletions WHERE emptied = 0 LIMIT 1"
         ).fetchone()
         if found is None:
             return False
@@ -242,15 +232,15 @@ class WriteTransaction:
     def schedule(self, plan: SchedulePlan, plan_text: str, state: EntryState) -> ScheduleEntry:
         """Add an entry to the schedule."""
         self._refuse_while_short()
-        added = self._connection.execute(
-            "INSERT INTO schedule (fleet, plan, state, revision) VALUES (?, ?, ?, ?)",
-            (plan.fleet, plan_text, encode_part(state), state.revision),
+        number = self._storage.add_to_schedule(
+            plan.fleet, plan_text, encode_part(state), state.revision
         )
         self._wrote = True
-        return ScheduleEntry(entry_id(added.lastrowid or 0), plan, state)
+        return ScheduleEntry(entry_id(number), plan, state)
 
     def change_entry(self, change: EntryChange, deletes: str, now_us: int) -> None:
         """Replace the state of an entry; delete a run of it that never began."""
+        self._storage.exclude_others()
         self._refuse_stale(change)
         if deletes:
             number = run_number(deletes)
@@ -285,6 +275,7 @@ class WriteTransaction:
 
     def remove_entries(self, entries: Sequence[str]) -> None:
         """Remove entries that are not active any more."""
+        self._storage.exclude_others()
         numbers = [known_entry(entry) for entry in entries]
         for entry, number in zip(entries, numbers, strict=True):
             row = self._connection.execute(
@@ -294,18 +285,20 @@ class WriteTransaction:
                 raise unknown_entry(entry)
             if decode_part(row[0], EntryState).active:
                 raise JournalError(f"{entry} is not removed: it may still start a mission")
-        self._connection.executemany(
-            "DELETE FROM schedule WHERE entry = ?", [(number,) for number in numbers]
-        )
+        for number in numbers:
+            self._connection.execute("DELETE FROM schedule WHERE entry = ?", (number,))
         self._wrote = True
 
     def hold_schedule(self, fleet: str, hold: Hold | None) -> None:
         """Note who holds the whole schedule of a fleet."""
+        self._storage.exclude_others()
         if hold is None:
             self._connection.execute("DELETE FROM schedule_holds WHERE fleet = ?", (fleet,))
         else:
             self._connection.execute(
-                "REPLACE INTO schedule_holds VALUES (?, ?)", (fleet, encode_part(hold))
+                "INSERT INTO schedule_holds VALUES (?, ?)"
+                " ON CONFLICT (fleet) DO UPDATE SET hold = excluded.hold",
+                (fleet, encode_part(hold)),
             )
         self._wrote = True
 
@@ -319,8 +312,9 @@ class WriteTransaction:
             changed[row.number] = before.after(row.entry, hash_)
             columns.append(row.columns(hash_))
         for number in changed:
-            if not self._locks.mine(number):
+            if not self._owners.mine(number):
                 raise InternalError(f"{run_id(number)}: written to without having been claimed")
+            self._storage.refuse_lost(number)
         self._changed.update(changed)
         self._appended.update(changed)
         self._rows.extend(columns)
@@ -332,6 +326,8 @@ class WriteTransaction:
 
     def forget(self, number: int) -> None:
         """Drop what is cached of a run that is released."""
+        if self._owners.mine(number) and self._storage.give_up(number):
+            self._wrote = True
         self._known.pop(number, None)
         self._lossy.discard(number)
         self._marks.forget(number)
@@ -342,15 +338,12 @@ class WriteTransaction:
         Raises:
             JournalError: the entries are in the journal, but must not be acknowledged: the files
                 are not where they were, or the marks cannot be written.
+            RetryError: nothing was written; carry out the calls again after `rollback`.
         """
-        self._write("INSERT INTO entries", self._rows)
-        self._write(
-            "REPLACE INTO standings", [_columns(*changed) for changed in self._changed.items()]
-        )
-        self._connection.execute("COMMIT")
         wrote = bool(self._changed) or self._wrote
+        self._storage.commit(self._rows, self._changed, wrote)
         if wrote:
-            self._presence.check()
+            self._storage.check()
             self._mark()
         self._known.update(self._changed)
         self._reset()
@@ -372,36 +365,26 @@ class WriteTransaction:
                 f"{self._marks.path}: the mark cannot be written: {error.strerror}"
             ) from error
 
-    def _write(self, into: str, rows: Sequence[tuple[Any, ...]]) -> None:
-        # Many rows to a statement: each execution releases the interpreter's lock, and with a busy
-        # event loop it takes 5 ms to acquire it again.
-        for first in range(0, len(rows), _ROWS):
-            some = rows[first : first + _ROWS]
-            statement = f"{into} VALUES {_placeholders(len(some), len(some[0]))}"
-            self._connection.execute(statement, tuple(chain.from_iterable(some)))
-
     def rollback(self) -> None:
-        """Write nothing of the transaction, and release the locks that it took."""
-        for number in self._locked:
-            self._locks.release(number)
+        """Write nothing of the transaction, and release the runs that it took."""
+        for number in self._taken:
+            self._owners.release(number)
         self._known.clear()
         self._reset()
-        if self._connection.in_transaction:
-            self._connection.execute("ROLLBACK")
+        self._storage.rollback()
 
     def _take(self, number: int, position: RunPosition) -> None:
         run = run_id(number)
-        if self._locks.mine(number):
+        if self._owners.mine(number):
             raise JournalError(f"run {run} is already driven, by this process ({os.getpid()})")
         try:
-            taken = self._locks.acquire(number)
+            taken = self._owners.acquire(number)
         except OSError as error:
             raise JournalError(f"run {run} cannot be locked: {error.strerror}") from error
         if not taken:
-            raise JournalError(
-                f"run {run} is driven by process {position.pid}, which is alive: end that first"
-            )
-        self._locked.append(number)
+            driver = self._storage.driver(number, position)
+            raise JournalError(f"run {run} is driven by {driver}, which is alive: end that first")
+        self._taken.append(number)
         try:
             self._marks.reserve(number)
         except OSError as error:
@@ -422,24 +405,17 @@ class WriteTransaction:
         self._changed.clear()
         self._rows.clear()
         self._appended.clear()
-        self._locked.clear()
+        self._taken.clear()
         self._wrote = False
 
 
-@cache
-def _placeholders(rows: int, columns: int) -> str:
-    return ", ".join([f"({', '.join('?' * columns)})"] * rows)
-
-
-def no_run(connection: sqlite3.Connection, number: int) -> JournalError:
+def no_run(connection: Connection, number: int) -> JournalError:
     """Return the error for a run that the journal does not have, or has no more."""
     found = deletions_in(connection, "WHERE run = ?", number)
     return JournalError(str(found[0])) if found else unknown_run(run_id(number))
 
 
-def deletions_in(
-    connection: sqlite3.Connection, where: str = "", *parameters: int
-) -> list[Deletion]:
+def deletions_in(connection: Connection, where: str = "", *parameters: int) -> list[Deletion]:
     """Return the deletions of a journal that a clause selects, in order of their runs' numbers."""
     rows = connection.execute(
         f"SELECT run, last_seq, deleted_us, deleted_by FROM deletions {where} ORDER BY run",
@@ -454,7 +430,8 @@ def mark_of(position: RunPosition) -> Mark:
     return Mark(position.epoch, position.last_seq, position.hash or NO_HASH, state)
 
 
-def _columns(number: int, s: RunPosition) -> tuple[Any, ...]:
+def position_columns(number: int, s: RunPosition) -> tuple[Any, ...]:
+    """Return the row of the table `standings` for a run at a position."""
     row = (
         number,
         s.epoch,

@@ -4,17 +4,15 @@ The thread owns the connection. It wakes each event loop once per transaction.
 """
 
 import asyncio
-import sqlite3
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from m2pem.errors import InternalError, JournalError, M2pemError
-from m2pem.journal.database import explained_error, is_transient
+from m2pem.journal.storage import RetryError, Storage
 from m2pem.journal.transaction import WriteTransaction
 
 T = TypeVar("T")
@@ -39,7 +37,7 @@ class GroupWriter:
     """
 
     transaction: WriteTransaction
-    path: Path
+    storage: Storage
     finish: Callable[[], None]
     commits: int = 0
     _failed: M2pemError | None = None
@@ -47,7 +45,9 @@ class GroupWriter:
 
     def start(self) -> None:
         """Start the thread, as a daemon: a process that never closes its journal can still end."""
-        threading.Thread(target=self._serve, name=f"journal {self.path}", daemon=True).start()
+        threading.Thread(
+            target=self._serve, name=f"journal {self.storage.place}", daemon=True
+        ).start()
 
     def submit(self, work: Callable[[WriteTransaction], T]) -> asyncio.Future[T]:
         """Submit a call; its result, or error, is set after the commit."""
@@ -93,30 +93,45 @@ class GroupWriter:
     def _transact(self, calls: Sequence[_Call]) -> M2pemError | None:
         """Write one transaction. An error that is returned says why nothing of it was written."""
         try:
+            while not self._write(calls):
+                self.transaction.rollback()
+        except JournalError as error:
+            return self._withdraw(error, for_good=True)
+        except self.storage.errors as error:
+            problem: M2pemError = self.storage.explained(error)
+            problem.__cause__ = error
+            return self._withdraw(problem, for_good=not self.storage.is_transient(error))
+        except Exception as error:
+            place = self.storage.place
+            problem = InternalError(f"{place}: the journal could not be written: {error!r}")
+            problem.__cause__ = error
+            return self._withdraw(problem, for_good=False)
+        return None
+
+    def _write(self, calls: Sequence[_Call]) -> bool:
+        """Carry out the calls; False: nothing was written, and they are to be carried out again."""
+        try:
             self.transaction.begin()
             for call in calls:
+                call.error = None
                 try:
                     call.result = call.work(self.transaction)
                 except M2pemError as error:
                     call.error = error
             if self.transaction.commit():
                 self.commits += 1
-        except JournalError as error:
-            return self._withdraw(error, for_good=True)
-        except sqlite3.Error as error:
-            problem: M2pemError = explained_error(error, self.path)
-            problem.__cause__ = error
-            return self._withdraw(problem, for_good=not is_transient(error))
-        except Exception as error:
-            problem = InternalError(f"{self.path}: the journal could not be written: {error!r}")
-            problem.__cause__ = error
-            return self._withdraw(problem, for_good=False)
-        return None
+        except RetryError:
+            return False
+        except self.storage.errors as error:
+            if self.storage.is_worth_a_retry(error):
+                return False
+            raise
+        return True
 
     def _withdraw(self, problem: M2pemError, for_good: bool) -> M2pemError:
         try:
             self.transaction.rollback()
-        except sqlite3.Error:
+        except self.storage.errors:
             for_good = True
         if not for_good:
             return problem

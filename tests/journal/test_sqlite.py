@@ -190,7 +190,7 @@ async def test_an_entry_of_a_newer_release_is_named(open_journal, tmp_path, monk
     async with opened(open_journal) as journal:
         run = await journal.create(HEADER)
         await journal.append([entry(run, 1)])
-        monkeypatch.setattr("m2pem.journal.sqlite.encode_body", of_a_newer_release)
+        monkeypatch.setattr("m2pem.journal.database_journal.encode_body", of_a_newer_release)
         await journal.append([entry(run, 2)])
     async with opened(open_journal) as journal:
         reading = journal.read(run)
