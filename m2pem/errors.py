@@ -121,5 +121,23 @@ class StaleEpochError(JournalError):
     """Another executive has claimed the run since; this one must stop driving it."""
 
 
+class StaleCommandError(M2pemError):
+    """A command of a lower epoch than its receiver has seen of the run: nothing was done.
+
+    `epoch`: of the command; `newest`: the highest that was seen.
+    """
+
+    code = "STALE_EPOCH"
+
+    def __init__(self, what: str, run: str, epoch: int, newest: int) -> None:
+        super().__init__(
+            f"{what} is refused: it has epoch {epoch} of {run}, and epoch {newest} was seen: "
+            "another executive drives the run"
+        )
+        self.run = run
+        self.epoch = epoch
+        self.newest = newest
+
+
 class InternalError(M2pemError):
     """A bug in m2pem: the run is held, nothing else is touched."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         BehaviorRequest,
         Connection,
         DetectingArbiter,
+        FencingArbiter,
         Limits,
         ReclaimingArbiter,
         ResolvedValue,
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from m2pem.api.connection_reader import ConnectionReader
     from m2pem.api.control import ControlEvent, MissionControl
     from m2pem.api.description import Description, Importance, Kind, describe
+    from m2pem.api.epoch_fence import EpochFence
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.health import HealthCheck, HealthStatus, listening_check
@@ -142,8 +144,8 @@ if TYPE_CHECKING:
 _MODULES = {
     "m2pem.api.arbiter": (
         "AddressedArbiter AdjustingArbiter Arbiter ArbiterContext BehaviorId BehaviorReport"
-        " BehaviorRequest Connection DetectingArbiter Limits ReclaimingArbiter ResolvedValue"
-        " SightedArbiter adjusts"
+        " BehaviorRequest Connection DetectingArbiter FencingArbiter Limits"
+        " ReclaimingArbiter ResolvedValue SightedArbiter adjusts"
     ),
     "m2pem.api.authoring": (
         "DataName Draft Editable MissionFiles MissionSource Outline OutlineElement"
@@ -156,6 +158,7 @@ _MODULES = {
     "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": "ControlEvent MissionControl",
     "m2pem.api.description": "Description Importance Kind describe",
+    "m2pem.api.epoch_fence": "EpochFence",
     "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
     "m2pem.api.health": "HealthCheck HealthStatus listening_check",
@@ -254,7 +257,9 @@ __all__ = [
     "Draft",
     "EastNorth",
     "Editable",
+    "EpochFence",
     "Fence",
+    "FencingArbiter",
     "Finding",
     "Fleet",
     "FleetBus",

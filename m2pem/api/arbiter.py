@@ -61,7 +61,10 @@ class ArbiterContext:
     metres). `teams`: members of each team, the lead first. `journal`: names the journal that the
     ids of behaviors belong to; with it, they are unique for ever. It is the same after a restart.
     `epoch_of`: the epoch with which this executive drives the run of a behavior; 0: it does not.
-    Commands whose call has no epoch, such as a query, carry it.
+    Commands whose call has no epoch, such as a query, carry it. `may_send`: whether an arbiter may
+    send on its own account: commands that it repeats, streams, the next step of a behavior. False
+    after this process was stopped for a while, until the journal has said that it still drives its
+    runs. What the executive calls is sent all the same, a hold above all.
     """
 
     clock: "Clock"
@@ -71,6 +74,7 @@ class ArbiterContext:
     teams: Mapping[str, tuple[ResourceId, ...]] = field(default_factory=dict)
     journal: UUID = field(default_factory=uuid4)
     epoch_of: Callable[[BehaviorId], int] = field(default=lambda _: 0)
+    may_send: Callable[[], bool] = field(default=lambda: True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +90,10 @@ class Limits:
 class BehaviorRequest:
     """Start `behavior` on `resources`. `start` is idempotent on `id`.
 
-    `epoch` is the run's: an arbiter refuses one lower than it has seen for the run. `parameters`
-    are resolved: SI units, geometries instead of names. `preempts`: behaviors that are being
-    cancelled and still hold a resource; the new one takes over from them.
+    `epoch` is the run's: an arbiter refuses one lower than it has seen for the run, with
+    `StaleCommandError`. `parameters` are resolved: SI units, geometries instead of names.
+    `preempts`: behaviors that are being cancelled and still hold a resource; the new one takes over
+    from them.
     """
 
     id: BehaviorId
@@ -125,10 +130,15 @@ class BehaviorReport:
     held: bool = False
     not_begun: bool = False
     remaining: Mapping[str, Value] | None = None
+    epoch: int = 0
 
 
 class Arbiter(Protocol):
-    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`."""
+    """Constructed as `Arbiter(connections: Mapping[ResourceId, Connection], context)`.
+
+    `start` and `cancel` of a lower epoch than was seen of the run raise `StaleCommandError`, and do
+    nothing: another executive drives the run. `hold` is never refused.
+    """
 
     @property
     def capabilities(self) -> ArbiterCapabilities:
@@ -158,6 +168,7 @@ class Arbiter(Protocol):
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the state of a behavior, by querying the vehicle. UNKNOWN if it is not known.
 
+        Commands of an executive that drove the run before are refused from now on.
         If an earlier executive has held the vehicle, the answer says `held`, or UNKNOWN if the
         vehicle cannot report that. `resume` lets it go on.
         """
@@ -232,6 +243,30 @@ class ReclaimingArbiter(Protocol):
         ...
 
 
+class FencingArbiter(Protocol):
+    """An arbiter that passes the epochs of runs on to its vehicles, and can let go of behaviors.
+
+    Without this, a vehicle learns of a takeover by the first command for it, and an executive that
+    was replaced ends its own behaviors there by closing all arbiters only.
+    """
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Have every vehicle refuse commands of the run that have a lower epoch.
+
+        The executive calls it when it has taken the run over, before it asks for any behavior.
+        """
+        ...
+
+    async def disown(self, run: str) -> None:
+        """Send nothing more for the behaviors of a run, and forget them: another executive drives
+        it.
+
+        Streams and repeated commands end, and the vehicles are not commanded: they go on with what
+        they do. Reports about it are ignored.
+        """
+        ...
+
+
 class DetectingArbiter(Protocol):
     """An arbiter that knows from their connections which payloads are detectors, beside those that
     the fleet marks with `detector: true`."""
@@ -260,6 +295,11 @@ def names_addresses(arbiter: Arbiter) -> TypeGuard[AddressedArbiter]:
 def reclaims(arbiter: Arbiter) -> TypeGuard[ReclaimingArbiter]:
     """Whether an arbiter declares that it ends what a vehicle goes on with after a lost link."""
     return arbiter_capabilities(arbiter).reclaims
+
+
+def fences(arbiter: Arbiter) -> TypeGuard[FencingArbiter]:
+    """Whether an arbiter declares that it passes epochs on, and lets go of behaviors."""
+    return arbiter_capabilities(arbiter).fences
 
 
 def detects(arbiter: Arbiter) -> TypeGuard[DetectingArbiter]:

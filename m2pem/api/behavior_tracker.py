@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from m2pem.api import behavior_parameters
 from m2pem.api.arbiter import BehaviorId, BehaviorReport, BehaviorRequest
 from m2pem.api.async_queue import AsyncQueue
-from m2pem.api.epoch_fence import EpochFence
+from m2pem.api.epoch_fence import EpochFence, run_of
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.mission.values import Value
 from m2pem.suggestions import suggest
@@ -59,11 +59,14 @@ class BehaviorTracker:
     ) -> bool:
         """Whether to do what `Arbiter.start` was asked. If so, it is reported ACCEPTED.
 
-        False: it is known already, or of a past epoch; or it was reported REJECTED, because the
+        False: it is known already; or it was reported REJECTED, because the
         behavior or a parameter does not fit the catalogue, or a resource is busy. Behaviors that it
         preempts are reported CANCELLED: the new command must end them on the vehicle. `refusal`
         returns why a request that fits the catalogue cannot be done; "" if it can. A callable
         `native_ref` is called only if the request is accepted.
+
+        Raises:
+            StaleCommandError: another executive drives the run.
         """
         if not self._is_new(request):
             return False
@@ -83,20 +86,47 @@ class BehaviorTracker:
         return True
 
     def may_cancel(self, behavior: BehaviorId, epoch: int) -> bool:
-        """Whether to do what `Arbiter.cancel` was asked: it goes on, and the epoch is not past."""
+        """Whether to do what `Arbiter.cancel` was asked: the behavior goes on.
+
+        Raises:
+            StaleCommandError: another executive drives the run.
+        """
         return self._may("cancel", behavior, epoch)
 
     def may_adjust(self, behavior: BehaviorId, epoch: int) -> bool:
         """The same for what `AdjustingArbiter.adjust` was asked."""
         return self._may("adjustment", behavior, epoch)
 
+    def fence(self, behavior: BehaviorId, epoch: int) -> None:
+        """Refuse lower epochs of a run from now on; `behavior`: one of it, or the run itself.
+
+        `Arbiter.query` calls it with `ArbiterContext.epoch_of`, and so does `fence`.
+        """
+        self._epochs.admit(behavior, epoch)
+
+    def disown(self, run: str) -> list[BehaviorId]:
+        """Forget the behaviors of a run that go on, without a report; returns them."""
+        ids = [
+            id_
+            for id_, entry in self._entries.items()
+            if run_of(id_) == run and not entry.last.state.terminal
+        ]
+        for id_ in ids:
+            self._logger.warning("%s: let go of, as another executive drives %s", id_, run)
+            del self._entries[id_]
+        self._holders = {each: id_ for each, id_ in self._holders.items() if id_ not in ids}
+        return ids
+
     def last(self, behavior: BehaviorId) -> BehaviorReport:
-        """Return the last report of a behavior; UNKNOWN, with number 0, without one."""
-        entry = self._entries.get(behavior)
+        """Return the last report of a behavior; UNKNOWN, with number 0, without one.
+
+        It names the highest epoch that was seen of the run.
+        """
+        entry, epoch = self._entries.get(behavior), self._epochs.newest(behavior)
         if entry is None:
             reason = "this arbiter knows no such behavior"
-            return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason)
-        return entry.last
+            return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason, epoch=epoch)
+        return replace(entry.last, epoch=epoch)
 
     def reports(self) -> AsyncIterator[BehaviorReport]:
         """Return the stream of reports, for `Arbiter.reports`."""
@@ -187,18 +217,14 @@ class BehaviorTracker:
     # --- inside ---------------------------------------------------------------------------------
 
     def _is_new(self, request: BehaviorRequest) -> bool:
-        if not self._epochs.admit(request.id, request.epoch):
-            self._logger.warning("start of %s ignored: epoch %d is past", request.id, request.epoch)
-            return False
+        self._epochs.require("start", request.id, request.epoch)
         known = self._entries.get(request.id)
         # A higher epoch that starts an ended behavior again means it: it is another executive.
         return known is None or (known.last.state.terminal and request.epoch > known.epoch > 0)
 
     def _may(self, what: str, behavior: BehaviorId, epoch: int) -> bool:
+        self._epochs.require(what, behavior, epoch)
         entry = self._entries.get(behavior)
-        if not self._epochs.admit(behavior, epoch):
-            self._logger.warning("%s of %s ignored: epoch %d is past", what, behavior, epoch)
-            return False
         return entry is not None and not entry.last.state.terminal
 
     def _misfit(self, request: BehaviorRequest) -> str:

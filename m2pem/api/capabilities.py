@@ -13,6 +13,7 @@ ARBITER_METHODS = {
     "addresses": "addresses",
     "reclaims": "reclaim",
     "detects": "detectors",
+    "fences": "fence",
 }
 """The member that an arbiter must have to declare a capability, by the capability."""
 
@@ -28,9 +29,9 @@ class ArbiterCapabilities:
     """What an arbiter can do beyond `m2pem.api.Arbiter`.
 
     `one_vehicle`: no request may be for several vehicles; where a mission has several do the same,
-    each of them is asked for its own. `adjusts`, `sights`, `addresses`, `reclaims`, `detects`: it
-    has what `AdjustingArbiter`, `SightedArbiter`, `AddressedArbiter`, `ReclaimingArbiter` or
-    `DetectingArbiter` describes.
+    each of them is asked for its own. `adjusts`, `sights`, `addresses`, `reclaims`, `detects`,
+    `fences`: it has what `AdjustingArbiter`, `SightedArbiter`, `AddressedArbiter`,
+    `ReclaimingArbiter`, `DetectingArbiter` or `FencingArbiter` describes.
     """
 
     one_vehicle: bool = False
@@ -39,6 +40,7 @@ class ArbiterCapabilities:
     addresses: bool = False
     reclaims: bool = False
     detects: bool = False
+    fences: bool = False
 
 
 @dataclass(frozen=True, slots=True)

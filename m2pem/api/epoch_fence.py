@@ -1,24 +1,84 @@
-"""Which executive may still command a run."""
+"""Which executive may still command a run: the epoch of each command, compared at its receiver."""
+
+import json
+import logging
+import os
+from pathlib import Path
 
 from m2pem.api.arbiter import BehaviorId
+from m2pem.errors import StaleCommandError
 
 REMEMBERED = 10_000
 
+log = logging.getLogger("m2pem.epochs")
+
+
+def run_of(behavior: BehaviorId) -> str:
+    """Return the run of a behavior: "r1" of "r1.b3", and of "r1.b3.evsg1", a team's part of it."""
+    return behavior.partition(".")[0]
+
 
 class EpochFence:
-    """The highest epoch seen for each run; the runs seen longest ago are forgotten."""
+    """The highest epoch seen for each run; the runs seen longest ago are forgotten.
 
-    def __init__(self) -> None:
-        self._highest: dict[str, int] = {}
+    `file`: where the epochs are kept across restarts, as JSON, readable by its owner alone; None:
+    they are forgotten with the process. A file that cannot be read or written is logged, and the
+    fence goes on in memory.
+    """
+
+    def __init__(self, file: Path | None = None) -> None:
+        self._file = file
+        self._highest: dict[str, int] = {} if file is None else _read(file)
+
+    def newest(self, behavior: BehaviorId) -> int:
+        """Return the highest epoch seen for the run of a behavior, or for a run; 0: none was."""
+        return self._highest.get(run_of(behavior), 0)
 
     def admit(self, behavior: BehaviorId, epoch: int) -> bool:
-        """Whether a command of this epoch is good.
+        """Whether a command of this epoch is good. A higher one than before is remembered.
 
-        "r1.b3" is a behavior of run r1, and "r1.b3.evsg1" a team's part of that behavior.
+        `behavior`: of the command, or the run itself.
         """
-        run = behavior.partition(".")[0]
-        highest = max(epoch, self._highest.pop(run, epoch))
-        self._highest[run] = highest
+        run = run_of(behavior)
+        before = self._highest.pop(run, None)
+        highest = self._highest[run] = epoch if before is None else max(epoch, before)
         if len(self._highest) > REMEMBERED:
             del self._highest[next(iter(self._highest))]
+        if self._file is not None and highest != before:
+            _write(self._file, self._highest)
         return epoch >= highest
+
+    def require(self, what: str, behavior: BehaviorId, epoch: int) -> None:
+        """Check that a command is good; `what` names it: "start".
+
+        Raises:
+            StaleCommandError: a higher epoch was seen, which the error names.
+        """
+        if not self.admit(behavior, epoch):
+            raise StaleCommandError(
+                f"{what} of {behavior}", run_of(behavior), epoch, self.newest(behavior)
+            )
+
+
+def _read(file: Path) -> dict[str, int]:
+    try:
+        content = json.loads(file.read_bytes())
+        return {str(run): int(epoch) for run, epoch in content.items()}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        log.warning("%s: the epochs of earlier commands cannot be read: %s", file, error)
+        return {}
+
+
+def _write(file: Path, epochs: dict[str, int]) -> None:
+    new = file.with_name(f"{file.name}.new")
+    try:
+        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
+        with os.fdopen(descriptor, "w") as out:
+            json.dump(epochs, out)
+            out.flush()
+            os.fsync(descriptor)
+        new.replace(file)
+    except OSError as error:
+        log.warning("%s: the epoch of a command cannot be kept: %s", file, error.strerror)

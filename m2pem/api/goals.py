@@ -153,6 +153,7 @@ class GoalArbiter:
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the known state; after a restart, find the behavior by the resources' goals."""
+        self._ledger.fence(behavior, self.context.epoch_of(behavior))
         holders = [resource for resource, goal in self._goals.items() if goal == native_ref]
         if native_ref and holders and native_ref not in self._behaviors:
             self._behaviors[native_ref] = behavior

@@ -17,7 +17,7 @@ from m2pem.api.arbiter import (
     ResolvedValue,
 )
 from m2pem.api.capabilities import ArbiterCapabilities
-from m2pem.api.epoch_fence import EpochFence
+from m2pem.api.epoch_fence import EpochFence, run_of
 from m2pem.api.telemetry import Detection, PayloadState, VehicleState
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.simulation.broadcast import DEFAULT_HZ, Broadcast
@@ -104,7 +104,7 @@ class SimArbiter:
     `broadcast`, and use `script`, `inject`, `lose_link` and `restore_link`.
     """
 
-    capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True)
+    capabilities = ArbiterCapabilities(adjusts=True, sights=True, addresses=True, fences=True)
 
     def __init__(
         self,
@@ -214,9 +214,7 @@ class SimArbiter:
     async def start(self, request: BehaviorRequest) -> None:
         """Start a behavior; see `BehaviorRequest`."""
         now_us = self._catch_up()
-        if not self._epochs.admit(request.id, request.epoch):
-            self._logger.warning("start of %s ignored: epoch %d is past", request.id, request.epoch)
-            return
+        self._require("start", request.id, request.epoch)
         known = self._memory.executions.get(request.id)
         if known is not None and (not known.ended or request.epoch <= known.epoch):
             known.epoch = max(known.epoch, request.epoch)
@@ -233,9 +231,7 @@ class SimArbiter:
     async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
         """End a behavior: a vehicle slows down first, a payload ends at once."""
         now_us = self._catch_up()
-        if not self._epochs.admit(behavior, epoch):
-            self._logger.warning("cancel of %s ignored: epoch %d is past", behavior, epoch)
-            return
+        self._require("cancel", behavior, epoch)
         execution = self._memory.executions.get(behavior)
         if execution is None or execution.ended:
             return
@@ -250,11 +246,10 @@ class SimArbiter:
         now_us = self._catch_up()
         speed = parameters.get("speed")
         execution = self._memory.executions.get(behavior)
-        if not self._epochs.admit(behavior, epoch):
-            self._logger.warning("adjust of %s ignored: epoch %d is past", behavior, epoch)
-        elif execution is None or execution.ended:
+        self._require("adjustment", behavior, epoch)
+        if execution is None or execution.ended:
             return
-        elif isinstance(speed, int | float) and speed > 0:
+        if isinstance(speed, int | float) and speed > 0:
             requested = float(speed)
             self._reach.command(
                 execution,
@@ -264,17 +259,22 @@ class SimArbiter:
             )
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
-        """The report that holds now; UNKNOWN, with number 0, if the behavior is not known.
-
-        Commands of an executive that drove the run before are refused from now on.
-        """
+        """The report that holds now; UNKNOWN, with number 0, if the behavior is not known."""
         self._catch_up()
-        self._epochs.admit(behavior, self._context.epoch_of(behavior))
-        execution = self._memory.executions.get(behavior)
+        self._admit(behavior, self._context.epoch_of(behavior))
+        execution, epoch = self._memory.executions.get(behavior), self._epochs.newest(behavior)
         if execution is None or execution.last is None:
             reason = "the simulation knows no such behavior"
-            return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason)
-        return replace(execution.last, held=any(part.body.held for part in execution.parts))
+            return BehaviorReport(behavior, 0, BehaviorState.UNKNOWN, reason=reason, epoch=epoch)
+        held = any(part.body.held for part in execution.parts)
+        return replace(execution.last, held=held, epoch=epoch)
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Refuse commands of lower epochs of a run; the state files keep that."""
+        self._admit(run, epoch)
+
+    async def disown(self, run: str) -> None:
+        """Do nothing: simulated vehicles go on by themselves, and nothing is sent to them again."""
 
     async def hold(self, resource: ResourceId) -> None:
         """Stop the resource, keeping its behavior. A vehicle brakes on its path."""
@@ -368,6 +368,17 @@ class SimArbiter:
         now_us = self._clock.now_us()
         self._event_queue.run_due(now_us)
         return now_us
+
+    def _admit(self, behavior: BehaviorId, epoch: int) -> None:
+        before = self._epochs.newest(behavior)
+        self._epochs.admit(behavior, epoch)
+        if epoch > max(before, 1):  # the first is kept with the behaviors of the run
+            for file in dict.fromkeys(self._memory.files.values()):
+                file.keep_epoch(run_of(behavior), epoch)
+
+    def _require(self, what: str, behavior: BehaviorId, epoch: int) -> None:
+        self._admit(behavior, epoch)
+        self._epochs.require(what, behavior, epoch)
 
     def _start(self, execution: Execution, request: BehaviorRequest, now_us: int) -> None:
         execution.watch = Warp(now_us)
@@ -464,6 +475,9 @@ class SimArbiter:
         self._memory.files = by_resource
         for execution in executions:
             self._epochs.admit(execution.id, execution.epoch)
+        for file in files.values():
+            for run, epoch in file.epochs().items():
+                self._epochs.admit(run, epoch)
         self._links.muted = True
         self._simulation.restore(executions, now_us)
         return began_us, found

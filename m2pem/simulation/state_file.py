@@ -1,5 +1,6 @@
 """What the simulation keeps of behaviors and effects: bounded in memory, or in a file."""
 
+import json
 import os
 import sqlite3
 from collections import deque
@@ -36,6 +37,8 @@ from m2pem.simulation.vehicles import SimVehicle
 FORMAT = "1"
 REMEMBERED = 10_000
 """So many behaviors that ended are kept."""
+
+REMEMBERED_EPOCHS = 1_000
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -151,6 +154,22 @@ class StateFile:
     def set_meta(self, key: str, value: str) -> None:
         """Keep `value` under `key`."""
         self._connection.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
+
+    def epochs(self) -> dict[str, int]:
+        """The highest epochs that were kept, by run of this journal."""
+        return dict(json.loads(self.meta(self._epochs_key, "{}")))
+
+    def keep_epoch(self, run: str, epoch: int) -> None:
+        """Keep the highest epoch of a run; those kept longest ago are forgotten."""
+        kept = self.epochs()
+        kept.pop(run, None)
+        kept[run] = epoch
+        newest = dict(list(kept.items())[-REMEMBERED_EPOCHS:])
+        self.set_meta(self._epochs_key, json.dumps(newest))
+
+    @property
+    def _epochs_key(self) -> str:
+        return f"epochs {self._prefix}"
 
     def save(
         self, bodies: Iterable[Body], execution: Execution | None, effects: Iterable[Effect]

@@ -52,7 +52,7 @@ class Teams:
     parts to `report_received`, and faults of members to `fault`.
     """
 
-    capabilities = ArbiterCapabilities()
+    capabilities = ArbiterCapabilities(fences=True)
 
     def __init__(
         self,
@@ -151,6 +151,7 @@ class Teams:
         Else it is UNKNOWN; its running parts are kept for a `start` with the same id, which adopts
         them, or a `cancel`.
         """
+        self._ledger.fence(behavior, self._context.epoch_of(behavior))
         request = self._requests.pop(behavior, None)
         known = self._ledger.last(behavior)
         if known.state is not BehaviorState.UNKNOWN or request is None:
@@ -171,6 +172,16 @@ class Teams:
         adopted.found(found.reports, kept, halts=not held)
         adopted.start()
         return replace(self._ledger.last(behavior), held=held)
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Refuse lower epochs of a run; the arbiters of the members have a fence of their own."""
+        self._ledger.fence(run, epoch)
+
+    async def disown(self, run: str) -> None:
+        """End the formation controllers of a run. Vehicles go on with their parts."""
+        for name in self._ledger.disown(run):
+            if (behavior := self._behaviors.pop(name, None)) is not None:
+                behavior.close()
 
     async def hold(self, resource: ResourceId) -> None:
         """Hold a member for a run: the whole team waits."""

@@ -2,6 +2,8 @@
 
 import logging
 
+import pytest
+
 from m2pem.api import (
     BehaviorReport,
     BehaviorRequest,
@@ -13,6 +15,7 @@ from m2pem.api import (
     ParameterSpec,
     ResourceId,
 )
+from m2pem.errors import StaleCommandError
 
 UGV1 = ResourceId("ugv1")
 SPEED = ParameterSpec("speed", ParameterKind.SPEED, minimum=0.0)
@@ -95,13 +98,13 @@ def test_a_reference_is_not_made_for_what_is_refused(virtual) -> None:
     assert [report.native_ref for report in reported(book, virtual)] == [None, "native"]
 
 
-def test_what_goes_on_may_be_adjusted_by_its_own_executive_only(caplog) -> None:
+def test_what_goes_on_may_be_adjusted_by_its_own_executive_only() -> None:
     book = ledger()
     assert not book.may_adjust("r1.b1", 2)
     assert book.admit(request("r1.b1", epoch=2))
     assert book.may_adjust("r1.b1", 2)
-    assert not book.may_adjust("r1.b1", 1)
-    assert "adjustment of r1.b1 ignored: epoch 1 is past" in caplog.text
+    with pytest.raises(StaleCommandError, match=r"adjustment of r1.b1 .* epoch 2 was seen"):
+        book.may_adjust("r1.b1", 1)
     book.end("r1.b1", BehaviorState.SUCCEEDED)
     assert not book.may_adjust("r1.b1", 2)
 
@@ -121,3 +124,25 @@ def test_a_reference_that_is_known_late_is_in_what_is_reported_then(virtual) -> 
         (3, BehaviorState.RUNNING, "two"),
         (4, BehaviorState.SUCCEEDED, "two"),
     ]
+
+
+def test_a_fenced_run_refuses_its_past_executive_and_names_the_newer_one() -> None:
+    book = ledger()
+    assert book.admit(request("r1.b1"))
+    book.fence("r1", 3)
+    with pytest.raises(StaleCommandError, match=r"start of r1.b2 .* epoch 1 of r1, and epoch 3"):
+        book.admit(request("r1.b2"))
+    with pytest.raises(StaleCommandError):
+        book.may_cancel("r1.b1", 2)
+    assert book.last("r1.b1").epoch == book.last("r1.b2").epoch == 3
+    assert book.may_cancel("r1.b1", 3)
+
+
+def test_what_is_disowned_is_forgotten_without_a_report(virtual) -> None:
+    book = ledger()
+    assert book.admit(request("r1.b1"))
+    assert book.disown("r2") == []
+    assert book.disown("r1") == ["r1.b1"]
+    assert book.holder(UGV1) is None
+    book.end("r1.b1", BehaviorState.FAILED)
+    assert [each.state for each in reported(book, virtual)] == [BehaviorState.ACCEPTED]

@@ -9,6 +9,7 @@ import pytest
 
 from m2pem.api.clock import Clock, run_virtual
 from m2pem.api.telemetry import VehicleState
+from m2pem.errors import StaleCommandError
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.geometry import Point, VehiclePosition
 from m2pem.simulation.arbiters import SimArbiter
@@ -66,6 +67,21 @@ def test_a_behavior_goes_on_while_nobody_is_there(state: str) -> None:
         ]
 
     lives(state, drive, again, gap_s=6.0)
+
+
+def test_an_epoch_that_was_only_announced_is_kept_across_a_restart(state: str) -> None:
+    async def taken_over(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+        await drive(bench, arbiter)
+        await arbiter.fence("r1", 4)
+
+    async def again(bench: ArbiterHarness, arbiter: SimArbiter) -> None:
+        with pytest.raises(StaleCommandError, match="epoch 4 was seen"):
+            await arbiter.cancel("r1.b1", 3)
+        assert (await arbiter.query("r1.b1", "r1.b1")).epoch == 4
+        await arbiter.cancel("r1.b1", 4)
+        assert (await bench.ended("r1.b1", 100)).state is BehaviorState.CANCELLED
+
+    lives(state, taken_over, again)
 
 
 def test_a_fault_that_has_struck_does_not_strike_again_after_a_restart(state: str) -> None:

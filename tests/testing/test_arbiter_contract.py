@@ -114,6 +114,26 @@ class Timeless(SimArbiter):
         await super().cancel(behavior, 9)
 
 
+class StartsOne(SimArbiter):
+    async def start(self, request: BehaviorRequest) -> None:
+        if not self.effects:
+            await super().start(request)
+
+
+class Unfenced(SimArbiter):
+    async def query(self, behavior: str, native_ref: str | None) -> BehaviorReport:
+        return dataclasses.replace(await super().query(behavior, native_ref), epoch=0)
+
+    async def fence(self, run: str, epoch: int) -> None:
+        pass
+
+
+class CancelsDisowned(SimArbiter):
+    async def disown(self, run: str) -> None:
+        for effect in self.effects:
+            await super().cancel(effect.behavior, 9)
+
+
 class NeverCancels(SimArbiter):
     async def cancel(self, behavior: str, epoch: int) -> None:
         pass
@@ -297,6 +317,10 @@ FINDS = [
     (HidesHolds, "a_vehicle_that_another_arbiter_has_held_is_reported_as_held"),
     (Timeless, "a_start_of_a_past_epoch_is_refused"),
     (Timeless, "a_cancel_of_a_past_epoch_is_refused"),
+    (StartsOne, "a_start_of_the_same_or_a_newer_epoch_is_accepted"),
+    (Unfenced, "a_query_names_the_epoch_that_was_seen"),
+    (Unfenced, "a_takeover_refuses_the_past_executive_for_every_vehicle"),
+    (CancelsDisowned, "a_vehicle_goes_on_with_what_is_disowned"),
     (NeverHolds, "hold_stops_the_vehicle_within_the_declared_bound"),
     (Hasty, "hold_stops_the_vehicle_within_the_declared_bound"),
     (NeverHolds, "resume_goes_on_with_the_behavior"),

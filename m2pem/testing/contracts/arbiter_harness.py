@@ -23,6 +23,7 @@ from m2pem.api.arbiter import (
 )
 from m2pem.api.clock import Clock, SystemClock, run_virtual
 from m2pem.api.telemetry import LinkState, PayloadState, TeamState, VehicleState
+from m2pem.errors import StaleCommandError
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.telemetry.bus import Bus
 from m2pem.testing.contracts.contract import Contract
@@ -33,11 +34,12 @@ JOURNAL = UUID("3f0e7d0a-6a51-4f5c-9a2c-0c1a7b1f2d11")
 
 
 def context(
-    clock: Clock, teams: Mapping[str, tuple[ResourceId, ...]] | None = None
+    clock: Clock, teams: Mapping[str, tuple[ResourceId, ...]] | None = None, epoch: int = 0
 ) -> ArbiterContext:
-    """Return a context as an executive gives it to an arbiter."""
+    """Return a context as an executive gives it to an arbiter; `epoch`: with which it drives every
+    run, 0: it drives none."""
     logger = logging.getLogger("m2pem.testing")
-    return ArbiterContext(clock, Bus(), logger, ORIGIN, teams or {}, JOURNAL)
+    return ArbiterContext(clock, Bus(), logger, ORIGIN, teams or {}, JOURNAL, lambda _: epoch)
 
 
 class ArbiterHarness:
@@ -280,6 +282,20 @@ async def start(
     """Start a behavior of the case."""
     name, parameters = behavior
     await harness.start(id_, name, *resources, **options, **dict[str, Any](parameters))
+
+
+async def refusal(call: Awaitable[None]) -> str:
+    """Make a call of a past epoch; returns the text of its refusal.
+
+    Raises:
+        AssertionError: it was not refused, or without the code.
+    """
+    try:
+        await call
+    except StaleCommandError as error:
+        assert error.code == "STALE_EPOCH", error.code
+        return str(error)
+    raise AssertionError("a command of a past epoch raises StaleCommandError")
 
 
 def terminal(harness: ArbiterHarness, id_: str) -> list[BehaviorState]:

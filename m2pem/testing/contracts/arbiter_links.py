@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from m2pem.api.arbiter import reclaims
+from m2pem.api.arbiter import adjusts, fences, reclaims
 from m2pem.api.clock import Clock
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.testing.contracts.arbiter_harness import (
@@ -21,6 +21,7 @@ from m2pem.testing.contracts.arbiter_harness import (
     is_at_rest,
     is_moving,
     link_is_up,
+    refusal,
     speed,
     start,
     terminal,
@@ -112,30 +113,109 @@ class ArbiterLinks(ArbiterFixtures):
     def test_a_start_of_a_past_epoch_is_refused(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """Another executive has taken the run over; other runs are not concerned."""
+        """Another executive has taken the run over: `StaleCommandError` names its epoch. Other runs
+        are not concerned."""
 
         async def main(harness: ArbiterHarness) -> None:
             await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
             await harness.running("r1.b1")
-            await start(harness, "r1.b2", case.long, case.other, epoch=1)
+            late = start(harness, "r1.b2", case.long, case.other, epoch=1)
+            assert "epoch 2" in await refusal(late)
             await harness.clock.sleep(case.watch_s)
-            assert BehaviorState.RUNNING not in harness.states_of("r1.b2")
+            assert harness.of("r1.b2") == []
             await start(harness, "r2.b1", case.long, case.other, epoch=1)
             await harness.running("r2.b1", 10)
+
+        with_harness(make_arbiter, run, main)
+
+    @needs("second vehicle")
+    def test_a_start_of_the_same_or_a_newer_epoch_is_accepted(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """A takeover leaves the other vehicles of the run as they are."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
+            await harness.running("r1.b1")
+            await start(harness, "r1.b2", case.long, case.other, epoch=2)
+            await harness.running("r1.b2", 10)
+            await harness.arbiter.cancel("r1.b2", 3)
+            await harness.ended("r1.b2", 60)
+            assert not terminal(harness, "r1.b1"), "only r1.b2 was cancelled"
 
         with_harness(make_arbiter, run, main)
 
     def test_a_cancel_of_a_past_epoch_is_refused(
         self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
     ) -> None:
-        """Another executive has taken the run over."""
+        """Another executive has taken the run over; `adjust` is refused in the same way."""
 
         async def main(harness: ArbiterHarness) -> None:
+            arbiter = harness.arbiter
             await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
             await harness.running("r1.b1")
-            await harness.arbiter.cancel("r1.b1", 1)
+            assert "epoch 2" in await refusal(arbiter.cancel("r1.b1", 1))
+            if adjusts(arbiter):
+                assert "epoch 2" in await refusal(arbiter.adjust("r1.b1", 1, {"speed": 1.0}))
             await harness.clock.sleep(case.watch_s)
             assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
+
+        with_harness(make_arbiter, run, main)
+
+    def test_a_query_names_the_epoch_that_was_seen(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """It is that of the executive that asks, or a newer one, and it refuses past ones."""
+
+        async def main(clock: Clock) -> None:
+            async with ArbiterHarness(make_arbiter(context(clock, epoch=3)), clock) as harness:
+                await start(harness, "r1.b1", case.long, case.vehicle, epoch=2)
+                await harness.running("r1.b1")
+                reference = harness.of("r1.b1")[-1].native_ref
+                assert (await harness.arbiter.query("r1.b1", reference)).epoch == 3
+                assert "epoch 3" in await refusal(harness.arbiter.cancel("r1.b1", 2))
+                await harness.arbiter.cancel("r1.b1", 5)
+                assert (await harness.arbiter.query("r1.b1", reference)).epoch == 5
+
+        run(main)
+
+    @needs("second vehicle")
+    def test_a_takeover_refuses_the_past_executive_for_every_vehicle(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """Also for one that the new executive has commanded nothing yet."""
+
+        async def main(clock: Clock) -> None:
+            async with ArbiterHarness(make_arbiter(context(clock, epoch=2)), clock) as harness:
+                arbiter = harness.arbiter
+                await start(harness, "r1.b1", case.long, case.vehicle, epoch=1)
+                await harness.running("r1.b1")
+                if fences(arbiter):
+                    await arbiter.fence("r1", 2)
+                else:
+                    await arbiter.query("r1.b1", harness.of("r1.b1")[-1].native_ref)
+                late = start(harness, "r1.b2", case.long, case.other, epoch=1)
+                assert "epoch 2" in await refusal(late)
+
+        run(main)
+
+    @needs("telemetry")
+    def test_a_vehicle_goes_on_with_what_is_disowned(
+        self, make_arbiter: MakeArbiter, case: ArbiterCase, run: Callable[[Main], None]
+    ) -> None:
+        """`disown`: another executive drives the run, so that nothing is cancelled here."""
+
+        async def main(harness: ArbiterHarness) -> None:
+            arbiter = harness.arbiter
+            if not fences(arbiter):
+                return
+            await start(harness, "r1.b1", case.long, case.vehicle)
+            moving = await harness.until(lambda: is_moving(harness, case), 30)
+            assert moving, "the long behavior must move the vehicle"
+            await arbiter.disown("r1")
+            assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
+            await harness.clock.sleep(case.watch_s / 2)
+            assert speed(harness, case.vehicle) > case.standing_m_s, "it was stopped"
 
         with_harness(make_arbiter, run, main)
 

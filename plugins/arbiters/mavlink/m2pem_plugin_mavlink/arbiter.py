@@ -264,6 +264,7 @@ class MavlinkArbiter:
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the last report or, after a restart, the state that the vehicle shows. Only
         questions are sent to the vehicle."""
+        self._tracker.fence(behavior, self._context.epoch_of(behavior))
         known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
@@ -348,7 +349,7 @@ class MavlinkArbiter:
 
         controller = self._controllers[checkpoint.resource]
         vehicle = controller.vehicle
-        unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
+        unknown = replace(self._tracker.last(id_), native_ref=reference, reason="")
         if checkpoint.behavior not in BEHAVIORS:
             return replace(unknown, reason=f"the behavior '{checkpoint.behavior}' no longer exists")
         if not await controller.wait_until_known(RECEIVED_WITHIN_S):

@@ -166,6 +166,7 @@ class PtzArbiter:
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the last report, or after a restart, what the direction of the camera shows."""
+        self._tracker.fence(behavior, self._context.epoch_of(behavior))
         known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
@@ -224,7 +225,7 @@ class PtzArbiter:
         from m2pem_plugin_ptz.behaviors.behavior import BehaviorFailedError  # noqa: PLC0415
 
         camera = self._cameras[checkpoint.resource]
-        unknown = BehaviorReport(id_, 0, BehaviorState.UNKNOWN, native_ref=reference)
+        unknown = replace(self._tracker.last(id_), native_ref=reference, reason="")
         if checkpoint.behavior not in BEHAVIORS:
             return replace(unknown, reason=f"the behavior '{checkpoint.behavior}' no longer exists")
         if not await camera.wait_for_ptz(FIRST_CONTACT_WITHIN_S):

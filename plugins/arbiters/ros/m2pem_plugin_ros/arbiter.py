@@ -234,6 +234,7 @@ class RosArbiter:
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the last report, or after a restart, what the vehicle answers. No behavior is
         started."""
+        self._tracker.fence(behavior, self._context.epoch_of(behavior))
         known = self._tracker.last(behavior)
         if known.state is not BehaviorState.UNKNOWN:
             return known
@@ -375,6 +376,7 @@ class RosArbiter:
             outcome.reason,
             reference,
             outcome.outputs,
+            epoch=self._tracker.last(behavior).epoch,
         )
 
     async def _attend(self) -> None:
