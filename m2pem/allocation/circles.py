@@ -11,17 +11,18 @@ from dataclasses import dataclass
 @dataclass(frozen=True, slots=True)
 class Waiting:
     """A request that waits. `needed`: by each role, how many more resources it needs than are free,
-    and the runs that hold one for as long as they do not go on; None stands for a holder that will
-    release its resource by itself, or for a resource that is lost or with an operator."""
+    and how many each run holds for as long as it does not go on; None stands for holders that will
+    release their resources by themselves, and for resources that are lost or with an operator."""
 
     request: str
     run: str
-    needed: tuple[tuple[int, tuple[str | None, ...]], ...]
+    needed: tuple[tuple[int, Mapping[str | None, int]], ...]
 
     def can_be_met(self, stuck: Collection[str]) -> bool:
         """Whether its roles can be filled though some runs hold what they have for ever."""
         return all(
-            sum(holder is None or holder not in stuck for holder in holders) >= count
+            sum(n for holder, n in holders.items() if holder is None or holder not in stuck)
+            >= count
             for count, holders in self.needed
         )
 

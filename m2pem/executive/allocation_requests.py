@@ -1,5 +1,6 @@
 """Requests for resources, as the allocator looks at them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from m2pem.allocation.needs import ConsideredRole, RoleEvaluator, Task, reads_candidate_alone
@@ -74,6 +75,16 @@ class ConsideredRequest:
         """The resources that its roles name, or an operator."""
         return frozenset(one for role in self.roles if role.named for one in role.resources)
 
+    def filled(
+        self, chosen: Mapping[str, tuple[ResourceId, ...]]
+    ) -> dict[str, tuple[ResourceId, ...]]:
+        """Return what fills each role, a named team, and what an operator named, in their order."""
+        return {
+            role.role.name: role.resources if role.named else chosen[role.role.name]
+            for role in self.roles
+            if role.role.name in chosen
+        }
+
     def is_hopeless(self, evaluator: RoleEvaluator) -> bool:
         """Whether what is left of a lost behavior will be done by no other, however long it waits.
 
@@ -97,21 +108,6 @@ class ConsideredRequest:
             if len(able) < considered.options.least:
                 return True
         return False
-
-
-@dataclass(slots=True)
-class Queue:
-    """Requests that wait for one resource each, and that the same resources can serve. Of those
-    that a decision has found free, every request served takes one. So no more of the queue have to
-    be looked at than are free, and one, to know why it waits."""
-
-    first: ConsideredRequest
-    looked_at: int = 1
-
-    @property
-    def is_done(self) -> bool:
-        """Whether none of those behind can be served."""
-        return self.looked_at >= len(self.first.roles[0].options.costs_s)
 
 
 def _constant_need(request: AllocationRequest) -> tuple[object, ...] | None:

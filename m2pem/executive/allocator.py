@@ -14,40 +14,29 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from heapq import merge
-from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.assignment import Request, assign
-from m2pem.allocation.candidates import Candidates, LatestState, Place
+from m2pem.allocation.candidates import LatestState
 from m2pem.allocation.explanation import Lack, lack, reason, what_was_considered
-from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Task
-from m2pem.api.arbiter import BehaviorId, BehaviorRequest, ResolvedValue
+from m2pem.allocation.needs import ConsideredRole, Occupancy
 from m2pem.api.clock import Clock
 from m2pem.api.runs import Alert, RunId
 from m2pem.engine import records as r
-from m2pem.engine.data import reader
 from m2pem.engine.elements.allocations import behavior_of
 from m2pem.engine.inputs import BehaviorPreempted, ResourcesChosen, ResourcesNotFree
-from m2pem.engine.keeping import may_use
-from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunState, RunStatus
-from m2pem.errors import ExpressionError
-from m2pem.executive.allocation_requests import AskedFor, ConsideredRequest, Preempting, Queue
+from m2pem.executive.allocation_requests import AskedFor, ConsideredRequest, Preempting
 from m2pem.executive.dispatcher import Geometries
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.preemption import Holder, choose, preemptible
 from m2pem.executive.runner import Runner
-from m2pem.executive.space_allocation import (
-    SpaceAllocation,
-    holders_of,
-)
+from m2pem.executive.space_allocation import SpaceAllocation, holders_of
 from m2pem.executive.waiting_circles import WaitingCircles
-from m2pem.executive.waiting_tasks import holder_label
-from m2pem.fleet.allocation import Availability, is_behavior
-from m2pem.fleet.parameters import ParameterError, resolve
+from m2pem.executive.waiting_queue import WaitingQueue
+from m2pem.fleet.allocation import Availability
 from m2pem.fleet.space import may_wait_for_space
-from m2pem.mission.behavior import Behavior
-from m2pem.mission.catalogue import BehaviorSpec, ResourceId
+from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.losses import PREEMPTED, UNAVAILABLE
 
 if TYPE_CHECKING:
@@ -60,7 +49,6 @@ log = logging.getLogger("m2pem.executive")
 
 LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
-
 
 _MAY_FREE = (
     r.RunResumed,
@@ -94,22 +82,20 @@ class Allocator:
         self._availability = availability
         self._latest = latest
         self._clock = clock
-        self._geometries = geometries
         self._runners = runners
         self._publish = publish
         self._space = space
-        self._asked: dict[str, AskedFor] = {}
+        in_turn = space is None and not arbiters.fleet.preemption
+        self._queue = WaitingQueue(
+            arbiters, availability, latest, geometries, runners, in_turn=in_turn
+        )
         self._scheduled = False
         self._later: asyncio.Task[None] | None = None
         self._looked_us = 0
         self._circles = WaitingCircles(runners, arbiters.graph, publish)
-        self._evaluator: RoleEvaluator | None = None
-        self._holders: dict[str, Occupancy] = {}
         self._named_holders: set[str] = set()
         self._must_look = True
         self._reads_telemetry = True
-        fleet = arbiters.fleet
-        self._order = {each: place for place, each in enumerate((*fleet.vehicles, *fleet.payloads))}
 
     # --- what runs ask ----------------------------------------------------------------------------
 
@@ -118,7 +104,7 @@ class Allocator:
 
         `again`: what was chosen for it had been taken meanwhile.
         """
-        asked = self._asked.setdefault(allocation, AskedFor(runner))
+        asked = self._queue.asked.setdefault(allocation, AskedFor(runner))
         if again and asked.chosen:
             asked.chosen, asked.preempts = False, None
             self._release(allocation)
@@ -126,7 +112,7 @@ class Allocator:
 
     def withdraw(self, allocation: str) -> None:
         """Forget a request: its task needs no resources any more."""
-        if self._asked.pop(allocation, None) is not None:
+        if self._queue.asked.pop(allocation, None) is not None:
             self._release(allocation)
 
     def _release(self, allocation: str) -> None:
@@ -138,7 +124,7 @@ class Allocator:
         """Hand what is held for a request to the behavior that was requested for it."""
         for record in records:
             if isinstance(record, r.BehaviorRequested):
-                if self._asked.pop(record.allocation, None) is not None:
+                if self._queue.asked.pop(record.allocation, None) is not None:
                     # Tasks that wait were told that the request has its resources.
                     self._must_look |= record.allocation in self._named_holders
                     self._availability.hand_on(record.allocation, record.behavior)
@@ -152,7 +138,7 @@ class Allocator:
 
     def let_go(self, run: RunId) -> None:
         """Forget the requests of a run that is not driven here any more."""
-        for allocation, asked in list(self._asked.items()):
+        for allocation, asked in list(self._queue.asked.items()):
             if asked.runner.id == run:
                 self.withdraw(allocation)
 
@@ -160,14 +146,14 @@ class Allocator:
 
     def resources_changed(self) -> None:
         """Look again at what waits: a resource is free, or is not available any more."""
-        if any(not each.chosen or each.preempts for each in self._asked.values()):
+        if any(not each.chosen or each.preempts for each in self._queue.asked.values()):
             self._decide_soon()
 
     def on_telemetry(self) -> None:
         """Look again at what waits, `LOOK_AGAIN_US` after the last time, if telemetry may decide
         what it gets."""
         may_decide = self._must_look or self._reads_telemetry
-        if may_decide and any(not each.chosen for each in self._asked.values()):
+        if may_decide and any(not each.chosen for each in self._queue.asked.values()):
             self._look_after(LOOK_AGAIN_US)
 
     def _look_after(self, wait_us: int) -> None:
@@ -178,8 +164,7 @@ class Allocator:
         await self._clock.sleep_until(self._looked_us + wait_us)
         self._later = None
         self._looked_us = self._clock.now_us()
-        evaluator = self._evaluator
-        if self._must_look or evaluator is None or evaluator.telemetry_changes_candidates():
+        if self._must_look or self._queue.evaluator.telemetry_changes_candidates():
             self.resources_changed()
 
     def close(self) -> None:
@@ -201,21 +186,16 @@ class Allocator:
             self._decide_all()
         except Exception as error:  # a bug in m2pem: what waits would wait for ever
             log.exception("the choice of resources: a bug in m2pem")
-            for asked in self._asked.values():
+            for asked in self._queue.asked.values():
                 if not asked.chosen or asked.preempts:
                     asked.runner.fail(error)
 
     def _decide_all(self) -> None:
-        if self._space is not None and self._asked and self._space.awaits_positions():
+        if self._space is not None and self._queue.asked and self._space.awaits_positions():
             self._look_after(LOOK_AGAIN_US // 5)
             return
         self._give_preempted()
-        if self._evaluator is None:
-            candidates = Candidates(self._arbiters.fleet, self._arbiters.graph, self._latest)
-            self._evaluator = RoleEvaluator(candidates)
-        evaluator = self._evaluator
-        evaluator.look_again()
-        waiting, behind = self._consider(evaluator)
+        waiting, behind = self._queue.consider()
         requests = {
             each.request.id: Request(each.request.id, tuple(role.options for role in each.roles))
             for each in waiting
@@ -228,7 +208,7 @@ class Allocator:
         }
         served = [each.request.id for each in waiting if each.request.id in chosen]
         given = {
-            resource: Occupancy(request, label=self._label(request))
+            resource: Occupancy(request, label=self._queue.label(request))
             for request, roles in chosen.items()
             for ids in roles.values()
             for resource in ids
@@ -259,13 +239,13 @@ class Allocator:
                 refusals[each.request.id] = no_space
                 self._refuse_space(each, no_space)
             else:
-                self._refuse(each, self._lack(each, given), given, evaluator, no_space)
+                self._refuse(each, self._lack(each, given), given, no_space)
         of_queues: dict[int, Lack] = {}
         for each in behind:
             roles = id(each.roles)
             if roles not in of_queues:
                 of_queues[roles] = self._lack(each, given)
-            self._refuse(each, of_queues[roles], given, evaluator)
+            self._refuse(each, of_queues[roles], given)
         self._circles.look(list(merge(left, behind, key=_place)), refusals)
 
     def _assign(
@@ -279,7 +259,7 @@ class Allocator:
         Returns what is chosen, and by request why vehicles have no space for it, the best first.
         """
         space = self._space
-        chosen = assign(list(requests.values()), self._order)
+        chosen = assign(list(requests.values()), self._queue.order)
         if space is None:
             return chosen, {}
         refusals: dict[str, dict[ResourceId, Refusal]] = {}
@@ -300,7 +280,7 @@ class Allocator:
                 for number in chosen:
                     space.commit(number)
                 return chosen, refusals
-            chosen = assign(list(requests.values()), self._order)
+            chosen = assign(list(requests.values()), self._queue.order)
 
     def _without_space(
         self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
@@ -308,172 +288,11 @@ class Allocator:
         """Return why a request has no space with what is chosen for it; None: it has."""
         assert self._space is not None
         fleet, behavior = self._arbiters.fleet, behavior_of(each.request)
-        resources = tuple(one for ids in self._filled(each, chosen).values() for one in ids)
+        resources = tuple(one for ids in each.filled(chosen).values() for one in ids)
         if not may_wait_for_space(fleet, behavior.type, behavior.name, resources):
             return None
-        wanted = self._wanted(each, chosen)
+        wanted = self._queue.behavior_request(each, chosen)
         return None if wanted is None else self._space.refusal(*wanted)
-
-    def _wanted(
-        self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
-    ) -> tuple[BehaviorRequest, BehaviorSpec] | None:
-        """Return the behavior that is requested with what is chosen; None: it will be refused."""
-        behavior = behavior_of(each.request)
-        roles = self._filled(each, chosen)
-        resources = tuple(dict.fromkeys(one for ids in roles.values() for one in ids))
-        spec = self._spec(behavior)
-        if spec is None:
-            return None
-        try:
-            parameters = self._parameters(spec, each.asked.runner.id, each.request)
-        except ParameterError:
-            return None  # its behavior is refused later, with the reason
-        number = BehaviorId(each.request.id)
-        return BehaviorRequest(number, 0, behavior.name, parameters, resources, roles), spec
-
-    def _consider(
-        self, evaluator: RoleEvaluator
-    ) -> tuple[list[ConsideredRequest], list[ConsideredRequest]]:
-        """Return the requests that are looked at, in their order, and those that are not: as many
-        as there are free resources are before them and need the same."""
-        found: list[ConsideredRequest] = []
-        behind: list[ConsideredRequest] = []
-        occupied = self._occupied()
-        of_runs: dict[RunId, Mapping[ResourceId, Occupancy]] = {}
-        queues: dict[tuple[object, ...], Queue] = {}
-        # What has no space, or takes from other runs, may be served before what needs the same.
-        may_queue = self._space is None and not self._arbiters.fleet.preemption
-        for _, asked, request in self._open_requests():
-            state = asked.runner.run.state
-            if state.run not in of_runs:
-                of_runs[state.run] = _without(occupied, _ending(state))
-            free_of = of_runs[state.run]
-            if state.kept:  # it has what its run keeps for it
-                own = {each.id for each in state.kept.values() if may_use(each, request.token)}
-                free_of = _without(free_of, own)
-            may_queue_here = may_queue and free_of is occupied
-            need = asked.need if may_queue_here else None
-            queue = queues.get(need) if need is not None else None
-            if queue is not None and queue.is_done:
-                first = queue.first
-                behind.append(ConsideredRequest(asked, request, first.task, first.roles))
-                continue
-            try:
-                task = self._task(evaluator, asked.runner, request, free_of)
-                roles = tuple(evaluator.role(role, task) for role in task.behavior.roles)
-            except ExpressionError as error:
-                asked.runner.post(ResourcesNotFree(request.id, str(error), code="EXPRESSION"))
-                continue
-            except Exception as error:
-                log.exception("%s: a bug in m2pem", request.id)
-                asked.runner.fail(error)
-                continue
-            found.append(ConsideredRequest(asked, request, task, roles))
-            if queue is not None:
-                queue.looked_at += 1
-            elif need is not None:
-                queues[need] = Queue(found[-1])
-        return found, behind
-
-    def _open_requests(self) -> "list[tuple[tuple[int, int, str], AskedFor, AllocationRequest]]":
-        """Return all that nothing was chosen for, with its place, in the order of service."""
-        found = []
-        for allocation, asked in self._asked.items():
-            state = asked.runner.run.state
-            request = state.allocations.get(allocation)
-            if not asked.chosen and request is not None and state.status is RunStatus.RUNNING:
-                found.append((asked.look_at(request), asked, request))
-        found.sort(key=itemgetter(0))
-        return found
-
-    def _task(
-        self,
-        evaluator: RoleEvaluator,
-        runner: Runner,
-        request: AllocationRequest,
-        occupied: Mapping[ResourceId, Occupancy],
-    ) -> Task:
-        behavior, lost = behavior_of(request), request.token.lost_work
-        return Task(
-            behavior,
-            lambda: self._place(evaluator.candidates, runner, behavior, request),
-            reader(request.token),
-            runner.run.state.commanded,
-            occupied,
-            {} if lost is None else lost.resources,
-            request.token.replacements or {},
-        )
-
-    def _occupied(self) -> dict[ResourceId, Occupancy]:
-        """Return what is not free, and why; also what behaviors have been given that wait for
-        their turn in the dispatcher."""
-        found = {
-            each: Occupancy(withdrawn=why) for each, why in self._availability.withdrawn().items()
-        }
-        held = dict(self._availability.held())
-        requested = {
-            ResourceId(resource): behaviors
-            for runner in self._runners.values()
-            for resource, behaviors in runner.run.state.held.items()
-        }
-        known: dict[str, Occupancy] = {}
-        for resource in held | requested:
-            if resource in found:
-                continue
-            by, behaviors = held.get(resource, ""), requested.get(resource, [])
-            if behaviors and (by in behaviors or not is_behavior(by)):
-                by = behaviors[-1]  # it waits until the one before it has ended
-            if by not in known:
-                before = self._holders.get(by)
-                label = before.label if before is not None else ""
-                known[by] = Occupancy(by, label=label or self._label(by))
-            found[resource] = known[by]
-        self._holders = known
-        return found
-
-    def _label(self, holder: str) -> str:
-        """Return words for a behavior or request; "" if it is not known."""
-        label = holder_label(self._runners, holder)
-        return f"{label} ({holder})" if label else ""
-
-    def _place(
-        self,
-        candidates: Candidates,
-        runner: Runner,
-        behavior: Behavior,
-        request: AllocationRequest,
-    ) -> Place:
-        """Return where the task begins; anywhere, if its parameters make no sense: its behavior is
-        refused later, with the reason."""
-        spec = self._spec(behavior)
-        if spec is None:
-            return Place()
-        try:
-            return candidates.place_of(self._parameters(spec, runner.id, request))
-        except ParameterError:
-            return Place()
-        except Exception as error:  # a bug in m2pem holds this run, not all that asks
-            log.exception("%s: a bug in m2pem", request.id)
-            runner.fail(error)
-            return Place()
-
-    def _parameters(
-        self, spec: BehaviorSpec, run: RunId, request: AllocationRequest
-    ) -> dict[str, ResolvedValue]:
-        fleet = self._arbiters.fleet
-        return resolve(
-            spec,
-            request.parameters,
-            lambda name: self._geometries(run, name),
-            fleet.vehicles,
-            fleet.origin,
-        )
-
-    def _spec(self, behavior: Behavior) -> BehaviorSpec | None:
-        """Return how the behavior is taken by the first resource that offers it."""
-        graph = self._arbiters.graph
-        found = (graph.spec(each, behavior.name, behavior.type) for each in self._order)
-        return next((spec for spec in found if spec is not None), None)
 
     def _give(
         self,
@@ -493,23 +312,13 @@ class Allocator:
         without_space: Mapping[ResourceId, "Refusal"] = MappingProxyType({}),
     ) -> tuple[ResourcesChosen, tuple[ResourceId, ...]]:
         """Hold what was chosen for a request; return the answer to it, and the resources."""
-        roles = self._filled(each, chosen)
+        roles = each.filled(chosen)
         resources = tuple(resource for ids in roles.values() for resource in ids)
         each.asked.chosen = True
         self._availability.adopt(resources, each.request.id)
         seen = [_excluding(role, without_space) for role in each.roles]
         considered = what_was_considered(seen, roles, together_with)
         return ResourcesChosen(each.request.id, dict(roles), considered), resources
-
-    def _filled(
-        self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]
-    ) -> dict[str, tuple[ResourceId, ...]]:
-        """Return what fills each role, a named team, and what an operator named, in their order."""
-        return {
-            role.role.name: role.resources if role.named else chosen[role.role.name]
-            for role in each.roles
-            if role.role.name in chosen
-        }
 
     def _refuse_space(self, each: ConsideredRequest, refusal: "Refusal") -> None:
         """Let a task wait for space, or throw its error."""
@@ -535,12 +344,11 @@ class Allocator:
         each: ConsideredRequest,
         lacks: Lack,
         given: Mapping[ResourceId, Occupancy],
-        evaluator: RoleEvaluator,
         without_space: "Refusal | None" = None,
     ) -> None:
         """Let a task wait for its resources, or throw its error. `without_space`: why it takes none
         from other runs."""
-        waits = each.waits and not each.is_hopeless(evaluator)
+        waits = each.waits and not each.is_hopeless(self._queue.evaluator)
         if waits and each.asked.lacks == lacks:
             return
         each.asked.lacks = lacks
@@ -584,7 +392,9 @@ class Allocator:
             kept.update(resources)
             self._take(each, {resource: holders[resource] for resource in taken})
             victims = frozenset(holders[resource].id for resource in taken)
-            each.asked.preempts = Preempting(answer, resources, victims, self._wanted(each, chosen))
+            each.asked.preempts = Preempting(
+                answer, resources, victims, self._queue.behavior_request(each, chosen)
+            )
         return without
 
     def _with_space(
@@ -603,11 +413,11 @@ class Allocator:
         refusals: list[Refusal] = []
         without: set[ResourceId] = set()
         while True:
-            chosen = choose(each.request.id, each.roles, holders, kept | without, self._order)
+            chosen = choose(each.request.id, each.roles, holders, kept | without, self._queue.order)
             taken = [e for ids in (chosen or {}).values() for e in ids if e in holders]
             if chosen is None or not taken:
                 return None, _foremost(refusals) if refusals else None
-            wanted = None if self._space is None else self._wanted(each, chosen)
+            wanted = None if self._space is None else self._queue.behavior_request(each, chosen)
             if self._space is None or wanted is None:
                 return chosen, None
             ending = {holders[resource].id for resource in taken}
@@ -641,7 +451,7 @@ class Allocator:
 
     def _give_preempted(self) -> None:
         """Give requests what was taken for them if the behaviors that had it have ended."""
-        for allocation, asked in self._asked.items():
+        for allocation, asked in self._queue.asked.items():
             preempts = asked.preempts
             if preempts is None:
                 continue
@@ -693,18 +503,3 @@ def _not_free(request: Request, vehicle: ResourceId) -> Request:
         for role in request.roles
     )
     return Request(request.id, roles)
-
-
-def _ending(state: RunState) -> set[str]:
-    """Return the behaviors that a run has cancelled: it may preempt these itself."""
-    behaviors = state.behaviors.values()
-    return {each.id for each in behaviors if each.phase is BehaviorPhase.CANCELLING}
-
-
-def _without(
-    occupied: Mapping[ResourceId, Occupancy], holders: set[str]
-) -> Mapping[ResourceId, Occupancy]:
-    """Return what is not free for a task that may have what some holders have."""
-    if not holders:
-        return occupied
-    return {each: found for each, found in occupied.items() if found.holder not in holders}

@@ -6,6 +6,7 @@ that is lost, may stay there: what the task needs is then free for others.
 """
 
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING
 
@@ -143,7 +144,7 @@ def space_circles(
             Waiting(
                 request,
                 request,
-                ((refusal.lacking, tuple(holder(request, each) for each in refusal.blockers)),),
+                ((refusal.lacking, Counter(holder(request, each) for each in refusal.blockers)),),
             )
             for request, refusal in refusals.items()
             if refusal.wait_s is not None

@@ -1,5 +1,6 @@
 """Circles of runs and tasks that wait for each other: found when they close, said to operators."""
 
+from collections import Counter
 from collections.abc import Callable, Container, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -114,45 +115,34 @@ class WaitingCircles:
 
 
 def _asked(waiting: Sequence[ConsideredRequest], idle: Mapping[RunId, Runner]) -> list[Waiting]:
-    """Return the requests of runs that can go on only by getting what idle runs hold.
+    """Return the requests of runs that can go on only by getting what they asked for.
 
-    `idle`: the runs that can go on only by getting what they asked for. A run that goes on as soon
-    as the behaviors of other runs end is left out: nobody waits for it for ever.
+    `idle`: these runs. What others have becomes free by itself.
     """
-    kept = {
+    idle_holders = {
         holder: run
-        for run, each in idle.items()
-        for state in (each.run.state,)
-        for holder in (*state.behaviors, *(kept.id for kept in state.kept.values()))
+        for run, runner in idle.items()
+        for holder in (
+            *runner.run.state.behaviors,
+            *(kept.id for kept in runner.run.state.kept.values()),
+        )
     }
-    known: dict[int, tuple[int, tuple[str | None, ...]]] = {}
+    known: dict[int, Counter[str | None]] = {}
 
-    def needed(
-        role: ConsideredRole, lost: Container[str]
-    ) -> tuple[int, int, tuple[str | None, ...]]:
-        """How many it lacks, how many may be free by themselves, and who holds each. What the task
-        has lost may return by itself; it shares its candidates with no other task."""
+    def needed(role: ConsideredRole, lost: Container[str]) -> tuple[int, Mapping[str | None, int]]:
+        """How many it lacks, and how many each run has. What the task has lost may return by
+        itself; it shares its candidates with no other task."""
         found = role.candidacy
         if id(found) not in known:
-            holders = tuple(
-                None if each in lost else kept.get(found.occupied[each].holder)
+            known[id(found)] = Counter(
+                None if each in lost else idle_holders.get(found.occupied[each].holder)
                 for each in found.resources
                 if each in lost or (each in found.occupied and each not in found.excluded)
             )
-            known[id(found)] = holders.count(None), holders
-        lacking = max(0, role.options.least - len(role.options.costs_s))
-        return lacking, *known[id(found)]
+        return max(0, role.options.least - len(role.options.costs_s)), known[id(found)]
 
-    asked: dict[RunId, list[Waiting]] = {}
-    going_on: set[RunId] = set()
-    for each in waiting:
-        run = each.asked.runner.id
-        if run not in idle or run in going_on:
-            continue
-        roles = [needed(role, each.task.lost) for role in each.roles]
-        if all(ending >= lacking for lacking, ending, _ in roles):
-            going_on.add(run)
-            continue
-        needs = tuple((lacking, holders) for lacking, _, holders in roles)
-        asked.setdefault(run, []).append(Waiting(each.request.id, run, needs))
-    return [each for run, all_of in asked.items() if run not in going_on for each in all_of]
+    return [
+        Waiting(each.request.id, run, tuple(needed(role, each.task.lost) for role in each.roles))
+        for each in waiting
+        if (run := each.asked.runner.id) in idle
+    ]

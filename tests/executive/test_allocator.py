@@ -379,7 +379,8 @@ def broken(*_: object, **__: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "where", ["m2pem.executive.allocator.assign", "m2pem.executive.allocator.RoleEvaluator.role"]
+    "where",
+    ["m2pem.executive.allocator.assign", "m2pem.executive.waiting_queue.RoleEvaluator.role"],
 )
 def test_an_exception_while_choosing_holds_the_runs_that_ask_and_tells_operators(
     play, monkeypatch, where
