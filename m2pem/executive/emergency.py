@@ -5,15 +5,9 @@ under way: a disk that hangs, or a mission that never waits, does not delay them
 """
 
 import asyncio
-import json
-import logging
-import os
-import threading
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from queue import Queue
 from uuid import UUID
 
 from m2pem.api.runs import Alert, RunId
@@ -25,8 +19,8 @@ from m2pem.errors import M2pemError, OperatorError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
 from m2pem.executive.ended_runs import in_words
+from m2pem.executive.mark_files import MarkFiles
 from m2pem.executive.runner import Runner
-from m2pem.executive.runtime_directory import runtime_directory
 
 ACKNOWLEDGED_WITHIN_S = 1.0
 """An arbiter that has not taken a STOP or hold by then: operators are alerted."""
@@ -150,11 +144,6 @@ def _problem(what: str, asked: "asyncio.Future[Step]") -> str:
     return ""
 
 
-CLOSED_WITHIN_S = 1.0
-
-log = logging.getLogger("m2pem.executive")
-
-
 @dataclass(frozen=True, slots=True)
 class StopMark:
     """Who stopped a run, and why."""
@@ -164,93 +153,26 @@ class StopMark:
 
 
 class StopMarks:
-    """The marks of one journal. `file`: where the journal is; None: in memory, as the marks
-    are then.
-
-    `identity`: of the journal, so that the marks of a removed journal do not stop the runs of the
-    next one at its place.
-    """
+    """The marks of stopped runs of one journal. `file`, `identity`: of the journal."""
 
     def __init__(self, file: Path | None, identity: UUID) -> None:
-        self._identity = str(identity)
-        self._put: dict[str, StopMark] = {}
-        self._places: dict[str, Queue[tuple[Path, bytes | None]]] = {}
-        if file is not None:
-            self._places[f"{file}-stopped-"] = Queue()
-            with suppress(OSError):
-                self._places[f"{runtime_directory()}/{identity}-stopped-"] = Queue()
-        self._started = False
+        self._files = MarkFiles(file, identity, "stopped")
 
     def put(self, run: str, mark: StopMark) -> None:
         """Have a mark written; returns at once."""
-        self._put[run] = mark
-        content = {"journal": self._identity, "by": mark.by, "reason": mark.reason}
-        self._queue(run, json.dumps(content).encode())
+        self._files.put(run, {"by": mark.by, "reason": mark.reason})
 
     def remove(self, run: str) -> None:
         """Have the mark of a run removed: the journal has the stop; returns at once."""
-        self._put.pop(run, None)
-        if self._started:
-            self._queue(run, None)
+        self._files.remove(run)
 
     def get(self, run: str) -> StopMark | None:
         """The mark of a run that was left without an end; None: it was not stopped."""
-        if (mark := self._put.get(run)) is not None:
-            return mark
-        for place in self._places:
-            try:
-                content = json.loads(Path(f"{place}{run}").read_bytes())
-            except (OSError, ValueError):
-                continue
-            if content.get("journal") == self._identity:
-                self._start()  # there is something to remove
-                return StopMark(str(content.get("by", "")), str(content.get("reason", "")))
-        return None
+        found = self._files.get(run)
+        if found is None:
+            return None
+        return StopMark(str(found.get("by", "")), str(found.get("reason", "")))
 
     async def close(self) -> None:
-        """Wait until what was asked for is done, at most `CLOSED_WITHIN_S`: a disk may hang."""
-        if self._started:
-            with suppress(TimeoutError):
-                async with asyncio.timeout(CLOSED_WITHIN_S):
-                    # Not in a thread that waits: the program would wait for that one in the end.
-                    while any(queue.unfinished_tasks for queue in self._places.values()):  # noqa: ASYNC110
-                        await asyncio.sleep(0.01)
-
-    def _queue(self, run: str, content: bytes | None) -> None:
-        self._start()
-        for place, queue in self._places.items():
-            queue.put((Path(f"{place}{run}"), content))
-
-    def _start(self) -> None:
-        if self._started:
-            return
-        self._started = True
-        for queue in self._places.values():
-            # A thread for each place, as one may hang; a daemon, as a hanging one must not keep
-            # the program from ending.
-            threading.Thread(target=_serve, args=(queue,), name="stop marks", daemon=True).start()
-
-
-def _serve(queue: "Queue[tuple[Path, bytes | None]]") -> None:
-    while True:
-        path, content = queue.get()
-        try:
-            if content is None:
-                path.unlink(missing_ok=True)
-            else:
-                _write(path, content)
-        except OSError as error:
-            log.warning("%s: the mark of a stopped run: %s", path, error.strerror)
-        finally:
-            queue.task_done()
-
-
-def _write(path: Path, content: bytes) -> None:
-    new = path.with_name(f"{path.name}.new")
-    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
-    try:
-        os.write(descriptor, content)
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-    new.rename(path)
+        """Let the marks be written."""
+        await self._files.close()

@@ -6,19 +6,22 @@ What it did when its link was lost has ended for its mission (LINK_LOST). The ve
 that, and goes on with it. So m2pem commands it to stop, at once and until it has acknowledged;
 operators see why it is not ready meanwhile, and afterwards that it is held.
 
-After a restart of the executive, the journals of resumed runs say which vehicles were lost before.
+After a restart of the executive, the journals of resumed runs say which vehicles were lost before,
+and marks beside the journal which were lost by runs that are over.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorId, reclaims
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
+from m2pem.engine.state import OutOfReach
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
+from m2pem.executive.lost_marks import LostMark, LostMarks
 from m2pem.fleet.allocation import Availability, is_behavior
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 
@@ -51,8 +54,10 @@ class _Lost:
 class LostResources:
     """The resources whose link was lost, until they are free again.
 
-    `epoch_of`: with which epoch the run of a behavior is driven here. `show`: to operators, how a
-    resource is. `returned`: is called when a resource has returned and stopped.
+    `epoch_of`: with which epoch the run of a behavior is driven here. `out_of_reach`: what a
+    resource does that is being lost, by the runs that are driven here. `show`: to operators, how a
+    resource is. `returned`: is called when a resource has returned and stopped. `marks`: of what is
+    lost, for the next executive.
     """
 
     def __init__(
@@ -62,16 +67,20 @@ class LostResources:
         handover: Handover,
         clock: Clock,
         epoch_of: Callable[[BehaviorId], int],
+        out_of_reach: Callable[[ResourceId], OutOfReach | None],
         show: Callable[[VehicleState | PayloadState], None],
         returned: Callable[[ResourceId, str], None],
+        marks: LostMarks,
     ) -> None:
         self._arbiters = arbiters
         self._availability = availability
         self._handover = handover
         self._clock = clock
         self._epoch_of = epoch_of
+        self._out_of_reach = out_of_reach
         self._show = show
         self._returned = returned
+        self._marks = marks
         self._held: set[ResourceId] = set()
         self._lost: dict[ResourceId, _Lost] = {}
         self._stopping: dict[ResourceId, asyncio.Task[None]] = {}
@@ -91,6 +100,8 @@ class LostResources:
         holder = self._availability.holder(resource)
         if commands or resource not in self._lost:
             self._lost[resource] = _Lost(holder if commands else None)
+            if (was := self._out_of_reach(resource)) is not None:
+                self._mark(resource, was.behavior, was.native_ref)
         self._withdraw(resource, reason)
 
     def lost_before(
@@ -101,7 +112,30 @@ class LostResources:
         if resource in self._lost:
             return
         self._lost[resource] = _Lost(behavior, is_earlier=True, native_ref=native_ref)
-        self._withdraw(resource, f"the link was lost before a restart, when it did {behavior}")
+        self._mark(resource, behavior, native_ref)
+        self._withdraw(resource, _why_lost(behavior))
+
+    def take_up(self, resources: Iterable[ResourceId]) -> None:
+        """Withdraw what the marks say that runs which are over have lost."""
+        for resource in resources:
+            mark = self._marks.get(resource)
+            if mark is not None:
+                log.warning("%s: %s; it is stopped when it is received", resource, mark.why)
+                lost = _Lost(mark.behavior, is_earlier=True, native_ref=mark.native_ref)
+                self._lost[resource] = lost
+                self._withdraw(resource, mark.why)
+
+    def epoch_before(self, behavior: BehaviorId) -> int:
+        """Return with which epoch the run of a behavior was driven that a lost resource may still
+        do, when it was lost; 0: none does it."""
+        for resource, lost in self._lost.items():
+            if lost.behavior == behavior and (mark := self._marks.get(resource)) is not None:
+                return mark.epoch
+        return 0
+
+    def _mark(self, resource: ResourceId, behavior: BehaviorId, native_ref: str | None) -> None:
+        epoch, why = self._epoch_of(behavior), _why_lost(behavior)
+        self._marks.put(resource, LostMark(behavior, native_ref, epoch, why))
 
     def _withdraw(self, resource: ResourceId, reason: str) -> None:
         self._why.pop(resource, None)
@@ -156,6 +190,7 @@ class LostResources:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        await self._marks.close()
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -171,6 +206,7 @@ class LostResources:
         ended = self._what(resource)
         del self._lost[resource], self._silent[resource], self._stopping[resource]
         self._why.pop(resource, None)
+        self._marks.remove(resource)
         self._held.add(resource)
         self._handover.restore(resource)
         self._returned(resource, f"it has ended {ended}")
@@ -230,3 +266,7 @@ class LostResources:
 
     def _what(self, resource: ResourceId) -> str:
         return self._lost[resource].behavior or "what it did before"
+
+
+def _why_lost(behavior: BehaviorId) -> str:
+    return f"the link was lost before a restart, when it did {behavior}"

@@ -8,9 +8,12 @@ from pathlib import Path
 from uuid import UUID
 
 from m2pem.api.clock import Clock
-from m2pem.errors import JournalError
+from m2pem.errors import JournalError, M2pemError
+from m2pem.executive.lost_marks import LostMark, LostMarks, left_by
 from m2pem.executive.runtime_directory import runtime_directory
+from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
+from m2pem.mission.catalogue import ResourceId
 from m2pem.units import US_PER_S
 
 DAY_S = 86_400.0
@@ -23,12 +26,33 @@ async def delete_runs(
 ) -> None:
     """Delete runs as `Journal.delete` does, then their tracks and the marks of their STOP.
 
+    What vehicles may still do of a run that has not ended is noted for the next executive.
+
     Raises:
         JournalError: nothing was deleted; or a file beside the journal cannot be removed.
     """
+    left = await _left_by(journal, runs) if unended else []
     await journal.delete(runs, by=by, unended=unended)
+    for fleet, resources in left:
+        marks = LostMarks(journal.file, journal.identity, fleet)
+        for resource, mark in resources.items():
+            marks.put(resource, mark)
+        await marks.close()
     if journal.file is not None:
         await asyncio.to_thread(_remove_files, journal.file, journal.identity, runs)
+
+
+async def _left_by(
+    journal: Journal, runs: Sequence[str]
+) -> list[tuple[Fleet, dict[ResourceId, LostMark]]]:
+    found = []
+    for line in await journal.runs():
+        if line.run in runs and line.outcome is None and not line.gone and line.last_seq:
+            try:
+                found.append(await left_by(journal, line))
+            except M2pemError as error:
+                log.warning("%s: what its vehicles do cannot be read: %s", line.run, error)
+    return found
 
 
 def _remove_files(journal: Path, identity: UUID, runs: Sequence[str]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from m2pem.engine.state import RunStatus
 from m2pem.executive.executive import Executive
+from m2pem.executive.lost_marks import LostMarks
 from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, dump
 
 STATE = "state"
@@ -52,7 +53,10 @@ def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
 
 
 def tidy_up(executive: Executive, journal: Path | None) -> None:
-    """Delete the files made here, unless a run has not ended and needs them to be resumed."""
+    """Delete the files made here, unless a run has not ended and needs them to be resumed.
+
+    Simulated vehicles do nothing more then: none is marked as lost.
+    """
     if journal is None or any(
         runner.failure is not None or runner.run.state.status is not RunStatus.ENDED
         for runner in executive.runners.values()
@@ -62,10 +66,14 @@ def tidy_up(executive: Executive, journal: Path | None) -> None:
         *executive.fleet.vehicles.values(),
         *executive.fleet.payloads.values(),
     ]
-    for path in {str(each.settings.get(STATE, "")) for each in everything}:
+    marks = LostMarks(journal, executive.journal.identity, executive.fleet)
+    for each in everything:
+        path = str(each.settings.get(STATE, ""))
         if path.startswith(_prefix(journal)):
             for suffix in ("", "-wal", "-shm"):
                 Path(f"{path}{suffix}").unlink(missing_ok=True)
+            for file in marks.files(each.id):
+                file.unlink(missing_ok=True)
 
 
 def _prefix(journal: Path) -> str:

@@ -24,7 +24,7 @@ from m2pem.engine.commands import Command
 from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import MissionRun
-from m2pem.engine.state import RunStatus
+from m2pem.engine.state import OutOfReach, RunStatus
 from m2pem.errors import JournalError, M2pemError, NotDrivenError, OperatorError, ScheduleError
 from m2pem.executive.allocator import Allocator
 from m2pem.executive.armed_vehicles import describe_armed_vehicles
@@ -44,6 +44,7 @@ from m2pem.executive.handover import Handover, refuse_busy_resources
 from m2pem.executive.interrupted_runs import InterruptedRuns
 from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
+from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.recovery import claim, replay, take_over
 from m2pem.executive.returns import Returns, still_lost
@@ -176,8 +177,10 @@ class Supervisor:
             self.handover,
             clock,
             self.epoch_of,
+            self._out_of_reach,
             bus.publish,
             self._returns.returned,
+            LostMarks(journal.file, journal.identity, self.fleet),
         )
         self._forecast = BatteryForecast(
             arbiters, self.availability, self._geometry, self.runners, self.fault
@@ -206,6 +209,7 @@ class Supervisor:
     def begin_tasks_in(self, group: asyncio.TaskGroup) -> None:
         """Say in which task group the runs are driven; the arbiters are connected."""
         self._group = group
+        self._lost_resources.take_up(self.arbiters.resources)
 
     def _refuse_unconnected(self) -> None:
         """Check that runs can be driven.
@@ -691,9 +695,19 @@ class Supervisor:
         )
 
     def epoch_of(self, behavior: BehaviorId) -> int:
-        """With which epoch the run of a behavior is driven here; 0: it is not."""
+        """With which epoch the run of a behavior is driven here, or was when a resource was lost
+        that may still do it; 0: neither."""
         runner = self.runners.get(behavior.partition(".")[0])
-        return runner.epoch if runner is not None else 0
+        return runner.epoch if runner is not None else self._lost_resources.epoch_before(behavior)
+
+    def _out_of_reach(self, resource: ResourceId) -> OutOfReach | None:
+        """What a resource does that is being lost, as far as runs know that are driven here."""
+        holder = self.availability.holder(resource)
+        states = [runner.run.state for runner in self.runners.values()]
+        for state in states:
+            if holder is not None and (behavior := state.behaviors.get(holder)) is not None:
+                return OutOfReach(behavior.id, behavior.native_ref)
+        return next((each.lost[resource] for each in states if resource in each.lost), None)
 
     def _geometry(self, run: str, name: str) -> Geometry | None:
         runner = self.runners.get(run)

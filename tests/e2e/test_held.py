@@ -1,5 +1,6 @@
 """An executive ends while its vehicles are held: the next one asks before they go on."""
 
+import signal
 from pathlib import Path
 
 from m2pem.simulation.executions import EffectKind
@@ -82,3 +83,28 @@ def test_what_an_interrupted_run_has_left_behind_is_said_and_can_be_stopped(
     kinds = [effect.kind for effect in recorded_effects(state)]
     assert (EffectKind.CANCEL in kinds, EffectKind.RESUME in kinds) == (True, False)
     assert "was interrupted" not in m2pem.run("fleet", fleet, "--journal", "journal.db")[1]
+
+
+def test_what_a_run_left_that_was_deleted_is_ended_before_its_vehicle_is_free(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
+    fleet, state = fleet_with_state(tmp_path)
+    at = ("--journal", "journal.db")
+    killed = m2pem.start("run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", *at,
+                         "--format", "json")  # fmt: skip
+    killed.until_record("BehaviorProgressed", state="RUNNING")
+    killed.kill()
+    assert m2pem.run("runs", "--delete", "r1", "--force", *at)[0] == 0
+    program = m2pem.start("serve", "--fleet", fleet, "--ocu", "plain", *at)
+    said = program.stderr
+    while "it has ended what it did before, and is free" not in said.readline():
+        pass
+    shown = m2pem.run("fleet", "--running", *at)[1].splitlines()
+    assert [line for line in shown if line.startswith("evsg1 ") and "returned: held" in line]
+    kinds = [effect.kind for effect in recorded_effects(state)]
+    assert kinds[-3:] == [EffectKind.CANCEL, EffectKind.END, EffectKind.HOLD]
+    program.type("start drive.bpmn")
+    program.until_text("r2 completed")
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 0

@@ -163,13 +163,14 @@ class World:
         self.errors = folder / "errors.txt"
         self._readers: list[threading.Thread] = []
         self._programs: list[subprocess.Popen[Any]] = []
-        self._start(
+        self.start(
             *("sim", "mavlink", "--copters", 1, "--speed", SPEED, "--ekf", "6s"),
             *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{self.relay.port}"),
             *("--set", "FS_GCS_ENABLE=0"),
         )
 
-    def _start(self, *words: object) -> subprocess.Popen[Any]:
+    def start(self, *words: object) -> subprocess.Popen[Any]:
+        """Start a command of m2pem."""
         with self.errors.open("a") as errors:
             program = subprocess.Popen(
                 [sys.executable, "-m", "m2pem", *map(str, words)],
@@ -183,7 +184,7 @@ class World:
     def executive(self, *words: object) -> subprocess.Popen[Any]:
         """Start m2pem; what it prints goes to `records`."""
         options = ("--ocu", "none", "--format", "json", "--journal", self.folder / "journal.db")
-        program = self._start(*words, *options)
+        program = self.start(*words, *options)
 
         def read() -> None:
             for line in program.stdout or ():
@@ -254,6 +255,41 @@ def cut_off_and_killed(world: World, *, noticed: bool) -> int:
     seen = len(world.relay.seen)
     world.relay.cut = False
     return seen
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("deleted", [False, True])
+@pytest.mark.parametrize("world", ["20 s"], indirect=True)
+def test_a_copter_that_no_run_is_resumed_for_is_stopped_when_it_is_back(
+    world: World, deleted: bool
+) -> None:
+    """Its run was stopped while it was out of reach; or its executive was killed, and the run
+    deleted."""
+    fleet = ("--fleet", world.folder / "fleet.yaml", "--speed", SPEED)
+    first = world.executive("run", world.folder / "m.bpmn", *fleet)
+    world.until(lambda: any(each.get("remaining") for each in world.records))
+    world.relay.cut = True
+    journal = ("--journal", world.folder / "journal.db")
+    if deleted:
+        first.kill()
+        first.wait()
+        assert world.start("runs", "--delete", "r1", "--force", *journal).wait(WITHIN_S) == 0
+    else:
+        world.until_record("AllocationDelayed")
+        assert world.start("stop", "r1", *journal).wait(WITHIN_S) == 0
+        first.wait(WITHIN_S)
+    world.executive("serve", *fleet)
+    world.until(lambda: "it is stopped when it is received" in world.errors.read_text())
+    assert world.relay.mode == AUTO
+    before = len(world.relay.seen)
+    world.relay.cut = False
+    world.until(lambda: "it has ended what it did before, and is free" in world.errors.read_text())
+    first_seen, *_ = world.relay.seen[before:]
+    assert str(first_seen[1]).startswith("mode "), world.relay.seen
+    assert is_stopped(world.relay.seen[before:])
+    shown = world.start("fleet", "--running", *journal)
+    assert shown.stdout is not None
+    assert "returned: held" in shown.stdout.read()
 
 
 def is_stopped(seen: list[tuple[str, object]]) -> bool:
