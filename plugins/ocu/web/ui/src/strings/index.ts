@@ -1,0 +1,33 @@
+// Every text that a person reads, one section a page.
+import { requirements, verify } from "./checks";
+import { editor } from "./editor";
+import { home } from "./home";
+import { operate } from "./operate";
+import { begin, run } from "./run";
+import { shell, signIn } from "./shell";
+
+export const strings = {
+  shell,
+  signIn,
+  home,
+  editor,
+  verify,
+  requirements,
+  run,
+  begin,
+  operate,
+};
+
+/** `{name}` in a text becomes its value. */
+export function fill(text: string, values: Record<string, string | number>): string {
+  return text.replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));
+}
+
+/** A text for one thing, and one for any other number of them. */
+export function counted(
+  texts: { readonly one: string; readonly many: string },
+  count: number,
+  values: Record<string, string | number> = {},
+): string {
+  return fill(count === 1 ? texts.one : texts.many, { count, ...values });
+}
