@@ -9,10 +9,13 @@ import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
-from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest
+from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest, fences
 from m2pem.api.clock import Clock
+from m2pem.api.epoch_fence import run_of
 from m2pem.engine.commands import CancelBehavior, StartBehavior
+from m2pem.errors import StaleCommandError
 from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.separation import VehicleSeparation
@@ -33,6 +36,19 @@ before its start would stop nothing."""
 
 Geometries = Callable[[str, str], Geometry | None]
 """(run, name) -> the route, area or point that the run knows under the name."""
+
+
+class Claims(Protocol):
+    """What the dispatcher must know of the runs' claims: `m2pem.executive.ownership.Ownership`."""
+
+    def open(self) -> None:
+        """Let arbiters send at once, as a hold must go out."""
+        ...
+
+    async def confirmed(self) -> None:
+        """Return when it is known that this executive still drives its runs; the dispatcher has
+        disowned all others then."""
+        ...
 
 
 @dataclass(slots=True)
@@ -56,8 +72,11 @@ class Order:
 
 
 class Dispatcher:
-    """`post` takes every report, those of arbiters and those made here. `clearance`:
-    reserves space for vehicles; None: the fleet does not say that they share it."""
+    """`post` takes every report, those of arbiters and those made here. `replaced` takes the
+    refusal of a command whose run another executive drives. `claims` is asked before a vehicle is
+    moved. `clearance`: reserves space for vehicles; None: the fleet does not say that they share
+    it.
+    """
 
     def __init__(
         self,
@@ -66,6 +85,8 @@ class Dispatcher:
         clock: Clock,
         geometries: Geometries,
         post: Callable[[BehaviorReport], None],
+        replaced: Callable[[StaleCommandError], None],
+        claims: Claims,
         clearance: VehicleSeparation | None = None,
     ) -> None:
         self._arbiters = arbiters
@@ -73,12 +94,15 @@ class Dispatcher:
         self._clock = clock
         self._geometries = geometries
         self._post = post
+        self._replaced = replaced
+        self._claims = claims
         self._clearance = clearance
         self._active: dict[str, _Active] = {}
         self._tails: dict[str, asyncio.Task[None]] = {}
         self._starts: dict[str, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._barred: set[str] = set()
+        self._disowned: dict[str, tuple[ResourceId, ...]] = {}
 
     # --- commands -------------------------------------------------------------------------------
 
@@ -102,11 +126,12 @@ class Dispatcher:
 
     def hold(self, resource: str) -> None:
         """Bring a resource to its safe state."""
+        self._claims.open()
         self._enqueue((resource,), lambda: self._turn("hold", ResourceId(resource)))
 
-    def resume(self, resource: str) -> None:
-        """Let a resource go on after `hold`."""
-        self._enqueue((resource,), lambda: self._turn("resume", ResourceId(resource)))
+    def resume(self, resource: str, run: str) -> None:
+        """Let a resource go on after `hold`, for a run."""
+        self._enqueue((resource,), lambda: self._resume(ResourceId(resource), run))
 
     def hold_all(self, run: str) -> list[ResourceId]:
         """Bring everything that a run commands to its safe state, whatever its state says.
@@ -118,6 +143,55 @@ class Dispatcher:
             self.hold(resource)
         return resources
 
+    # --- runs that pass from one executive to another --------------------------------------------
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Have all vehicles refuse what an earlier executive commands for a run, from now on driven
+        here."""
+        self._barred.discard(run)
+        for resource in self._disowned.pop(run, ()):
+            if self._availability.reason(resource) == _driven_elsewhere(run):
+                self._availability.restore(resource)
+        await asyncio.gather(
+            *(
+                self._call(f"fence {run}", arbiter.fence(run, epoch))
+                for arbiter in self._arbiters.all.values()
+                if fences(arbiter)
+            )
+        )
+
+    def bar(self, run: str) -> None:
+        """Move no vehicle for a run any more, until it is driven here again."""
+        self._barred.add(run)
+
+    def disown(self, run: str) -> None:
+        """Another executive drives a run: command nothing more for it, and have arbiters send
+        nothing more.
+
+        Its resources are not given to others here. They are held if an operator had stopped the
+        run: the other executive did not get that stop.
+        """
+        if run in self._disowned:
+            return
+        active = self._active_of(run)
+        resources = tuple(dict.fromkeys(each for _, one in active for each in one.resources))
+        self._disowned[run] = resources
+        is_stopped = run in self._barred
+        self._barred.add(run)
+        for behavior, _ in active:
+            self.ended(behavior)
+        for resource in resources:
+            self._availability.withdraw(resource, _driven_elsewhere(run))
+        self._enqueue((), lambda: self._let_go(run))
+        if is_stopped:
+            for resource in resources:
+                self.hold(resource)
+
+    async def _let_go(self, run: str) -> None:
+        for arbiter in self._arbiters.all.values():
+            if fences(arbiter):
+                await self._call(f"disown {run}", arbiter.disown(run))
+
     # --- STOP and pause, out of turn -------------------------------------------------------------
 
     def stop_at_once(self, run: str, epoch: int) -> dict[str, Order]:
@@ -125,9 +199,15 @@ class Dispatcher:
 
         These cancels wait for nothing that their resources were asked before, but for
         `START_WAIT_S` for a start under way. A start that takes longer is abandoned, and the
-        resource is held as well, as the arbiter may have begun the behavior.
+        resource is held as well, as the arbiter may have begun the behavior. What is disowned
+        is held: its vehicles refuse to cancel what another executive drives.
         """
         self._barred.add(run)
+        if run in self._disowned:
+            return {
+                each: self._order((each,), partial(self._turn, "hold", each))
+                for each in self._disowned[run]
+            }
         return {
             behavior: self._order(active.resources, partial(self._stop, behavior, active, epoch))
             for behavior, active in self._active_of(run)
@@ -163,12 +243,13 @@ class Dispatcher:
         self._availability.release(holder)
 
     def _active_of(self, run: str) -> list[tuple[str, _Active]]:
-        return [each for each in self._active.items() if each[0].partition(".")[0] == run]
+        return [each for each in self._active.items() if run_of(each[0]) == run]
 
     def _order(
         self, resources: tuple[ResourceId, ...], send: Callable[[], Awaitable[str]]
     ) -> Order:
         order = Order(resources)
+        self._claims.open()
 
         async def carry_out() -> None:
             order.wrong = await send()
@@ -183,7 +264,7 @@ class Dispatcher:
             start.cancel()
             await _returns(start)
         if self._active.get(behavior) is not active:
-            return ""  # it was not sent: `_start` saw that its run is barred
+            return ""  # it was not sent: `_start` saw that its run is barred; or it is disowned
         wrong = await self._cancel_active(behavior, active, active.resources, epoch)
         if abandoned:
             wrong = wrong or "its start had not returned and was abandoned; it is held as well"
@@ -293,6 +374,10 @@ class Dispatcher:
         try:
             async with asyncio.timeout(CALL_TIMEOUT_S):
                 await call
+        except StaleCommandError as error:
+            log.error("%s: %s", what, error)
+            self._replaced(error)
+            return str(error)
         except TimeoutError:
             log.error("%s: the arbiter did not return within %s s", what, CALL_TIMEOUT_S)
             return f"the arbiter did not return within {CALL_TIMEOUT_S:g} s"
@@ -333,8 +418,9 @@ class Dispatcher:
             if near:
                 self._refuse(command.behavior, "REJECTED", near)
                 return
+        await self._claims.confirmed()
         if self._is_barred(command):
-            del self._active[command.behavior]
+            self._active.pop(command.behavior, None)
             return
         wrong = await self._call(f"start {command.behavior}", arbiter.start(request))
         if wrong and self._active.get(command.behavior) is active:
@@ -346,7 +432,7 @@ class Dispatcher:
         Raises:
             ParameterError: a parameter makes no sense.
         """
-        run = command.behavior.partition(".")[0]
+        run = run_of(command.behavior)
         ids = _ids(command.resources)
         parameters = resolve(
             spec,
@@ -366,7 +452,7 @@ class Dispatcher:
         )
 
     def _is_barred(self, command: StartBehavior) -> bool:
-        return command.behavior.partition(".")[0] in self._barred
+        return run_of(command.behavior) in self._barred
 
     async def _turn(self, what: str, resource: ResourceId) -> str:
         """Hold or resume; asked in its turn, as a team may have taken the resource meanwhile."""
@@ -375,6 +461,11 @@ class Dispatcher:
             self._clearance.reservations.delay(resource)
         call = arbiter.hold(resource) if what == "hold" else arbiter.resume(resource)
         return await self._call(f"{what} {resource}", call)
+
+    async def _resume(self, resource: ResourceId, run: str) -> None:
+        await self._claims.confirmed()
+        if run not in self._barred:
+            await self._turn("resume", resource)
 
     def spec(
         self, resources: tuple[ResourceId, ...], name: str, kind: BehaviorType
@@ -386,6 +477,9 @@ class Dispatcher:
         return next((spec for spec in specs if spec is not None), None)
 
     async def _cancel(self, command: CancelBehavior) -> None:
+        await self._claims.confirmed()
+        if run_of(command.behavior) in self._disowned:
+            return
         active = self._active.get(command.behavior)
         if active is None:
             self._post(BehaviorReport(command.behavior, 1, BehaviorState.CANCELLED))
@@ -426,6 +520,10 @@ async def _returns(start: asyncio.Task[None] | None) -> bool:
         return True
     await asyncio.wait({start}, timeout=START_WAIT_S)
     return start.done()
+
+
+def _driven_elsewhere(run: str) -> str:
+    return f"another executive drives {run}, which has it"
 
 
 async def _nothing() -> None:

@@ -15,7 +15,7 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
 from m2pem.engine.state import RunStatus
-from m2pem.errors import M2pemError, OperatorError
+from m2pem.errors import M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
 from m2pem.executive.ended_runs import in_words
@@ -134,6 +134,11 @@ def _problem(what: str, asked: "asyncio.Future[Step]") -> str:
             "it has not been recorded yet"
         )
     error = asked.exception()
+    if isinstance(error, StaleEpochError):
+        return (
+            f"its vehicles were commanded to hold, and it is not stopped: {error}. Stop it at the "
+            "other executive, too"
+        )
     if isinstance(error, M2pemError):
         return f"the {what} went to its vehicles, but was not recorded: {error}"
     if error is not None:

@@ -88,6 +88,7 @@ class Executive:
                 {team.name: spelled_out(team) for team in fleet.teams.values()},
                 journal.identity,
                 self._epoch_of,
+                self._may_send,
             ),
         )
         self._observers = (
@@ -106,6 +107,7 @@ class Executive:
         self._connections = FleetConnections(
             self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
         )
+        self.ownership = self._supervisor.ownership
         self.health = ExecutiveHealth(journal)
         self._schedule = ScheduleEntries(
             self._supervisor,
@@ -154,6 +156,8 @@ class Executive:
         self._supervisor.begin_tasks_in(group)
         for what, listening in self._connections.listeners():
             self._listen(group, what, listening)
+        if isinstance(self.clock, SystemClock):
+            self._listen(group, "watch of the runs' claims", self.ownership.watch)
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
@@ -227,6 +231,9 @@ class Executive:
 
     def _epoch_of(self, behavior: BehaviorId) -> int:
         return self._supervisor.epoch_of(behavior)
+
+    def _may_send(self) -> bool:
+        return self.ownership.may_send()
 
     # --- runs: see `Supervisor` -----------------------------------------------------------------
 

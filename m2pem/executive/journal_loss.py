@@ -122,7 +122,7 @@ class JournalLossPrompts:
                     runner.take_up([each for each in services if each.service in open_])
                     for resource in self._close(run, "go_on", by):
                         if not is_behavior(self._availability.holder(resource)):
-                            self._dispatcher.resume(resource)
+                            self._dispatcher.resume(resource, run)
                     return
                 case RunEnded():
                     # Held resources stay held: no operator has said that they may move.

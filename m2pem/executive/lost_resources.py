@@ -13,12 +13,14 @@ and marks beside the journal which were lost by runs that are over.
 import asyncio
 import logging
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from m2pem.api.arbiter import Arbiter, BehaviorId, reclaims
 from m2pem.api.clock import Clock
 from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.engine.state import OutOfReach
+from m2pem.errors import StaleCommandError
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
 from m2pem.executive.lost_marks import LostMark, LostMarks
@@ -230,7 +232,9 @@ class LostResources:
                 if reclaims(arbiter):
                     return await arbiter.reclaim(resource)
                 if lost.behavior is not None:
-                    await arbiter.cancel(lost.behavior, self._epoch_of(lost.behavior))
+                    # Of a run that is not driven here any more, the hold that follows is enough.
+                    with suppress(StaleCommandError):
+                        await arbiter.cancel(lost.behavior, self._epoch_of(lost.behavior))
                 if resource not in self._handover.taken:
                     await arbiter.hold(resource)
         except TimeoutError:
@@ -246,7 +250,11 @@ class LostResources:
         assert lost.behavior is not None
         report = await arbiter.query(lost.behavior, lost.native_ref)
         if report.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING):
-            await arbiter.cancel(lost.behavior, self._epoch_of(lost.behavior))
+            try:
+                await arbiter.cancel(lost.behavior, self._epoch_of(lost.behavior))
+            except StaleCommandError:
+                await arbiter.hold(resource)
+                return ""
             return f"its link is restored, and it still does {lost.behavior}, which is cancelled"
         if report.state is BehaviorState.UNKNOWN and resource not in self._handover.taken:
             await arbiter.hold(resource)

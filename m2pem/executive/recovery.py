@@ -22,6 +22,7 @@ from m2pem.engine.inputs import (
 )
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
+from m2pem.errors import StaleEpochError
 from m2pem.executive.behavior_reports import reported, spec_of
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.fleet_connections import FleetArbiters
@@ -103,6 +104,10 @@ async def take_over(
         dispatcher.keep_between_tasks(keeping.id, keeping.resource)
     _recall(runner, arbiters, dispatcher)
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
+    newest = max((report.epoch for report in reports if report is not None), default=0)
+    if newest > runner.epoch:
+        runner.fail(replaced_by(runner, newest))
+        return []
     resend: set[str] = set()
     for behavior, report in zip(known, reports, strict=True):
         number = max(report.number if report is not None else 0, behavior.number)
@@ -175,6 +180,14 @@ def _arbiter(arbiters: FleetArbiters, behavior: Behavior) -> Arbiter:
     ids = [ResourceId(name) for name in behavior.resources]
     serving = arbiters.serving(ids, behavior.name, BehaviorType(behavior.type))
     return serving or arbiters.of(ids[0])
+
+
+def replaced_by(runner: Runner, newest: int) -> StaleEpochError:
+    """The error for a run of which a vehicle has seen a newer epoch."""
+    return StaleEpochError(
+        f"a vehicle has seen epoch {newest} of {runner.id}, and this executive has epoch "
+        f"{runner.epoch}: another one drives it"
+    )
 
 
 async def _query(arbiters: FleetArbiters, behavior: Behavior) -> BehaviorReport | None:

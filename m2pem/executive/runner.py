@@ -112,6 +112,8 @@ class Runner:
         self.id: RunId = run.state.run
         self.epoch = epoch
         self.failure: M2pemError | None = None
+        self.replaced = False
+        """Another executive drives the run."""
         self._broken: Exception | None = None
         self.prompts: dict[str, OpenPrompt] = {}
         self._context = context
@@ -354,7 +356,7 @@ class Runner:
             return
         strays, self._strays = self._strays, frozenset()
         for resource in sorted(strays):
-            self._context.dispatcher.resume(resource)
+            self._context.dispatcher.resume(resource, self.id)
         if not self._is_held:
             self._release_withheld()
 
@@ -417,7 +419,7 @@ class Runner:
                     context.dispatcher.hold(resource)
             case c.ResumeResource(resource=resource):
                 if not self._is_held:
-                    context.dispatcher.resume(resource)
+                    context.dispatcher.resume(resource, self.id)
                     self._release_withheld()
             case c.OpenPrompt():
                 prompt = OpenPrompt(

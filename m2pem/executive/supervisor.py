@@ -17,6 +17,7 @@ from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.authoring import MissionFiles, MissionSource
 from m2pem.api.clock import Clock
+from m2pem.api.epoch_fence import run_of
 from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState, Telemetry
@@ -25,7 +26,15 @@ from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import OutOfReach, RunStatus
-from m2pem.errors import JournalError, M2pemError, NotDrivenError, OperatorError, ScheduleError
+from m2pem.errors import (
+    JournalError,
+    M2pemError,
+    NotDrivenError,
+    OperatorError,
+    ScheduleError,
+    StaleCommandError,
+    StaleEpochError,
+)
 from m2pem.executive.allocator import Allocator
 from m2pem.executive.armed_vehicles import describe_armed_vehicles
 from m2pem.executive.battery_forecast import BatteryForecast
@@ -46,7 +55,8 @@ from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
-from m2pem.executive.recovery import claim, replay, take_over
+from m2pem.executive.ownership import Ownership
+from m2pem.executive.recovery import claim, replaced_by, replay, take_over
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.scheduled_start import NotBegunError
@@ -138,12 +148,15 @@ class Supervisor:
         self._group: asyncio.TaskGroup | None = None
         # Of two starts at once the second must see what the first one takes.
         self._starting = asyncio.Lock()
+        self.ownership = Ownership(journal, self.runners, self.replaced, self._claim_unknown)
         self.dispatcher = Dispatcher(
             arbiters,
             self.availability,
             clock,
             self._geometry,
             self._post_report,
+            self._refused,
+            self.ownership,
             self._separation,
         )
         self.allocator = Allocator(
@@ -510,6 +523,7 @@ class Supervisor:
         run = MissionRun(mission, self.fleet, number, self.settings.steps_at_once)
         last_us = await replay(self.journal, run, self.settings.on_records)
         runner = self._runner(run, epoch)
+        await self.dispatcher.fence(number, epoch)
         self.handover.take_up(run.state.taken)
         outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
         claim(runner, line.loss, self.handover.taken, self._geometries_given())
@@ -554,6 +568,8 @@ class Supervisor:
 
     async def _drive_and_release(self, runner: Runner) -> None:
         await runner.drive()
+        if isinstance(runner.failure, StaleEpochError):
+            self.replaced(runner.id, runner.failure)
         self.allocator.let_go(runner.id)
         await self.journal.release(runner.id)
         del self._tasks[runner.id]
@@ -607,8 +623,31 @@ class Supervisor:
         runner.post(reported(report, runner.run.state.behaviors.get(report.id), self.arbiters))
 
     def on_report(self, report: BehaviorReport) -> None:
-        """An arbiter reported what became of a behavior."""
-        self.dispatcher.reported(report)
+        """An arbiter reported what became of a behavior, or that another executive drives it."""
+        runner = self.runners.get(run_of(report.id))
+        if runner is not None and report.epoch > runner.epoch:
+            self.replaced(runner.id, replaced_by(runner, report.epoch))
+        else:
+            self.dispatcher.reported(report)
+
+    def _refused(self, error: StaleCommandError) -> None:
+        if (runner := self.runners.get(error.run)) is not None and error.newest > runner.epoch:
+            self.replaced(runner.id, replaced_by(runner, error.newest))
+
+    def replaced(self, run: RunId, error: StaleEpochError) -> None:
+        """Another executive drives a run: nothing more is commanded for it here, and nothing that
+        its arbiters stream or repeat goes out any more."""
+        runner = self.runners[run]
+        if runner.replaced:
+            return
+        runner.replaced = True
+        self.dispatcher.disown(run)
+        runner.fail(error)
+        text = (
+            f"{error}. This executive commands nothing more for {run}; its vehicles do what the "
+            f"other one commands. STOP of {run} here still holds them"
+        )
+        self.events.publish(Alert(run, "RUN_REPLACED", text))
 
     def on_telemetry(self, state: Telemetry) -> None:
         """An arbiter published the state of a vehicle, payload or team."""
@@ -647,6 +686,12 @@ class Supervisor:
             for each in self.arbiters.resources
         }
         return {each: why for each, why in found.items() if why}
+
+    def _claim_unknown(self, run: RunId, error: M2pemError) -> None:
+        """The journal cannot say whether this executive drives a run: hold what it commands."""
+        self.dispatcher.bar(run)
+        self.dispatcher.hold_all(run)
+        self.runners[run].fail(error)
 
     def set_geometry(
         self, name: str, geometry: Mapping[str, Value], run: RunId | None, by: str

@@ -172,6 +172,15 @@ class Journal(Protocol):
         """
         ...
 
+    async def check_claim(self, run: str, epoch: int) -> None:
+        """Return if the claim of a run with this epoch holds; nothing is written.
+
+        Raises:
+            StaleEpochError: another executive has claimed the run since.
+            JournalError: no such run, or the journal cannot say.
+        """
+        ...
+
     async def release(self, run: str) -> None:
         """Release a run, so that another executive may claim it."""
         ...

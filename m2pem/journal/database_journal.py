@@ -25,6 +25,7 @@ from m2pem.journal.codec import (
 )
 from m2pem.journal.hash_chain import entry_hash, header_hash
 from m2pem.journal.marks import MarkFile, find_losses
+from m2pem.journal.position import RunPosition
 from m2pem.journal.storage import Connection, Storage
 from m2pem.journal.transaction import (
     EntryRow,
@@ -137,6 +138,17 @@ class DatabaseJournal(ABC):
         except asyncio.CancelledError:
             taking.add_done_callback(release)
             raise
+
+    async def check_claim(self, run: str, epoch: int) -> None:
+        """See `Journal.check_claim`; it does not wait for what is being written."""
+        number = run_number(run)
+        (await self._read(lambda: self._position(number))).check_claim(run, epoch)
+
+    def _position(self, number: int) -> RunPosition:
+        row = self._reading.execute("SELECT * FROM standings WHERE run = ?", (number,)).fetchone()
+        if row is None:
+            raise no_run(self._reading, number)
+        return position_from(row)
 
     async def release(self, run: str) -> None:
         """See `Journal.release`; what was submitted before is written first."""

@@ -86,6 +86,11 @@ class MemoryJournal:
         found.position = found.position.claimed(os.getpid())
         return found.position.epoch
 
+    async def check_claim(self, run: str, epoch: int) -> None:
+        """See `Journal.check_claim`."""
+        self._check_open()
+        self._find(run).position.check_claim(run, epoch)
+
     async def release(self, run: str) -> None:
         """See `Journal.release`."""
         self._check_open()

@@ -33,11 +33,7 @@ class RunPosition:
             StaleEpochError: the run was claimed since.
             InternalError: the entry does not follow the last one.
         """
-        if entry.epoch < self.epoch:
-            raise StaleEpochError(
-                f"{entry.run} was claimed by another executive since (epoch {self.epoch}; "
-                f"this one has {entry.epoch}): this one must stop driving it"
-            )
+        self.check_claim(entry.run, entry.epoch)
         if entry.epoch > self.epoch:
             raise InternalError(
                 f"{entry.run}: an entry of epoch {entry.epoch}, which was never claimed; "
@@ -55,6 +51,18 @@ class RunPosition:
             if type(record) in _CHANGING:
                 position = position._with_record(entry, record)
         return position
+
+    def check_claim(self, run: str, epoch: int) -> None:
+        """Check that a claim of the run holds.
+
+        Raises:
+            StaleEpochError: the run was claimed since.
+        """
+        if epoch < self.epoch:
+            raise StaleEpochError(
+                f"{run} was claimed by another executive since (epoch {self.epoch}; this one has "
+                f"{epoch}): this one must stop driving it"
+            )
 
     def _with_record(self, entry: Entry, record: object) -> "RunPosition":
         match record:

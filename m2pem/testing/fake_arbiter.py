@@ -24,7 +24,8 @@ from m2pem.mission.values import Value
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call of the arbiter: start, cancel, query, hold or resume, and its subject."""
+    """A call of the arbiter: start, cancel, query, hold or resume, and its subject; disown of a
+    run."""
 
     what: str
     subject: str
@@ -33,11 +34,12 @@ class Call:
 class FakeArbiter:
     """Offers the whole shared catalogue on every resource, and keeps every call in `calls`.
 
-    `known`: the answers of `query`, by behavior. `raises`: exceptions by method ("start").
+    `known`: the answers of `query`, by behavior. `fenced`: the epochs of runs that were taken over.
+    `raises`: exceptions by method ("start").
     `hangs`: methods that never return.
     """
 
-    capabilities = ArbiterCapabilities()
+    capabilities = ArbiterCapabilities(fences=True)
 
     def __init__(
         self, connections: Mapping[ResourceId, Connection], context: ArbiterContext
@@ -47,6 +49,7 @@ class FakeArbiter:
         self.calls: list[Call] = []
         self.requests: dict[BehaviorId, BehaviorRequest] = {}
         self.known: dict[BehaviorId, BehaviorReport] = {}
+        self.fenced: dict[str, int] = {}
         self.raises: dict[str, Exception] = {}
         self.hangs: set[str] = set()
         self.limit = Limits()
@@ -65,6 +68,7 @@ class FakeArbiter:
         reason: str = "",
         outputs: Mapping[str, Value] | None = None,
         remaining: Mapping[str, Value] | None = None,
+        epoch: int = 0,
     ) -> None:
         """Make the arbiter report the state of a behavior, after what `known` says of it."""
         known = self.known.get(behavior)
@@ -72,7 +76,14 @@ class FakeArbiter:
         number = self._numbers[behavior] = before + 1
         self._reports.put_nowait(
             BehaviorReport(
-                behavior, number, state, code, reason, outputs=outputs or {}, remaining=remaining
+                behavior,
+                number,
+                state,
+                code,
+                reason,
+                outputs=outputs or {},
+                remaining=remaining,
+                epoch=epoch,
             )
         )
 
@@ -120,6 +131,13 @@ class FakeArbiter:
 
     async def resume(self, resource: ResourceId) -> None:
         await self._called("resume", resource)
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Keep the epoch in `fenced`."""
+        self.fenced[run] = epoch
+
+    async def disown(self, run: str) -> None:
+        await self._called("disown", run)
 
     async def reports(self) -> AsyncIterator[BehaviorReport]:
         """Yield the reports that the test makes."""

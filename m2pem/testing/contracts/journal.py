@@ -403,6 +403,23 @@ class JournalContract(Contract):
             await journal.append([entry(run, 2, RunClaimed(2), epoch=2)])
             assert [found.epoch for found in await written(journal, run)] == [1, 2]
 
+    async def test_a_claim_holds_until_another_executive_claims_the_run(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """`check_claim` says so without a record, to an executive that was stopped for a while."""
+        async with opened(open_journal) as journal:
+            run, other = await journal.create(HEADER), await journal.create(HEADER)
+            await journal.check_claim(run, 1)
+            await journal.release(run)
+            assert await journal.claim(run) == 2
+            with pytest.raises(StaleEpochError, match="epoch 2; this one has 1"):
+                await journal.check_claim(run, 1)
+            await journal.check_claim(run, 2)
+            await journal.check_claim(other, 1)
+            with pytest.raises(JournalError, match="r9"):
+                await journal.check_claim("r9", 1)
+            assert await written(journal, run) == []
+
     async def test_a_refused_call_does_not_touch_those_it_waits_with(
         self, open_journal: OpenJournal
     ) -> None:

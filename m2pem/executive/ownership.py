@@ -1,0 +1,120 @@
+"""Whether this executive still drives its runs, asked of the journal after it was stopped a while.
+
+A process that was stopped (SIGSTOP, a suspended machine, a blocked event loop) may have lost its
+runs to another executive, and learns of it at its next entry in the journal. That is too late: what
+it was about to send goes out first. So after such a time nothing is sent before the journal has
+said that the claims of all runs hold. Holds and an operator's STOP do not wait for that.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Mapping
+
+from m2pem.api.runs import RunId
+from m2pem.errors import JournalError, M2pemError, StaleEpochError
+from m2pem.executive.runner import Runner
+from m2pem.journal.base import Journal
+
+log = logging.getLogger("m2pem.executive")
+
+TICK_S = 0.25
+STOPPED_AFTER_S = 1.0
+"""A process that has not run for so long asks the journal. It is less than any lease of a claim."""
+
+ANSWERED_WITHIN_S = 2.0
+"""A journal that has not answered by then counts as failed: the run is held."""
+
+
+def awake_s() -> float:
+    """Seconds of a clock that goes on while the process is stopped, or the machine suspended."""
+    if hasattr(time, "CLOCK_BOOTTIME"):
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.monotonic()
+
+
+class Ownership:
+    """The claims of an executive's runs.
+
+    `replaced` is called for a run that another executive has claimed, `unknown` for one of which
+    the journal cannot say it: when they return, nothing that moves a vehicle goes out for the run.
+    Times during which `watch` does not run do not count.
+    """
+
+    def __init__(
+        self,
+        journal: Journal,
+        runners: Mapping[RunId, Runner],
+        replaced: Callable[[RunId, StaleEpochError], None],
+        unknown: Callable[[RunId, M2pemError], None],
+    ) -> None:
+        self._journal = journal
+        self._runners = runners
+        self._replaced = replaced
+        self._unknown = unknown
+        self._seen_s: float | None = None
+        self._stops = 0
+        self._confirmed = 0
+        self._opened = 0
+        self._asking = asyncio.Lock()
+
+    def may_send(self) -> bool:
+        """Whether arbiters may send by themselves: see `ArbiterContext.may_send`."""
+        return self._look() in (self._confirmed, self._opened)
+
+    def open(self) -> None:
+        """Let arbiters send at once: an operator's STOP, or a hold, must go out."""
+        self._opened = self._look()
+
+    async def confirmed(self) -> None:
+        """Return when the journal has been asked since the process was stopped last."""
+        if self._look() == self._confirmed:
+            return
+        async with self._asking:
+            while (stops := self._look()) != self._confirmed:
+                await self._ask()
+                self._confirmed = stops
+
+    async def watch(self) -> None:
+        """Ask the journal each time that the process was stopped, until cancelled."""
+        self._seen_s = awake_s()
+        try:
+            while True:
+                await self.confirmed()
+                await asyncio.sleep(TICK_S)
+        finally:
+            self._seen_s = None
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _look(self) -> int:
+        """How often this process was stopped until now."""
+        if self._seen_s is not None:
+            now_s = awake_s()
+            stopped_s, self._seen_s = now_s - self._seen_s, now_s
+            if stopped_s > STOPPED_AFTER_S:
+                self._stops += 1
+                log.warning(
+                    "the executive did not run for %.1f s: it asks its journal before it goes on",
+                    stopped_s,
+                )
+        return self._stops
+
+    async def _ask(self) -> None:
+        driven = [each for each in self._runners.values() if not each.done.is_set()]
+        await asyncio.gather(*(self._ask_of(runner) for runner in driven))
+
+    async def _ask_of(self, runner: Runner) -> None:
+        try:
+            async with asyncio.timeout(ANSWERED_WITHIN_S):
+                await self._journal.check_claim(runner.id, runner.epoch)
+        except StaleEpochError as error:
+            self._replaced(runner.id, error)
+        except TimeoutError:
+            text = (
+                f"the journal has not said within {ANSWERED_WITHIN_S:g} s whether this executive "
+                f"still drives {runner.id}, after it was stopped"
+            )
+            self._unknown(runner.id, JournalError(text))
+        except M2pemError as error:
+            self._unknown(runner.id, error)
