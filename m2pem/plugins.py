@@ -64,7 +64,7 @@ _CHECK = "m2pem_check_mission"
 _CHECK_HOST = "m2pem_check_host"
 _OBSERVE = "m2pem_records_committed"
 PUBLISHED: Mapping[str, Sequence[str]] = {
-    "arbiter": ("mavlink", "ptz", "ros"),
+    "arbiter": ("mavlink", "ptz", "ros", "zenoh"),
     "ocu": ("mocu", "terminal", "web"),
 }
 """What the plugins of m2pem itself provide, installed or not. Plugin NAME provides NAME alone."""

@@ -78,11 +78,11 @@ def test_ros_is_a_profile() -> None:
     assert "profiles" not in service("executive")
 
 
-@pytest.fixture
-def unit(tmp_path: Path) -> Path:
-    """The unit with a program that is here: systemd-analyze looks for it."""
-    text = (DEPLOY / "m2pem.service").read_text(encoding="utf-8")
-    file = tmp_path / "m2pem.service"
+@pytest.fixture(params=["m2pem.service", "m2pem-arbiter-host.service"])
+def unit(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """A unit with a program that is here: systemd-analyze looks for it."""
+    text = (DEPLOY / request.param).read_text(encoding="utf-8")
+    file = tmp_path / request.param
     file.write_text(text.replace("/opt/m2pem/bin/m2pem", sys.executable))
     return file
 
@@ -116,6 +116,16 @@ def test_the_unit_and_the_containers_serve_with_options_that_exist(m2pem: Comman
     for command in (words, *(service(name)["command"] for name in SERVICES)):
         assert command[0] == "serve"
         assert all(word in usage for word in command if word.startswith("--"))
+
+
+def test_the_unit_of_a_host_has_options_that_exist(m2pem: CommandLine) -> None:
+    unit = RawConfigParser(strict=False)
+    unit.optionxform = str  # type: ignore[assignment,method-assign]
+    unit.read(DEPLOY / "m2pem-arbiter-host.service")
+    _, command, *words = unit["Service"]["ExecStart"].split()
+    status, usage, _ = m2pem.run(command, "--help")
+    assert status == 0
+    assert all(word in usage for word in words if word.startswith("--"))
 
 
 def test_every_file_and_variable_of_the_page_is_there() -> None:

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.health import HealthCheck, HealthStatus, listening_check
+    from m2pem.api.hosting import CutOffPolicy, Host, HostedArbiter, HostLink, WhenCutOff
     from m2pem.api.latest_task import LatestTask
     from m2pem.api.ocu import Ocu
     from m2pem.api.operations import (
@@ -162,6 +163,7 @@ _MODULES = {
     "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
     "m2pem.api.health": "HealthCheck HealthStatus listening_check",
+    "m2pem.api.hosting": "CutOffPolicy Host HostLink HostedArbiter WhenCutOff",
     "m2pem.api.behavior_parameters": "BehaviorParameters decode_parameters encode_parameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
@@ -248,6 +250,7 @@ __all__ = [
     "Clock",
     "Connection",
     "ConnectionReader",
+    "CutOffPolicy",
     "DataName",
     "Decision",
     "Description",
@@ -269,6 +272,9 @@ __all__ = [
     "HandedOver",
     "HealthCheck",
     "HealthStatus",
+    "Host",
+    "HostLink",
+    "HostedArbiter",
     "BehaviorTracker",
     "Importance",
     "Kind",
@@ -336,6 +342,7 @@ __all__ = [
     "Value",
     "VehiclePosition",
     "VehicleState",
+    "WhenCutOff",
     "adjusts",
     "as_geojson",
     "command_group",

@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "Show missions on simulated vehicles.",
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",
+    "arbiter-host": "Run the arbiters of vehicles on this host, for an executive elsewhere.",
     "start": "Start a mission in an executive that is running on this host.",
     "schedule": "Show the missions that start later; cancel, hold or release them.",
     "check": "Check a mission file, alone or against a fleet.",
@@ -59,8 +60,8 @@ _MODULES = {**dict.fromkeys(_RUN_CONTROL, "run_control"), "resolve": "incidents"
 
 def built_in(name: str) -> click.Command:
     """Return the built-in command of that name; the function `continue_` is `m2pem continue`."""
-    module = _MODULES.get(name, name)
-    function = f"{name}_" if iskeyword(name) else name
+    module = _MODULES.get(name, name.replace("-", "_"))
+    function = f"{name}_" if iskeyword(name) else name.replace("-", "_")
     command = getattr(import_module(f"m2pem.cli.{module}"), function)
     assert isinstance(command, click.Command)
     return command

@@ -64,11 +64,15 @@ class _Active:
 
 @dataclass(slots=True)
 class Order:
-    """A STOP or hold that was sent out of turn. `wrong`: "", or why it may not have arrived."""
+    """A STOP or hold that was sent out of turn. `wrong`: "", or why it may not have arrived.
+
+    `hosts`: the other hosts that it goes to.
+    """
 
     resources: tuple[ResourceId, ...]
     task: asyncio.Task[None] | None = None
     wrong: str = ""
+    hosts: tuple[str, ...] = ()
 
 
 class Dispatcher:
@@ -248,7 +252,8 @@ class Dispatcher:
     def _order(
         self, resources: tuple[ResourceId, ...], send: Callable[[], Awaitable[str]]
     ) -> Order:
-        order = Order(resources)
+        hosts = filter(None, map(self._arbiters.host_of, resources))
+        order = Order(resources, hosts=tuple(dict.fromkeys(hosts)))
         self._claims.open()
 
         async def carry_out() -> None:

@@ -114,9 +114,8 @@ class EmergencyCommands:
         """Say at once which vehicles may go on, and why."""
         tasks = {order.task for order in orders.values() if order.task is not None}
         await asyncio.wait(tasks, timeout=ACKNOWLEDGED_WITHIN_S)
-        waited = f"its arbiter has not taken it within {ACKNOWLEDGED_WITHIN_S:g} s"
         late: Sequence[tuple[Order, str]] = [
-            (order, order.wrong or waited)
+            (order, order.wrong or _waited(order))
             for order in orders.values()
             if order.wrong or not (order.task is None or order.task.done())
         ]
@@ -124,6 +123,11 @@ class EmergencyCommands:
             names = ", ".join(order.resources)
             text = f"{names} may not have received the {what} of {run}: {why}. Use its own stop"
             self._events.publish(Alert(run, "NOT_RECEIVED", text))
+
+
+def _waited(order: Order) -> str:
+    where = f" on {', '.join(order.hosts)}" if order.hosts else ""
+    return f"its arbiter{where} has not taken it within {ACKNOWLEDGED_WITHIN_S:g} s"
 
 
 def _problem(what: str, asked: "asyncio.Future[Step]") -> str:

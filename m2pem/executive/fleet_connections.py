@@ -15,6 +15,7 @@ from m2pem.api.arbiter import (
     names_addresses,
 )
 from m2pem.api.capabilities import arbiter_capabilities, arbiter_problem
+from m2pem.api.hosting import HostedArbiter
 from m2pem.api.telemetry import Telemetry
 from m2pem.errors import FleetError, PluginError
 from m2pem.findings import Finding
@@ -46,8 +47,72 @@ def _located(finding: Finding, fleet: Fleet) -> Finding:
     return replace(finding, file=fleet.file, line=entry.line if entry else 0)
 
 
+HOST_LINK = "zenoh"
+"""The arbiter that stands for those on other hosts."""
+
+
+def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connection]]:
+    """The connections of each arbiter, by its name and the host that it runs on."""
+    area = fleet.geometries.get(fleet.fence)
+    fence = area if isinstance(area, Area) else None
+    connections: dict[tuple[str, str], dict[ResourceId, Connection]] = {}
+    for vehicle in fleet.vehicles.values():
+        group = connections.setdefault((vehicle.arbiter, vehicle.host), {})
+        group[vehicle.id] = Connection(
+            vehicle.id,
+            vehicle.domain.value,
+            vehicle.settings,
+            vehicle.behaviors,
+            lost_after_s=vehicle.lost_after_s,
+            failsafe=vehicle.failsafe,
+            fence=fence,
+            sitl=vehicle.sitl,
+            cruise_speed_m_s=vehicle.cruise_speed_m_s,
+            endurance_s=vehicle.endurance_s,
+        )
+    for payload in fleet.payloads.values():
+        owner = fleet.vehicles[payload.vehicle]
+        group = connections.setdefault((payload.arbiter, owner.host), {})
+        group[payload.id] = Connection(
+            payload.id,
+            owner.domain.value,
+            payload.settings,
+            payload.behaviors,
+            detector=payload.detector,
+            lost_after_s=owner.lost_after_s,
+            failsafe=owner.failsafe,
+            fence=fence,
+            sitl=owner.sitl,
+        )
+    return connections
+
+
+def hosted_arbiters(fleet: Fleet, plugins: ArbiterPlugins, host: str) -> list[HostedArbiter]:
+    """Return the arbiters that run on a host of the fleet.
+
+    Raises:
+        PluginError: the fleet names an arbiter that no plugin provides.
+    """
+    return [
+        HostedArbiter(
+            fleet.name,
+            fleet.hosts[host],
+            name,
+            group,
+            {each: fleet.vehicles[_vehicle(each)].when_cut_off for each in group},
+            partial(plugins.arbiter(name), group),
+        )
+        for (name, where), group in _connections(fleet).items()
+        if where == host
+    ]
+
+
+def _vehicle(resource: ResourceId) -> ResourceId:
+    return ResourceId(resource.partition("/")[0])
+
+
 class FleetArbiters:
-    """One object per registered name, built from the fleet. Building needs no connection.
+    """One object per registered name and host, built from the fleet. Building needs no connection.
 
     Raises:
         PluginError: the fleet names an arbiter that no plugin provides, or one that declares
@@ -57,47 +122,26 @@ class FleetArbiters:
 
     def __init__(self, fleet: Fleet, plugins: ArbiterPlugins, context: ArbiterContext) -> None:
         self.fleet = fleet
-        area = fleet.geometries.get(fleet.fence)
-        fence = area if isinstance(area, Area) else None
-        connections: dict[str, dict[ResourceId, Connection]] = {}
-        for vehicle in fleet.vehicles.values():
-            connections.setdefault(vehicle.arbiter, {})[vehicle.id] = Connection(
-                vehicle.id,
-                vehicle.domain.value,
-                vehicle.settings,
-                vehicle.behaviors,
-                lost_after_s=vehicle.lost_after_s,
-                failsafe=vehicle.failsafe,
-                fence=fence,
-                sitl=vehicle.sitl,
-                cruise_speed_m_s=vehicle.cruise_speed_m_s,
-                endurance_s=vehicle.endurance_s,
-            )
-        for payload in fleet.payloads.values():
-            owner = fleet.vehicles[payload.vehicle]
-            connections.setdefault(payload.arbiter, {})[payload.id] = Connection(
-                payload.id,
-                owner.domain.value,
-                payload.settings,
-                payload.behaviors,
-                detector=payload.detector,
-                lost_after_s=owner.lost_after_s,
-                failsafe=owner.failsafe,
-                fence=fence,
-                sitl=owner.sitl,
-            )
+        found = _connections(fleet)
         self.nothing_is_real = all(
             name == SIMULATED or connection.sitl
-            for name, group in connections.items()
+            for (name, _), group in found.items()
             for connection in group.values()
         )
+        connections = {_label(name, host): group for (name, host), group in found.items()}
+        self.by_name: dict[str, Arbiter] = {}
         try:
-            self.by_name: dict[str, Arbiter] = {
-                name: plugins.arbiter(name)(group, context) for name, group in connections.items()
-            }
+            for (name, host), group in found.items():
+                if not host:
+                    self.by_name[name] = plugins.arbiter(name)(group, context)
+            for host in fleet.hosts:
+                for hosted in hosted_arbiters(fleet, plugins, host):
+                    link = plugins.arbiter(HOST_LINK)
+                    arbiter = link(hosted.connections, context, hosted)
+                    self.by_name[_label(hosted.name, host)] = arbiter
         except FleetError as error:
-            found = [_located(finding, fleet) for finding in error.findings]
-            raise FleetError(error.what, found) from error
+            located = [_located(finding, fleet) for finding in error.findings]
+            raise FleetError(error.what, located) from error
         for name, arbiter in self.by_name.items():
             if problem := arbiter_problem(arbiter):
                 raise PluginError(f"arbiter {name!r}: {problem}")
@@ -148,6 +192,11 @@ class FleetArbiters:
     def holding(self, resource: ResourceId) -> Arbiter:
         """Who holds a resource, and lets it go on: its team while it is in one, else its own."""
         return self.teams if self.teams.marshals(resource) else self.of(resource)
+
+    def host_of(self, resource: ResourceId) -> str:
+        """The host on which the arbiter of a resource runs; "": in this process."""
+        vehicle = self.fleet.vehicles.get(_vehicle(resource))
+        return vehicle.host if vehicle is not None else ""
 
     def of(self, resource: ResourceId) -> Arbiter:
         """The arbiter that serves a resource."""
@@ -246,6 +295,10 @@ class FleetConnections:
     async def _read_telemetry(self, arbiter: Arbiter) -> None:
         async for state in arbiter.telemetry():
             self._on_telemetry(state)
+
+
+def _label(arbiter: str, host: str) -> str:
+    return f"{arbiter} on {host}" if host else arbiter
 
 
 def _has(specs: Sequence[BehaviorSpec], team_behavior: str) -> bool:

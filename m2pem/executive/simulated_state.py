@@ -35,18 +35,22 @@ def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
         return fleet
     path = f"{_prefix(journal)}{name}"
 
-    def settings(arbiter: str, own: Mapping[str, Any]) -> Mapping[str, Any]:
+    hosted = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.host}
+
+    def settings(each: Vehicle | Payload) -> Mapping[str, Any]:
         """Return the settings; those of the fleet have precedence."""
-        return {STATE: path, **own} if arbiter == SIMULATED else own
+        is_here = each.id.partition("/")[0] not in hosted
+        own = each.settings
+        return {STATE: path, **own} if each.arbiter == SIMULATED and is_here else own
 
     return replace(
         fleet,
         vehicles={
-            name: replace(vehicle, settings=settings(vehicle.arbiter, vehicle.settings))
+            name: replace(vehicle, settings=settings(vehicle))
             for name, vehicle in fleet.vehicles.items()
         },
         payloads={
-            name: replace(payload, settings=settings(payload.arbiter, payload.settings))
+            name: replace(payload, settings=settings(payload))
             for name, payload in fleet.payloads.items()
         },
     )

@@ -8,6 +8,7 @@ from typing import Any, get_type_hints
 import msgspec
 
 from m2pem.errors import JournalError
+from m2pem.fleet.hosts import CutOffPolicy, Host
 from m2pem.geo.geojson import kind_of
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.elements import ErrorPolicy
@@ -58,7 +59,9 @@ class Payload:
 @dataclass(frozen=True, slots=True)
 class Vehicle:
     """A vehicle. `payloads`: the ids of what is mounted on it. `cruise_speed_m_s`: how fast it goes
-    if no behavior says; `endurance_s`: how long it can, with a full battery. None: not said."""
+    if no behavior says; `endurance_s`: how long it can, with a full battery. None: not said.
+    `host`: the computer that its arbiters run on, and those of its payloads; "": the executive's
+    own. `when_cut_off`: what that computer does without contact to the executive."""
 
     id: ResourceId
     domain: Domain
@@ -73,6 +76,8 @@ class Vehicle:
     cruise_speed_m_s: float | None = None
     endurance_s: float | None = None
     tags: tuple[str, ...] = ()
+    host: str = ""
+    when_cut_off: CutOffPolicy = field(default_factory=CutOffPolicy)
     line: int = 0
 
 
@@ -129,7 +134,7 @@ class Fleet:
     start operators are warned of it. `preemption`: whether a task may take vehicles from tasks of
     other runs with a lower priority. `incident_role`: which operators decide about incidents, where
     the mission does not say; "": all. `operators`: the names of those who have each role; none:
-    every operator has every role.
+    every operator has every role. `hosts`: the other computers that arbiters run on, by name.
     """
 
     name: str
@@ -158,6 +163,7 @@ class Fleet:
     preemption: bool = False
     incident_role: str = ""
     operators: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    hosts: Mapping[str, Host] = field(default_factory=dict)
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:
@@ -166,19 +172,25 @@ class Fleet:
 
     @property
     def simulated(self) -> bool:
-        """Whether every vehicle and payload is of the simulated arbiter."""
+        """Whether every vehicle and payload is of the simulated arbiter, in this process."""
         everything: list[Vehicle | Payload] = [*self.vehicles.values(), *self.payloads.values()]
-        return all(each.arbiter == SIMULATED for each in everything)
+        hosted = any(vehicle.host for vehicle in self.vehicles.values())
+        return not hosted and all(each.arbiter == SIMULATED for each in everything)
 
 
 def real_resources(fleet: Fleet) -> list[ResourceId]:
-    """The vehicles and payloads that are neither simulated nor software in the loop."""
+    """The vehicles and payloads that are neither simulated nor software in the loop.
+
+    What another host simulates counts as real: it has that host's clock.
+    """
     everything: list[Vehicle | Payload] = [*fleet.vehicles.values(), *fleet.payloads.values()]
     sitl = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.sitl}
+    hosted = {vehicle.id for vehicle in fleet.vehicles.values() if vehicle.host}
     return [
         each.id
         for each in everything
-        if each.arbiter != SIMULATED and each.id.partition("/")[0] not in sitl
+        if (owner := each.id.partition("/")[0]) in hosted
+        or (each.arbiter != SIMULATED and owner not in sitl)
     ]
 
 
@@ -189,7 +201,7 @@ def simulated_fleet(fleet: Fleet, settings: Mapping[str, Any] | None = None) -> 
     return replace(
         fleet,
         vehicles={
-            id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra})
+            id_: replace(each, arbiter=SIMULATED, settings={**each.settings, **extra}, host="")
             for id_, each in fleet.vehicles.items()
         },
         payloads={

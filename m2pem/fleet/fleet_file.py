@@ -21,9 +21,11 @@ from m2pem.fleet.fleet_schema import (
     AllocationModel,
     DeconflictionModel,
     FleetModel,
+    HostModel,
     ScheduleModel,
     VehicleModel,
 )
+from m2pem.fleet.hosts import CutOffPolicy, Host, WhenCutOff, endpoint_problem
 from m2pem.fleet.yaml_source import YamlSource, note_shape_findings, read_yaml
 from m2pem.geo.files import GeometryError, read_geometry
 from m2pem.geo.local_frame import Origin
@@ -58,6 +60,7 @@ def load_fleet(path: str | Path) -> Fleet:
             note_shape_findings(source, error, FleetModel)
         _check_names(source)
         _check_teams(source)
+        _check_hosts(source)
         _check_incident_role(source)
         geometries = _read_geometries(source, path.parent)
         _check_fence(source)
@@ -116,6 +119,47 @@ def _check_teams(source: YamlSource) -> None:
             hint = suggest(lead, [m for m in members if isinstance(m, str)], "members")
             message = f"the lead '{lead}' is not one of the members"
             source.error(("teams", name, "lead"), "lead-not-member", message, hint)
+
+
+def _check_hosts(source: YamlSource) -> None:
+    hosts = source.mapping("hosts")
+    for name, value in source.mapping("vehicles").items():
+        vehicle = value if isinstance(value, dict) else {}
+        host = vehicle.get("host")
+        if isinstance(host, str) and host not in hosts:
+            hint = suggest(host, hosts, "hosts")
+            path = ("vehicles", name, "host")
+            source.error(path, "unknown-host", f"no host is named '{host}'", hint)
+        elif "when_cut_off" in vehicle and host is None:
+            message = "the vehicle's arbiter runs in the executive, which it cannot be cut off from"
+            path = ("vehicles", name, "when_cut_off")
+            source.error(path, "no-host", message, "add 'host', or leave 'when_cut_off' out")
+    for name in hosts:
+        _check_host(source, name)
+
+
+def _check_host(source: YamlSource, name: str) -> None:
+    host, tls = source.mapping("hosts", name), source.mapping("hosts", name, "tls")
+    if bool(host.get("connect")) == bool(host.get("listen")):
+        message = "say where the executive connects to, or else where it listens"
+        remedy = "write 'connect: [tls/ADDRESS:PORT]', or 'listen' in place of it"
+        source.error(("hosts", name), "host-endpoints", message, remedy)
+    if bool(tls.get("certificate")) != bool(tls.get("key")):
+        message = "a certificate and its key belong together"
+        source.error(("hosts", name, "tls"), "host-tls", message, "write both or none")
+    authenticated = bool(tls.get("certificate") and tls.get("key"))
+    for key in ("connect", "listen"):
+        endpoints = host.get(key)
+        for index, each in enumerate(endpoints if isinstance(endpoints, list) else ()):
+            if not isinstance(each, str) or not each:
+                continue
+            message, remedy = endpoint_problem(each, authenticated=authenticated)
+            path = ("hosts", name, key, index)
+            if message:
+                source.error(path, "host-endpoint", message, remedy)
+            elif each.startswith("tls/") and not tls:
+                remedy = "add 'tls: {ca: ..., certificate: ..., key: ...}'"
+                source.error(path, "host-tls", "the files of TLS are not named", remedy)
 
 
 def _check_incident_role(source: YamlSource) -> None:
@@ -199,6 +243,8 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
             cruise_speed_m_s=vehicle.cruise_speed,
             endurance_s=vehicle.endurance,
             tags=tuple(vehicle.tags),
+            host=vehicle.host or "",
+            when_cut_off=_cut_off(vehicle),
             line=source.line(("vehicles", name)),
         )
     teams = {
@@ -242,6 +288,36 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         preemption=costs.preemption,
         incident_role=model.incident_role or "",
         operators={role: tuple(names) for role, names in model.operators.items()},
+        hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
+    )
+
+
+def _cut_off(vehicle: VehicleModel) -> CutOffPolicy:
+    said = vehicle.when_cut_off
+    if said is None:
+        return CutOffPolicy()
+    behaviors = {name: WhenCutOff(action) for name, action in said.behaviors.items()}
+    return CutOffPolicy(WhenCutOff(said.action), said.after, behaviors)
+
+
+def _host(source: YamlSource, name: str, model: HostModel) -> Host:
+    folder = Path(source.file).parent
+
+    def beside(file: str | None) -> str:
+        return str(folder / Path(file).expanduser()) if file else ""
+
+    tls = model.tls
+    return Host(
+        name,
+        tuple(model.connect),
+        tuple(model.listen),
+        model.telemetry_hz,
+        model.round_trip,
+        beside(tls.ca) if tls else "",
+        beside(tls.certificate) if tls else "",
+        beside(tls.key) if tls else "",
+        beside(model.credentials),
+        source.line(("hosts", name)),
     )
 
 

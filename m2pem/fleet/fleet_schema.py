@@ -17,6 +17,7 @@ from pydantic import (
 from pydantic.json_schema import WithJsonSchema
 
 from m2pem.fleet.fleet import CONFLICT_WAIT_S
+from m2pem.fleet.hosts import CutOffPolicy, Host
 from m2pem.units import UNITS, Dimension, quantity
 
 
@@ -104,6 +105,58 @@ class PayloadModel(_Model):
     tags: Annotated[list[Text], Field(description="Words by which roles ask for it.")] = []
 
 
+_Action = Literal["continue", "hold", "end"]
+
+
+class CutOffModel(_Model):
+    """What the host of a vehicle does without contact to the executive."""
+
+    action: Annotated[_Action, Field(description="What it does with the vehicle's behavior.")] = (
+        "hold"
+    )
+    after: Annotated[Duration, Field(description="How long it waits for the contact first.")] = (
+        CutOffPolicy().after_s
+    )
+    behaviors: Annotated[
+        dict[Text, _Action], Field(description="What it does with behaviors of these names.")
+    ] = {}
+
+
+def _cut_off(value: object) -> object:
+    """A word alone is the action."""
+    return value if isinstance(value, dict | list | CutOffModel) else {"action": value}
+
+
+class TlsModel(_Model):
+    """Files of TLS (PEM), relative to the fleet file. Each host has its own under these names."""
+
+    ca: Annotated[Text, Field(description="The certificate of who signed the hosts'.")]
+    certificate: Annotated[Text | None, Field(description="This host's certificate.")] = None
+    key: Annotated[Text | None, Field(description="Its private key, of mode 0600.")] = None
+
+
+class HostModel(_Model):
+    """A computer that runs the arbiters of vehicles: `m2pem arbiter-host`."""
+
+    connect: Annotated[
+        list[Text],
+        Field(description="Endpoints the executive connects to: tls/10.0.0.7:7447."),
+    ] = []
+    listen: Annotated[
+        list[Text], Field(description="Where the executive listens, if the host connects to it.")
+    ] = []
+    telemetry_hz: Annotated[
+        float, Field(gt=0, le=100, description="States of one vehicle in a second, at most.")
+    ] = Host("").telemetry_hz
+    round_trip: Annotated[
+        Duration, Field(description="The longest usual time from a request to its answer.")
+    ] = Host("").round_trip_s
+    tls: Annotated[TlsModel | None, Field(description="Files of TLS.")] = None
+    credentials: Annotated[
+        Text | None, Field(description="A file of mode 0600 with lines 'user:password'.")
+    ] = None
+
+
 class VehicleModel(_Model):
     """A vehicle."""
 
@@ -134,6 +187,14 @@ class VehicleModel(_Model):
     endurance: Annotated[
         Annotated[Duration, Field(gt=0)] | None,
         Field(description="How long it can go at that speed, with a full battery."),
+    ] = None
+    host: Annotated[
+        Name | None, Field(description="The host that its arbiter runs on; one of 'hosts'.")
+    ] = None
+    when_cut_off: Annotated[
+        CutOffModel | None,
+        BeforeValidator(_cut_off, json_schema_input_type=CutOffModel | _Action),
+        Field(description="What its host does without contact to the executive."),
     ] = None
     tags: Annotated[list[Text], Field(description="Words by which roles ask for it.")] = []
 
@@ -296,6 +357,9 @@ class FleetModel(_Model):
         ),
     ] = {}
     vehicles: dict[Name, VehicleModel] = {}
+    hosts: Annotated[
+        dict[Name, HostModel], Field(description="Other computers that run arbiters.")
+    ] = {}
     teams: dict[Name, TeamModel] = {}
     routes: Annotated[
         dict[Name, Text], Field(description="Files of LineStrings or waypoints.")

@@ -1,0 +1,280 @@
+"""What the executive and a host say to each other, as msgpack.
+
+A request has the same `id` when it is sent again; the host does it once. Times are microseconds of
+the sender's clock, since the Unix epoch.
+"""
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import msgspec
+
+from m2pem.api import (
+    Area,
+    BehaviorReport,
+    BehaviorRequest,
+    PayloadState,
+    Point,
+    ResolvedValue,
+    ResourceId,
+    Route,
+    VehiclePosition,
+    VehicleState,
+)
+
+VERSION = 1
+"""Of these messages. Both ends must have the same."""
+
+
+class MessageError(ValueError):
+    """What arrived is no message of this version."""
+
+
+# --- what the executive asks --------------------------------------------------------------------
+
+
+class Hello(msgspec.Struct, frozen=True, tag=True):
+    """The executive wants contact. `fresh`: its first one since it began. `going`: the behaviors
+    that go on as it knows; the host holds what does something else. `who`: for people."""
+
+    version: int
+    who: str
+    fresh: bool
+    going: tuple[str, ...] = ()
+
+
+class Ping(msgspec.Struct, frozen=True, tag=True):
+    """It is still there. `round_trip_s`: as it measured it last."""
+
+    round_trip_s: float
+
+
+class Start(msgspec.Struct, frozen=True, tag=True):
+    request: dict[str, Any]
+
+
+class Cancel(msgspec.Struct, frozen=True, tag=True):
+    behavior: str
+    epoch: int
+
+
+class Adjust(msgspec.Struct, frozen=True, tag=True):
+    behavior: str
+    epoch: int
+    parameters: dict[str, Any]
+
+
+class Query(msgspec.Struct, frozen=True, tag=True):
+    behavior: str
+    native_ref: str | None
+    epoch: int
+
+
+class Hold(msgspec.Struct, frozen=True, tag=True):
+    resource: str
+
+
+class Resume(msgspec.Struct, frozen=True, tag=True):
+    resource: str
+
+
+class Reclaim(msgspec.Struct, frozen=True, tag=True):
+    resource: str
+
+
+Body: TypeAlias = Hello | Ping | Start | Cancel | Adjust | Query | Hold | Resume | Reclaim
+
+
+class Request(msgspec.Struct, frozen=True):
+    """`executive`: a process. `journal`: of that executive. `contact`: as the host has named it in
+    `Welcome`; "" before."""
+
+    id: str
+    executive: str
+    journal: str
+    contact: str
+    body: Body
+
+
+# --- what the host answers ----------------------------------------------------------------------
+
+
+class Welcome(msgspec.Struct, frozen=True, tag=True):
+    """There is contact. `store`: which numbers of items belong together."""
+
+    contact: str
+    store: str
+    time_us: int
+
+
+class Done(msgspec.Struct, frozen=True, tag=True):
+    """`text`: what `reclaim` returned, else "". `time_us`: of the host's clock."""
+
+    time_us: int
+    text: str = ""
+
+
+class Found(msgspec.Struct, frozen=True, tag=True):
+    """The answer to `Query`. `resources`: of the behavior, if the host knows them."""
+
+    report: bytes
+    resources: tuple[str, ...]
+
+
+class Refused(msgspec.Struct, frozen=True, tag=True):
+    """`code`: why, for programs: NO_CONTACT, SUPERSEDED, IN_USE, STALE_EPOCH, VERSION, FAILED."""
+
+    code: str
+    reason: str
+
+
+Answer: TypeAlias = Welcome | Done | Found | Refused
+
+# --- what the host reports ----------------------------------------------------------------------
+
+
+class Item(msgspec.Struct, frozen=True):
+    """A report or a state with detections. `number` rises by the order in which they came."""
+
+    number: int
+    kind: str
+    content: bytes
+
+
+class Items(msgspec.Struct, frozen=True):
+    """Delivered until the executive has said up to which number it has them."""
+
+    store: str
+    items: tuple[Item, ...]
+
+
+class Received(msgspec.Struct, frozen=True):
+    number: int
+
+
+REPORT, STATE = "report", "state"
+"""Kinds of items."""
+
+_encoder = msgspec.msgpack.Encoder()
+
+
+def encode(message: msgspec.Struct) -> bytes:
+    """Return a message as bytes."""
+    return _encoder.encode(message)
+
+
+def decode(content: bytes, type_: Any) -> Any:
+    """Return the message of a type.
+
+    Raises:
+        MessageError: it is none.
+    """
+    try:
+        return msgspec.msgpack.decode(content, type=type_)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise MessageError(f"not a message of this version: {error}") from error
+
+
+# --- requests, reports and states of m2pem.api --------------------------------------------------
+
+_GEOMETRIES: Mapping[str, type[Any]] = {
+    "point": Point,
+    "route": Route,
+    "area": Area,
+    "vehicle": VehiclePosition,
+}
+_KINDS = {type_: kind for kind, type_ in _GEOMETRIES.items()}
+
+
+def plain_parameters(parameters: Mapping[str, ResolvedValue]) -> dict[str, Any]:
+    """Return parameters with their geometries as maps."""
+    return {
+        name: {"kind": kind, "geometry": msgspec.to_builtins(value)}
+        if (kind := _KINDS.get(type(value)))
+        else value
+        for name, value in parameters.items()
+    }
+
+
+def resolved_parameters(plain: Mapping[str, Any]) -> dict[str, ResolvedValue]:
+    """Return what `plain_parameters` was given.
+
+    Raises:
+        MessageError: it was not given this.
+    """
+    try:
+        return {
+            name: msgspec.convert(value["geometry"], _GEOMETRIES[value["kind"]])
+            if isinstance(value, dict)
+            else value
+            for name, value in plain.items()
+        }
+    except (msgspec.MsgspecError, KeyError) as error:
+        raise MessageError(f"parameters: {error}") from error
+
+
+def plain_request(request: BehaviorRequest) -> dict[str, Any]:
+    """Return a request for a behavior as a map."""
+    return {
+        "id": request.id,
+        "epoch": request.epoch,
+        "behavior": request.behavior,
+        "parameters": plain_parameters(request.parameters),
+        "resources": list(request.resources),
+        "roles": {role: list(who) for role, who in request.roles.items()},
+        "preempts": list(request.preempts),
+    }
+
+
+def behavior_request(plain: Mapping[str, Any]) -> BehaviorRequest:
+    """Return what `plain_request` was given.
+
+    Raises:
+        MessageError: it was not given this.
+    """
+    parameters = resolved_parameters(plain.get("parameters", {}))
+    try:
+        return msgspec.convert({**plain, "parameters": {}}, _WithoutParameters).with_(parameters)
+    except msgspec.MsgspecError as error:
+        raise MessageError(f"a request for a behavior: {error}") from error
+
+
+class _WithoutParameters(msgspec.Struct, frozen=True):
+    id: str
+    epoch: int
+    behavior: str
+    resources: tuple[str, ...]
+    roles: dict[str, tuple[str, ...]]
+    preempts: tuple[str, ...]
+
+    def with_(self, parameters: Mapping[str, ResolvedValue]) -> BehaviorRequest:
+        ids = {role: tuple(map(ResourceId, who)) for role, who in self.roles.items()}
+        resources = tuple(map(ResourceId, self.resources))
+        return BehaviorRequest(
+            self.id, self.epoch, self.behavior, parameters, resources, ids, self.preempts
+        )
+
+
+def encode_report(report: BehaviorReport) -> bytes:
+    """Return a report as bytes."""
+    return _encoder.encode(report)
+
+
+def decode_report(content: bytes) -> BehaviorReport:
+    """Return what `encode_report` was given; raises MessageError."""
+    report = decode(content, BehaviorReport)
+    assert isinstance(report, BehaviorReport)
+    return report
+
+
+def encode_state(state: VehicleState | PayloadState) -> bytes:
+    """Return a state as bytes."""
+    return _encoder.encode((isinstance(state, PayloadState), state))
+
+
+def decode_state(content: bytes) -> VehicleState | PayloadState:
+    """Return what `encode_state` was given; raises MessageError."""
+    payload, plain = decode(content, tuple[bool, msgspec.Raw])
+    state = decode(bytes(plain), PayloadState if payload else VehicleState)
+    assert isinstance(state, VehicleState | PayloadState)
+    return state
