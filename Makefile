@@ -16,7 +16,7 @@ UI := plugins/ocu/web/ui
 UI_SOURCES := $(shell find $(UI) -path $(UI)/node_modules -prune -o -type f -print)
 PAGE := plugins/ocu/web/m2pem_plugin_web/static/index.html
 # a/b: b where the distribution has no a. Chromium without windows takes the tests less time.
-DEBIAN_PACKAGES := chromium-headless-shell/chromium curl nodejs npm spin systemd tcc tmux
+DEBIAN_PACKAGES := chromium-headless-shell/chromium curl nodejs npm postgresql spin systemd tcc tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew. Which Python the
 # shell has counts only where it was asked for (PYTHON=...). One that make has not made is left alone.
@@ -78,10 +78,11 @@ $(VENV)/for-%: $(CREATED) pyproject.toml constraints.txt
 	@touch $@
 
 # The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, those of the web page
-# Chromium, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
+# Chromium, those of journals PostgreSQL, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
 npm-packages:
 	@missing=; for wanted in $(DEBIAN_PACKAGES); do first=$${wanted%%/*}; \
-	  command -v $${first/nodejs/node} >/dev/null || \
+	  program=$${first/nodejs/node}; \
+	  command -v $${program/postgresql/pg_ctlcluster} >/dev/null || \
 	  { command -v $${wanted#*/} >/dev/null && ! apt-cache show $$first >/dev/null 2>&1; } || missing="$$missing $$wanted"; \
 	done; \
 	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \

@@ -81,13 +81,13 @@ def _runs(url: str | None) -> Sequence[tuple[int, str, str | None]]:
 
 
 def _rows(url: str | None, query: str) -> Sequence[tuple[Any, ...]]:
-    from m2pem.journal import default_url, file_of
+    from m2pem.journal import default_url, file_of, is_postgres
     from m2pem.journal.database import open_for_reading
 
     try:
         path = file_of(url or default_url())
-        if path is None or not path.exists():
-            return ()
+        if path is None or not path.exists() or is_postgres(str(path)):
+            return ()  # no server is asked while someone types
         with closing(open_for_reading(path)) as connection:
             return connection.execute(query).fetchall()
     except (M2pemError, sqlite3.Error):

@@ -1,5 +1,6 @@
 """The checks of `m2pem doctor` that need no plugin: what a host must have for an executive."""
 
+import asyncio
 import ctypes
 import errno
 import os
@@ -17,7 +18,7 @@ from m2pem.api.health import HealthCheck, HealthStatus
 from m2pem.control_socket.paths import folder_of, live_sockets
 from m2pem.errors import FleetError, M2pemError
 from m2pem.executive.runtime_directory import VARIABLE, runtime_directory
-from m2pem.journal import default_url, file_of
+from m2pem.journal import default_url, file_of, is_postgres, open_journal
 from m2pem.journal.storage_checks import (
     MIN_FREE_VARIABLE,
     free_space_mb,
@@ -75,12 +76,23 @@ def check_journal(url: str | None) -> Iterator[HealthCheck]:
         return
     path = path.absolute()
     problem = _folder_problem(path.parent) or _file_problem(path)
+    if problem is None and is_postgres(url or ""):
+        problem = _server_problem(url or "")
     if problem is not None:
         yield problem
         return
     yield HealthCheck("journal", OK, f"{path} can be written")
     yield _disk(path)
     yield _control(path)
+
+
+def _server_problem(url: str) -> HealthCheck | None:
+    try:
+        journal = open_journal(url)
+    except M2pemError as error:
+        return HealthCheck("journal", ERROR, str(error), "mend the cause, or use another journal")
+    asyncio.run(journal.close())
+    return None
 
 
 def _folder_problem(folder: Path) -> HealthCheck | None:

@@ -37,9 +37,11 @@ def info(file: str | None, output: str) -> int:
     """
     from m2pem.journal.maintenance import LATEST_FORMAT, file_info
 
+    if _is_postgres(file):
+        return _show_database(str(file), output)
     path = _path(file)
     on_disk = file_info(path)
-    content, executives = asyncio.run(_content(path)), _executives(path)
+    content, executives = asyncio.run(_content(str(path))), _executives(path)
     if output == "json":
         found = {
             "path": str(path),
@@ -60,9 +62,54 @@ def info(file: str | None, output: str) -> int:
             )
             or "no executive",
         }
-        for name, text in rows.items():
-            click.echo(f"{name:<11} {text}")
+        _show(rows)
     return 1 if content.problems else 0
+
+
+def _show_database(url: str, output: str) -> int:
+    from m2pem.journal import postgres_address
+    from m2pem.journal.postgres_info import LATEST_FORMAT, database_info
+
+    content = asyncio.run(_content(url))
+    address = postgres_address(url)
+    found = database_info(address)
+    if output == "json":
+        database = {"url": address.shown, "path": str(address.file), **asdict(found)}
+        click.echo(as_json({**database, **content.as_data()}))
+    else:
+        rows = {
+            "database": f"{address.shown}, PostgreSQL {found.server}",
+            "path": f"{address.file} (marks, control sockets and tracks of this host)",
+            "size": _mb(found.size),
+            "format": f"{found.format} (this m2pem writes {LATEST_FORMAT})",
+            **content.as_text(),
+            "written by": "; ".join(found.executives) or "no executive",
+        }
+        _show(rows)
+    return 1 if content.problems else 0
+
+
+def _show(rows: dict[str, str]) -> None:
+    for name, text in rows.items():
+        click.echo(f"{name:<11} {text}")
+
+
+def _is_postgres(file: str | None) -> bool:
+    from m2pem.journal import is_postgres
+
+    return is_postgres(file or "")
+
+
+def _refuse_database(file: str | None, instead: str) -> None:
+    """Refuse what only a file can be asked for.
+
+    Raises:
+        UnusableError: the journal is in PostgreSQL.
+    """
+    from m2pem.journal.postgres_address import without_password
+
+    if _is_postgres(file):
+        raise UnusableError(f"{without_password(str(file))} is in PostgreSQL: {instead}")
 
 
 @journal.command(epilog=example("m2pem journal backup --to monday.db"))
@@ -83,6 +130,9 @@ def backup(file: str | None, copy: Path | None) -> int:
     from m2pem.cli.notes import progress_line, share
     from m2pem.journal.maintenance import back_up
 
+    _refuse_database(
+        file, "copy it with `pg_dump`, also while executives write (docs/journal.md#postgresql)"
+    )
     path = _path(file)
     if copy is None:
         copy = path.with_name(f"{path.stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}{path.suffix}")
@@ -92,7 +142,7 @@ def backup(file: str | None, copy: Path | None) -> int:
             copy,
             lambda remaining, total: show(lambda: share(total - remaining, total, "pages copied")),
         )
-    content = asyncio.run(_content(copy))
+    content = asyncio.run(_content(str(copy)))
     for problem in content.problems:
         click.echo(f"m2pem: {problem}", err=True)
     click.echo(copy)
@@ -109,6 +159,7 @@ def compact(file: str | None) -> None:
     from m2pem.errors import OperatorError
     from m2pem.journal import maintenance
 
+    _refuse_database(file, "it gives space back by itself (autovacuum)")
     path = _path(file)
     if writing := [f"process {process}" for process in _executives(path)]:
         raise OperatorError(f"{', '.join(writing)} writes to {path}: end that first")
@@ -164,12 +215,12 @@ class Content:
         }
 
 
-async def _content(path: Path) -> Content:
+async def _content(url: str) -> Content:
     """Read all entries of a journal."""
     from m2pem.cli.journals import journal_to_read
     from m2pem.cli.notes import progress_line, share
 
-    async with journal_to_read(str(path)) as opened:
+    async with journal_to_read(url) as opened:
         lines = list(await opened.runs())
         content = Content(str(opened.identity), lines, list(await opened.deletions()))
         total = sum(line.last_seq for line in lines)

@@ -15,10 +15,18 @@ from m2pem.cli.options import UnusableError
 from m2pem.cli.status import RunStatusView
 from m2pem.errors import JournalError
 from m2pem.executive.runtime_directory import runtime_directory
-from m2pem.journal import Journal, MemoryJournal, RunInfo, default_url, file_of, open_journal
+from m2pem.journal import (
+    Journal,
+    MemoryJournal,
+    RunInfo,
+    default_url,
+    file_of,
+    is_postgres,
+    open_journal,
+)
 
 if TYPE_CHECKING:
-    from m2pem.journal.sqlite import SqliteJournal
+    from m2pem.journal.database_journal import DatabaseJournal
 
 
 def url_of(url: str | None) -> str:
@@ -47,7 +55,8 @@ async def journal_to_read(url: str | None) -> AsyncIterator[Journal]:
     What the vehicles were doing must be known then, too.
     """
     path = file_of(url_of(url))
-    if path is None or not path.exists() or not _is_full(path):
+    elsewhere = is_postgres(url_of(url))
+    if elsewhere or path is None or not path.exists() or not _is_full(path):
         async with existing_journal(url) as journal:
             yield journal
         return
@@ -94,7 +103,7 @@ async def existing_journal(url: str | None) -> AsyncIterator[Journal]:
         UnusableError: there is no such file.
     """
     path = file_of(url_of(url))
-    if path is None or path.exists():
+    if is_postgres(url_of(url)) or path is None or path.exists():
         async with journal_at(url_of(url)) as journal:
             yield journal
     elif url is not None:
@@ -131,7 +140,7 @@ async def accept(journal: Journal, run: str) -> None:
     """
     if isinstance(journal, MemoryJournal):
         raise UnusableError(f"the journal has no run {run!r}")
-    await cast("SqliteJournal", journal).accept_loss(run)
+    await cast("DatabaseJournal", journal).accept_loss(run)
 
 
 async def last_decided_us(journal: Journal, line: RunInfo) -> int:

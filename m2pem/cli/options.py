@@ -42,7 +42,7 @@ journal_option = click.option(
     "--journal",
     metavar="URL",
     shell_complete=file_or("memory:"),
-    help="Where runs are kept: a path, sqlite:///path or memory:  "
+    help="Where runs are kept: a path, postgresql://user@host/database or memory:  "
     "[default: m2pem/journal.db in $XDG_STATE_HOME or ~/.local/state]",
 )
 

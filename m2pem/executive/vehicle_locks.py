@@ -16,6 +16,7 @@ from m2pem.errors import M2pemError
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.runtime_directory import VARIABLE, runtime_directory
 from m2pem.fleet.fleet import SIMULATED
+from m2pem.journal.postgres_address import without_password
 from m2pem.mission.catalogue import ResourceId
 
 
@@ -88,7 +89,7 @@ class VehicleLocks:
         self._held[path] = file
         me = {
             "pid": os.getpid(),
-            "command": shlex.join(_command()),
+            "command": without_password(shlex.join(_command())),
             "address": address,
             "journal": str(self._journal or ""),
         }

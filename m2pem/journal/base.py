@@ -148,7 +148,28 @@ class Journal(Protocol):
 
     @property
     def file(self) -> Path | None:
-        """The journal's path, for files beside it; None for a journal in memory."""
+        """The journal's path, for files beside it; None for a journal in memory.
+
+        Of a journal in a database elsewhere it is a file of this host, which names the journal.
+        """
+        ...
+
+    @property
+    def lease_s(self) -> float | None:
+        """How long runs stay this executive's while the journal cannot be reached, in seconds.
+
+        None: as long as its process lives.
+        """
+        ...
+
+    @property
+    def owned_until_s(self) -> float | None:
+        """Until when the runs that were claimed or created here surely are this executive's, by
+        `m2pem.journal.lease_clock.lease_clock_s`; it moves on as the lease is renewed.
+
+        None: as long as its process lives, or no run was. When it is over, another executive may
+        claim them, and `append` raises StaleEpochError until they are released.
+        """
         ...
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:

@@ -107,6 +107,16 @@ class DatabaseJournal(ABC):
         return self._path
 
     @property
+    def lease_s(self) -> float | None:
+        """See `Journal.lease_s`: a process that lives keeps its locks."""
+        return None
+
+    @property
+    def owned_until_s(self) -> float | None:
+        """See `Journal.owned_until_s`."""
+        return None
+
+    @property
     def commits(self) -> int:
         """How many transactions have been written since it was opened."""
         return self._writer.commits

@@ -62,6 +62,16 @@ class MemoryJournal:
         """See `Journal.file`: there is none."""
         return None
 
+    @property
+    def lease_s(self) -> float | None:
+        """See `Journal.lease_s`."""
+        return None
+
+    @property
+    def owned_until_s(self) -> float | None:
+        """See `Journal.owned_until_s`."""
+        return None
+
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """See `Journal.create`."""
         self._check_open()

@@ -35,6 +35,7 @@ class SqliteStorage:
     """The file of an open journal, and its locks; see `Storage`."""
 
     errors: tuple[type[Exception], ...] = (sqlite3.Error,)
+    locking = ""
 
     def __init__(
         self, path: Path, connection: sqlite3.Connection, locks: RunLocks, mark: Path
@@ -55,6 +56,9 @@ class SqliteStorage:
 
     def exclude_others(self) -> None:
         """See `Storage.exclude_others`: a transaction of SQLite excludes all others."""
+
+    def fence(self, number: int) -> None:
+        """See `Storage.fence`: a process that has lost its lock has ended."""
 
     def driver(self, number: int, position: RunPosition) -> str:
         """See `Storage.driver`."""

@@ -82,8 +82,18 @@ class Storage(Protocol):
         ...
 
     @property
+    def locking(self) -> str:
+        """What a query ends with so that no other transaction changes the row that it finds."""
+        ...
+
+    @property
     def owners(self) -> RunOwners:
         """Who drives which run."""
+        ...
+
+    def fence(self, number: int) -> None:
+        """Let the owner of a run write to it no more, if it has lost the run; within a transaction
+        that excludes others."""
         ...
 
     def driver(self, number: int, position: RunPosition) -> str:

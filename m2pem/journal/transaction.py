@@ -75,6 +75,7 @@ class WriteTransaction:
         self._changed: dict[int, RunPosition] = {}
         self._rows: list[tuple[Any, ...]] = []
         self._taken: list[int] = []
+        self._given_up: set[int] = set()
         self._appended: set[int] = set()
         self._lossy: set[int] = set()
         self._wrote = False
@@ -89,7 +90,9 @@ class WriteTransaction:
             self._known.clear()
 
     def check(self) -> None:
-        """Check that the files are where they were opened, and that there is room for a run."""
+        """Check that the database answers, that the files are where they were opened, and that
+        there is room for a run."""
+        self._connection.execute("SELECT 1")
         self._storage.check()
         self._refuse_while_short()
 
@@ -149,6 +152,7 @@ class WriteTransaction:
     def claim(self, number: int) -> int:
         """Take a run's lock and raise its epoch, which is returned."""
         self._storage.exclude_others()
+        self._storage.fence(number)
         position = self._position(number)
         self._take(number, position)
         # With the lock, no other process writes the mark.
@@ -193,6 +197,7 @@ class WriteTransaction:
 
     def _refuse_deletion(self, number: int, *, unended: bool) -> None:
         run = run_id(number)
+        self._storage.fence(number)
         position = self._position(number)
         if driver := self._storage.driver(number, position):
             raise JournalError(
@@ -328,6 +333,7 @@ class WriteTransaction:
         """Drop what is cached of a run that is released."""
         if self._owners.mine(number) and self._storage.give_up(number):
             self._wrote = True
+        self._given_up.add(number)
         self._known.pop(number, None)
         self._lossy.discard(number)
         self._marks.forget(number)
@@ -346,6 +352,8 @@ class WriteTransaction:
             self._storage.check()
             self._mark()
         self._known.update(self._changed)
+        for number in self._given_up:
+            self._known.pop(number, None)
         self._reset()
         return wrote
 
@@ -393,12 +401,13 @@ class WriteTransaction:
     def _position(self, number: int) -> RunPosition:
         position = self._changed.get(number) or self._known.get(number)
         if position is None:
-            row = self._connection.execute(
-                "SELECT * FROM standings WHERE run = ?", (number,)
-            ).fetchone()
+            query = f"SELECT * FROM standings WHERE run = ?{self._storage.locking}"
+            row = self._connection.execute(query, (number,)).fetchone()
             if row is None:
                 raise no_run(self._connection, number)
-            position = self._known[number] = position_from(row)
+            position = position_from(row)
+            if self._owners.mine(number):
+                self._known[number] = position
         return position
 
     def _reset(self) -> None:
@@ -406,6 +415,7 @@ class WriteTransaction:
         self._rows.clear()
         self._appended.clear()
         self._taken.clear()
+        self._given_up.clear()
         self._wrote = False
 
 
@@ -431,7 +441,10 @@ def mark_of(position: RunPosition) -> Mark:
 
 
 def position_columns(number: int, s: RunPosition) -> tuple[Any, ...]:
-    """Return the row of the table `standings` for a run at a position."""
+    """Return the row of the table `standings` for a run at a position.
+
+    No text of PostgreSQL has the character 0.
+    """
     row = (
         number,
         s.epoch,
@@ -440,7 +453,7 @@ def position_columns(number: int, s: RunPosition) -> tuple[Any, ...]:
         s.last_seq,
         int(s.paused),
         s.outcome,
-        s.detail,
+        s.detail.replace("\0", "\ufffd"),
         s.ended_us,
         s.hash,
     )

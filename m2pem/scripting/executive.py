@@ -174,7 +174,8 @@ class Executive:
 
     `fleet`: one that was loaded, or the path of a fleet file. `simulate`: every vehicle and payload
     is simulated. `speed`: of simulated vehicles and timers against the wall clock. `journal`: a
-    path, `sqlite:///path` or `memory:`; None: the user's own, as on the command line.
+    path, `sqlite:///path`, `postgresql://user@host/database` or `memory:`; None: the user's own, as
+    on the command line.
     `search_path`: folders of processes that missions call. `by`: the operator's name in the
     journal; None: M2PEM_OPERATOR, else user and host.
 

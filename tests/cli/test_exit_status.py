@@ -62,7 +62,7 @@ def test_unusable_input_ends_each_command_of_missions_with_2(
 
 
 @pytest.mark.parametrize("words", OF_JOURNALS, ids=lambda words: " ".join(map(str, words[:2])))
-@pytest.mark.parametrize("journal", ["ftp://host/db", "postgresql://host/db", "", "/no/such.db"])
+@pytest.mark.parametrize("journal", ["ftp://host/db", "postgresql://host/a/b", "", "/no/such.db"])
 def test_what_is_no_journal_ends_each_command_of_journals_with_2(
     invoke: Invoke, tmp_path: Path, words: tuple[object, ...], journal: str
 ) -> None:

@@ -66,7 +66,7 @@ def test_a_journal_that_is_named_must_exist(invoke: Invoke, tmp_path: Path) -> N
     assert not missing.exists()
 
 
-@pytest.mark.parametrize("url", ["postgresql://me:secret@host/db", "ftp://host/db"])
+@pytest.mark.parametrize("url", ["postgresql://me:secret@host/a/b", "ftp://host/db"])
 def test_a_journal_that_nothing_opens_is_told(invoke: Invoke, url: str) -> None:
     status, _, err = invoke("runs", "--journal", url)
     assert status == 2

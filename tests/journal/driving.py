@@ -2,16 +2,17 @@
 
     python driving.py JOURNAL RUNS
 
+JOURNAL is a path or a URL.
+
 Makes RUNS runs and appends to all of them at once. Prints `RUN SEQ` for each entry, after `append`
 has returned: what was printed is durable.
 """
 
 import asyncio
 import sys
-from pathlib import Path
 
 from m2pem.engine.records import InputIgnored
-from m2pem.journal.sqlite import SqliteJournal
+from m2pem.journal import open_journal
 from m2pem.testing.contracts.journal import HEADER, entry
 
 
@@ -27,7 +28,7 @@ async def drive(journal, run):
 
 
 async def main(path, runs):
-    journal = SqliteJournal.open(Path(path))
+    journal = open_journal(path)
     names = [await journal.create(HEADER) for _ in range(runs)]
     await asyncio.gather(*(drive(journal, run) for run in names))
 

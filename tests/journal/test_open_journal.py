@@ -44,14 +44,6 @@ async def test_a_path_may_have_a_colon(tmp_path, monkeypatch):
     await assert_opens("trial:3.db", tmp_path / "trial:3.db")
 
 
-@pytest.mark.parametrize("scheme", ["postgresql", "postgres"])
-def test_postgresql_is_reserved_and_its_password_kept_out_of_messages(scheme):
-    with pytest.raises(JournalError, match="reserved for a later version") as refused:
-        open_journal(f"{scheme}://ann:s3cret@db/missions")
-    assert "s3cret" not in str(refused.value)
-    assert "db/missions" in str(refused.value)
-
-
 @pytest.mark.parametrize(
     "url",
     [

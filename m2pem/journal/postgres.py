@@ -1,0 +1,438 @@
+"""The journal in a PostgreSQL database, for executives on any number of hosts."""
+
+import os
+import shlex
+import socket
+import sys
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from typing import Any, TypeVar
+from uuid import UUID, uuid4
+
+import psycopg
+
+from m2pem.errors import JournalError, StaleEpochError
+from m2pem.journal.codec import run_id
+from m2pem.journal.database_journal import DatabaseJournal
+from m2pem.journal.lease import Executive, Lease, end_dead, lease_s, process_space
+from m2pem.journal.lease_clock import lease_clock_s
+from m2pem.journal.marks import MarkFile, find_losses
+from m2pem.journal.position import RunPosition
+from m2pem.journal.postgres_address import PostgresAddress, without_password, write_address
+from m2pem.journal.postgres_database import (
+    PostgresConnection,
+    check_server,
+    connect,
+    explained_error,
+    identity_of,
+    log,
+    migrate,
+)
+from m2pem.journal.storage import RetryError
+from m2pem.journal.storage_checks import OpenFiles, min_free_mb
+from m2pem.journal.transaction import position_columns
+
+T = TypeVar("T")
+
+_TRIES = 10
+"""Of a transaction that others get in the way of."""
+
+_BETWEEN_TRIES_S = 0.1
+
+_LIVE = "owners JOIN executives ON id = executive AND lease_until > clock_timestamp()"
+
+
+class LeasedRuns:
+    """The runs that this executive has taken, and has not lost since; see `RunOwners`."""
+
+    def __init__(self, connection: PostgresConnection) -> None:
+        self._connection = connection
+        self._held: set[int] = set()
+        self._lost: set[int] = set()
+        self.lease: Lease
+
+    def acquire(self, number: int) -> bool:
+        """See `RunOwners.acquire`, after `PostgresStorage.fence`."""
+        self.lease.begin()
+        taken = self._connection.execute(
+            "SELECT 1 FROM owners JOIN executives ON id = executive WHERE run = ?", (number,)
+        ).fetchone()
+        if taken is not None:
+            return False
+        self._connection.execute(
+            "INSERT INTO owners VALUES (?, ?)"
+            " ON CONFLICT (run) DO UPDATE SET executive = excluded.executive",
+            (number, self.lease.id),
+        )
+        self._held.add(number)
+        return True
+
+    def release(self, number: int) -> None:
+        """See `RunOwners.release`."""
+        self._held.discard(number)
+        self._lost.discard(number)
+        if self._lost or not self._held:
+            self.lease.wake()
+
+    def mine(self, number: int) -> bool:
+        """See `RunOwners.mine`; also one that was lost, until it is released."""
+        return number in self._held
+
+    @property
+    def any(self) -> bool:
+        """Whether a run is taken here."""
+        return bool(self._held)
+
+    def lose(self) -> None:
+        """Note that the lease has ended, under which all were taken."""
+        self._lost.update(self._held)
+
+    def lost(self, number: int) -> bool:
+        """Whether the lease has ended since the run was taken."""
+        return number in self._lost
+
+
+class PostgresStorage:
+    """The database of an open journal; see `Storage`."""
+
+    errors: tuple[type[Exception], ...] = (psycopg.Error,)
+    locking = " FOR UPDATE"
+
+    def __init__(
+        self,
+        address: PostgresAddress,
+        connection: PostgresConnection,
+        owners: LeasedRuns,
+        files: OpenFiles,
+    ) -> None:
+        self.place = address.shown
+        self.connection = connection
+        self.owners = owners
+        self._files = files
+        self._in_transaction = False
+        self._excludes = False
+        self._tries = 0
+        self._unknown = False
+
+    def begin(self) -> bool:
+        """See `Storage.begin`: the positions of runs that are this executive's stay known."""
+        self.connection.execute("BEGIN ISOLATION LEVEL READ COMMITTED")
+        self._in_transaction, self._excludes = True, False
+        return True
+
+    def exclude_others(self) -> None:
+        """See `Storage.exclude_others`; appends go on."""
+        if not self._excludes:
+            self.connection.execute("SELECT 1 FROM identity FOR UPDATE")
+            self._excludes = True
+
+    def fence(self, number: int) -> None:
+        """See `Storage.fence`. A transaction of it that is under way is ended: the process may
+        stand still in the middle of it."""
+        end_dead(self.connection)
+        # It can never renew its lease, once its row is gone; one that does so now is waited for.
+        ended = self.connection.execute(
+            "DELETE FROM executives USING owners WHERE executives.id = owners.executive"
+            " AND owners.run = ? AND lease_until <= clock_timestamp() RETURNING session",
+            (number,),
+        ).fetchone()
+        if ended is not None:
+            self.connection.execute(
+                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
+                " WHERE application_name = ? AND usename = current_user",
+                ended,
+            )
+
+    def driver(self, number: int, position: RunPosition) -> str:
+        """See `Storage.driver`."""
+        row = self.connection.execute(
+            f"SELECT pid, host, command FROM {_LIVE} WHERE run = ?", (number,)
+        ).fetchone()
+        if row is None:
+            return ""
+        pid, host, command = row
+        return f"process {pid} on {host} ({command})"
+
+    def refuse_lost(self, number: int) -> None:
+        """See `Storage.refuse_lost`."""
+        if self.owners.lost(number):
+            raise StaleEpochError(
+                f"{run_id(number)}: the lease of this executive has ended, so another may have "
+                "claimed it: this one must stop driving it"
+            )
+
+    def give_up(self, number: int) -> bool:
+        """See `Storage.give_up`."""
+        self.connection.execute(
+            "DELETE FROM owners WHERE run = ? AND executive = ?", (number, self.owners.lease.id)
+        )
+        return True
+
+    def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:
+        """See `Storage.add_to_schedule`."""
+        (number,) = self.connection.execute(
+            "UPDATE identity SET last_entry = last_entry + 1 RETURNING last_entry"
+        ).fetchone()  # type: ignore[misc]
+        self.connection.execute(
+            "INSERT INTO schedule VALUES (?, ?, ?, ?, ?)", (number, fleet, plan, state, revision)
+        )
+        return int(number)
+
+    def commit(
+        self, entries: Sequence[tuple[Any, ...]], positions: Mapping[int, RunPosition], wrote: bool
+    ) -> None:
+        """See `Storage.commit`."""
+        raw = self.connection.raw
+        with raw.pipeline():
+            there = raw.execute(
+                "SELECT run, epoch FROM standings WHERE run = ANY(%s) ORDER BY run FOR UPDATE",
+                (list(positions),),
+            )
+            state = raw.execute(
+                "SELECT pg_current_xact_id()::text, (SELECT lease_until > clock_timestamp()"
+                " FROM executives WHERE id = %s)"
+                if wrote
+                else "SELECT '', false",
+                (self.owners.lease.id,) if wrote else None,
+            )
+            if entries:
+                raw.execute(_INSERT_ENTRIES, _columns(entries))
+            if positions:
+                rows = [position_columns(*each) for each in positions.items()]
+                raw.execute(_WRITE_STANDINGS, _columns(rows))
+        if any(epoch > positions[number].epoch for number, epoch in there):
+            raise RetryError  # another has claimed it: read again, its position says so
+        transaction, leased = state.fetchone() or ("", False)
+        if positions and not leased:
+            self.owners.lease.end()
+            raise RetryError
+        self._commit(transaction)
+
+    def _commit(self, transaction: str) -> None:
+        self._in_transaction = False
+        try:
+            self.connection.raw.execute("COMMIT")
+        except self.errors as error:
+            if not transaction or not self.connection.lost:
+                raise
+            if not self._was_committed(transaction, error):
+                raise RetryError from error
+        self._tries = 0
+
+    def _was_committed(self, transaction: str, error: Exception) -> bool:
+        """Ask the server what has become of a transaction whose connection was lost."""
+        while True:
+            if not self._connected_again():
+                self._unknown = True
+                raise error
+            try:
+                row = self.connection.execute(
+                    "SELECT pg_xact_status(CAST(? AS xid8))", (transaction,)
+                ).fetchone()
+            except psycopg.errors.InvalidParameterValue:
+                return False  # the server has taken over from another one, and never had it
+            except psycopg.OperationalError:
+                continue
+            if row is not None and row[0] == "in progress":
+                time.sleep(_BETWEEN_TRIES_S)
+                continue
+            return row is not None and row[0] == "committed"
+
+    def _connected_again(self) -> bool:
+        """Connect again, as long as this executive surely has its runs."""
+        lease = self.owners.lease
+        until_s = lease.until_s if lease.until_s is not None else lease_clock_s() + lease.length_s
+        while True:
+            with suppress(psycopg.Error):
+                self.connection.execute("SELECT 1")
+                return True
+            if lease_clock_s() + _BETWEEN_TRIES_S > until_s - lease.length_s / 3:
+                return False
+            time.sleep(_BETWEEN_TRIES_S)
+
+    def rollback(self) -> None:
+        """See `Storage.rollback`."""
+        in_transaction, self._in_transaction = self._in_transaction, False
+        if in_transaction and not self.connection.lost:
+            self.connection.execute("ROLLBACK")
+
+    def check(self) -> None:
+        """See `Storage.check`: of the marks, the only files."""
+        self._files.check()
+
+    def explained(self, error: Exception) -> JournalError:
+        """See `Storage.explained`."""
+        explained = explained_error(error, self.place)
+        if not self._unknown:
+            return explained
+        self._unknown = False
+        return JournalError(f"{explained}. What was being written may or may not be in it")
+
+    def is_transient(self, error: Exception) -> bool:
+        """See `Storage.is_transient`: what a run has written is read again, before more follows."""
+        return True
+
+    def is_worth_a_retry(self, error: Exception) -> bool:
+        """See `Storage.is_worth_a_retry`."""
+        self._tries += 1
+        passed = not self._unknown and self._tries < _TRIES
+        if isinstance(
+            error, (psycopg.errors.DeadlockDetected, psycopg.errors.SerializationFailure)
+        ):
+            again = passed
+        else:
+            again = passed and self.connection.lost and self._connected_again()
+        if not again:
+            self._tries = 0
+        return again
+
+
+def _columns(rows: Sequence[tuple[Any, ...]]) -> list[list[Any]]:
+    return [list(column) for column in zip(*rows, strict=True)]
+
+
+_INSERT_ENTRIES = (
+    "INSERT INTO entries SELECT run, seq, epoch, at_us, t_us, convert_to(body, 'UTF8'), hash FROM"
+    " unnest(%s::bigint[], %s::bigint[], %s::bigint[], %s::bigint[], %s::bigint[], %s::text[],"
+    " %s::bytea[]) AS given (run, seq, epoch, at_us, t_us, body, hash)"
+)
+
+_WRITE_STANDINGS = (
+    "INSERT INTO standings SELECT * FROM unnest(%s::bigint[], %s::bigint[], %s::bigint[],"
+    " %s::bigint[], %s::bigint[], %s::int[], %s::text[], %s::text[], %s::bigint[], %s::bytea[],"
+    " %s::bytea[]) ON CONFLICT (run) DO UPDATE SET epoch = excluded.epoch, pid = excluded.pid,"
+    " started_us = excluded.started_us, last_seq = excluded.last_seq, paused = excluded.paused,"
+    " outcome = excluded.outcome, detail = excluded.detail, ended_us = excluded.ended_us,"
+    " hash = excluded.hash, seal = excluded.seal"
+)
+
+
+class PostgresJournal(DatabaseJournal):
+    """An append that returned is where `synchronous_commit` of the server says, at least on its
+    disk; a run belongs to the executive that has taken it for as long as its lease lasts.
+
+    Beside the file of its address, `FILE-mark` has what executives of this host acknowledged last.
+    """
+
+    batch_entries = 200
+
+    def __init__(
+        self,
+        address: PostgresAddress,
+        connection: PostgresConnection,
+        marks: MarkFile,
+        identity: UUID,
+        length_s: float,
+        session: str,
+    ) -> None:
+        owners = LeasedRuns(connection)
+        executive = Executive(
+            socket.gethostname(),
+            process_space(),
+            os.getpid(),
+            _command(),
+            str(address.file),
+            session,
+        )
+        self._lease = owners.lease = Lease(
+            lambda: connect(address, length_s / 3),
+            length_s,
+            executive,
+            owners.lose,
+            lambda: not owners.any,
+        )
+        self._owners = owners
+        self._writing = connection
+        self._pooled = PostgresConnection(lambda: connect(address, length_s))
+        storage = PostgresStorage(address, connection, owners, OpenFiles([marks.path]))
+        super().__init__(address.file, identity, storage, self._pooled, marks)
+
+    @classmethod
+    def open(cls, address: PostgresAddress) -> "PostgresJournal":
+        """Open a journal, making its tables where they are missing; `close` it in the end.
+
+        What executives of this host acknowledged and is gone is logged as an error, and each run's
+        `RunInfo.loss`.
+
+        Raises:
+            JournalError: no server answers, it refuses, the database is no journal, ...
+        """
+        min_free_mb()  # a wrong setting is reported now, not when a run is to begin
+        length_s = lease_s()
+        shown = address.shown
+        session = f"m2pem {uuid4()}"
+        connection = PostgresConnection(lambda: connect(address, length_s, session))
+        with ExitStack() as undo:
+            undo.callback(connection.close)
+            try:
+                check_server(connection.raw, shown)
+                migrate(connection.raw, shown)
+                identity = identity_of(connection.raw, shown)
+                end_dead(connection)
+                write_address(address)
+                mark = address.file.with_name(f"{address.file.name}-mark")
+                marks = MarkFile(mark, identity)
+                undo.callback(marks.close)
+                for number, loss in find_losses(connection, marks.read()).items():
+                    log.error("%s: %s: %s", shown, run_id(number), loss)
+            except psycopg.Error as error:
+                raise explained_error(error, shown) from error
+            except OSError as error:
+                name = error.filename or address.file
+                raise JournalError(f"{name} can't be opened: {error.strerror}") from error
+            undo.pop_all()
+        return cls(address, connection, marks, identity, length_s, session)
+
+    @property
+    def owned_until_s(self) -> float | None:
+        """See `Journal.owned_until_s`."""
+        return self._lease.until_s if self._owners.any else None
+
+    @property
+    def lease_s(self) -> float | None:
+        """See `Journal.lease_s`."""
+        return self._lease.length_s
+
+    @contextmanager
+    def _snapshot(self) -> Iterator[None]:
+        self._pooled.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
+        try:
+            yield
+        finally:
+            if not self._pooled.lost:
+                self._pooled.execute("ROLLBACK")
+
+    def _driven(self, numbers: Collection[int]) -> Collection[int]:
+        return {row[0] for row in self._pooled.execute(f"SELECT run FROM {_LIVE}")}
+
+    async def _read(self, work: Callable[[], T]) -> T:
+        return await super()._read(partial(self._read_again, work))
+
+    def _read_again(self, work: Callable[[], T]) -> T:
+        """Read; if the connection is lost meanwhile, once more over a new one."""
+        try:
+            return work()
+        except psycopg.OperationalError:
+            if not self._pooled.lost:
+                raise
+        until_s = lease_clock_s() + self._lease.length_s
+        while True:
+            try:
+                return work()
+            except psycopg.OperationalError:
+                if not self._pooled.lost or lease_clock_s() > until_s:
+                    raise
+            time.sleep(_BETWEEN_TRIES_S)
+
+    def _finish(self) -> None:
+        self._reader.submit(self._pooled.close)
+        self._reader.shutdown()
+        self._lease.close()
+        self._writing.close()
+        self._marks.close()
+
+
+def _command() -> str:
+    return without_password(shlex.join(sys.argv))

@@ -1,0 +1,48 @@
+"""What the database of a journal in PostgreSQL is now: its format and size, and who writes."""
+
+from contextlib import closing
+from dataclasses import dataclass
+
+import psycopg
+
+from m2pem.journal.postgres_address import PostgresAddress
+from m2pem.journal.postgres_database import MIGRATIONS, connect, explained_error
+
+LATEST_FORMAT = len(MIGRATIONS)
+"""The version of the tables that this m2pem writes."""
+
+_WITHIN_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class DatabaseInfo:
+    """Format and size in bytes; `server`: its version. `executives`: those whose lease lasts."""
+
+    format: int
+    size: int
+    server: str
+    executives: tuple[str, ...]
+
+
+def database_info(address: PostgresAddress) -> DatabaseInfo:
+    """Return what the database of a journal that was opened before is now.
+
+    Raises:
+        JournalError: it cannot be read.
+    """
+    try:
+        with closing(connect(address, _WITHIN_S)) as connection:
+            row = connection.execute(
+                "SELECT version, pg_database_size(current_database()),"
+                " current_setting('server_version') FROM m2pem_format"
+            ).fetchone()
+            assert row is not None
+            executives = connection.execute(
+                "SELECT pid, host, command FROM executives WHERE lease_until > clock_timestamp()"
+                " ORDER BY host, pid"
+            ).fetchall()
+    except psycopg.Error as error:
+        raise explained_error(error, address.shown) from error
+    named = tuple(f"process {pid} on {host}: {command}" for pid, host, command in executives)
+    version, size, server = row
+    return DatabaseInfo(version, size, server, named)

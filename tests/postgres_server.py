@@ -1,0 +1,104 @@
+"""A PostgreSQL server of the tests' own, in a temporary folder: the fixtures `postgres`, and
+`postgres_url`, an empty database of it.
+
+It answers on a Unix socket alone. The server refuses to run as root: root runs it as `postgres`.
+"""
+
+import os
+import pwd
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+
+import psycopg
+import pytest
+
+ROLE = "m2pem"
+
+
+def _programs() -> Path | None:
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"), key=lambda each: each.parts[4])
+    if found:
+        return found[-1].parent
+    initdb = shutil.which("initdb")
+    return Path(initdb).parent if initdb else None
+
+
+class PostgresServer:
+    """A server that runs until `remove`. The role `m2pem` may log in, and owns each database."""
+
+    def __init__(self, programs: Path) -> None:
+        self._programs = programs
+        self._numbers = count(1)
+        self.folder = Path(tempfile.mkdtemp(prefix="m2pem-pg-"))
+        if os.geteuid() == 0:
+            user = pwd.getpwnam("postgres")
+            os.chown(self.folder, user.pw_uid, user.pw_gid)
+        self.folder.chmod(0o755)
+        self._data = self.folder / "data"
+        self._run("initdb", "-D", self._data, "-U", "postgres", "-A", "trust", "--no-sync",
+                  "-E", "UTF8", "--locale=C")  # fmt: skip
+        self.start()
+        self.execute(f"CREATE ROLE {ROLE} LOGIN")
+
+    def start(self) -> None:
+        """Start it; returns when it answers."""
+        options = f"-k {self.folder} -c listen_addresses= -c fsync=off -c max_connections=200"
+        self._run("pg_ctl", "-D", self._data, "-o", options, "-l", self.folder / "log", "-w",
+                  "start")  # fmt: skip
+
+    def stop(self, mode: str = "immediate") -> None:
+        """End it, as a crash does, or in another of pg_ctl's modes."""
+        self._run("pg_ctl", "-D", self._data, "-m", mode, "-w", "stop")
+
+    def remove(self) -> None:
+        """End it, and remove its files."""
+        self.stop()
+        shutil.rmtree(self.folder)
+
+    def new_database(self) -> str:
+        """Make an empty database; returns its URL."""
+        name = f"journal{next(self._numbers)}"
+        self.execute(f"CREATE DATABASE {name} OWNER {ROLE}")
+        return self.url(name)
+
+    def url(self, database: str, user: str = ROLE) -> str:
+        """The URL of a database."""
+        return f"postgresql://{user}@/{database}?host={self.folder}"
+
+    def execute(self, statement: str, url: str | None = None) -> list[tuple[object, ...]]:
+        """Carry out a statement as the superuser, or over a URL."""
+        with psycopg.connect(url or self.url("postgres", "postgres"), autocommit=True) as made:
+            found = made.execute(statement)  # type: ignore[call-overload]
+            return found.fetchall() if found.description else []
+
+    def _run(self, program: str, *arguments: object) -> None:
+        words = [str(self._programs / program), *map(str, arguments)]
+        if os.geteuid() == 0:
+            words = ["runuser", "-u", "postgres", "--", *words]
+        with (self.folder / "output").open("ab") as output:
+            code = subprocess.run(
+                words, cwd=self.folder, stdout=output, stderr=output, check=False
+            ).returncode
+        assert code == 0, (self.folder / "output").read_text()
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[PostgresServer]:
+    """A server; skips where PostgreSQL is not installed."""
+    programs = _programs()
+    if programs is None:
+        pytest.skip("PostgreSQL is not installed (Debian: postgresql)")
+    server = PostgresServer(programs)
+    yield server
+    server.remove()
+
+
+@pytest.fixture
+def postgres_url(postgres: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The URL of an empty database; what is beside the journal is in a folder of the test."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return postgres.new_database()
