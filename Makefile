@@ -39,7 +39,7 @@ PIP_FAILED = { echo "pip could not install what is needed (its own message is ab
   Then the same make command again" >&2; exit 1; }
 
 .PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team
-.PHONY: check page-test test test-long test-ros fuzz lint format docs pictures
+.PHONY: check page-test test test-long test-ros fuzz chaos lint format docs pictures
 .PHONY: bench bench-quick conformance clean dist ros
 
 help: ## list the targets
@@ -228,6 +228,13 @@ FUZZ_S := 600
 
 fuzz: python-packages ## read and run strange files for FUZZ_S seconds (600)
 	@$(BIN)/python -m tools.fuzzer.fuzz --seconds $(FUZZ_S) $(M2PEM_CORPORA)
+
+CHAOS_ROUNDS := 1000
+# One of these alone again: make chaos CHAOS="--seed 5 --round 17"
+CHAOS :=
+
+chaos: python-packages ## kill executives at chosen points and random moments, CHAOS_ROUNDS times (1000)
+	@$(BIN)/python -m tests.chaos --rounds $(CHAOS_ROUNDS) $(CHAOS)
 
 dist: $(CREATED) ## build the wheels of m2pem and its plugins, into dist/
 	@echo "Building the wheels of m2pem and its plugins into dist; this takes about two minutes"

@@ -34,7 +34,7 @@ EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
     *("setup", "demo", "demo-air", "demo-ros", "demo-team", "demo-web", "test", "test-long"),
     *("test-ros", "ros", "fuzz", "lint", "format", "docs", "pictures", "conformance", "bench"),
-    *("bench-quick", "check", "clean", "demo-sitl", "dist"),
+    *("bench-quick", "chaos", "check", "clean", "demo-sitl", "dist"),
 }
 
 BLOCKS = {

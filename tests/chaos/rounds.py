@@ -1,0 +1,402 @@
+"""A round: missions are run by `m2pem serve`, which is killed and started again until they end.
+
+All of a round follows from its number and the seed, but for what the computer's load changes.
+"""
+
+import asyncio
+import json
+import os
+import random
+import signal
+import sqlite3
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from m2pem.api import MissionControl
+from m2pem.api.authoring import MissionFiles
+from m2pem.api.runs import OpenPrompt, RunId
+from m2pem.control_socket.paths import ControlSocketError, live_sockets
+from m2pem.control_socket.remote import RemoteControl
+from m2pem.errors import M2pemError, OperatorError
+from m2pem.journal.migrations import MIGRATIONS
+from tests.chaos.judge import Verdict, judge
+from tests.chaos.kill_points import JOURNALS, RANDOM, JournalKind, points_of
+from tests.chaos.worlds import WORLDS, ChaosMission, World
+from tests.command_line import CommandLine
+from tests.preloaded import Process, preloaded
+
+LOOK_EVERY_S = 0.01
+ROUND_WITHIN_S = 120.0
+MOST_KILLS = 3
+
+UNDONE = {
+    "deletions": ("DROP TABLE deletions",),
+    "schedule": ("DROP TABLE schedule", "DROP TABLE schedule_holds"),
+}
+"""How the last steps of migration are undone in a journal with no deletion and no schedule."""
+
+_STARTER = """
+import runpy, sys
+from pathlib import Path
+from tests.chaos import kill_points
+{arm}
+{spoil}
+sys.argv = ["m2pem", *{words!r}]
+runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Kill:
+    """A kill of one executive. `passage`: of the point, from 1. `after_s`: of a random moment, of
+    the wall clock, from when it serves."""
+
+    point: str
+    passage: int = 1
+    after_s: float = 0.0
+
+    def __str__(self) -> str:
+        if self.point == RANDOM:
+            return f"{self.point}, after {self.after_s:.2f} s"
+        return f"{self.point}, passage {self.passage}"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What happens in a round: executives are killed, one after the other; the next one is not.
+
+    `pauses`: whether an operator pauses all runs in each life, and resumes them. `spoil`: Python
+    code that makes the executives that are killed worse, to see that the judge finds it.
+    """
+
+    number: int
+    world: str
+    journal: str
+    kills: tuple[Kill, ...]
+    pauses: bool = False
+    spoil: str = ""
+
+    def __str__(self) -> str:
+        kills = "; ".join(map(str, self.kills)) or "no kill"
+        pauses = "; an operator pauses and resumes" if self.pauses else ""
+        return f"round {self.number}: {self.world}, {self.journal}: {kills}{pauses}"
+
+
+@dataclass
+class Round:
+    """A round that was played. `reached`: how many of its kills happened."""
+
+    plan: Plan
+    verdict: Verdict
+    reached: int = 0
+
+
+def plan_round(seed: int, number: int, world: str, journal: str, point: str = "") -> Plan:
+    """Draw a round. `point`: of its first kill; "": any, each as often as the others."""
+    chance = random.Random(f"{seed} {number}")
+    kind = JOURNALS[journal]
+    passages = undisturbed(world, journal).passages
+    points = points_of(kind, WORLDS[world].arbiter)
+    names = [RANDOM, *points]
+    first = point or names[number % len(names)]
+    kills: list[Kill] = []
+    after = first != RANDOM and (points[first].resuming or points[first].opening)
+    if after and (points[first].resuming or chance.random() < 0.7):
+        early = [RANDOM, *(each for each in points if passages.get(each, 0) > 1)]
+        kills.append(_kill(chance, chance.choice(early), passages))
+    kills.append(_kill(chance, first, passages))
+    while len(kills) < MOST_KILLS and chance.random() < 0.3:
+        kills.append(_kill(chance, chance.choice(names), passages))
+    return Plan(number, world, journal, tuple(kills), pauses=chance.random() < 0.15)
+
+
+def _kill(chance: random.Random, point: str, passages: Mapping[str, int]) -> Kill:
+    # A point that is passed only in a resume is passed once for each run or behavior.
+    most = max(2, passages.get(point, 0))
+    return Kill(point, chance.randint(1, most), chance.uniform(0.0, 1.5))
+
+
+@dataclass(frozen=True, slots=True)
+class Undisturbed:
+    """What missions do when nothing goes wrong. `passages`: of each kill point."""
+
+    passages: Mapping[str, int]
+    ends: Mapping[str, tuple[str, Counter[str]]]
+
+
+@cache
+def undisturbed(world: str, journal: str) -> Undisturbed:
+    """Run the missions once with no kill."""
+    with TemporaryDirectory(prefix="m2pem-chaos-") as folder:
+        passages = Path(folder) / "passages.json"
+        play = Play(Plan(0, world, journal, ()), Path(folder))
+        try:
+            asyncio.run(play.to_the_end(count_into=passages))
+            verdict = asyncio.run(judge(play.evidence(), None))
+        finally:
+            play.close()
+        if verdict.faults:
+            raise AssertionError("with no kill: " + "; ".join(verdict.faults))
+        return Undisturbed(json.loads(passages.read_text()), verdict.ends)
+
+
+@dataclass
+class Evidence:
+    """What is known of a round from outside: see `m2pem`'s judge."""
+
+    world: World
+    url: str
+    journal: JournalKind
+    printed: Sequence[str] = ()
+    acknowledged: Mapping[str, Sequence[RunId]] = field(default_factory=dict)
+    answered: Sequence[tuple[RunId, str]] = ()
+    errors: str = ""
+
+
+_GONE = (ControlSocketError, OSError)
+"""What an operator sees of an executive that is killed."""
+
+
+class Play:
+    """One round while it is played."""
+
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        self.plan = plan
+        self.reached = 0
+        self._world: World = WORLDS[plan.world](folder)
+        self._folder = folder
+        self._kind = JOURNALS[plan.journal]
+        self._url = self._kind.url.format(folder=folder)
+        self._environment = CommandLine(folder).environment
+        self._process: Process | None = None
+        self._chance = random.Random(f"{plan.number}")
+        self._lives = 0
+        self._runs: dict[str, list[RunId]] = {each.name: [] for each in self._world.missions}
+        self._answered: list[tuple[RunId, str]] = []
+
+    def close(self) -> None:
+        """Leave nothing running."""
+        if self._process is not None and self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        self._world.close()
+
+    def evidence(self) -> Evidence:
+        """Return what the judge looks at."""
+        lives = range(1, self._lives + 1)
+        printed = [self._output(life).read_text().splitlines(keepends=True) for life in lives]
+        # What a killed process had not printed whole, no operator has read.
+        lines = [line.rstrip("\n") for life in printed for line in life if line.endswith("\n")]
+        errors = "\n".join(self._errors(life).read_text() for life in lives)
+        return Evidence(
+            self._world, self._url, self._kind, lines, self._runs, self._answered, errors
+        )
+
+    async def whole(self) -> None:
+        """Play the plan."""
+        for kill in self.plan.kills:
+            if kill.point == "migration" and self._lives:
+                downgrade(Path(self._url))
+            if await self._life(kill):
+                self.reached += 1
+            elif self._over:
+                break
+        await self.to_the_end()
+
+    async def to_the_end(self, count_into: Path | None = None) -> None:
+        """Run an executive that is not killed until all missions have ended."""
+        await self._life(None, count_into)
+
+    # --- one executive --------------------------------------------------------------------------
+
+    async def _life(self, kill: Kill | None, count_into: Path | None = None) -> bool:
+        """Run one executive. Returns whether it was killed."""
+        self._over = False
+        process = self._start(self._arm(kill, count_into), self.plan.spoil if kill else "")
+        operator = asyncio.create_task(self._operate(process))
+        killer = asyncio.create_task(self._kill_later(kill, process))
+        try:
+            async with asyncio.timeout(ROUND_WITHIN_S):
+                while process.poll() is None and not operator.done():  # noqa: ASYNC110
+                    await asyncio.sleep(LOOK_EVERY_S)
+        except TimeoutError as error:
+            last = self._output(self._lives).read_text()[-2000:]
+            raise AssertionError(f"no end within {ROUND_WITHIN_S:g} s: {last}") from error
+        finally:
+            killer.cancel()
+        if process.poll() is None and operator.exception() is None:
+            self._over = True
+            process.terminate()
+        elif process.poll() is None and not isinstance(operator.exception(), _GONE):
+            await operator  # raises what went wrong
+        operator.cancel()
+        await asyncio.gather(operator, return_exceptions=True)
+        async with asyncio.timeout(ROUND_WITHIN_S):
+            while process.poll() is None:  # noqa: ASYNC110  # a pipe tells, which blocks
+                await asyncio.sleep(LOOK_EVERY_S)
+        killed = process.returncode == -signal.SIGKILL and kill is not None
+        if not killed and not (self._over and process.returncode == 0):
+            raise AssertionError(f"it ended by itself ({process.returncode}): {self._said()}")
+        return killed
+
+    def _start(self, arm: str, spoil: str) -> Process:
+        self._lives += 1
+        words = [
+            *("serve", "--fleet", str(self._world.fleet), "--journal", self._url),
+            *("--speed", f"{self._world.speed:g}", "--ocu", "none", "--format", "json"),
+        ]
+        code = _STARTER.format(arm=arm, spoil=spoil, words=words)
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        output, errors = (
+            os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
+            for path in (self._output(self._lives), self._errors(self._lives))
+        )
+        try:
+            self._process = preloaded().start(
+                ["-c", code], self._folder, self._environment, (nothing, output, errors)
+            )
+        finally:
+            for each in (nothing, output, errors):
+                os.close(each)
+        return self._process
+
+    def _arm(self, kill: Kill | None, count_into: Path | None) -> str:
+        names = f"kill_points.points_of(kill_points.JOURNALS[{self._kind.name!r}], "
+        points = f"{names}{self._world.arbiter!r})"
+        if count_into is not None:
+            return f"kill_points.count({points}.values(), Path({str(count_into)!r}))"
+        if kill is None or kill.point == RANDOM:
+            return ""
+        return f"kill_points.die_at({points}[{kill.point!r}], {kill.passage})"
+
+    async def _kill_later(self, kill: Kill | None, process: Process) -> None:
+        if kill is not None and kill.point == RANDOM:
+            await self._control(process)
+            await asyncio.sleep(kill.after_s)
+            process.kill()
+
+    def _output(self, life: int) -> Path:
+        return self._folder / f"output{life}.jsonl"
+
+    def _errors(self, life: int) -> Path:
+        return self._folder / f"errors{life}.txt"
+
+    def _said(self) -> str:
+        return self._errors(self._lives).read_text()[-3000:]
+
+    # --- the operator ---------------------------------------------------------------------------
+
+    async def _control(self, process: Process) -> Path:
+        """Wait until the executive can be asked."""
+        while True:
+            for path in live_sockets(Path(self._kind.url.format(folder=self._folder))):
+                if path.stem == str(process.pid):
+                    return path
+            await asyncio.sleep(LOOK_EVERY_S)
+
+    async def _operate(self, process: Process) -> None:
+        """Start what has not started, answer what is asked, until all missions have ended."""
+        async with RemoteControl(await self._control(process)) as control:
+            await self._connected(control)
+            begun = await self._begun(control)
+            for mission in self._world.missions:
+                if mission.name not in begun:
+                    self._runs[mission.name].append(await self._begin(control, mission))
+            pausing = asyncio.create_task(self._pause(control))
+            try:
+                while not await self._all_ended(control):
+                    for prompt in control.prompts():
+                        await self._answer(control, prompt)
+                    await asyncio.sleep(LOOK_EVERY_S)
+                await pausing
+            finally:
+                pausing.cancel()
+
+    async def _begin(self, control: MissionControl, mission: ChaosMission) -> RunId:
+        source = MissionFiles(mission.name, mission.source)
+        while True:
+            try:
+                return await control.start(source, even_if_busy=True, by="anna")
+            except OperatorError as error:
+                if "is just taken up" not in str(error):
+                    raise
+            await asyncio.sleep(LOOK_EVERY_S)
+
+    async def _all_ended(self, control: MissionControl) -> bool:
+        ended = {each.mission for each in await control.runs() if each.ended_us is not None}
+        return ended.issuperset(self._runs)
+
+    async def _connected(self, control: MissionControl) -> None:
+        while True:
+            found = {each.name: each.status for each in await control.health()}
+            if found["arbiters"] == "ok":
+                return
+            await asyncio.sleep(LOOK_EVERY_S)
+
+    async def _begun(self, control: MissionControl) -> set[str]:
+        """Look which missions have begun: the answer to a start may have been lost."""
+        begun = [each for each in await control.runs() if each.records]
+        for each in begun:
+            known = self._runs[each.mission]
+            if each.run not in known:
+                known.append(each.run)
+        return {each.mission for each in begun}
+
+    async def _answer(self, control: MissionControl, prompt: OpenPrompt) -> None:
+        decisions = [each.value for each in prompt.decisions]
+        decision = "yes" if "yes" in decisions else "resume"
+        try:
+            await control.answer(prompt.run, prompt.prompt, decision, by="anna")
+        except M2pemError as error:
+            if "gone" in str(error) or "answered" not in str(error):
+                raise
+        else:
+            self._answered.append((prompt.run, prompt.prompt))
+
+    async def _pause(self, control: MissionControl) -> None:
+        """Pause what runs, and resume it."""
+        if not self.plan.pauses:
+            return
+        await asyncio.sleep(self._chance.uniform(0.0, 0.6))
+        for run in [run for some in self._runs.values() for run in some]:
+            # It may have ended, or not be taken up yet; or the journal is late, and it pauses.
+            for act in (control.pause, control.resume):
+                with suppress(OperatorError):
+                    await act(run, by="anna")
+
+
+def play_round(plan: Plan, folder: Path | None = None) -> Round:
+    """Play a round and judge it. `folder`: where it is played; None: one that is removed."""
+    expected = undisturbed(plan.world, plan.journal)
+    if folder is None:
+        with TemporaryDirectory(prefix="m2pem-chaos-") as made:
+            return play_round(plan, Path(made))
+    play = Play(plan, folder)
+    try:
+        asyncio.run(play.whole())
+        verdict = asyncio.run(judge(play.evidence(), expected.ends))
+    except (AssertionError, M2pemError, TimeoutError, OSError) as error:
+        verdict = Verdict(faults=[f"{type(error).__name__}: {error}"])
+    finally:
+        play.close()
+    return Round(plan, verdict, play.reached)
+
+
+def downgrade(path: Path) -> None:
+    """Make a journal of the newest format one of an older m2pem: it is migrated when opened."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("BEGIN IMMEDIATE")
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        while version and MIGRATIONS[version - 1].__name__ in UNDONE:
+            version -= 1
+            for statement in UNDONE[MIGRATIONS[version].__name__]:
+                connection.execute(statement)
+        if version == len(MIGRATIONS):
+            raise AssertionError(f"say in UNDONE how {MIGRATIONS[-1].__name__} is undone")
+        connection.execute(f"PRAGMA user_version = {version}")
+        connection.execute("COMMIT")

@@ -1,0 +1,47 @@
+"""Rounds of chaos: one for each kill point in `make test`, many others in `make test-long`."""
+
+import random
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from m2pem.journal.migrations import MIGRATIONS
+from m2pem.journal.sqlite import SqliteJournal
+from tests.chaos.kill_points import RANDOM, SQLITE, points_of
+from tests.chaos.rounds import downgrade, plan_round, play_round
+from tests.chaos.worlds import SimulatedVehicles
+
+SEED = 1
+WORLD = SimulatedVehicles.name
+POINTS = [RANDOM, *points_of(SQLITE, SimulatedVehicles.arbiter)]
+
+
+@pytest.mark.parametrize("point", POINTS)
+def test_nothing_is_lost_when_the_executive_dies(point: str) -> None:
+    played = play_round(plan_round(SEED, POINTS.index(point), WORLD, SQLITE.name, point))
+    assert not played.verdict.faults, f"{played.plan}: {played.verdict.faults}"
+    assert played.reached
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", range(1, 101))
+def test_nothing_is_lost_in_a_round_by_chance(number: int) -> None:
+    seed = random.SystemRandom().randrange(10**6)
+    played = play_round(plan_round(seed, number, WORLD, SQLITE.name))
+    assert not played.verdict.faults, f"seed {seed}, {played.plan}: {played.verdict.faults}"
+
+
+def test_a_round_can_be_played_again_by_its_number() -> None:
+    first, second = (plan_round(7, 12, WORLD, SQLITE.name) for _ in range(2))
+    assert first == second
+    assert first != plan_round(8, 12, WORLD, SQLITE.name)
+
+
+async def test_a_journal_can_be_made_one_of_an_older_format(tmp_path: Path) -> None:
+    path = tmp_path / "j.db"
+    await SqliteJournal.open(path).close()
+    downgrade(path)
+    (version,) = sqlite3.connect(path).execute("PRAGMA user_version").fetchone()
+    assert version < len(MIGRATIONS)
+    await SqliteJournal.open(path).close()
