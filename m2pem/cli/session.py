@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -23,6 +24,7 @@ from m2pem.cli.ocus import PLAIN, Operators
 from m2pem.cli.options import UnusableError
 from m2pem.cli.output import Output
 from m2pem.cli.standard_streams import writer_for
+from m2pem.control_socket.paths import live_sockets
 from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import PluginError
 from m2pem.executive.executive import Executive
@@ -272,9 +274,17 @@ def make_executive(
             on_records=None if answers is None else answers.seen,
             rehearse=_rehearse,
             foresee=outlook_in_subprocess,
+            has_others=partial(_others_on, journal.file),
         )
     except PluginError as error:
         raise UnusableError(f"{fleet.file}: {error}") from error
+
+
+def _others_on(journal: Path | None) -> bool:
+    """Whether executives of other processes are on a journal; it blocks."""
+    if journal is None:
+        return False
+    return any(path.stem != str(os.getpid()) for path in live_sockets(journal))
 
 
 def _scripted(plugins: PluginManager, answers: "Answers") -> Plugins:

@@ -51,7 +51,7 @@ class Executive:
 
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `watch_links`:
     whether silence of a vehicle ends its behaviors. `observed`: whether plugins observe records.
-    `search_path`, `limit`, `on_records`: as in `RunSettings`. `rehearse`: what
+    `search_path`, `limit`, `on_records`, `has_others`: as in `RunSettings`. `rehearse`: what
     `MissionControl.simulate` awaits; None: it is refused. `foresee`: what explores the choices
     about incidents; None: what follows them is not known.
     """
@@ -71,6 +71,7 @@ class Executive:
         on_records: OnRecords | None = None,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
+        has_others: Callable[[], bool] = lambda: False,
     ) -> None:
         self.fleet = fleet
         self.journal = journal
@@ -101,7 +102,7 @@ class Executive:
             self.arbiters,
             self.bus,
             self.events,
-            RunSettings(speed, tuple(search_path), limit, on_records),
+            RunSettings(speed, tuple(search_path), limit, on_records, has_others),
             observers=self._observers,
         )
         self._connections = FleetConnections(

@@ -75,6 +75,8 @@ class ScheduleEntries:
         self.to_hold: dict[EntryId, Hold] = {}
         """Entries whose run is stopped, before the journal has their hold."""
         self._runs: dict[RunId, EntryId] = {}
+        self._elsewhere: set[EntryId] = set()
+        """Entries of the journal that are of other fleets."""
 
     # --- the entries ----------------------------------------------------------------------------
 
@@ -126,13 +128,32 @@ class ScheduleEntries:
         if entry.state.run:
             self._runs[entry.state.run] = entry.id
 
-    async def reload(self, number: EntryId) -> None:
-        """Read an entry again, which another executive has changed."""
-        for entry in await self._starter.journal.entries():
-            if entry.id == number:
+    async def refresh(self) -> bool:
+        """Take over what other executives on the journal have added, changed, removed, held and
+        released; returns whether anything has changed.
+
+        Raises:
+            JournalError: the journal cannot be read.
+        """
+        held = await self.read_hold()
+        revisions = await self._starter.journal.schedule_revisions()
+        known = {number: entry.state.revision for number, entry in self.by_id.items()}
+        if {each: revisions[each] for each in revisions.keys() - self._elsewhere} == known:
+            return held
+        found = await self._starter.journal.entries()
+        here = {entry.id: entry for entry in found if self._belongs_here(entry.plan)}
+        self._elsewhere = {entry.id for entry in found} - here.keys()
+        for number, entry in here.items():
+            if known.get(number) != entry.state.revision:
                 self.add(entry)
-                return
-        self.by_id.pop(number, None)
+        for number in known.keys() - here.keys():
+            self._remove(number)
+        self._publish(ScheduleChanged())
+        return True
+
+    def _remove(self, number: EntryId) -> None:
+        del self.by_id[number], self.looks[number]
+        self._runs = {run: entry for run, entry in self._runs.items() if entry != number}
 
     def active(self) -> list[ScheduleEntry]:
         """Return the entries that may still start something."""
@@ -161,6 +182,19 @@ class ScheduleEntries:
             detail = entry.state.detail or f"it has started {entry.state.run}"
             raise OperatorError(f"{number} is {entry.state.status.value}: {detail}")
         return entry
+
+    async def find(self, number: EntryId) -> ScheduleEntry:
+        """Return an entry that may still start something, also one that another executive has just
+        added.
+
+        Raises:
+            OperatorError: there is none, or it is over.
+            JournalError: the journal cannot be read.
+        """
+        if number not in self.by_id:
+            async with self.lock:
+                await self.refresh()
+        return self.active_entry(number)
 
     async def change(self, entry: ScheduleEntry, **fields: object) -> ScheduleEntry:
         """Write an entry with other values of some fields of its state; returns it."""
@@ -218,6 +252,7 @@ class ScheduleEntries:
             OperatorError: all was stopped or held since: what was asked for before does not count.
         """
         async with self.lock:
+            await self.refresh()  # what another executive has removed is not removed again
             if holds != self.holds:
                 raise OperatorError("all was stopped or held meanwhile; schedule it again")
             state = EntryState(plan.scheduled_us - 1 if not plan.when.cron else plan.scheduled_us)
@@ -235,7 +270,7 @@ class ScheduleEntries:
         if old := over[:-KEPT_ENTRIES]:
             await self._starter.journal.remove_entries(old)
             for each in old:
-                del self.by_id[each], self.looks[each]
+                self._remove(each)
 
     async def cancel(self, number: EntryId, by: str) -> None:
         """Cancel an entry.
@@ -243,7 +278,7 @@ class ScheduleEntries:
         Raises:
             OperatorError: there is none, or it is over.
         """
-        entry, who = self.active_entry(number), by or "an operator"
+        entry, who = await self.find(number), by or "an operator"
         with self._stopping(number):
             async with self.lock:
                 found = self.active_entry(number)
@@ -292,8 +327,9 @@ class ScheduleEntries:
         if self._unwritten is hold:
             self._unwritten = None
 
-    async def read_hold(self) -> None:
-        """Take over what another executive on the journal has held or released.
+    async def read_hold(self) -> bool:
+        """Take over that another executive on the journal has held or released all; returns
+        whether it has.
 
         Raises:
             JournalError: the journal cannot be read.
@@ -301,12 +337,13 @@ class ScheduleEntries:
         before = self.hold_of_all
         found = await self._starter.journal.schedule_hold(self._starter.fleet.name)
         if self.hold_of_all is not before or self._unwritten is not None or found == before:
-            return
+            return False
         self.hold_of_all = found
         if found is None:
             self.say("the schedule is released by another executive's operator")
         else:
             self.say_held()
+        return True
 
     async def hold(self, number: EntryId | None, by: str, reason: str) -> None:
         """Hold an entry, or the whole schedule.
@@ -320,7 +357,7 @@ class ScheduleEntries:
                 raise OperatorError("nothing is scheduled")
             await self.written(hold)
             return
-        self.active_entry(number)
+        await self.find(number)
         hold = Hold(by, reason, self._starter.clock.now_us())
         with self._stopping(number):
             async with self.lock:
@@ -333,6 +370,8 @@ class ScheduleEntries:
         Raises:
             OperatorError: it is not held.
         """
+        if number is not None:
+            await self.find(number)
         async with self.lock:
             if number is None:
                 await self._release_all()

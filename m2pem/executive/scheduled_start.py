@@ -46,6 +46,10 @@ class NotBegunError(M2pemError):
         super().__init__(reason)
 
 
+class LeftToOthersError(M2pemError):
+    """This executive cannot start an entry, and another one on the journal may."""
+
+
 class Starter(Protocol):
     """Starts missions: `m2pem.executive.supervisor.Supervisor`."""
 
@@ -83,6 +87,10 @@ class Starter(Protocol):
             NotBegunError: it may not, or its beginning could not be written.
             M2pemError: nothing was written.
         """
+        ...
+
+    def has_others(self) -> bool:
+        """Whether other executives are on the journal now. Blocks."""
         ...
 
     def outcome_of(self, run: RunId) -> str | None:

@@ -17,6 +17,7 @@ operators do with entries, `schedule_entries`.
 import asyncio
 import logging
 import time
+from collections.abc import Iterable
 
 import msgspec
 
@@ -29,6 +30,7 @@ from m2pem.executive.scheduled_start import (
     ASK_AGAIN_S,
     LOOK_AGAIN_S,
     STARTING,
+    LeftToOthersError,
     Look,
     NotBegunError,
     StartConditions,
@@ -57,6 +59,13 @@ LONGEST_SLEEP_S = 600.0
 
 CLOCKS_APART_S = 5.0
 
+FOLLOW_S = 1.0
+"""Between two looks at what other executives on the journal have done with the schedule."""
+
+
+def _first(times_us: Iterable[int | None]) -> int | None:
+    return min((each for each in times_us if each is not None), default=None)
+
 
 class Scheduler:
     """Starts the missions of a schedule when they are due, or when an operator says so."""
@@ -76,9 +85,28 @@ class Scheduler:
                 self._entries.changed.clear()
                 async with self._entries.lock:
                     next_us = await self._look()
-                await self._sleep_until(next_us)
+                await self._wait(next_us)
         finally:
             self._entries.served = False
+
+    async def _wait(self, next_us: int | None) -> None:
+        """Wait until that time, or until something has changed, here or at another executive."""
+        clock, is_shared = self._starter.clock, self._starter.journal.file is not None
+        while not self._entries.changed.is_set():
+            now_us = clock.now_us()
+            if next_us is not None and now_us >= next_us:
+                return
+            limits = [next_us, self._in(FOLLOW_S) if is_shared else None]
+            await self._sleep_until(_first(limits))
+            if is_shared and await self._has_changed_elsewhere():
+                return
+
+    async def _has_changed_elsewhere(self) -> bool:
+        async with self._entries.lock:
+            try:
+                return await self._entries.refresh()
+            except JournalError:
+                return False  # looking at the schedule says why
 
     async def _sleep_until(self, next_us: int | None) -> None:
         if next_us is None:
@@ -99,7 +127,7 @@ class Scheduler:
     async def _look(self) -> int | None:
         """Start what can start now; returns when to look again."""
         try:
-            await self._entries.read_hold()
+            await self._entries.refresh()
             await self._conditions.ask_journal(self._entries.active())
             await self._judge_runs()
         except JournalError as error:
@@ -108,13 +136,16 @@ class Scheduler:
         self._compare_clocks()
         kept: dict[ResourceId, EntryId] = {}
         wakes: list[int] = []
-        for entry in self._entries.in_order():
+        for number in [entry.id for entry in self._entries.in_order()]:
+            entry = self._entries.by_id.get(number)
+            if entry is None:  # another executive has removed it meanwhile
+                continue
             try:
                 again_us = await self._look_at(entry, kept)
             except StaleEntryError:
-                await self._entries.reload(entry.id)
+                await self._entries.refresh()
                 again_us = self._starter.clock.now_us()
-            except JournalError as error:
+            except (JournalError, LeftToOthersError) as error:
                 look = self._entries.looks[entry.id]
                 if look.reason != str(error):
                     look.reason = str(error)
@@ -124,10 +155,6 @@ class Scheduler:
                 again_us = self._in(ASK_AGAIN_S)
             if again_us is not None:
                 wakes.append(again_us)
-        if self._starter.journal.file is not None and (
-            self._entries.active() or self._entries.hold_of_all
-        ):
-            wakes.append(self._in(ASK_AGAIN_S))  # another executive may hold the schedule
         return min(wakes, default=None)
 
     def _compare_clocks(self) -> None:
@@ -149,8 +176,11 @@ class Scheduler:
 
         Of an entry that starts nothing any more there is nothing to hold.
         """
-        for entry in self._entries.active():
-            hold = self._entries.to_hold.get(entry.id)
+        for number in [entry.id for entry in self._entries.active()]:
+            entry = self._entries.by_id.get(number)
+            if entry is None:  # another executive has removed it meanwhile
+                continue
+            hold = self._entries.to_hold.get(number)
             run, judged = entry.state.run, entry.state.judged_run
             if hold is None and run and run != judged:
                 judged, outcome = run, self._conditions.outcome(run)
@@ -168,7 +198,7 @@ class Scheduler:
             try:
                 await self._entries.change(entry, **fields)
             except StaleEntryError:
-                await self._entries.reload(entry.id)
+                await self._entries.refresh()
                 continue
             if "hold" in fields:
                 self._entries.say(f"{entry.id} is {hold}; it starts nothing until it is released")
@@ -215,7 +245,7 @@ class Scheduler:
         limits = [found.next_us, wait.again_us]
         if found.deadline_us is not None:
             limits.append(found.deadline_us + 1)
-        return min((each for each in limits if each is not None), default=None)
+        return _first(limits)
 
     async def _settle_passed(self, entry: ScheduleEntry, now_us: int) -> tuple[ScheduleEntry, Due]:
         """Settle the times that are missed by now; returns what the entry is then, and its due
@@ -344,7 +374,7 @@ class Scheduler:
                 run that was interrupted may command its vehicles.
         """
         async with self._entries.lock:
-            await self._entries.read_hold()
+            await self._entries.refresh()
             entry = self._entries.active_entry(number)
             if held := self._entries.why_held(entry):
                 raise OperatorError(f"{number} is not started: {held}; release it first")
@@ -412,10 +442,17 @@ class Scheduler:
         return Wait(why, self._in(ASK_AGAIN_S))
 
     async def _admitted(self, entry: ScheduleEntry, due_us: int) -> tuple[Mission, str] | None:
-        """Read and check the mission of an entry; None: it is refused, and the entry has failed."""
+        """Read and check the mission of an entry; None: it is refused, and the entry has failed.
+
+        Raises:
+            LeftToOthersError: it is refused, and another executive may start it.
+        """
         try:
             return await asyncio.to_thread(self._starter.admitted, entry.plan)
         except M2pemError as error:
+            if await asyncio.to_thread(self._starter.has_others):
+                text = f"{error}\nAnother executive on the journal may start it"
+                raise LeftToOthersError(text) from error
             await self._refused(entry, due_us, str(error))
             return None
 

@@ -97,13 +97,14 @@ class RunSettings:
     `speed`: of the clock against the wall clock, kept in the journal for a resume. `search_path`:
     folders of processes that missions call. `limit`: see `RunLimit`. `on_records`: is called with
     the records of each run in their order, those of before a resume too, before their commands go
-    out.
+    out. `has_others`: says whether other executives are on the journal now; it blocks.
     """
 
     speed: float = 1.0
     search_path: tuple[Path, ...] = ()
     limit: RunLimit | None = None
     on_records: OnRecords | None = None
+    has_others: Callable[[], bool] = lambda: False
 
     @property
     def steps_at_once(self) -> int:
@@ -406,6 +407,10 @@ class Supervisor:
         loaded = load_source(files)
         process, _ = self.admit(loaded, plan.process, plan.data)
         return loaded, process
+
+    def has_others(self) -> bool:
+        """Whether other executives are on the journal now; it blocks."""
+        return self.settings.has_others()
 
     def refuse_unattended(self) -> None:
         """Check that missions may start with no operator present.

@@ -3,7 +3,7 @@
 `JournalContract` checks every promise made here.
 """
 
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -275,6 +275,14 @@ class Journal(Protocol):
 
     async def entries(self) -> Sequence[ScheduleEntry]:
         """Return every entry of the schedule, of all fleets, in order of its number."""
+        ...
+
+    async def schedule_revisions(self) -> Mapping[str, int]:
+        """Return the revision of each entry of the schedule, by its id.
+
+        It is asked each second for what other executives have added, changed or removed, so it
+        must cost little.
+        """
         ...
 
     async def remove_entries(self, entries: Sequence[str]) -> None:

@@ -4,7 +4,7 @@ import asyncio
 import struct
 import time
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Callable, Collection, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, closing
 from functools import partial
@@ -347,6 +347,14 @@ class DatabaseJournal(ABC):
             )
             for number, plan, state in rows
         ]
+
+    async def schedule_revisions(self) -> Mapping[str, int]:
+        """See `Journal.schedule_revisions`."""
+        return await self._read(self._schedule_revisions)
+
+    def _schedule_revisions(self) -> Mapping[str, int]:
+        rows = self._reading.execute("SELECT entry, revision FROM schedule ORDER BY entry")
+        return {entry_id(number): revision for number, revision in rows}
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
         """See `Journal.remove_entries`."""

@@ -3,7 +3,7 @@
 import os
 import time
 from bisect import bisect_right
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
@@ -218,6 +218,11 @@ class MemoryJournal:
         """See `Journal.entries`."""
         self._check_open()
         return list(self._entries.values())
+
+    async def schedule_revisions(self) -> Mapping[str, int]:
+        """See `Journal.schedule_revisions`."""
+        self._check_open()
+        return {entry.id: entry.state.revision for entry in self._entries.values()}
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
         """See `Journal.remove_entries`."""

@@ -142,6 +142,8 @@ class SqliteJournal(DatabaseJournal):
         self._locks = locks
         self._writing = writing
         self._closing = reading.close
+        self._data_version: int | None = None
+        self._revisions: Mapping[str, int] = {}
         storage = SqliteStorage(path, writing, locks, marks.path)
         super().__init__(path, identity, storage, reading, marks)
 
@@ -187,6 +189,14 @@ class SqliteJournal(DatabaseJournal):
             yield
         finally:
             self._reading.execute("ROLLBACK")
+
+    def _schedule_revisions(self) -> Mapping[str, int]:
+        # Read before the rows: what is written meanwhile is seen the next time.
+        (version,) = self._reading.execute("PRAGMA data_version").fetchone()
+        if version != self._data_version:
+            self._revisions = super()._schedule_revisions()
+            self._data_version = version
+        return self._revisions
 
     def _driven(self, numbers: Collection[int]) -> Collection[int]:
         return {number for number in numbers if self._locks.held(number)}

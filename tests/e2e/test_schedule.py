@@ -170,8 +170,20 @@ def test_two_executives_of_a_fleet_hold_and_release_its_schedule_together(
     ask(first, "release_schedule", by="bob")
     while hold_at(second):
         assert programs[1].process.poll() is None
+    assert [each["entry"] for each in ask(second, "scheduled")["entries"]] == ["s1"]
+    on = ("--run-on", str(programs[0].process.pid))
+    assert m2pem.run("start", reverse, *JOURNAL, "--when", "free", *on)[:2] == (0, "s2\n")
+    while len(ask(second, "scheduled")["entries"]) < 2:
+        assert programs[1].process.poll() is None
+    while (found := entry(m2pem, "s2"))["status"] != "ended":
+        assert programs[0].process.poll() is None
+    assert [each["run"] for each in runs(m2pem)] == [found["run"]]
+    assert [each["settlement"] for each in found["times"]] == ["started"]
     assert m2pem.run("schedule", "hold", *JOURNAL)[0] == 0
     assert m2pem.run("schedule", "release", *JOURNAL)[0] == 0
+    ask(second, "unschedule", entry="s1", by="anna")
+    while "scheduled" in {each["status"] for each in ask(first, "scheduled")["entries"]}:
+        assert programs[0].process.poll() is None
 
 
 IMPOSSIBLE = [

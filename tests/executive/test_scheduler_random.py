@@ -108,6 +108,9 @@ class Starts:
         await self.journal.release(run)
         self.running.pop(run, None)
 
+    def has_others(self) -> bool:
+        return False
+
     def outcome_of(self, run: str) -> str | None:
         return "" if run in self.running else None
 

@@ -215,6 +215,25 @@ class JournalContract(Contract):
             assert [each.id for each in await journal.entries()] == ["s1"]
             assert (await journal.schedule(PLAN, EntryState(5))).id == "s3"
 
+    async def test_a_change_of_the_schedule_shows_in_its_revisions(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Each entry that is added, changed, has started a run, or is removed."""
+        async with opened(open_journal) as journal:
+            assert await journal.schedule_revisions() == {}
+            await journal.schedule(PLAN, EntryState(5))
+            await journal.schedule(PLAN, EntryState(6))
+            assert await journal.schedule_revisions() == {"s1": 0, "s2": 0}
+            await journal.create(
+                HEADER, EntryChange("s1", EntryState(9, times=(STARTED,), revision=1))
+            )
+            assert await journal.schedule_revisions() == {"s1": 1, "s2": 0}
+            cancelled = EntryState(6, status=EntryStatus.CANCELLED, revision=1)
+            await journal.change_entry(EntryChange("s2", cancelled))
+            assert await journal.schedule_revisions() == {"s1": 1, "s2": 1}
+            await journal.remove_entries(["s2"])
+            assert await journal.schedule_revisions() == {"s1": 1}
+
     async def test_a_schedule_is_held_for_each_fleet(self, open_journal: OpenJournal) -> None:
         """Until it is released."""
         async with opened(open_journal) as journal:
@@ -589,6 +608,24 @@ class JournalContract(Contract):
             assert await journal.claim(run) == 2
             await journal.append([entry(run, 3, epoch=2)])
             assert await journal.create(HEADER) == "r2"
+
+    @needs("durability")
+    async def test_each_of_two_journals_sees_what_the_other_does_with_the_schedule(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Entries that it adds, changes and removes, and holds of all."""
+        async with opened(open_journal) as one, opened(open_journal) as two:
+            assert await two.schedule_revisions() == {}
+            added = await one.schedule(PLAN, EntryState(5))
+            assert await two.schedule_revisions() == {"s1": 0}
+            assert await two.entries() == [added]
+            cancelled = EntryState(6, status=EntryStatus.CANCELLED, revision=1)
+            await one.change_entry(EntryChange("s1", cancelled))
+            assert await two.schedule_revisions() == {"s1": 1}
+            await two.remove_entries(["s1"])
+            assert await one.schedule_revisions() == {}
+            await one.hold_schedule(PLAN.fleet, Hold("anna", "rain", 8))
+            assert await two.schedule_hold(PLAN.fleet) == Hold("anna", "rain", 8)
 
     @needs("durability")
     async def test_two_journals_on_one_storage_share_it(self, open_journal: OpenJournal) -> None:
