@@ -33,6 +33,8 @@ class Accessibility:
             [part, OPTIONS],
         )
         self.looked.append(what)
+        if repeated := await self.page.evaluate(REPEATED_IDS):
+            self.wrong.append(f"{what}: ids are there twice: {', '.join(repeated)}")
         for violation in violations:
             nodes = violation["nodes"]
             self.wrong.append(f"{what}: {violation['id']} ({len(nodes)}): {violation['help']}")
@@ -47,6 +49,12 @@ def why(node: dict[str, list[dict[str, str]]]) -> str:
     checks = [*node["any"], *node["all"], *node["none"]]
     return "; ".join(check["message"] for check in checks)[:240]
 
+
+# Labels refer to elements by their ids; axe sees only those of the part.
+REPEATED_IDS = """() => {
+  const ids = [...document.querySelectorAll("[id]")].map((each) => each.id);
+  return ids.filter((id, place) => ids.indexOf(id) < place);
+}"""
 
 # Colours in the middle of a transition are no colours of the page.
 STILL = """() => Promise.all(

@@ -2,8 +2,9 @@
 // cannot be used meanwhile. Escape closes; the focus goes back to where it was.
 import type { ComponentChildren } from "preact";
 import { createPortal } from "preact/compat";
-import { useEffect, useId, useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { strings } from "../strings";
+import { useUniqueId } from "./uniqueId";
 import "./dialog.css";
 
 export interface DialogProps {
@@ -32,7 +33,7 @@ function keepBehind(): () => void {
 
 export function Dialog({ title, onClose, children, actions, wide = false }: DialogProps) {
   const dialog = useRef<HTMLDivElement>(null);
-  const heading = useId();
+  const heading = useUniqueId();
   useEffect(() => {
     const before = document.activeElement;
     const release = keepBehind();

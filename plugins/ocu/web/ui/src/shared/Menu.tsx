@@ -1,6 +1,7 @@
 // A button that opens a menu (WAI-ARIA menu button pattern).
 import type { ComponentChildren } from "preact";
-import { useEffect, useId, useRef, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { useUniqueId } from "./uniqueId";
 import "./menu.css";
 
 export interface MenuItem {
@@ -20,7 +21,7 @@ export function Menu({ label, children, items, class: className }: MenuProps) {
   const [isOpen, setOpen] = useState(false);
   const outer = useRef<HTMLDivElement>(null);
   const button = useRef<HTMLButtonElement>(null);
-  const id = useId();
+  const id = useUniqueId();
   useEffect(() => {
     if (!isOpen) return undefined;
     outer.current?.querySelector<HTMLElement>('[role="menuitem"]')?.focus();

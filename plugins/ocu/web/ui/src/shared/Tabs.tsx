@@ -1,6 +1,7 @@
 // Panes of which one is seen at a time. Arrow keys go from tab to tab.
 import type { ComponentChildren } from "preact";
-import { useId, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
+import { useUniqueId } from "./uniqueId";
 import "./tabs.css";
 
 export interface Tab {
@@ -11,7 +12,7 @@ export interface Tab {
 
 export function Tabs({ label, tabs }: { label: string; tabs: Tab[] }) {
   const [chosen, choose] = useState(tabs[0]!.id);
-  const prefix = useId();
+  const prefix = useUniqueId();
   const current = tabs.find(({ id }) => id === chosen) ?? tabs[0]!;
   return (
     <div class="tabs">

@@ -1,6 +1,6 @@
 // Why the server would not do something: in its words, with all that it found.
-import { useId } from "preact/hooks";
 import type { Finding } from "../../shared/types";
+import { useUniqueId } from "../../shared/uniqueId";
 import { strings } from "../../strings";
 import type { Refusal } from "./job";
 import type { EditorContext } from "./panel";
@@ -17,7 +17,7 @@ export interface ProblemViewProps {
 }
 
 export function ProblemView({ editor, title, refusal, spec = "" }: ProblemViewProps) {
-  const heading = useId();
+  const heading = useUniqueId();
   return (
     <section class="m2v-problem" role="alert" aria-labelledby={heading}>
       <h2 id={heading}>{title}</h2>

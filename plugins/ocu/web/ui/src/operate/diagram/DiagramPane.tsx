@@ -1,9 +1,10 @@
 // The mission's diagrams, with what is active in them; tabs for the others, and for what is inside.
 import { useComputed, useSignal } from "@preact/signals";
-import { useEffect, useId, useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 import { fill, strings } from "../../strings";
 import { remember, remembered } from "../../shared/memory";
 import { TabList } from "../../shared/Tabs";
+import { useUniqueId } from "../../shared/uniqueId";
 import { useOperating } from "../context";
 import { Pane } from "../layout/Pane";
 import { DiagramTools } from "./DiagramTools";
@@ -20,7 +21,7 @@ export function DiagramPane() {
   const { scene, mission, selected } = useOperating();
   const host = useRef<HTMLDivElement>(null);
   const drawings = useRef<Drawings>();
-  const panel = useId();
+  const panel = useUniqueId();
   const shown = useSignal(mission.views[0]?.key ?? "");
   const following = useSignal(remembered("follow", true));
   const activity = useComputed<Map<string, Activity>>(() => {

@@ -1,6 +1,6 @@
 // One part of the page, with its name and its own buttons.
 import type { ComponentChildren } from "preact";
-import { useId } from "preact/hooks";
+import { useUniqueId } from "../../shared/uniqueId";
 
 export interface PaneProps {
   title: string;
@@ -12,7 +12,7 @@ export interface PaneProps {
 }
 
 export function Pane({ title, tools, children, class: more = "", scrolls = false }: PaneProps) {
-  const id = useId();
+  const id = useUniqueId();
   return (
     <section class={`pane ${more}`} aria-labelledby={id}>
       <header>

@@ -1,5 +1,6 @@
 // The requirements that stand in the mission's file: a list, of which one at a time is edited.
-import { useId, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
+import { useUniqueId } from "../../../shared/uniqueId";
 import type { Requirement } from "../../moddle/requirements";
 import { fill, strings } from "../../../strings";
 import type { Finding } from "../../../shared/types";
@@ -24,7 +25,7 @@ export function Requirements({ editor, verification }: RequirementsProps) {
   // Undone and redone changes are shown too.
   editor.changes.value;
   const all = placed(editor);
-  const heading = useId();
+  const heading = useUniqueId();
   const vocabulary = vocabularyOf(editor);
   const taken = all.map(({ requirement }) => requirement.id);
   const changeTo = (one: Placed, next: Requirement) => {
