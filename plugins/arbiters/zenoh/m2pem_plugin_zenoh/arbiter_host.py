@@ -16,6 +16,7 @@ from uuid import UUID, uuid4
 
 from m2pem.api import (
     Arbiter,
+    ArbiterCapabilities,
     ArbiterContext,
     BehaviorReport,
     BehaviorState,
@@ -28,8 +29,9 @@ from m2pem.api import (
     VehicleState,
     WhenCutOff,
 )
+from m2pem.errors import StaleCommandError
 from m2pem_plugin_zenoh import messages as m
-from m2pem_plugin_zenoh.store import HostStore, Kept
+from m2pem_plugin_zenoh.store import HostStore, Kept, run_of
 
 LOST_AFTER_S = 3.0
 """Of a vehicle for which neither the fleet nor its arbiter states one."""
@@ -79,7 +81,6 @@ class ArbiterHost:
         self._outlet = outlet
         self._arbiter: Arbiter | None = None
         self._executive = self._contact = self._who = ""
-        self._superseded: set[str] = set()
         self._answers: OrderedDict[str, asyncio.Task[m.Answer]] = OrderedDict()
         self._received_s = 0.0
         self._received_us = 0
@@ -195,6 +196,8 @@ class ArbiterHost:
                 async with self._greeting:
                     return await self._greet(request, request.body)
             return await self._do(request)
+        except StaleCommandError as error:
+            return m.Refused(error.code, str(error), error.newest)
         except Exception as error:  # an arbiter's fault must not end the host
             self._log.exception("%s", type(request.body).__name__)
             return m.Refused("FAILED", f"{type(error).__name__}: {error}")
@@ -203,8 +206,6 @@ class ArbiterHost:
         if hello.version != m.VERSION:
             reason = f"the host speaks version {m.VERSION} of the link, not {hello.version}"
             return m.Refused("VERSION", f"{reason}: install the same m2pem-plugin-zenoh on both")
-        if request.executive in self._superseded:
-            return m.Refused("SUPERSEDED", f"{self._who} has taken the host over")
         owner = self._store.journal
         if owner and owner != request.journal:
             if self._contact:
@@ -216,8 +217,9 @@ class ArbiterHost:
                     f"{names} of another journal still goes on; let its executive resume and end "
                     f"it, or remove the state of the host",
                 )
+        if not self._store.greet(request.executive):
+            return self._superseded()
         if self._contact and self._executive != request.executive:
-            self._superseded.add(self._executive)
             self._log.warning("%s has taken over from %s", hello.who, self._who)
         if self._arbiter is None or owner != request.journal:
             await self._end()
@@ -254,9 +256,16 @@ class ArbiterHost:
     def _out_of_contact(self, request: m.Request) -> m.Refused | None:
         if self._contact and request.contact == self._contact:
             return None
-        if request.executive in self._superseded:
-            return m.Refused("SUPERSEDED", f"{self._who} has taken the host over")
+        if self._contact and request.executive != self._executive:
+            return self._superseded()
         return m.Refused("NO_CONTACT", "the host has lost the contact meanwhile")
+
+    def _superseded(self) -> m.Refused:
+        newer = self._who or "another executive"
+        return m.Refused(
+            "SUPERSEDED",
+            f"{newer} has taken the host over from this one; to have it back, start this one again",
+        )
 
     async def _do(self, request: m.Request) -> m.Answer:
         arbiter, body = self._arbiter, request.body
@@ -265,8 +274,7 @@ class ArbiterHost:
         # What stops a vehicle is done without contact, too.
         match body:
             case m.Cancel():
-                if stale := self._stale(body.behavior, body.epoch):
-                    return stale
+                self._require("cancel", body.behavior, body.epoch)
                 await arbiter.cancel(body.behavior, body.epoch)
                 return self._done()
             case m.Hold():
@@ -282,8 +290,7 @@ class ArbiterHost:
             case m.Query():
                 return await self._query(arbiter, body)
             case m.Adjust():
-                if stale := self._stale(body.behavior, body.epoch):
-                    return stale
+                self._require("adjust", body.behavior, body.epoch)
                 parameters = m.resolved_parameters(body.parameters)
                 await _adjusting(arbiter)(body.behavior, body.epoch, parameters)
             case m.Resume():
@@ -291,6 +298,10 @@ class ArbiterHost:
                 self._held_for_executive.discard(resource)
                 self._store.hold(self._store.held() - {resource})
                 await arbiter.resume(resource)
+            case m.Fence():
+                self._store.admit(body.run, body.epoch)
+                if _capabilities(arbiter).fences:
+                    await _fencing(arbiter)(body.run, body.epoch)
             case m.Reclaim():
                 text = await _reclaiming(arbiter)(ResourceId(body.resource))
                 return m.Done(self._now_us, text)
@@ -298,8 +309,7 @@ class ArbiterHost:
 
     async def _start(self, arbiter: Arbiter, body: m.Start) -> m.Answer:
         request = m.behavior_request(body.request)
-        if stale := self._stale(request.id, request.epoch):
-            return stale
+        self._require("start", request.id, request.epoch)
         known = self._store.behavior(request.id)
         # A higher epoch that starts an ended behavior again means it: it is another executive.
         if known is not None and not (known.ended and request.epoch > known.epoch):
@@ -308,6 +318,8 @@ class ArbiterHost:
         self._store.begin(request)
         try:
             await arbiter.start(request)
+        except StaleCommandError:
+            raise
         except Exception as error:  # an arbiter's fault must not end the host
             self._log.exception("start of %s", request.id)
             reason = f"the arbiter raised {type(error).__name__}: {error}"
@@ -315,8 +327,7 @@ class ArbiterHost:
         return self._done()
 
     async def _query(self, arbiter: Arbiter, body: m.Query) -> m.Answer:
-        if body.epoch and (stale := self._stale(body.behavior, body.epoch)):
-            return stale
+        self._store.admit(body.behavior, body.epoch)
         kept = self._store.behavior(body.behavior)
         last = kept.report if kept is not None else None
         if kept is not None and kept.ended and last is not None:
@@ -326,16 +337,15 @@ class ArbiterHost:
             if last is not None and last.native_ref is not None:
                 reference = last.native_ref
             found = await arbiter.query(body.behavior, reference)
+        found = replace(found, epoch=self._store.epoch(body.behavior))
         resources = kept.resources if kept is not None else ()
         return m.Found(m.encode_report(found), resources)
 
-    def _stale(self, behavior: str, epoch: int) -> m.Refused | None:
-        if self._store.admit(behavior, epoch):
-            return None
-        newer = self._store.epoch(behavior)
-        return m.Refused(
-            "STALE_EPOCH", f"epoch {epoch} is past: an executive of epoch {newer} has the run"
-        )
+    def _require(self, what: str, behavior: str, epoch: int) -> None:
+        """Check that a command is not of a past epoch; raises StaleCommandError."""
+        if not self._store.admit(behavior, epoch):
+            newest = self._store.epoch(behavior)
+            raise StaleCommandError(f"{what} of {behavior}", run_of(behavior), epoch, newest)
 
     def _done(self) -> m.Done:
         return m.Done(self._now_us)
@@ -478,8 +488,17 @@ class ArbiterHost:
             self._log.error("%s broke off", task.get_name(), exc_info=error)
 
 
+def _capabilities(arbiter: Arbiter) -> ArbiterCapabilities:
+    declared = getattr(arbiter, "capabilities", None)
+    return declared if isinstance(declared, ArbiterCapabilities) else ArbiterCapabilities()
+
+
 def _adjusting(arbiter: Arbiter) -> Any:
     return arbiter.adjust  # type: ignore[attr-defined]  # its capabilities say so at the other end
+
+
+def _fencing(arbiter: Arbiter) -> Any:
+    return arbiter.fence  # type: ignore[attr-defined]  # its capabilities say so
 
 
 def _reclaiming(arbiter: Arbiter) -> Any:

@@ -82,7 +82,12 @@ class Reclaim(msgspec.Struct, frozen=True, tag=True):
     resource: str
 
 
-Body: TypeAlias = Hello | Ping | Start | Cancel | Adjust | Query | Hold | Resume | Reclaim
+class Fence(msgspec.Struct, frozen=True, tag=True):
+    run: str
+    epoch: int
+
+
+Body: TypeAlias = Hello | Ping | Start | Cancel | Adjust | Query | Hold | Resume | Reclaim | Fence
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -122,10 +127,12 @@ class Found(msgspec.Struct, frozen=True, tag=True):
 
 
 class Refused(msgspec.Struct, frozen=True, tag=True):
-    """`code`: why, for programs: NO_CONTACT, SUPERSEDED, IN_USE, STALE_EPOCH, VERSION, FAILED."""
+    """`code`: why, for programs: NO_CONTACT, SUPERSEDED, IN_USE, STALE_EPOCH, VERSION, FAILED.
+    `newest`: with STALE_EPOCH, the epoch that was seen."""
 
     code: str
     reason: str
+    newest: int = 0
 
 
 Answer: TypeAlias = Welcome | Done | Found | Refused

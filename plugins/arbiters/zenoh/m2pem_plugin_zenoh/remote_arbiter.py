@@ -26,7 +26,7 @@ from m2pem.api import (
     Telemetry,
     VehicleState,
 )
-from m2pem.errors import PluginError
+from m2pem.errors import PluginError, StaleCommandError
 from m2pem_plugin_zenoh import messages as m
 from m2pem_plugin_zenoh.arbiter_host import LinkError, lost_after_s
 from m2pem_plugin_zenoh.link import Endpoints, Link, settings
@@ -44,6 +44,10 @@ CONFIRMED_WITHIN_S = 8.0
 """How long what stops a vehicle is sent again until the host confirms it."""
 
 AGAIN_S = 1.0
+
+
+def _stale(what: str, behavior: BehaviorId, epoch: int, newest: int) -> StaleCommandError:
+    return StaleCommandError(f"{what} of {behavior}", behavior.partition(".")[0], epoch, newest)
 
 
 class HostError(PluginError):
@@ -74,7 +78,7 @@ class RemoteArbiter:
         self._key = key
         self._local = hosted.make(context)
         declared = getattr(self._local, "capabilities", ArbiterCapabilities())
-        self.capabilities = replace(declared, sights=False, addresses=True)
+        self.capabilities = replace(declared, sights=False, addresses=True, fences=True)
         # What the arbiter of the host cannot, this one must not seem to.
         if declared.adjusts:
             self.adjust = self._adjust
@@ -167,6 +171,9 @@ class RemoteArbiter:
         """Have the host start a behavior: once, however often it is sent.
 
         While the host is not reached the behavior is REJECTED: it is not sent.
+
+        Raises:
+            StaleCommandError: another executive drives the run.
         """
         known = self._behaviors.get(request.id)
         if known is None or known.ended:
@@ -175,13 +182,24 @@ class RemoteArbiter:
         if not self._contact:
             self._end(request.id, BehaviorState.REJECTED, "LINK_LOST", self._unreached)
             return
-        sending = self._create(self._send_start(request), f"start {request.id}")
+        stale: asyncio.Future[StaleCommandError] = asyncio.get_running_loop().create_future()
+        sending = self._create(self._send_start(request, stale), f"start {request.id}")
         await asyncio.wait({sending}, timeout=START_WITHIN_S)
+        if stale.done():
+            raise stale.result()
 
-    async def _send_start(self, request: BehaviorRequest) -> None:
+    async def _send_start(
+        self, request: BehaviorRequest, stale: "asyncio.Future[StaleCommandError]"
+    ) -> None:
         body, id_ = m.Start(m.plain_request(request)), uuid4().hex
         behavior = self._behaviors[request.id]
+        is_first = True
         while not behavior.ended:
+            # An executive that was stopped for a while may not repeat what it has commanded.
+            if not (is_first or self._context.may_send()):
+                await self._again()
+                continue
+            is_first = False
             try:
                 answer = await self._request(id_, body, self._resend_after_s)
             except LinkError:
@@ -191,6 +209,9 @@ class RemoteArbiter:
                 case m.Refused("NO_CONTACT"):
                     await self._again()
                     continue
+                case m.Refused("STALE_EPOCH"):
+                    behavior.ended = True
+                    stale.set_result(_stale("start", request.id, request.epoch, answer.newest))
                 case m.Refused(code, reason):
                     self._end(request.id, BehaviorState.REJECTED, code, reason)
             return
@@ -200,6 +221,7 @@ class RemoteArbiter:
 
         Raises:
             HostError: it has not confirmed that, or refuses it.
+            StaleCommandError: another executive drives the run.
         """
         await self._stop(m.Cancel(behavior, epoch))
 
@@ -242,6 +264,23 @@ class RemoteArbiter:
         answer = await self._confirmed(m.Reclaim(resource))
         return answer.text if isinstance(answer, m.Done) else ""
 
+    async def fence(self, run: str, epoch: int) -> None:
+        """Have the host refuse commands of the run that have a lower epoch.
+
+        Without contact nothing is done: each command has its epoch.
+        """
+        if self._contact:
+            await self._confirmed(m.Fence(run, epoch))
+
+    async def disown(self, run: str) -> None:
+        """Send nothing more for the behaviors of a run.
+
+        The host's arbiter keeps them: the executive that drives the run now has the same one.
+        """
+        for id_, behavior in self._behaviors.items():
+            if id_.partition(".")[0] == run:
+                behavior.ended = True
+
     # --- requests -------------------------------------------------------------------------------
 
     async def _stop(self, body: m.Cancel | m.Hold) -> None:
@@ -270,9 +309,9 @@ class RemoteArbiter:
                         await self._again()
                         continue
                     if isinstance(answer, m.Refused):
-                        if answer.code == "STALE_EPOCH" and isinstance(body, m.Cancel):
-                            self._log.warning("cancel of %s: %s", body.behavior, answer.reason)
-                            return m.Done(0)
+                        if answer.code == "STALE_EPOCH" and isinstance(body, m.Cancel | m.Adjust):
+                            what = type(body).__name__.lower()
+                            raise _stale(what, body.behavior, body.epoch, answer.newest)
                         raise HostError(f"host {self._host.name}: {answer.reason}")
                     return answer
         except TimeoutError:

@@ -14,6 +14,12 @@ from m2pem.api import BehaviorId, BehaviorReport, BehaviorRequest, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_zenoh.messages import REPORT, STATE, Item, decode_report, encode_report
 
+
+def run_of(behavior: BehaviorId) -> str:
+    """Return the run of a behavior, or of a team's part of one."""
+    return behavior.partition(".")[0]
+
+
 MOST_ITEMS = 10_000
 """Items that wait for the executive. The oldest that matters least gives way to the newest."""
 
@@ -98,16 +104,28 @@ class HostStore:
 
     def hold(self, resources: Iterable[ResourceId]) -> None:
         """Note which resources the host holds because it was cut off: these and no others."""
-        self._database.execute(
-            "INSERT OR REPLACE INTO facts VALUES ('held', ?)", (" ".join(sorted(resources)),)
-        )
+        self._set("held", " ".join(sorted(resources)))
+
+    def greet(self, executive: str) -> bool:
+        """Note that an executive has contact; False: another one has taken over from it before."""
+        last, before = self._fact("executive"), self._fact("superseded").split()
+        if executive in before:
+            return False
+        if last not in ("", executive):
+            kept = " ".join([*before, last][-REMEMBERED:])
+            self._set("superseded", kept)
+        self._set("executive", executive)
+        return True
+
+    def _set(self, name: str, value: str) -> None:
+        self._database.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (name, value))
 
     # --- epochs ---------------------------------------------------------------------------------
 
     def epoch(self, behavior: BehaviorId) -> int:
         """The highest epoch seen for the run of a behavior; 0: none."""
         query = "SELECT epoch FROM epochs WHERE run = ?"
-        row = self._database.execute(query, (behavior.partition(".")[0],)).fetchone()
+        row = self._database.execute(query, (run_of(behavior),)).fetchone()
         return int(row[0]) if row else 0
 
     def admit(self, behavior: BehaviorId, epoch: int) -> bool:
@@ -115,7 +133,7 @@ class HostStore:
         highest = self.epoch(behavior)
         if epoch > highest:
             self._database.execute(
-                "INSERT OR REPLACE INTO epochs VALUES (?, ?)", (behavior.partition(".")[0], epoch)
+                "INSERT OR REPLACE INTO epochs VALUES (?, ?)", (run_of(behavior), epoch)
             )
         return epoch >= highest
 
