@@ -1,4 +1,4 @@
-"""`m2pem journal`: the state of a journal, a backup of it, a smaller file."""
+"""`m2pem journal`: the state of a journal, a check, a backup, what is intact, a smaller file."""
 
 import asyncio
 from collections.abc import Callable
@@ -15,13 +15,14 @@ from m2pem.cli.options import UnusableError, as_json, example, format_option
 if TYPE_CHECKING:
     from m2pem.journal import Journal, RunInfo
     from m2pem.journal.base import Deletion
+    from m2pem.journal.inspection import Inspection
 
 file_argument = click.argument("file", metavar="[FILE]", required=False, shell_complete=file_or())
 
 
 @click.group(epilog=example("m2pem journal info"))
 def journal() -> None:
-    """Show the state of a journal, back it up, or make its file smaller.
+    """Show the state of a journal, check it, back it up, salvage it, or make its file smaller.
 
     FILE is a path or a URL, as of --journal of other commands; else your own journal.
     """
@@ -56,6 +57,7 @@ def info(file: str | None, output: str) -> int:
             "size": f"{_mb(on_disk.size)}, of which {_mb(on_disk.free)} are free; "
             f"log {_mb(on_disk.log)}",
             "format": f"{on_disk.format} (this m2pem writes {LATEST_FORMAT})",
+            **({"origin": on_disk.origin} if on_disk.origin else {}),
             **content.as_text(),
             "written by": ", ".join(
                 f"process {process} with fleet {fleet}" for process, fleet in executives.items()
@@ -110,6 +112,57 @@ def _refuse_database(file: str | None, instead: str) -> None:
 
     if _is_postgres(file):
         raise UnusableError(f"{without_password(str(file))} is in PostgreSQL: {instead}")
+
+
+@journal.command(epilog=example("m2pem journal check"))
+@file_argument
+@format_option
+def check(file: str | None, output: str) -> int:
+    """Say what is intact in a journal, damaged or not.
+
+    Changes nothing, also where nothing may be written, and while executives write. Ends with 1 if
+    something is damaged or missing.
+    """
+    from m2pem.journal.inspection import inspected
+
+    _refuse_database(
+        file, "the server checks its own pages; `m2pem journal info` verifies all entries"
+    )
+    path = _path(file)
+    with inspected(path) as (_, found):
+        if output == "json":
+            click.echo(as_json(_inspection_data(found)))
+        else:
+            for line in _inspection_lines(found):
+                click.echo(line)
+    return 0 if found.whole else 1
+
+
+@journal.command(epilog=example("m2pem journal salvage damaged.db journal.db"))
+@click.argument("source", metavar="SOURCE", shell_complete=file_or())
+@click.argument("target", metavar="TARGET", type=click.Path(dir_okay=False, path_type=Path))
+def salvage(source: str, target: Path) -> int:
+    """Copy what is intact in a damaged journal to a new one.
+
+    SOURCE is a path or a URL, and is not changed; TARGET is the file to make. A run that had not
+    ended asks an operator when it is resumed; the schedule is held. Ends with 1 if something of
+    SOURCE is damaged or missing. Refused while an executive writes to SOURCE.
+    """
+    from m2pem.api.operator import operator_name
+    from m2pem.errors import OperatorError
+    from m2pem.journal import salvage as salvaging
+
+    _refuse_database(
+        source, "restore a backup (pg_restore), or export its runs: `m2pem runs --export`"
+    )
+    path = _path(source)
+    if writing := [f"process {process}" for process in _executives(path)]:
+        raise OperatorError(f"{', '.join(writing)} writes to {path}: end that first")
+    found = salvaging.salvage(path, target, operator_name())
+    for line in _inspection_lines(found):
+        click.echo(line)
+    click.echo(f"{'salvaged to':<11} {target}")
+    return 0 if found.whole else 1
 
 
 @journal.command(epilog=example("m2pem journal backup --to monday.db"))
@@ -213,6 +266,58 @@ class Content:
             "records": f"{self.records:,} in {self.entries:,} entries",
             "integrity": "; ".join(self.problems) or "all entries are there and unchanged",
         }
+
+
+def _inspection_data(found: "Inspection") -> dict[str, object]:
+    """Return what is intact as JSON values."""
+    return {
+        "path": str(found.path),
+        "identity": None if found.identity is None else str(found.identity),
+        "whole": found.whole,
+        "problems": found.problems,
+        "runs": [
+            {
+                "run": each.run,
+                "entries": each.entries,
+                "records": each.position.last_seq,
+                "unusable": each.unusable,
+                "missing": each.missing,
+                "problem": each.problem,
+            }
+            for each in found.runs
+        ],
+        "deleted": len(found.deletions),
+        "schedule": {
+            "entries": len(found.schedule),
+            "damaged": found.lost_schedule,
+            "held": {fleet: str(hold) for fleet, hold in found.holds.items()},
+        },
+    }
+
+
+def _inspection_lines(found: "Inspection") -> list[str]:
+    """Return what is intact as lines for people: a run that is whole is only counted."""
+    wrong = [each for each in found.runs if each.problem]
+    whole = len(found.runs) - len(wrong)
+    entries = sum(each.entries for each in found.runs)
+    records = sum(each.position.last_seq for each in found.runs)
+    held = "".join(f"; {fleet} is {hold}" for fleet, hold in found.holds.items())
+    damaged = f", {found.lost_schedule} damaged" if found.lost_schedule else ""
+    rows = [
+        ("path", str(found.path)),
+        ("identity", str(found.identity or "unknown")),
+        ("file, mark", "; ".join(found.problems) or "no error is found"),
+        (
+            "runs",
+            f"{len(found.runs)} ({whole} whole, {len(wrong)} not)"
+            if wrong
+            else f"{whole}, all whole",
+        ),
+        ("intact", f"{records:,} records in {entries:,} entries"),
+        ("schedule", f"{len(found.schedule)} entries{damaged}{held}"),
+        *((each.run, each.problem) for each in wrong),
+    ]
+    return [f"{name:<11} {text}" for name, text in rows]
 
 
 async def _content(url: str) -> Content:

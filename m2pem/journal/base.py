@@ -62,11 +62,13 @@ class Loss:
 
     `acknowledged` is the last record that was reported as durable, `found` the last one that the
     journal has now (0: none; None: the run itself is gone). `resumable`: the run can be taken up.
+    `salvaged`: the run comes from another journal, which may have had more of it.
     """
 
     acknowledged: int
     found: int | None
     resumable: bool = True
+    salvaged: bool = False
 
     @property
     def records(self) -> int:
@@ -80,6 +82,11 @@ class Loss:
         return f"Look at its vehicles, then `m2pem runs --accept-loss {run}` lets new runs begin"
 
     def __str__(self) -> str:
+        if self.salvaged and self.found is not None:
+            return (
+                f"the run was salvaged from another journal, which acknowledged record "
+                f"{self.acknowledged}; its last one here is {self.found}"
+            )
         if self.found is None:
             return (
                 f"the journal has lost the run: it acknowledged {self.acknowledged} records of it"

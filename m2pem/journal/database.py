@@ -2,8 +2,11 @@
 
 import logging
 import os
+import shutil
 import sqlite3
+import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from urllib.parse import quote
 from uuid import UUID
@@ -125,6 +128,52 @@ def open_for_reading(path: Path) -> sqlite3.Connection:
     return connection
 
 
+def open_unchanged(path: Path, stack: ExitStack) -> sqlite3.Connection:
+    """Open a journal's file, damaged or not, so that nothing of it is changed: not even its log
+    is moved into it.
+
+    SQLite needs to write beside the file. Where it cannot, a copy is opened, which is removed when
+    `stack` is closed.
+
+    Raises:
+        JournalError: it cannot be opened, or cannot be copied.
+    """
+    try:
+        return _opened_unchanged(path)
+    except sqlite3.OperationalError as error:
+        if _primary_code(error) not in _NEEDS_COPY:
+            raise explained_error(error, path) from error
+    try:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="m2pem-")))
+        for file in (path, path.with_name(f"{path.name}-wal")):
+            if file.exists():
+                shutil.copyfile(file, folder / file.name)
+        return _opened_unchanged(folder / path.name)
+    except sqlite3.Error as error:
+        raise explained_error(error, path) from error
+    except OSError as error:
+        raise JournalError(
+            f"{path} cannot be copied to {tempfile.gettempdir()}: {error.strerror}; TMPDIR names "
+            "another folder"
+        ) from error
+
+
+def _opened_unchanged(path: Path) -> sqlite3.Connection:
+    connection = _connect(path, "ro")
+    try:
+        # SQLite refuses all of a truncated file otherwise.
+        connection.execute("PRAGMA writable_schema = ON")
+        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+    except sqlite3.DatabaseError as error:
+        if _primary_code(error) in _NEEDS_COPY:
+            connection.close()
+            raise
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
     return sqlite3.connect(
         f"file:{quote(str(path))}?mode={mode}",
@@ -139,12 +188,19 @@ _EXPLANATIONS = {
     sqlite3.SQLITE_FULL: "the disk is full; make room",
     sqlite3.SQLITE_READONLY: "it, its folder or its file system can only be read; allow writing",
     sqlite3.SQLITE_NOTADB: "it is not a journal of m2pem, nor any SQLite database",
-    sqlite3.SQLITE_CORRUPT: "it is damaged; use a copy, or save what can be read with "
-    "`sqlite3 FILE .recover`",
+    sqlite3.SQLITE_CORRUPT: "it is damaged; use a backup, or save what is intact with "
+    "`m2pem journal salvage`",
     sqlite3.SQLITE_BUSY: f"another program has kept it locked for {BUSY_TIMEOUT_S:g} s; end that",
     sqlite3.SQLITE_CANTOPEN: "it cannot be opened; check the permissions of it and its folder",
     sqlite3.SQLITE_IOERR: "the disk failed to read or write",
 }
+
+_NEEDS_COPY = (
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR,
+)
 
 _TRANSIENT = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY)
 

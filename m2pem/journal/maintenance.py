@@ -9,15 +9,19 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from m2pem.errors import JournalError
 from m2pem.journal.database import explained_error, open_for_reading, open_for_writing
 from m2pem.journal.marks import identity_in
 from m2pem.journal.migrations import MIGRATIONS, check
+from m2pem.units import US_PER_S
 
 LATEST_FORMAT = len(MIGRATIONS)
 """The version of the tables that this m2pem writes."""
+
+_FORMAT_OF_ORIGIN = 7
 
 _PAGES = 1000
 """Copied between two calls that show the progress."""
@@ -25,12 +29,14 @@ _PAGES = 1000
 
 @dataclass(frozen=True, slots=True)
 class FileInfo:
-    """Format and sizes, in bytes. `free`: of pages in `size` that hold nothing any more."""
+    """Format and sizes, in bytes. `free`: of pages in `size` that hold nothing any more. `origin`:
+    from where, when and by whom the journal was salvaged; "" if it was not."""
 
     format: int
     size: int
     free: int
     log: int
+    origin: str = ""
 
 
 def file_info(path: Path) -> FileInfo:
@@ -51,7 +57,17 @@ def file_info(path: Path) -> FileInfo:
             path.stat().st_size,
             free_pages * page_size,
             log.stat().st_size if log.exists() else 0,
+            _origin(connection) if version >= _FORMAT_OF_ORIGIN else "",
         )
+
+
+def _origin(connection: sqlite3.Connection) -> str:
+    row = connection.execute("SELECT path, uuid, salvaged_us, salvaged_by FROM origin").fetchone()
+    if row is None:
+        return ""
+    path, uuid, salvaged_us, by = row
+    when = datetime.fromtimestamp(salvaged_us / US_PER_S, UTC)
+    return f"salvaged from {path} ({uuid or 'unknown'}) on {when:%Y-%m-%d at %H:%M:%S} UTC by {by}"
 
 
 def compact(path: Path) -> None:

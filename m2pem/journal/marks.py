@@ -41,11 +41,13 @@ NO_HASH = bytes(HASH_BYTES)
 
 
 class MarkState(IntEnum):
-    """State of a run: not ended, ended, or its loss was accepted by a person."""
+    """State of a run: not ended, ended, its loss was accepted by a person, or it was salvaged from
+    another journal and has not gone on since."""
 
     OPEN = 0
     ENDED = 1
     ACCEPTED = 2
+    SALVAGED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +93,7 @@ class MarkFile:
 
     def read(self) -> dict[int, Mark]:
         """The marks of all runs, by the run's number. Read them before the journal's tables."""
-        content = os.pread(self._file, os.fstat(self._file).st_size, 0)
-        return {
-            number: newest[1]
-            for number in range(1, len(content) // _SLOT_BYTES)
-            if (newest := _newest(content[number * _SLOT_BYTES :], number)) is not None
-        }
+        return _marks_in(os.pread(self._file, os.fstat(self._file).st_size, 0))
 
     def of(self, number: int) -> Mark | None:
         """The mark of one run."""
@@ -143,21 +140,39 @@ def identity_in(path: Path) -> UUID | None:
     Raises:
         JournalError: it is damaged, or not a mark file.
     """
+    return read_marks(path)[0]
+
+
+def read_marks(path: Path) -> tuple[UUID | None, dict[int, Mark]]:
+    """The identity of a mark file's journal, and the marks by run number; None: no such file.
+
+    Raises:
+        JournalError: it is damaged, or not a mark file.
+    """
     try:
-        head = path.read_bytes()[: len(_MAGIC) + 16 + _CHECK_BYTES]
+        content = path.read_bytes()
     except FileNotFoundError:
-        return None
+        return None, {}
     except OSError as error:
         raise JournalError(f"{path} cannot be read: {error.strerror}") from error
-    if not head:
-        return None
+    if not content:
+        return None, {}
+    head = content[: len(_MAGIC) + 16 + _CHECK_BYTES]
     if head[: len(_MAGIC)] != _MAGIC or _check(head[:-_CHECK_BYTES]) != head[-_CHECK_BYTES:]:
         raise JournalError(
             f"{path} is damaged, or not the mark file of a journal: what was acknowledged cannot "
             f"be compared with the journal. Look at the vehicles, and remove {path.name} to go on "
             "without the comparison"
         )
-    return UUID(bytes=head[len(_MAGIC) : -_CHECK_BYTES])
+    return UUID(bytes=head[len(_MAGIC) : -_CHECK_BYTES]), _marks_in(content)
+
+
+def _marks_in(content: bytes) -> dict[int, Mark]:
+    return {
+        number: newest[1]
+        for number in range(1, len(content) // _SLOT_BYTES)
+        if (newest := _newest(content[number * _SLOT_BYTES :], number)) is not None
+    }
 
 
 def _newest(slot: bytes, number: int) -> tuple[int, Mark] | None:
@@ -224,7 +239,7 @@ def _loss(
     if mark.state is MarkState.ACCEPTED:
         return None
     if position is None:
-        if _is_deleted(connection, number, mark):
+        if is_deleted(connection, number, mark):
             return None
         return Loss(mark.seq, None, resumable=False)
     epoch, last_seq, hash_, outcome = position
@@ -240,10 +255,11 @@ def _loss(
         # The mark before the first entry has the hash of the header, which no entry has.
         if (there or NO_HASH) == mark.hash or (mark.seq == 0 and last_seq > 0):
             return None
-    return Loss(mark.seq, last_seq, resumable=last_seq > 0 and outcome is None)
+    resumable = last_seq > 0 and outcome is None
+    return Loss(mark.seq, last_seq, resumable, mark.state is MarkState.SALVAGED)
 
 
-def _is_deleted(connection: Connection, number: int, mark: Mark) -> bool:
+def is_deleted(connection: Connection, number: int, mark: Mark) -> bool:
     """Whether the run was deleted on request, with all that had been acknowledged."""
     row = connection.execute(
         "SELECT epoch, last_seq, hash FROM deletions WHERE run = ?", (number,)

@@ -114,6 +114,21 @@ def schedule(connection: sqlite3.Connection) -> None:
     connection.execute("CREATE TABLE schedule_holds (fleet TEXT PRIMARY KEY, hold TEXT NOT NULL)")
 
 
+def origin_of_salvaged_runs(connection: sqlite3.Connection) -> None:
+    """0.7: where the runs of a salvaged journal come from; no row: nothing was salvaged.
+
+    `uuid`: identity of the other journal, "" if it could not be read.
+    """
+    connection.execute(
+        """CREATE TABLE origin (
+            path TEXT NOT NULL,
+            uuid TEXT NOT NULL,
+            salvaged_us INTEGER NOT NULL,
+            salvaged_by TEXT NOT NULL
+        )"""
+    )
+
+
 MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     runs_standings_and_entries,
     other_files_of_missions,
@@ -121,6 +136,7 @@ MIGRATIONS: tuple[Callable[[sqlite3.Connection], None], ...] = (
     hash_chain,
     deletions,
     schedule,
+    origin_of_salvaged_runs,
 )
 
 

@@ -154,8 +154,77 @@ def test_a_journal_is_not_compacted_while_an_executive_writes(
     assert f"process {program.process.pid} writes to {path}: end that first" in err
 
 
-@pytest.mark.parametrize("command", ["info", "backup", "compact"])
+@pytest.mark.parametrize("command", ["info", "check", "backup", "compact"])
 def test_a_journal_that_is_missing_is_named(invoke: Invoke, path: Path, command: str) -> None:
     assert invoke("journal", command, path)[0::2] == (2, f"m2pem: there is no journal {path}\n")
     assert not path.exists()
     assert invoke("journal", command, "memory:")[0] == 2
+
+
+def test_a_whole_journal_is_checked_and_nothing_of_it_changed(invoke: Invoke, path: Path) -> None:
+    with_runs(invoke, path, 2)
+    before = path.read_bytes()
+    status, out, err = invoke("journal", "check", path)
+    assert (status, err) == (0, "")
+    assert "file, mark  no error is found" in out
+    assert "runs        2, all whole" in out
+    status, out, _ = invoke("journal", "check", path, "--format", "json")
+    assert (status, json.loads(out)["whole"]) == (0, True)
+    assert path.read_bytes() == before
+
+
+def test_a_journal_in_a_folder_that_may_not_be_written_is_checked(
+    invoke: Invoke, m2pem: CommandLine, path: Path
+) -> None:
+    with_runs(invoke, path, 1)
+    path.parent.chmod(0o500)
+    try:
+        status, out, _ = invoke("journal", "check", path)
+    finally:
+        path.parent.chmod(0o700)
+    assert (status, "runs        1, all whole" in out) == (0, True)
+
+
+def test_a_journal_is_checked_while_an_executive_writes(
+    invoke: Invoke, m2pem: CommandLine, path: Path
+) -> None:
+    running(m2pem, path)
+    status, out, _ = invoke("journal", "check", path, "--format", "json")
+    (run,) = json.loads(out)["runs"]
+    assert (status, run["run"], run["problem"]) == (0, "r1", "")
+    assert run["records"] > 0
+
+
+def test_what_is_intact_is_salvaged_replayed_and_exported(
+    invoke: Invoke, path: Path, tmp_path: Path
+) -> None:
+    with_runs(invoke, path, 3)
+    records = invoke("replay", "r2", "--journal", path, "--format", "json")[1].splitlines()
+    with closing(sqlite3.connect(path)) as connection, connection:
+        (last,) = connection.execute("SELECT max(seq) FROM entries WHERE run = 2").fetchone()
+        connection.execute("UPDATE entries SET t_us = 0 WHERE run = 2 AND seq = ?", (last,))
+    intact = last - 1
+    status, out, _ = invoke("journal", "check", path)
+    assert status == 1
+    assert f"r2          records 1 to {intact} are intact; record {last}: it does not follow" in out
+    before, new = path.read_bytes(), tmp_path / "new.db"
+    status, out, _ = invoke("journal", "salvage", path, new)
+    assert status == 1
+    assert out.endswith(f"salvaged to {new}\n")
+    assert path.read_bytes() == before
+    for run in ("r1", "r3"):
+        assert invoke("replay", run, "--journal", new, "--verify")[0] == 0
+    status, out, _ = invoke("replay", "r2", "--journal", new, "--verify")
+    assert (status, "the run was salvaged from another journal" in out) == (1, True)
+    exported = invoke("runs", "--export", "r2", "--journal", new)[1].splitlines()
+    assert exported[1:] == records[:intact]
+    assert f"salvaged from {path}" in invoke("journal", "info", new)[1]
+
+
+def test_a_journal_is_not_salvaged_while_an_executive_writes(
+    invoke: Invoke, m2pem: CommandLine, path: Path, tmp_path: Path
+) -> None:
+    program = running(m2pem, path)
+    status, _, err = invoke("journal", "salvage", path, tmp_path / "new.db")
+    assert status == 1
+    assert f"process {program.process.pid} writes to {path}: end that first" in err
