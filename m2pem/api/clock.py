@@ -13,6 +13,7 @@ import asyncio
 import itertools
 import math
 import selectors
+import sys
 import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -47,8 +48,20 @@ class DeadlockError(InternalError):
     """In virtual time: every task waits, and nothing is scheduled that could wake one."""
 
 
+_LONGEST_SLEEP_US = 2_000_000
+"""So much later than due, at most, a wait ends during which the computer was suspended."""
+
+
+def boot_time_ns() -> int:
+    """Nanoseconds since the computer was started, those in which it was suspended included."""
+    if sys.platform == "linux":
+        return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+    return time.monotonic_ns()
+
+
 class SystemClock:
-    """The wall clock at start plus steady time: it never goes back, and never jumps with NTP.
+    """The wall clock at start plus steady time: it never goes back, and never jumps with NTP. It
+    goes on while the computer is suspended, as vehicles and the day do.
 
     `speed`: seconds of this clock in a real second. `start_us`: what it shows at first,
     microseconds since the Unix epoch; None is now. `steady_ns`: returns the steady time in
@@ -66,7 +79,7 @@ class SystemClock:
         self.speed = speed
         # Whole numbers: a float would lose microseconds in a process that runs for months.
         self._numerator, self._denominator = speed.as_integer_ratio()
-        self._steady_ns = steady_ns or time.monotonic_ns
+        self._steady_ns = steady_ns or boot_time_ns
         self._started_ns = self._steady_ns()
         self._start_us = time.time_ns() // 1000 if start_us is None else start_us
 
@@ -85,8 +98,10 @@ class SystemClock:
         if remaining_us <= 0:
             await asyncio.sleep(0)
         while remaining_us > 0:
-            # The loop may wake us a clock tick early, and a virtual one counts microseconds.
-            await asyncio.sleep(math.ceil(remaining_us / self.speed) / US_PER_S)
+            # The loop may wake us a clock tick early, and a virtual one counts microseconds. Its
+            # timers stand still while the computer is suspended.
+            real_us = min(math.ceil(remaining_us / self.speed), _LONGEST_SLEEP_US)
+            await asyncio.sleep(real_us / US_PER_S)
             remaining_us = time_us - self.now_us()
 
 

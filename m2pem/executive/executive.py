@@ -25,6 +25,7 @@ from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordOb
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee
+from m2pem.executive.outages import Outages
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.schedule_entries import ScheduleEntries
@@ -162,6 +163,9 @@ class Executive:
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
+        if isinstance(self.clock, SystemClock):
+            watching = partial(self.outages.watch, self.clock)
+            self._listen(group, "watch of outages", watching)
         if self._supervisor.fleet.shared_space and isinstance(self.clock, SystemClock):
             spaces, publish = self._supervisor.shared_space, self.events.publish
             watching = partial(watch_shared_space, self.clock, spaces, publish)
@@ -247,6 +251,11 @@ class Executive:
     def availability(self) -> Availability:
         """Which behavior has which resource."""
         return self._supervisor.availability
+
+    @property
+    def outages(self) -> Outages:
+        """When this executive was away: suspended, stopped or blocked."""
+        return self._supervisor.outages
 
     def runner(self, run: RunId) -> Runner:
         """The runner of a run; raises NotDrivenError when it is not driven here."""

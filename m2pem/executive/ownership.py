@@ -8,9 +8,9 @@ said that the claims of all runs hold. Holds and an operator's STOP do not wait 
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable, Mapping
 
+from m2pem.api.clock import boot_time_ns
 from m2pem.api.runs import RunId
 from m2pem.errors import JournalError, M2pemError, StaleEpochError
 from m2pem.executive.runner import Runner
@@ -28,9 +28,7 @@ ANSWERED_WITHIN_S = 2.0
 
 def awake_s() -> float:
     """Seconds of a clock that goes on while the process is stopped, or the machine suspended."""
-    if hasattr(time, "CLOCK_BOOTTIME"):
-        return time.clock_gettime(time.CLOCK_BOOTTIME)
-    return time.monotonic()
+    return boot_time_ns() / 1_000_000_000
 
 
 class Ownership:

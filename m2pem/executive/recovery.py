@@ -6,6 +6,7 @@ running is asked for at its arbiter. Nothing is sent again that may have been do
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
@@ -23,6 +24,7 @@ from m2pem.engine.inputs import (
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import Behavior, BehaviorPhase, RunStatus
 from m2pem.errors import StaleEpochError
+from m2pem.executive.behavior_lifecycle import DispatcherView
 from m2pem.executive.behavior_reports import reported, spec_of
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.fleet_connections import FleetArbiters
@@ -86,11 +88,11 @@ async def take_over(
     Returns the commands that are still to be carried out: when every interrupted run has what it
     commanded, as they may be for a vehicle that another one has.
 
-    `outage_s`: for how long no executive drove it. Longer than the fleet's `max_outage`, every
-    behavior is held and an operator is asked. `lost`: is called for each resource whose arbiter
-    cannot be asked, which must stop before it is free again. `loss`: what the journal has lost of
-    it: the run is paused, and an operator is asked about every behavior when it goes on (see
-    `JournalLossPrompts`).
+    `outage_s`: for how long no executive drove it; infinite: that is not known. Longer than the
+    fleet's `max_outage`, every behavior is held and an operator is asked. `lost`: is called for
+    each resource whose arbiter cannot be asked, which must stop before it is free again. `loss`:
+    what the journal has lost of it: the run is paused, and an operator is asked about every
+    behavior when it goes on (see `JournalLossPrompts`).
     """
     state = runner.run.state
     max_outage_s = arbiters.fleet.max_outage_s
@@ -146,6 +148,44 @@ async def take_over(
                 return True
 
     return [command for command in runner.run.outstanding() if is_due(command)]
+
+
+async def look_again(
+    runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher, outage_s: float
+) -> tuple[list[Input], frozenset[str]]:
+    """Look at the vehicles of a run after an outage of this executive, before it sends anything.
+
+    Returns the inputs that what was seen amounts to, and the behaviors whose start must not be
+    sent any more. After an outage longer than the fleet's `max_outage`, every behavior is held and
+    an operator is asked. A vehicle that cannot be asked is left to the link monitor.
+    """
+    state = runner.run.state
+    max_outage_s = arbiters.fleet.max_outage_s
+    too_long = max_outage_s is not None and outage_s > max_outage_s
+    known = list(state.behaviors.values())
+    reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
+    items: list[Input] = []
+    unsent: set[str] = set()
+    for behavior, report in zip(known, reports, strict=True):
+        active = behavior.phase is BehaviorPhase.ACTIVE
+        begun = behavior.state is not None
+        item: Input | None = None
+        if report is not None and begun:
+            policy = _policy(arbiters, behavior, too_long)
+            item = _what_to_post(arbiters, behavior, report, policy)
+        if item is None and active and too_long:
+            if dispatcher.view(behavior.id) is DispatcherView.NONE:
+                if state.status is RunStatus.PAUSED:
+                    continue  # it was not sent, and is not before an operator lets the run go on
+                unsent.add(behavior.id)
+                arbiter = _arbiter(arbiters, behavior)
+                dispatcher.adopt(behavior.id, behavior.resources, behavior.number, arbiter)
+            seen = report.state if report is not None else BehaviorState.UNKNOWN
+            reason = f"the executive did nothing for {outage_s:.0f} s"
+            item = BehaviorMissing(behavior.id, ResumePolicy.HOLD, seen, reason)
+        if item is not None:
+            items.append(item)
+    return items, frozenset(unsent)
 
 
 def _recall(runner: Runner, arbiters: FleetArbiters, dispatcher: Dispatcher) -> None:
@@ -236,6 +276,8 @@ def _why_ask(status: RunStatus, report: BehaviorReport | None, outage_s: float |
     does not know of came from an executive whose journal failed, or from an operator whose pause
     was not written any more: only an operator can say whether it is over.
     """
+    if outage_s == math.inf:
+        return "for how long no executive drove the mission is not known: the clock went back"
     if outage_s is not None:
         return f"no executive drove the mission for {outage_s:.0f} s"
     if report is not None and report.held and status is not RunStatus.PAUSED:

@@ -7,7 +7,7 @@ together and share a commit.
 
 import asyncio
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -31,6 +31,7 @@ from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.errors import InternalError, M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher
+from m2pem.executive.outages import Outages
 from m2pem.executive.services import Services
 from m2pem.journal.base import Entry, Journal
 
@@ -51,6 +52,10 @@ STALLED_AFTER_S = 2.0
 
 OnRecords = Callable[[RunId, Sequence[r.Record]], None]
 """Is called with the records of a run when they are committed, before their commands go out."""
+
+
+LookAgain = Callable[["Runner", float], Awaitable[tuple[list[Input], frozenset[str]]]]
+"""Looks at a run's vehicles after an outage: `m2pem.executive.recovery.look_again`."""
 
 
 class ResourceAllocator(Protocol):
@@ -91,6 +96,8 @@ class RunContext:
     observe: OnRecords
     hold: Callable[[RunId, Sequence[str]], None]
     """Holds what failed work commanded, at once, and warns of what may not have received it."""
+    outages: Outages
+    look_again: LookAgain
     limit: RunLimit | None = None
 
 
@@ -119,6 +126,7 @@ class Runner:
         self._context = context
         self._steps_between_waits = steps_between_waits
         self._steps_at_wait = 0
+        self._outages_seen = context.outages.number
         self._stopping = False
         self._pauses = 0
         self._cancelled_at_once: frozenset[str] = frozenset()
@@ -182,6 +190,10 @@ class Runner:
         self._held_at_once |= held
         return self.submit(item)
 
+    def wake(self) -> None:
+        """Have the run look at its vehicles now, after an outage of the executive."""
+        self._wake.set()
+
     def fail(self, error: Exception) -> None:
         """Hold what the run commands and end its task, as after an exception of the engine."""
         self._broken = error
@@ -197,7 +209,10 @@ class Runner:
         """
         try:
             while not self._is_over():
-                await self._cycle(await self._next_inputs())
+                batch = await self._next_inputs()
+                seen, _ = await self._look_after_outage()
+                if seen or batch:
+                    await self._cycle([*seen, *batch])
         except StaleEpochError as error:
             log.error("%s: another executive drives it now", self.id)
             self.failure = error
@@ -222,13 +237,15 @@ class Runner:
     async def _next_inputs(self) -> list[Input]:
         """Return the next inputs: those that were posted, a due timer, or the engine's own.
 
-        Waits when there is none.
+        Waits when there is none; returns none after an outage of the executive.
         """
         while True:
             if self._broken is not None:
                 raise self._broken
             if why := self._exceeds_limit():
                 return [GiveUp(why)]
+            if self._context.outages.number != self._outages_seen:
+                return []
             if self._inbox:
                 batch, self._inbox = self._inbox[:MAX_BATCH], self._inbox[MAX_BATCH:]
                 return batch
@@ -288,17 +305,32 @@ class Runner:
                 break
             steps.append(self._decide(Continue()))
         await self._commit(steps)
+        seen, unsent = await self._look_after_outage()
+        self._inbox[:0] = seen
         if any(isinstance(step.input, PauseRun) for step in steps):
             self._let_strays_go()
         for step in steps:
             self._publish(step)
             early = isinstance(step.input, _EARLY)
             for command in step.commands:
-                if not (isinstance(command, c.HoldResource) and _opens_incident(step)):
-                    self._dispatch(command, early_done=early)
+                if isinstance(command, c.HoldResource) and _opens_incident(step):
+                    continue
+                if isinstance(command, c.StartBehavior) and command.behavior in unsent:
+                    continue
+                self._dispatch(command, early_done=early)
             self._answer_asker(step)
             if len(step.records) > MANY_RECORDS:
                 await asyncio.sleep(0)  # subscribers keep up, and STOP does not wait
+
+    async def _look_after_outage(self) -> tuple[list[Input], frozenset[str]]:
+        """Look at the vehicles if this executive was away. Returns what was seen, and the behaviors
+        that must not be started any more."""
+        outages = self._context.outages
+        outages.look()
+        if outages.number == self._outages_seen:
+            return [], frozenset()
+        self._outages_seen = outages.number
+        return await self._context.look_again(self, outages.length_s)
 
     def _decide(self, item: Input) -> Step:
         step = self.run.receive(item, self._context.clock.now_us())

@@ -6,9 +6,11 @@ they concern.
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from m2pem.allocation.assignment import load_solver
@@ -16,13 +18,13 @@ from m2pem.allocation.candidates import Candidates, Facts
 from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
 from m2pem.api.authoring import MissionFiles, MissionSource
-from m2pem.api.clock import Clock
+from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.epoch_fence import run_of
 from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import LinkState, TeamState, Telemetry
 from m2pem.engine.commands import Command
-from m2pem.engine.inputs import GeometrySet, ResourceFault, StartRun, StopRun
+from m2pem.engine.inputs import GeometrySet, Input, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import OutOfReach, RunStatus
@@ -55,8 +57,9 @@ from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
+from m2pem.executive.outages import OUTAGE_S, Outages
 from m2pem.executive.ownership import Ownership
-from m2pem.executive.recovery import claim, replaced_by, replay, take_over
+from m2pem.executive.recovery import claim, look_again, replaced_by, replay, take_over
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
 from m2pem.executive.scheduled_start import NotBegunError
@@ -80,6 +83,7 @@ from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
 from m2pem.scheduling.entry import EntryChange, SchedulePlan
 from m2pem.telemetry.bus import Bus
+from m2pem.units import US_PER_S
 
 log = logging.getLogger("m2pem.executive")
 
@@ -112,6 +116,10 @@ class RunSettings:
         return STEPS_AT_ONCE if self.limit is None else min(STEPS_AT_ONCE, self.limit.steps_at_once)
 
 
+CLOCK_BACK_US = 2 * US_PER_S
+"""A wall clock that is behind the journal by more has gone back: no leap second, and no slew."""
+
+
 class Supervisor:
     """Every run of one executive. `runners`: the runs that it drives, and the last that ended.
 
@@ -142,6 +150,8 @@ class Supervisor:
         self.availability = Availability(self.fleet)
         self._bus = bus
         self._observers = observers
+        self.outages = Outages(events, min(OUTAGE_S, self.fleet.max_outage_s or OUTAGE_S))
+        self.outages.on_outage = self._look_at_all
         self._separation = separation_for(self.fleet, clock)
         self.marks = StopMarks(journal.file, journal.identity)
         self.interrupted = InterruptedRuns(self.marks)
@@ -530,7 +540,7 @@ class Supervisor:
         runner = self._runner(run, epoch)
         await self.dispatcher.fence(number, epoch)
         self.handover.take_up(run.state.taken)
-        outage_s = max(0.0, (self.clock.now_us() - last_us) / 1_000_000)
+        outage_s = self._outage_s(number, last_us)
         claim(runner, line.loss, self.handover.taken, self._geometries_given())
         mark = self.marks.get(number)
         if mark is not None:
@@ -545,6 +555,22 @@ class Supervisor:
         if line.loss is not None:
             await self.losses.ask(runner, line.loss)
         return runner, commands
+
+    def _outage_s(self, number: RunId, last_us: int) -> float:
+        """Return for how long no executive drove a run whose last input was decided at `last_us`.
+
+        Infinite: that is not known, as the computer's clock went back since.
+        """
+        by_wall = isinstance(self.clock, SystemClock) and self.settings.speed == 1.0
+        if by_wall and time.time_ns() // 1000 < last_us - CLOCK_BACK_US:
+            log.warning(
+                "%s: the computer's clock is before the run's last record (%s UTC): for how long "
+                "no executive drove it is not known",
+                number,
+                datetime.fromtimestamp(last_us / US_PER_S, UTC).strftime("%Y-%m-%d %H:%M:%S"),
+            )
+            return math.inf
+        return max(0.0, (self.clock.now_us() - last_us) / US_PER_S)
 
     def _geometries_given(self) -> list[GeometrySet]:
         """Return the inputs that hand over what operators have handed over for all runs."""
@@ -561,11 +587,22 @@ class Supervisor:
             self.events,
             self._observe,
             self.emergency.hold,
+            self.outages,
+            self._look_again,
             self.settings.limit,
         )
         runner = Runner(run, epoch, context, self.fleet.steps_between_waits)
         self.runners[runner.id] = runner
         return runner
+
+    def _look_at_all(self) -> None:
+        for runner in self.runners.values():
+            runner.wake()
+
+    async def _look_again(
+        self, runner: Runner, outage_s: float
+    ) -> tuple[list[Input], frozenset[str]]:
+        return await look_again(runner, self.arbiters, self.dispatcher, outage_s)
 
     def _drive(self, runner: Runner) -> None:
         assert self._group is not None

@@ -92,11 +92,15 @@ class LinkMonitor:
         """Return a fault for each resource without telemetry for longer than its bound."""
         if self._next_check_us is None or now_us < self._next_check_us:
             return []
-        if now_us - self._next_check_us > STALL_US and not self._stalled:
+        late_us = now_us - self._next_check_us
+        if late_us > STALL_US and not self._stalled:
             # This process was not running: states that arrived meanwhile still wait. Only once in a
             # row, as on a fast clock every check is late.
             self._stalled = True
-            self._next_check_us = now_us + STALL_US
+            # Nobody listened for longer than a bound, as while the computer was suspended: each
+            # gets its bound to be received again.
+            bounds_us = [each.bound_us for each in self._links.values() if each.bound_us < late_us]
+            self._next_check_us = now_us + max([STALL_US, *bounds_us])
             return []
         self._stalled = False
         faults = []

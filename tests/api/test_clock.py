@@ -21,7 +21,7 @@ START_US = 1_767_225_600_000_000  # 2026-01-01T00:00:00Z
 def steady_ns(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """Steady time, as a test sets it."""
     now = [5_000]
-    monkeypatch.setattr(time, "monotonic_ns", lambda: now[0])
+    monkeypatch.setattr("m2pem.api.clock.boot_time_ns", lambda: now[0])
     yield now
 
 
@@ -45,6 +45,23 @@ def test_system_clock_runs_faster_by_its_speed_and_stays_exact_for_years(
     clock = SystemClock(speed=20, start_us=START_US)
     steady_ns[0] += 10 * 365 * DAY_S * 1_000_000_000 + 1_000
     assert clock.now_us() == START_US + 200 * 365 * DAY_S * 1_000_000 + 20
+
+
+async def test_a_wait_ends_when_it_is_due_though_the_computer_was_suspended_meanwhile(
+    steady_ns: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The event loop's own timers stand still in a suspend; the clock does not."""
+    clock = SystemClock(start_us=START_US)
+    slept: list[float] = []
+
+    async def suspended(seconds: float) -> None:
+        slept.append(seconds)
+        steady_ns[0] += 7_200 * 1_000_000_000
+
+    monkeypatch.setattr("m2pem.api.clock.asyncio.sleep", suspended)
+    await clock.sleep(3_600)
+    assert slept == [2.0]
+    assert clock.now_us() == START_US + 7_200 * 1_000_000
 
 
 @pytest.mark.parametrize("speed", [0, -1, math.inf, math.nan])

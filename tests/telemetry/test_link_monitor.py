@@ -8,7 +8,7 @@ from m2pem.api.telemetry import LinkState, PayloadState, VehicleState
 from m2pem.engine.inputs import ResourceFault
 from m2pem.mission.catalogue import ResourceId
 from m2pem.telemetry.bus import Bus
-from m2pem.telemetry.link_monitor import LinkMonitor, monitor_links
+from m2pem.telemetry.link_monitor import STALL_US, LinkMonitor, monitor_links
 
 UGV, UAV, PTZ = ResourceId("evsg1"), ResourceId("uav1"), ResourceId("evsg1/ptz")
 S = 1_000_000
@@ -109,7 +109,16 @@ def test_a_check_that_comes_late_first_lets_the_waiting_states_be_heard() -> Non
     rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=0)
     assert rules.check(20 * S) == []
     rules.received(vehicle(UGV), 20 * S)
-    assert [fault.resource for fault in run_checks(rules, 21 * S)] == [UAV]
+    assert run_checks(rules, 22 * S) == []
+    rules.received(vehicle(UGV), 22 * S)
+    assert [fault.resource for fault in run_checks(rules, 23 * S)] == [UAV]
+
+
+def test_after_a_check_that_comes_a_little_late_no_bound_begins_again() -> None:
+    rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=0)
+    rules.received(vehicle(UGV), 2 * S)
+    assert rules.check(4 * S) == []
+    assert [fault.resource for fault in rules.check(4 * S + STALL_US)] == [UAV]
 
 
 def test_checks_that_always_come_late_still_find_who_is_silent() -> None:
