@@ -124,7 +124,7 @@ async def write_some(path):
 async def test_a_truncated_journal_is_refused(path):
     await write_some(path)
     os.truncate(path, path.stat().st_size // 2)
-    assert "it is damaged; use a copy" in refused(path)
+    assert "it is damaged; use a backup" in refused(path)
 
 
 @contextmanager
@@ -151,7 +151,7 @@ async def test_damage_that_is_met_while_reading_is_told(path):
     content[page * 4096 : page * 4096 + 64] = os.urandom(64)
     path.write_bytes(content)
     async with opened(lambda: SqliteJournal.open(path)) as journal:
-        with pytest.raises(JournalError, match="it is damaged; use a copy"):
+        with pytest.raises(JournalError, match="it is damaged; use a backup"):
             assert [found.seq async for found in journal.read("r1")] != []
 
 
