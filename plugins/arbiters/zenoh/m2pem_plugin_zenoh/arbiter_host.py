@@ -254,10 +254,10 @@ class ArbiterHost:
         return m.Done(self._now_us)
 
     def _out_of_contact(self, request: m.Request) -> m.Refused | None:
-        if self._contact and request.contact == self._contact:
-            return None
         if self._contact and request.executive != self._executive:
             return self._superseded()
+        if self._contact and request.contact == self._contact:
+            return None
         return m.Refused("NO_CONTACT", "the host has lost the contact meanwhile")
 
     def _superseded(self) -> m.Refused:

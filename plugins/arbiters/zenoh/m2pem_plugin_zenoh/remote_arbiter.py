@@ -482,6 +482,9 @@ class RemoteArbiter:
             self._reports.put(BehaviorReport(id_, known.number, state, code, reason))
 
     def _take_state(self, content: bytes) -> None:
+        # What was on its way while the contact was lost does not mean that the vehicle is there.
+        if not self._contact:
+            return
         state = m.decode_state(content)
         if state.resource not in self._hosted.connections:
             return

@@ -1,6 +1,8 @@
 """`m2pem arbiter-host` and an executive, as docs/arbiter-host.md shows them: two processes."""
 
+import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -100,3 +102,59 @@ def test_bad_words_are_refused_with_a_remedy(
 def test_no_vehicle_has_the_link_as_its_arbiter() -> None:
     with pytest.raises(PluginError, match="keep the vehicle's own arbiter"):
         ZenohHosts()({}, None)  # type: ignore[arg-type]  # it is refused before
+
+
+def far(folder: Path) -> None:
+    mission = scenarios.one_behavior("goto", "rover1", target="[38.1090, -77.3192]", speed="4 m/s")
+    (folder / "far.bpmn").write_bytes(mission)
+
+
+def begun(folder: Path) -> "subprocess.Popen[str]":
+    """An executive whose vehicle moves."""
+    command = [*M2PEM, "run", "far.bpmn", "--fleet", "fleet.yaml", "--ocu", "none"]
+    process = subprocess.Popen(
+        [*command, "--journal", "journal.db"],
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        if "begins goto" in line:
+            return process
+    raise AssertionError(f"it ended with {process.wait()}")
+
+
+def test_an_executive_that_was_killed_finds_its_behavior_at_the_host(
+    folder: Path, host: "subprocess.Popen[str]"
+) -> None:
+    far(folder)
+    executive = begun(folder)
+    executive.kill()
+    executive.communicate()
+    command = [*M2PEM, "resume", "r1", "--journal", "journal.db", "--ocu", "none"]
+    resumed = subprocess.run(command, cwd=folder, text=True, capture_output=True, check=False)
+    assert resumed.returncode == 0, resumed
+    assert "ends goto: succeeded" in resumed.stdout
+    assert "ended goto: lost" not in resumed.stdout
+
+
+def test_the_operator_is_told_which_host_has_not_confirmed_a_stop(
+    folder: Path, host: "subprocess.Popen[str]"
+) -> None:
+    far(folder)
+    executive = begun(folder)
+    assert executive.stdout is not None
+    host.send_signal(signal.SIGSTOP)
+    try:
+        stop = [*M2PEM, "stop", "r1", "--journal", "journal.db"]
+        subprocess.run(stop, cwd=folder, capture_output=True, check=False)
+        told = next((line for line in executive.stdout if "may not have received" in line), "")
+    finally:
+        host.send_signal(signal.SIGCONT)
+    assert "rover1 may not have received the STOP of r1" in told
+    assert "on rover1-pi has not taken it within 1 s" in told
+    executive.communicate()
+    assert executive.returncode == 130

@@ -1,4 +1,6 @@
-"""A host of simulated vehicles: python zenoh_host_process.py PORT FOLDER SPEED ACTION:AFTER_S
+"""A host of simulated vehicles.
+
+    python zenoh_host_process.py PORT FOLDER SPEED ACTION:AFTER_S LOST_AFTER_S
 
 It obeys lines at its standard input: "cut VEHICLE", "mend VEHICLE" (the link from the host to the
 vehicle), "effects VEHICLE" (how many motions it has begun).
@@ -21,8 +23,10 @@ from m2pem.telemetry.bus import Bus
 ORIGIN = (38.1075, -77.3192, 60.0)
 
 
-async def main(port: int, folder: Path, speed: float, action: str, after_s: float) -> None:
-    hosted = hosted_simulation(port, folder, CutOffPolicy(WhenCutOff(action), after_s), 3.0)
+async def main(
+    port: int, folder: Path, speed: float, policy: CutOffPolicy, lost_after_s: float
+) -> None:
+    hosted = hosted_simulation(port, folder, policy, lost_after_s)
     made: list[SimArbiter] = []
 
     def make(context: ArbiterContext) -> SimArbiter:
@@ -40,8 +44,6 @@ async def main(port: int, folder: Path, speed: float, action: str, after_s: floa
             case "effects":
                 begun = [each for each in arbiter.effects if each.kind == "start"]
                 print(sum(each.resource == vehicle for each in begun), flush=True)
-            case "held":
-                print(arbiter.doing(vehicle), flush=True)
 
     loop = asyncio.get_running_loop()
 
@@ -58,4 +60,6 @@ async def main(port: int, folder: Path, speed: float, action: str, after_s: floa
 if __name__ == "__main__":
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     action, _, after = sys.argv[4].partition(":")
-    asyncio.run(main(int(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), action, float(after)))
+    policy = CutOffPolicy(WhenCutOff(action), float(after))
+    port, speed, lost_after_s = int(sys.argv[1]), float(sys.argv[3]), float(sys.argv[5])
+    asyncio.run(main(port, Path(sys.argv[2]), speed, policy, lost_after_s))

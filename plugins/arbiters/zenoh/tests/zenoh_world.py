@@ -50,15 +50,24 @@ def hosted_simulation(
 
 
 class HostProcess:
-    """A host in a process of its own. It obeys lines at its standard input: cut, mend, effects."""
+    """A host in a process of its own. It obeys lines at its standard input: cut, mend, effects.
+
+    `speed`: of its clock. `policy`: what it does alone, and after how long. `lost_after_s`: of its
+    vehicles.
+    """
 
     def __init__(
-        self, port: int, folder: Path, speed: float = 1.0, policy: str = "hold:10"
+        self,
+        port: int,
+        folder: Path,
+        speed: float = 1.0,
+        policy: str = "hold:10",
+        lost_after_s: float = 3.0,
     ) -> None:
         self.port = port
         self._command = [
             *(sys.executable, str(Path(__file__).with_name("zenoh_host_process.py"))),
-            *(str(port), str(folder), str(speed), policy),
+            *(str(port), str(folder), str(speed), policy, str(lost_after_s)),
         ]
         self._process = self._start()
 
