@@ -135,8 +135,14 @@ def test_a_choice_after_which_the_mission_cannot_complete_must_be_confirmed(
 
 SPEED = 50.0
 HOME = (38.1075, -77.3192)
-NEAR, FAR = (38.1080, -77.3192), (38.2, -77.3192)
-"""50 m, and 10 km."""
+LANE_DEG = 0.001
+"""Of longitude between the lanes of two vehicles: 90 m."""
+NEAR_DEG, FAR_DEG = 0.0005, 0.1
+"""Of latitude to a target in a vehicle's own lane: 50 m, and 10 km."""
+BLOCKED = (38.1100, -77.3192)
+BLOCKER = "blocker1"
+"""A vehicle that stands there."""
+IN_THE_WAY = "another vehicle is in the way"
 FAULTS = {
     "FAILED": "goto: fail at 1 s",
     "REJECTED": "goto: refuse",
@@ -145,41 +151,50 @@ FAULTS = {
     "BATTERY_LOW": "goto: fail BATTERY_LOW at 1 s",
     "ROUTE_BLOCKED": "goto: fail ROUTE_BLOCKED at 1 s",
 }
-ERRORS = (*FAULTS, "an operator has it", "an operator takes over", "a task takes it")
+ERRORS = (
+    *FAULTS,
+    "an operator has it",
+    "an operator takes over",
+    "a task takes it",
+    IN_THE_WAY,
+)
 
 
 class Simulated(Table):
-    """A vehicle of the simulated arbiter, which fails once."""
+    """A vehicle of the simulated arbiter, which fails once, in a lane of its own."""
 
-    def __init__(self, error: str, choice: str) -> None:
+    def __init__(self, error: str, choice: str, lane: int) -> None:
         self.error, self.vehicle = error, f"{error}_{choice}".lower().replace(" ", "_")
+        self.home = (HOME[0], HOME[1] + lane * LANE_DEG)
 
     def data(self) -> dict[str, Any]:
-        return {"speed": 5, "target": list(NEAR)}
+        return {"speed": 5, "target": [self.home[0] + NEAR_DEG, self.home[1]]}
 
     def far(self) -> dict[str, Any]:
-        return {"target": list(FAR)}
+        return {"target": [self.home[0] + FAR_DEG, self.home[1]]}
 
     def provocations(self) -> dict[str, Provocation]:
         async def available(_: str) -> None:
             await self.available()
 
         faults = {code: Provocation(code, mend=available) for code in FAULTS}
-        return {**self.common(), **faults}
+        blocked = Provocation("REJECTED", {"target": list(BLOCKED)}, mend=self.set_right)
+        return {**self.common(), **faults, IN_THE_WAY: blocked}
 
     def connection(self, state: Path) -> dict[str, Any]:
         faults = [FAULTS[self.error]] if self.error in FAULTS else []
-        return {"state": str(state), "home": list(HOME), "faults": faults}
+        return {"state": str(state), "home": list(self.home), "faults": faults}
 
 
 def simulated_rows(m2pem: CommandLine, folder: Path, rows: Sequence[tuple[str, str]]) -> None:
     """Play rows: all come to their incidents, then the executive is killed."""
-    tables = [Simulated(error, choice) for error, choice in rows]
+    tables = [Simulated(*row, lane) for lane, row in enumerate(rows, 1)]
     state = folder / "vehicles.state"
     connections = {each.vehicle: each.connection(state) for each in tables}
     connections[SPARE] = {"state": str(state), "home": list(HOME)}
+    connections[BLOCKER] = {"state": str(state), "home": list(BLOCKED)}
     fleet = folder / "fleet.yaml"
-    content = {
+    content: dict[str, Any] = {
         "version": 1,
         "origin": {"lat": HOME[0], "lon": HOME[1], "alt": 60.0},
         "allocation": {"preemption": True},
@@ -188,6 +203,8 @@ def simulated_rows(m2pem: CommandLine, folder: Path, rows: Sequence[tuple[str, s
             for name, connection in connections.items()
         },
     }
+    if IN_THE_WAY in dict(rows):
+        content["deconfliction"] = {"ground": {"horizontal": "3 m"}}
     fleet.write_text(json.dumps(content), encoding="utf-8")
     journal = folder / "journal.db"
 
@@ -206,7 +223,14 @@ def simulated_rows(m2pem: CommandLine, folder: Path, rows: Sequence[tuple[str, s
 def test_each_choice_is_made_after_kill_9_and_the_replay_is_equal(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:
-    errors = ("ROUTE_BLOCKED", "TIMEOUT", "REJECTED", "an operator has it", "FAILED", "BATTERY_LOW")
+    errors = (
+        "ROUTE_BLOCKED",
+        IN_THE_WAY,
+        "REJECTED",
+        "an operator has it",
+        "FAILED",
+        "BATTERY_LOW",
+    )
     simulated_rows(m2pem, tmp_path, list(zip(errors, CHOICES, strict=True)))
 
 
