@@ -127,3 +127,25 @@ async def test_a_wrong_password_and_a_missing_recorder_reject_with_whose_fault_i
         end = await found.ended("r1.b1", 40)
         assert (end.state, end.code) == (BehaviorState.REJECTED, "REJECTED")
         assert "has no recording service" in end.reason
+
+
+@on_loopback
+async def test_what_is_left_of_a_sector_is_reported_by_where_the_camera_looks(tmp_path):
+    async with camera(latency_s=0.1, endless=True) as server, bench(server, tmp_path) as (found, _):
+        sector = {"heading": rad(90), "sector": rad(80)}
+        await found.start("r1.b1", "ptz_scan_sector", PTZ, **sector, speed=rad(40))
+        assert (await found.ended("r1.b1", 40)).state is BehaviorState.SUCCEEDED
+        said = [each.remaining for each in found.of("r1.b1") if each.remaining is not None]
+    ends = [_ends(each) for each in said]
+    left = [high - low for low, high in ends]
+    assert len(left) > 2
+    assert left == sorted(left, reverse=True)
+    assert left[-1] < 40.0
+    near, far = (50.0, 130.0)
+    assert all(abs(low - near) < 0.2 or abs(high - far) < 0.2 for low, high in ends), ends
+
+
+def _ends(remaining):
+    """The edges of what is left, in degrees."""
+    heading, sector = (float(remaining[key].removesuffix(" deg")) for key in ("heading", "sector"))
+    return heading - sector / 2, heading + sector / 2
