@@ -102,7 +102,7 @@ class MavlinkArbiter:
     """
 
     capabilities = ArbiterCapabilities(
-        one_vehicle=True, adjusts=True, addresses=True, reclaims=True
+        one_vehicle=True, adjusts=True, addresses=True, reclaims=True, fences=True
     )
 
     def __init__(
@@ -260,6 +260,18 @@ class MavlinkArbiter:
     async def reclaim(self, resource: ResourceId) -> str:
         """Stop a vehicle that was lost and is connected again, unless it executes a failsafe."""
         return await self._controllers[resource].reclaim() if resource in self._controllers else ""
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Refuse lower epochs of a run here: autopilots know none."""
+        self._tracker.fence(run, epoch)
+
+    async def disown(self, run: str) -> None:
+        """End setpoints, repeated commands and further steps of a run's behaviors."""
+        held = {resource: self._tracker.holder(resource) for resource in self._controllers}
+        behaviors = self._tracker.disown(run)
+        for resource, controller in self._controllers.items():
+            if held[resource] in behaviors:
+                controller.release()
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the last report or, after a restart, the state that the vehicle shows. Only

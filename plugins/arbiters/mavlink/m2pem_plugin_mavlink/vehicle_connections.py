@@ -57,7 +57,9 @@ class MavlinkVehicleConnections:
         address = Address(settings.system_id, settings.component_id)
         source = Address(settings.gcs_system_id, GROUND_STATION.component)
         try:
-            link = await _OPEN[settings.driver](address, settings.urls, clock, source)
+            link = await _OPEN[settings.driver](
+                address, settings.urls, clock, source, self._context.may_send
+            )
         except PluginError as error:
             raise PluginError(f"{resource}: connection.url: {error}") from error
         self._links.append(link)

@@ -150,7 +150,8 @@ class VehicleController:
             self._work.cancel()  # it may still wait to be received, to be held then
 
     def release(self) -> None:
-        """Forget the behavior of a vehicle that is lost; what was seen of it last is reported."""
+        """Forget the behavior of a vehicle that is lost, or that another executive commands; what
+        was seen of it last is reported."""
         if self._active is not None:
             self._report_left(self._active, LEAST_PROGRESS_M)
         self._active = None

@@ -132,6 +132,22 @@ def test_following_goes_on_after_a_hold() -> None:
     play(Body().fly(), main)
 
 
+def test_following_ends_without_a_command_when_another_executive_drives_the_run() -> None:
+    async def main(bench) -> None:
+        says(bench, 50.0, 0.0)
+        await bench.start("r1.b1", "follow", "v", target=VehiclePosition("w"))
+        await drives(bench, 2.0)
+        told = len(bench.told)
+        await bench.arbiter.disown("r1")
+        await drives(bench, 5.0)
+        assert bench.told[told:] == []
+        await bench.arbiter.hold("v")  # an operator's STOP still does that
+        await bench.clock.sleep(2.0)
+        assert bench.told[told:] == ["stop"]
+
+    play(Body().fly(), main)
+
+
 def test_following_is_found_again_after_a_restart() -> None:
     async def main(bench, reference: str) -> None:
         says(bench, 50.0, 0.0)

@@ -1,7 +1,7 @@
 """A vehicle over several endpoints, and exchanges with it over real sockets."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import ClassVar
 
@@ -55,10 +55,12 @@ def port(url: str) -> int:
 
 
 @asynccontextmanager
-async def joined() -> AsyncIterator[tuple[HandClock, RoutedLink, list[FarEnd]]]:
+async def joined(
+    may_send: Callable[[], bool] = lambda: True,
+) -> AsyncIterator[tuple[HandClock, RoutedLink, list[FarEnd]]]:
     """A vehicle that is heard over both endpoints."""
     clock = HandClock()
-    link = await open_link(VEHICLE, URLS, clock)
+    link = await open_link(VEHICLE, URLS, clock, may_send=may_send)
     ends = [await udp_end(port(url)) for url in URLS]
     for end, url in zip(ends, URLS, strict=True):
         end.beat()
@@ -174,6 +176,21 @@ async def test_an_exchange_asks_again_by_the_arbiters_clock_and_gives_up() -> No
             ends[0].beat()
         with pytest.raises(NoAnswerError):
             await asking
+
+
+async def test_an_exchange_sends_nothing_again_while_the_executive_may_not() -> None:
+    allowed = [True]
+    async with joined(lambda: allowed[0]) as (clock, link, ends):
+        asked = asyncio.create_task(link.perform(Ask(400)))
+        await until(lambda: commands(ends[0]) == [400])
+        allowed[0] = False
+        await clock.turn(1.1)
+        send(link)
+        allowed[0] = True
+        await clock.turn(1.1)
+        await until(lambda: commands(ends[0]) == [400, 400])
+        ends[0].acknowledge(400)
+        assert await asked == 0
 
 
 async def test_exchanges_with_the_same_key_wait_for_each_other() -> None:

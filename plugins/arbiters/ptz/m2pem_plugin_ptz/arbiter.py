@@ -54,7 +54,7 @@ class PtzArbiter:
         PluginError: a connection cannot be used; the text names the resource and the key.
     """
 
-    capabilities = ArbiterCapabilities()
+    capabilities = ArbiterCapabilities(fences=True)
 
     def __init__(
         self,
@@ -163,6 +163,18 @@ class PtzArbiter:
         """Let a camera continue after `hold`."""
         if resource in self._cameras:
             self._cameras[resource].resume()
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Refuse lower epochs of a run here: cameras know none."""
+        self._tracker.fence(run, epoch)
+
+    async def disown(self, run: str) -> None:
+        """End the behaviors of a run; the cameras are not commanded."""
+        held = {resource: self._tracker.holder(resource) for resource in self._cameras}
+        behaviors = self._tracker.disown(run)
+        for resource, camera in self._cameras.items():
+            if held[resource] in behaviors:
+                camera.drop()
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the last report, or after a restart, what the direction of the camera shows."""

@@ -153,7 +153,7 @@ class CameraController:
             self._tracker.remains(task.id, left)
 
     async def _wait_while_held(self) -> None:
-        while self._held:
+        while self._held or not self.model.context.may_send():
             await self._clock.sleep(TICK_S)
 
     async def _end_replaced(self) -> None:

@@ -30,10 +30,14 @@ WORSE_LOSS = 0.1
 
 
 async def open_link(
-    address: Address, urls: Sequence[str], clock: Clock, source: Address = GROUND_STATION
+    address: Address,
+    urls: Sequence[str],
+    clock: Clock,
+    source: Address = GROUND_STATION,
+    may_send: Callable[[], bool] = lambda: True,
 ) -> "RoutedLink":
     """Open a link to a vehicle over one or more endpoints, the preferred one first; `source`: the
-    address of this ground station.
+    address of this ground station. Nothing is sent while `may_send` is false.
 
     Return when listening: a silent vehicle, or a connection that is not made yet, is no error.
 
@@ -44,20 +48,27 @@ async def open_link(
         raise PluginError("the vehicle needs a URL, such as udpin://127.0.0.1:14550")
     hub = shared_hub()
     routes = await hub.join(address.system, [parse_url(url) for url in urls], source, clock)
-    return RoutedLink(hub, address, source, routes, clock)
+    return RoutedLink(hub, address, source, routes, clock, may_send)
 
 
 class RoutedLink:
     """See `VehicleLink`. Sends over the endpoint with the best connection to the vehicle."""
 
     def __init__(
-        self, hub: Hub, address: Address, source: Address, routes: Sequence[Route], clock: Clock
+        self,
+        hub: Hub,
+        address: Address,
+        source: Address,
+        routes: Sequence[Route],
+        clock: Clock,
+        may_send: Callable[[], bool] = lambda: True,
     ) -> None:
         self.address = address
         self.source = source
         self._hub = hub
         self._routes = list(routes)
         self._clock = clock
+        self._may_send = may_send
         self._used = self._routes[0]
         for route in routes:
             route.autopilots.add(address.component)
@@ -76,7 +87,7 @@ class RoutedLink:
         Raises:
             struct.error: a field's value does not fit its type.
         """
-        if self._closed:
+        if self._closed or not self._may_send():
             return
         component = getattr(message, "target_component", 0)
         peer = self._best().peer_of(component, self.address.component)

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import socket
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -97,7 +97,11 @@ def _refuse_if_taken(url: SocketUrl) -> None:
 
 
 async def open_mavsdk_link(
-    address: Address, urls: Sequence[str], clock: Clock, source: Address = GROUND_STATION
+    address: Address,
+    urls: Sequence[str],
+    clock: Clock,
+    source: Address = GROUND_STATION,
+    may_send: Callable[[], bool] = lambda: True,
 ) -> MavsdkLink:
     """Open a link to a vehicle; see `link.routed_link.open_link`.
 
@@ -111,7 +115,9 @@ async def open_mavsdk_link(
     stations = _ground_stations.get(loop)
     if stations is None:
         stations = _ground_stations[loop] = _GroundStations()
-    return await stations.join(address, parse_url(urls[0]), source, clock)
+    link = await stations.join(address, parse_url(urls[0]), source, clock)
+    link.may_send = may_send
+    return link
 
 
 class _GroundStations:

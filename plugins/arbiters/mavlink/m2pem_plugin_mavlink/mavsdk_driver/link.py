@@ -147,6 +147,8 @@ class MavsdkLink:
         self.address = address
         self.calls = PendingCalls()
         self.missions: Any = None
+        self.may_send: Callable[[], bool] = lambda: True
+        """Nothing is sent while it is false."""
         self._direct: Any = None
         self._clock = clock
         self._leave = leave
@@ -206,7 +208,7 @@ class MavsdkLink:
 
     def send(self, message: Message) -> None:
         """See `VehicleLink.send`."""
-        if self._closed or not self.attached:
+        if self._closed or not self.attached or not self.may_send():
             return
         self._unsent.append(message)
         if self._sender is None or self._sender.done():
