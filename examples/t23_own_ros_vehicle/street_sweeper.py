@@ -16,7 +16,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import rclpy
-from m2pem_interfaces.msg import BehaviorCommand, BehaviorStatus, VehicleStatus
+from m2pem_interfaces.msg import (
+    BehaviorCommand,
+    BehaviorStatus,
+    CommandRefusal,
+    VehicleStatus,
+)
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -85,6 +90,7 @@ class Sweeper(Node):
         self.last: dict[str, BehaviorStatus] = {}
         self.epochs: dict[str, int] = {}
         self.statuses = self.create_publisher(BehaviorStatus, "behavior_status", BEHAVIOR_STATUS)
+        self.refusals = self.create_publisher(CommandRefusal, "command_refusal", COMMANDS)
         self.states = self.create_publisher(VehicleStatus, "vehicle_status", VEHICLE_STATUS)
         self.fixes = self.create_publisher(NavSatFix, "fix", 10)
         self.odometry = self.create_publisher(Odometry, "odom", 10)
@@ -104,8 +110,16 @@ class Sweeper(Node):
             BehaviorCommand.RESUME: lambda _: self.hold(False),
             BehaviorCommand.QUERY: self.repeat_status,
             BehaviorCommand.ADJUST: self.adjust,
+            BehaviorCommand.CLAIM: lambda _: None,
         }
-        if command.verb in verbs:
+        if command.verb not in verbs:
+            return
+        past = self.is_past(command)
+        if past and command.verb != BehaviorCommand.HOLD:
+            self.refuse(command)
+        # A START gets a status, a QUERY its answer, and whoever wants the vehicle to stand may.
+        answered = (BehaviorCommand.START, BehaviorCommand.QUERY, BehaviorCommand.HOLD)
+        if not past or command.verb in answered:
             verbs[command.verb](command)
 
     def start(self, command: BehaviorCommand) -> None:
@@ -115,9 +129,11 @@ class Sweeper(Node):
         if command.id in self.last:  # a repeated START: the behavior has begun already
             self.statuses.publish(self.last[command.id])
             return
+        if self.is_past(command):
+            reason = f"epoch {command.epoch} of its run is past"
+            self.report(command.id, BehaviorStatus.REJECTED, "STALE_EPOCH", reason)
+            return
         try:
-            if self.is_past(command):
-                raise RefusedError(f"epoch {command.epoch} of its run is past")
             steps, speed_m_s = self.prepare(command)
             if self.job is not None and self.job.id not in command.preempts:
                 raise RefusedError(f"busy with {self.job.id}")
@@ -150,7 +166,7 @@ class Sweeper(Node):
 
     def cancel(self, command: BehaviorCommand) -> None:
         """Have a behavior end; it has ended when the vehicle stands."""
-        if self.job is not None and self.job.id == command.id and not self.is_past(command):
+        if self.job is not None and self.job.id == command.id:
             self.job.cancelled = True
 
     def hold(self, held: bool) -> None:
@@ -160,7 +176,7 @@ class Sweeper(Node):
 
     def adjust(self, command: BehaviorCommand) -> None:
         """Another speed is all that can be changed on the way."""
-        if self.job is None or self.job.id != command.id or self.is_past(command):
+        if self.job is None or self.job.id != command.id:
             return
         with contextlib.suppress(RefusedError):
             given = {each.key: parsed(each.key, each.value) for each in command.parameters}
@@ -177,6 +193,15 @@ class Sweeper(Node):
         newest = max(command.epoch, self.epochs.get(command.run, 0))
         self.epochs[command.run] = newest
         return command.epoch < newest
+
+    def refuse(self, command: BehaviorCommand) -> None:
+        """Say that another executive drives the run."""
+        refusal = CommandRefusal(verb=command.verb, id=command.id, run=command.run)
+        refusal.stamp = self.get_clock().now().to_msg()
+        refusal.epoch, refusal.newest = command.epoch, self.epochs[command.run]
+        refusal.code = "STALE_EPOCH"
+        refusal.reason = f"epoch {command.epoch} of its run is past"
+        self.refusals.publish(refusal)
 
     # --- what the executive hears ---------------------------------------------------------------
 

@@ -104,6 +104,12 @@ class BehaviorTracker:
         """
         self._epochs.admit(behavior, epoch)
 
+    def superseded(self, behavior: BehaviorId, newest: int) -> None:
+        """The vehicle has seen a newer epoch of the run than that of this executive, which a report
+        says: it is the last one that counts."""
+        self._epochs.admit(behavior, newest)
+        self._reports.put(self.last(behavior))
+
     def disown(self, run: str) -> list[BehaviorId]:
         """Forget the behaviors of a run that go on, without a report; returns them."""
         ids = [

@@ -32,14 +32,21 @@ class EpochFence:
 
     def newest(self, behavior: BehaviorId) -> int:
         """Return the highest epoch seen for the run of a behavior, or for a run; 0: none was."""
-        return self._highest.get(run_of(behavior), 0)
+        return self.newest_of_run(run_of(behavior))
+
+    def newest_of_run(self, run: str) -> int:
+        """The same for a run, whose name may be any text."""
+        return self._highest.get(run, 0)
 
     def admit(self, behavior: BehaviorId, epoch: int) -> bool:
         """Whether a command of this epoch is good. A higher one than before is remembered.
 
         `behavior`: of the command, or the run itself.
         """
-        run = run_of(behavior)
+        return self.admit_run(run_of(behavior), epoch)
+
+    def admit_run(self, run: str, epoch: int) -> bool:
+        """The same for a run, whose name may be any text."""
         before = self._highest.pop(run, None)
         highest = self._highest[run] = epoch if before is None else max(epoch, before)
         if len(self._highest) > REMEMBERED:

@@ -70,7 +70,7 @@ class RosArbiter:
     """
 
     capabilities = ArbiterCapabilities(
-        one_vehicle=True, adjusts=True, addresses=True, reclaims=True, detects=True
+        one_vehicle=True, adjusts=True, addresses=True, reclaims=True, detects=True, fences=True
     )
 
     def __init__(
@@ -230,6 +230,19 @@ class RosArbiter:
         """End what a vehicle still does that was lost and is received again; see
         `Vehicle.reclaim`."""
         return await self._vehicles[resource].reclaim() if resource in self._vehicles else ""
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Tell the nodes of all vehicles that the run has this epoch. Nav2 and plain bases know no
+        epochs."""
+        self._tracker.fence(run, epoch)
+        for vehicle in self._vehicles.values():
+            vehicle.claim(run, epoch)
+
+    async def disown(self, run: str) -> None:
+        """End velocities and repeated commands for a run. Nav2 and nodes go on with their goals."""
+        behaviors = self._tracker.disown(run)
+        for vehicle in self._vehicles.values():
+            vehicle.disown(behaviors)
 
     async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
         """Return the last report, or after a restart, what the vehicle answers. No behavior is

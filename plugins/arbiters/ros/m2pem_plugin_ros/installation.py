@@ -13,6 +13,14 @@ from m2pem.errors import PluginError
 WHEELS = "pip install 'm2pem-plugin-ros[wheels]'"
 SOURCED = "a machine with ROS 2: source /opt/ros/jazzy/setup.bash before m2pem starts"
 
+OWN_INTERFACES = "m2pem_interfaces"
+OWN_INSTALLATION = (
+    "with the wheels: pip install ./ros/m2pem_interfaces of m2pem's sources; "
+    "with a sourced ROS: colcon build that folder, and source the result"
+)
+NEWEST_MESSAGE = "CommandRefusal"
+"""The message that was added last."""
+
 
 class RosError(PluginError):
     """ROS 2 is missing, or cannot be used; the message gives the remedy."""
@@ -52,7 +60,7 @@ def require_interfaces(package: str) -> ModuleType:
     """Import and return a package of interfaces, such as m2pem_interfaces or nav2_msgs.
 
     Raises:
-        RosError: it is not installed.
+        RosError: it is not installed, or that of an earlier m2pem.
     """
     require_ros()
     try:
@@ -62,12 +70,14 @@ def require_interfaces(package: str) -> ModuleType:
                 importlib.import_module(f"{package}.{part}")
     except ImportError as error:
         how = f"apt-get install ros-jazzy-{package.replace('_', '-')}, then source ROS again"
-        if package == "m2pem_interfaces":
-            how = (
-                "with the wheels: pip install ./ros/m2pem_interfaces of m2pem's sources; "
-                "with a sourced ROS: colcon build that folder, and source the result"
-            )
+        if package == OWN_INTERFACES:
+            how = OWN_INSTALLATION
         raise RosError(f"the ROS package {package} is not installed ({error}); {how}") from error
+    if package == OWN_INTERFACES and not hasattr(module.msg, NEWEST_MESSAGE):
+        raise RosError(
+            f"the ROS package {package} is that of an earlier m2pem: it has no {NEWEST_MESSAGE}; "
+            f"install it again, {OWN_INSTALLATION}"
+        )
     return module
 
 

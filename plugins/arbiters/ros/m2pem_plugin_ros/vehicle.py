@@ -3,7 +3,7 @@ link."""
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from uuid import UUID
@@ -91,6 +91,7 @@ class Vehicle:
         self._fence_check = None if fence is None else FenceCheck(fence, setup.context.bus)
         self._log_throttle = LogThrottle(setup.context.logger, self.resource)
         self._behaviors: dict[UUID, BehaviorId] = {}
+        self._runs: dict[str, BehaviorId] = {}
         self._order: Order | None = None
         self._route: RemainingRoute | None = None
         self._left: Mapping[str, Value] | None = None
@@ -247,6 +248,23 @@ class Vehicle:
         request = BehaviorRequest(behavior, epoch, name, parameters or {}, (self.resource,))
         return self._order_for(request)
 
+    def claim(self, run: str, epoch: int) -> None:
+        """Have the vehicle refuse lower epochs of a run."""
+        id_ = run_id(self._context.journal, run)
+        self._remember_run(id_, run)
+        self._call_driver("claim", lambda: self.driver.claim(id_, epoch))
+
+    def disown(self, behaviors: Collection[BehaviorId]) -> None:
+        """Send nothing more for these behaviors; the vehicle goes on with them."""
+        if self._order is not None and self._order.request.id in behaviors:
+            self._order = None
+            self._call_driver("forget", self.driver.abandon)
+        self._unresolved = {
+            goal: behavior
+            for goal, behavior in self._unresolved.items()
+            if behavior not in behaviors
+        }
+
     def mark_unresolved(self, order: Order) -> None:
         """Remember that the vehicle may still execute an order. It is preempted by the next one."""
         self._unresolved[order.goal] = order.request.id
@@ -314,6 +332,11 @@ class Vehicle:
         if outcome.state is BehaviorState.SUCCEEDED:
             self._tracker.progress(behavior)  # a behavior that ends at once has run, too
         self._tracker.end(behavior, outcome.state, outcome.code, outcome.reason, outcome.outputs)
+
+    def superseded(self, run: str, newest: int) -> None:
+        behavior = self._runs.get(run)
+        if behavior is not None and newest > self._context.epoch_of(behavior):
+            self._tracker.superseded(behavior, newest)
 
     # --- time -----------------------------------------------------------------------------------
 
@@ -419,12 +442,20 @@ class Vehicle:
 
     def _order_for(self, request: BehaviorRequest) -> Order:
         journal = self._context.journal
-        goal = goal_id(journal, request.id)
+        goal, run = goal_id(journal, request.id), run_id(journal, request.id)
+        self._remember_run(run, request.id)
         others = [goal_id(journal, preempted) for preempted in request.preempts]
         preempts = tuple(
             each for each in dict.fromkeys([*others, *self._unresolved]) if each != goal
         )
-        return Order(request, goal, run_id(journal, request.id), preempts)
+        return Order(request, goal, run, preempts)
+
+    def _remember_run(self, run: UUID, behavior: BehaviorId) -> None:
+        """Remember of which run a refusal may be; the newest behavior of it stands for it."""
+        self._runs.pop(str(run), None)
+        self._runs[str(run)] = behavior
+        if len(self._runs) > REMEMBERED:
+            del self._runs[next(iter(self._runs))]
 
     def _keep(self, order: Order) -> None:
         self._order = order

@@ -172,6 +172,9 @@ class DoubleDriver:
             return Outcome(BehaviorState.RUNNING, held=self.body.held)
         return self.body.outcomes.get(order.goal, Outcome(BehaviorState.UNKNOWN))
 
+    def claim(self, run: UUID, epoch: int) -> None:
+        self.body.events("claim", run, epoch)
+
     def abandon(self) -> None:
         self.body.events("forget")
         self.known.clear()

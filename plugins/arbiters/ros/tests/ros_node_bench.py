@@ -28,6 +28,7 @@ class RecordedEvents:
         self.begun: list[UUID] = []
         self.left: list[tuple[UUID, Mapping[str, Value]]] = []
         self.ends: list[tuple[UUID, Outcome]] = []
+        self.newer: list[tuple[str, int]] = []
 
     def alive(self) -> None:
         self.times_heard += 1
@@ -41,6 +42,9 @@ class RecordedEvents:
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         self.ends.append((goal, outcome))
+
+    def superseded(self, run: str, newest: int) -> None:
+        self.newer.append((run, newest))
 
 
 class Bench:

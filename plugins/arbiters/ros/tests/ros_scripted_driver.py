@@ -8,6 +8,7 @@ often it has begun something.
 
 import asyncio
 from collections.abc import Mapping
+from uuid import UUID
 
 from m2pem_plugin_ros.drivers.driver import DriverEvents, Health, Order, Outcome
 
@@ -84,6 +85,8 @@ class ScriptedDriver:
 
     async def query(self, order: Order) -> Outcome:
         return Outcome(BehaviorState.UNKNOWN)
+
+    def claim(self, run: UUID, epoch: int) -> None: ...
 
     def abandon(self) -> None:
         self._order = None

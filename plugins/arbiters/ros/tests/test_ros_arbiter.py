@@ -18,6 +18,7 @@ from m2pem.api import (
     VehiclePosition,
     VehicleState,
 )
+from m2pem.errors import StaleCommandError
 
 FAILED, LOST, RUNNING = BehaviorState.FAILED, BehaviorState.LOST, BehaviorState.RUNNING
 CANCELLED, SUCCEEDED = BehaviorState.CANCELLED, BehaviorState.SUCCEEDED
@@ -58,13 +59,57 @@ def test_a_behavior_is_adjusted_on_the_way() -> None:
             await bench.start("r1.b1", "goto", A, target=at(1000.0, 0.0), speed=1.0)
             await bench.running("r1.b1")
             await bench.arbiter.adjust("r1.b1", 1, {"speed": float("nan")})
-            await bench.arbiter.adjust("r1.b1", 0, {"speed": 7.0})
+            with pytest.raises(StaleCommandError, match="epoch 1 was seen"):
+                await bench.arbiter.adjust("r1.b1", 0, {"speed": 7.0})
             await bench.arbiter.adjust("r9.b9", 1, {"speed": 7.0})
             assert world.bodies[A].called("adjust") == []
             await bench.arbiter.adjust("r1.b1", 1, {"speed": 50.0})
             assert (await bench.ended("r1.b1", 30)).state is SUCCEEDED
             await bench.arbiter.adjust("r1.b1", 1, {"speed": 5.0})
             assert len(world.bodies[A].called("adjust")) == 1
+
+    play(main)
+
+
+def test_a_takeover_is_told_to_every_vehicle() -> None:
+    async def main(world) -> None:
+        async with world.connected() as bench:
+            await bench.arbiter.fence("r1", 3)
+            for name in (A, B):
+                assert world.bodies[name].called("claim") == [("claim", run_id(JOURNAL, "r1"), 3)]
+            with pytest.raises(StaleCommandError, match="epoch 3 was seen"):
+                await bench.start("r1.b1", "goto", A, epoch=2, target=NEAR)
+
+    play(main)
+
+
+def test_a_refusal_by_a_vehicle_is_reported_with_the_newer_epoch() -> None:
+    async def main(world) -> None:
+        async with world.connected() as bench:
+            await bench.start("r1.b1", "goto", A, target=FAR)
+            await bench.running("r1.b1")
+            events = world.bodies[A].driver.setup.events
+            events.superseded("of another journal", 7)
+            events.superseded(str(run_id(JOURNAL, "r1")), 7)
+            assert await bench.until(lambda: bench.of("r1.b1")[-1].epoch == 7, 5)
+            with pytest.raises(StaleCommandError, match="epoch 7 was seen"):
+                await bench.arbiter.cancel("r1.b1", 1)
+
+    play(main)
+
+
+def test_a_disowned_vehicle_goes_on_and_can_be_held() -> None:
+    async def main(world) -> None:
+        async with world.connected() as bench:
+            await bench.start("r1.b1", "goto", A, target=FAR)
+            await bench.running("r1.b1")
+            await bench.arbiter.disown("r1")
+            await bench.clock.sleep(10)
+            body = world.bodies[A]
+            assert (body.called("end"), body.called("hold")) == ([], [])
+            assert len(body.called("forget")) == 1
+            await bench.arbiter.hold(A)
+            assert len(body.called("hold")) == 1
 
     play(main)
 

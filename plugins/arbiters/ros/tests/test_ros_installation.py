@@ -53,3 +53,11 @@ def test_libraries_that_are_not_found_are_explained(
 def test_interfaces_that_are_missing_are_named() -> None:
     with pytest.raises(RosError, match=r"nav3_msgs is not installed .* ros-jazzy-nav3-msgs"):
         require_interfaces("nav3_msgs")
+
+
+def test_interfaces_of_an_earlier_m2pem_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(require_interfaces("m2pem_interfaces").msg, "CommandRefusal")
+    with pytest.raises(
+        RosError, match=r"earlier m2pem: it has no CommandRefusal; install it again"
+    ):
+        require_interfaces("m2pem_interfaces")

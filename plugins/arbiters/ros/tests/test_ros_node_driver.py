@@ -172,8 +172,20 @@ async def test_a_past_epoch_is_rejected(one: Bench) -> None:
     end = await one.end_of(old)
     assert (end.state, end.reason) == (
         REJECTED,
-        "epoch 2 is past: another executive drives the run",
+        "epoch 2 is past: another executive drives the run with epoch 3",
     )
+    assert end.code == "STALE_EPOCH"
+    await one.until(lambda: (str(now.run), 3) in one.events.newer)
+
+
+async def test_a_claim_refuses_what_an_earlier_executive_commands(one: Bench) -> None:
+    order = one.begin("single_vehicle_routing", route=ROUTE, loop=True)
+    await one.running(order)
+    one.driver.claim(order.run, 4)
+    late = one.order_of(order.run, 3, "drive_stop")
+    one.driver.begin(late)
+    assert (await one.end_of(late)).code == "STALE_EPOCH"
+    await one.until(lambda: (str(order.run), 4) in one.events.newer)
 
 
 async def test_another_driver_finds_what_runs_and_what_has_ended(

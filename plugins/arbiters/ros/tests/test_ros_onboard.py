@@ -14,6 +14,7 @@ from m2pem_interfaces.msg import (
     Allocation,
     BehaviorCommand,
     BehaviorStatus,
+    CommandRefusal,
     GeoPoint,
     KeyValue,
     TargetState,
@@ -41,11 +42,14 @@ class Console:
     def __init__(self, ros: RosRuntime, vehicle: str = "evsg1") -> None:
         self.ros = ros
         self.statuses: list[S] = []
+        self.refusals: list[CommandRefusal] = []
         self.vehicle = VehicleStatus()
         self.heard = 0
         create = ros.node.create_publisher
         self.commands = create(C, f"/{vehicle}/command", qos.COMMANDS)
         self.targets = create(TargetState, f"/{vehicle}/target", qos.TELEMETRY)
+        refused = f"/{vehicle}/command_refusal"
+        ros.subscribe(CommandRefusal, refused, self.refusals.append, qos.COMMANDS)
         ros.subscribe(S, f"/{vehicle}/behavior_status", self.statuses.append, qos.BEHAVIOR_STATUS)
         ros.subscribe(VehicleStatus, f"/{vehicle}/vehicle_status", self._on_message, qos.STATUS)
 
@@ -69,6 +73,8 @@ class Console:
         await self.until(self.commands.get_subscription_count)
         await self.until(self.targets.get_subscription_count)
         await self.until(lambda: self.heard)
+        refused = self.commands.topic_name.replace("command", "command_refusal")
+        await self.until(lambda: self.ros.node.count_publishers(refused))
 
     def say(self, verb: int, id_: str = "", **fields: Any) -> str:
         fields.setdefault("run", f"run of {id_}")
@@ -188,10 +194,39 @@ async def test_commands_of_a_past_epoch_change_nothing(one: Console) -> None:
     one.say(C.CANCEL, id_, run="r", epoch=4)
     one.say(C.ADJUST, id_, run="r", epoch=4, parameters=[KeyValue(key="speed", value="9")])
     old = one.start("drive_stop", run="r", epoch=4)
-    assert "epoch 4 is past" in (await one.last_of(old, S.REJECTED)).reason
+    rejected = await one.last_of(old, S.REJECTED)
+    assert (rejected.code, "epoch 4 is past" in rejected.reason) == ("STALE_EPOCH", True)
     one.say(C.QUERY, id_, run="r", epoch=4)
     await one.until(lambda: one.of(id_)[-2:] == [(2, S.RUNNING)] * 2)
+    await one.until(lambda: len(one.refusals) == 4)
+    assert [each.verb for each in one.refusals] == [C.CANCEL, C.ADJUST, C.START, C.QUERY]
+    assert {(r.run, r.epoch, r.newest, r.code) for r in one.refusals} == {
+        ("r", 4, 5, "STALE_EPOCH")
+    }
+    assert (
+        one.refusals[0].reason == "epoch 4 is past: another executive drives the run with epoch 5"
+    )
     one.say(C.CANCEL, id_, run="r", epoch=6)
+    await one.last_of(id_, S.CANCELLED)
+
+
+async def test_a_past_executive_may_hold_a_vehicle_but_not_let_it_go(one: Console) -> None:
+    id_ = one.start("single_vehicle_routing", parameters=[route()], run="h", epoch=1)
+    await one.last_of(id_, S.RUNNING)
+    one.say(C.CLAIM, run="h", epoch=2)
+    one.say(C.HOLD, run="h", epoch=1)
+    await one.until(lambda: one.vehicle.held)
+    one.say(C.RESUME, run="h", epoch=1)
+    await one.until(lambda: any(each.verb == C.RESUME for each in one.refusals))
+    await one.later()
+    assert one.vehicle.held
+    one.say(C.RESUME, run="h", epoch=2)
+    await one.until(lambda: not one.vehicle.held)
+    one.say(C.HOLD, run="", epoch=0)
+    await one.until(lambda: one.vehicle.held)
+    one.say(C.RESUME, run="", epoch=0)  # an executive of before there were epochs in RESUME
+    await one.until(lambda: not one.vehicle.held)
+    one.say(C.CANCEL, id_, run="h", epoch=2)
     await one.last_of(id_, S.CANCELLED)
 
 

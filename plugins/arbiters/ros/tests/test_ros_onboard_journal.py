@@ -1,6 +1,7 @@
 """What the node on board says of behaviors: each change once, and one behavior at a time."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -9,7 +10,7 @@ from m2pem_plugin_ros.interfaces.behavior_status import ENDS, Status
 from m2pem_plugin_ros.onboard import journal as module
 from m2pem_plugin_ros.onboard.journal import BehaviorJournal
 
-from m2pem.api import BehaviorState
+from m2pem.api import BehaviorState, EpochFence
 
 IDS = ("a", "b", "c", "d")
 ENDINGS = sorted(ENDS - {BehaviorState.REJECTED})
@@ -78,6 +79,15 @@ def test_a_lower_epoch_of_the_same_run_is_past() -> None:
         False,
         True,
     ]
+
+
+def test_epochs_in_a_file_refuse_past_executives_after_a_restart(tmp_path: Path) -> None:
+    file = tmp_path / "epochs.json"
+    book = BehaviorJournal(lambda _: None, EpochFence(file))
+    assert not book.is_past("run.of.any.name", 3)
+    again = BehaviorJournal(lambda _: None, EpochFence(file))
+    assert again.is_past("run.of.any.name", 2)
+    assert (again.newest("run.of.any.name"), again.newest("run.of")) == (3, 0)
 
 
 def test_of_very_many_the_oldest_are_forgotten_but_not_what_goes_on(

@@ -87,6 +87,10 @@ class DriverEvents(Protocol):
         """The goal has ended. The state of `outcome` is terminal."""
         ...
 
+    def superseded(self, run: str, newest: int) -> None:
+        """The vehicle has refused a command of a run, as it has seen a newer epoch of it."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class DriverSetup:
@@ -143,8 +147,13 @@ class Driver(Protocol):
         the goal is RUNNING, the driver adopts it and reports its progress."""
         ...
 
+    def claim(self, run: UUID, epoch: int) -> None:
+        """Have the vehicle refuse lower epochs of a run, if it can compare them."""
+        ...
+
     def abandon(self) -> None:
-        """Drop the order of a vehicle that is lost. Nothing more is sent for it."""
+        """Drop the order of a vehicle that is lost, or whose run another executive drives. Nothing
+        more is sent for it."""
         ...
 
     async def close(self) -> None:

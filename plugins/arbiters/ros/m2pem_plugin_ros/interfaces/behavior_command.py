@@ -23,6 +23,7 @@ class Verb(IntEnum):
     RESUME = 4
     QUERY = 5
     ADJUST = 6
+    CLAIM = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ class Command:
     @property
     def of_vehicle(self) -> bool:
         """Whether the command names no behavior."""
-        return self.verb in (Verb.HOLD, Verb.RESUME)
+        return self.verb in (Verb.HOLD, Verb.RESUME, Verb.CLAIM)
 
 
 def read_command(message: Any) -> Command:
@@ -150,9 +151,10 @@ def goal_command(verb: int, goal: UUID, now_us: int) -> Any:
     return _message(verb, now_us, id=str(goal))
 
 
-def vehicle_command(verb: int, now_us: int) -> Any:
-    """Return a HOLD or RESUME."""
-    return _message(verb, now_us)
+def vehicle_command(verb: int, run: UUID | None, epoch: int, now_us: int) -> Any:
+    """Return a HOLD, RESUME or CLAIM of the executive that drives a run with this epoch; `run`:
+    None: the vehicle has no behavior of a run."""
+    return _message(verb, now_us, run="" if run is None else str(run), epoch=epoch)
 
 
 def _roles(request: BehaviorRequest) -> Mapping[str, tuple[str, ...]]:

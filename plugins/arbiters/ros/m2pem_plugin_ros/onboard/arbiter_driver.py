@@ -121,6 +121,9 @@ class ArbiterDriver:
     async def query(self, order: Order) -> Outcome:
         return _outcome(await self._arbiter.query(str(order.goal), None))
 
+    def claim(self, run: UUID, epoch: int) -> None:
+        """Do nothing: the node checks the epochs itself."""
+
     def abandon(self) -> None:
         if (goal := self._current) is not None:
             self.end(goal)

@@ -1,11 +1,12 @@
 """The command `m2pem ros onboard`: the m2pem node of a vehicle, until Ctrl-C."""
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import click
 
-from m2pem.api import ArbiterContext, Connection, GeoPosition, ResourceId, SystemClock
+from m2pem.api import ArbiterContext, Connection, EpochFence, GeoPosition, ResourceId, SystemClock
 from m2pem.api.command_options import PositionOption
 from m2pem.api.foreground import interrupted
 from m2pem.errors import PluginError
@@ -63,6 +64,12 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
     help="A key of a connection in a fleet, such as bounds.speed=1.5 m/s or odom_frame=odom. "
     "May be given more than once.",
 )
+@click.option(
+    "--epochs",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Keep in this file which executive has driven each run, so that an earlier one is refused "
+    "after a restart of the node, too.",
+)
 @click.option("--loopback", is_flag=True, help="Keep DDS on 127.0.0.1.")
 def onboard(
     vehicle: str,
@@ -72,6 +79,7 @@ def onboard(
     origin: GeoPosition,
     domain_id: int | None,
     words: tuple[tuple[tuple[str, ...], str | bool], ...],
+    epochs: Path | None,
     loopback: bool,
 ) -> None:
     """Run the m2pem node of a vehicle on board until Ctrl-C, which stops the vehicle.
@@ -93,7 +101,7 @@ def onboard(
     if loopback:
         keep_on_loopback()
     at = (origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
-    asyncio.run(_serve(connection, settings, at))
+    asyncio.run(_serve(connection, settings, at, EpochFence(epochs)))
 
 
 def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> None:
@@ -104,7 +112,10 @@ def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> Non
 
 
 async def _serve(
-    connection: Connection, settings: Settings, origin: tuple[float, float, float]
+    connection: Connection,
+    settings: Settings,
+    origin: tuple[float, float, float],
+    epochs: EpochFence,
 ) -> None:
     from m2pem_plugin_ros.drivers.driver import (  # noqa: PLC0415
         Driver,
@@ -130,7 +141,7 @@ async def _serve(
             )
 
         namespace = settings.namespace
-        node = OnboardNode(ros, name, namespace, make, clock=clock, bus=targets)
+        node = OnboardNode(ros, name, namespace, make, clock=clock, bus=targets, epochs=epochs)
         await node.open()
         click.echo(f"{name}: {namespace or '/'}, an m2pem node that drives by {settings.driver}")
         click.echo("ready")

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from m2pem.api import BehaviorState, Value
+from m2pem.api import BehaviorState, EpochFence, Value
 from m2pem_plugin_ros.interfaces.behavior_status import Status
 
 REMEMBERED = 10_000
@@ -13,13 +13,13 @@ class BehaviorJournal:
     """Runs one behavior at a time, and publishes each change of a status once, with a number that
     rises.
 
-    Ids are kept until 10,000 later behaviors have ended.
+    Ids are kept until 10,000 later behaviors have ended. `epochs`: of the runs, seen so far.
     """
 
-    def __init__(self, publish: Callable[[Status], None]) -> None:
+    def __init__(self, publish: Callable[[Status], None], epochs: EpochFence | None = None) -> None:
         self._publish_status = publish
         self._last: dict[str, Status] = {}
-        self._epochs: dict[str, int] = {}
+        self._epochs = EpochFence() if epochs is None else epochs
         self._current = ""
 
     @property
@@ -38,11 +38,11 @@ class BehaviorJournal:
 
     def is_past(self, run: str, epoch: int) -> bool:
         """Return whether another executive has taken over the run. The highest epoch is stored."""
-        highest = max(epoch, self._epochs.pop(run, epoch))
-        self._epochs[run] = highest
-        if len(self._epochs) > REMEMBERED:
-            del self._epochs[next(iter(self._epochs))]
-        return epoch < highest
+        return not self._epochs.admit_run(run, epoch)
+
+    def newest(self, run: str) -> int:
+        """Return the highest epoch that was seen of a run."""
+        return self._epochs.newest_of_run(run)
 
     def repeat(self, id_: str) -> None:
         """Publish the last status again."""

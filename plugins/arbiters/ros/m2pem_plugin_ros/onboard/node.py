@@ -15,12 +15,14 @@ from m2pem.api import (
     BehaviorSpec,
     BehaviorState,
     Clock,
+    EpochFence,
     FleetBus,
     PayloadState,
     Value,
 )
 from m2pem_plugin_ros.catalogue import LEVEL
 from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, Order, Outcome
+from m2pem_plugin_ros.installation import require_interfaces
 from m2pem_plugin_ros.interfaces.behavior_command import (
     Command,
     Verb,
@@ -30,6 +32,8 @@ from m2pem_plugin_ros.interfaces.behavior_command import (
     read_request,
 )
 from m2pem_plugin_ros.interfaces.behavior_status import Status
+from m2pem_plugin_ros.interfaces.command_refusal import CODE as REFUSAL_CODE
+from m2pem_plugin_ros.interfaces.command_refusal import past_reason
 from m2pem_plugin_ros.interfaces.key_values import WireError
 from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus
 from m2pem_plugin_ros.log_throttle import LogThrottle
@@ -63,6 +67,7 @@ class OnboardNode:
     `vehicle`: its name in the fleet, or that of the payload. `make_driver` gets the `DriverEvents`
     of this node. `bus` receives the states on `target`; it must be the bus of the driver's context.
     `catalogue`: the behaviors of the driver. `payload_state` returns the state of the payload.
+    `epochs`: those of the runs; with a file, past executives are refused after a restart, too.
     """
 
     def __init__(
@@ -76,6 +81,7 @@ class OnboardNode:
         bus: FleetBus | None = None,
         catalogue: Sequence[BehaviorSpec] = LEVEL,
         payload_state: Callable[[], PayloadState | None] | None = None,
+        epochs: EpochFence | None = None,
         logger: logging.Logger = LOGGER,
     ) -> None:
         self._ros = ros
@@ -86,7 +92,7 @@ class OnboardNode:
         self._catalogue = catalogue
         self._logger = logger
         self._log_throttle = LogThrottle(logger, vehicle)
-        self._journal = BehaviorJournal(self._publish_status)
+        self._journal = BehaviorJournal(self._publish_status, epochs)
         self._publisher = StatusPublisher(clock, self._about_vehicle, payload_state)
         self._held = False
         self._ending = False
@@ -103,7 +109,12 @@ class OnboardNode:
     # --- life -----------------------------------------------------------------------------------
 
     async def open(self) -> None:
-        """Open the driver, and serve."""
+        """Open the driver, and serve.
+
+        Raises:
+            RosError: the interfaces are those of an earlier m2pem.
+        """
+        require_interfaces("m2pem_interfaces")
         await self._driver.open()
         node = self._node = self._ros.make_node(
             "m2pem_onboard",
@@ -163,31 +174,43 @@ class OnboardNode:
             return
         if command.verb is Verb.START:
             self.start(message)
-        elif command.verb is Verb.QUERY:
-            self._journal.is_past(
-                command.run, command.epoch
-            )  # the first message of a higher epoch refuses lower ones from then on
-            self._journal.repeat(command.id)
-        elif command.verb is Verb.HOLD:
+            return
+        is_past = bool(command.run) and self._is_past(command)
+        if command.verb is Verb.HOLD:  # whoever sends it
             self._hold()
+        elif command.verb is Verb.QUERY:
+            self._journal.repeat(command.id)
+        elif is_past or command.verb is Verb.CLAIM:
+            return
         elif command.verb is Verb.RESUME:
             self._resume()
-        elif self._journal.is_past(command.run, command.epoch):
-            text = f"{command.verb.name} of {command.id}: {_past(command.epoch)}"
-            self._log_throttle.log("a command of a past epoch", text)
         elif command.verb is Verb.CANCEL:
             self.cancel(command.id)
         else:
             self._adjust(command, message)
 
+    def _is_past(self, command: Command) -> bool:
+        """Whether another executive drives the run by now, which is said if the command is refused
+        for it."""
+        if not self._journal.is_past(command.run, command.epoch):
+            return False
+        newest = self._journal.newest(command.run)
+        if command.verb is not Verb.HOLD:
+            text = f"{command.verb.name} {command.id}: {past_reason(command.epoch, newest)}"
+            self._log_throttle.log("a command of a past epoch", text)
+            self._publisher.refusal(command, newest)
+        return True
+
     def start(self, message: Any) -> None:
         """Handle a START: begin a new behavior, or publish the status of a known one again."""
         id_ = message.id
+        is_past = self._is_past(Command(Verb.START, id_, message.run, message.epoch))
         if self._journal.knows(id_):
             self._journal.repeat(id_)
             return
-        if self._journal.is_past(message.run, message.epoch):
-            self._journal.reject(id_, "REJECTED", _past(message.epoch))
+        if is_past:
+            newest = self._journal.newest(message.run)
+            self._journal.reject(id_, REFUSAL_CODE, past_reason(message.epoch, newest))
             return
         try:
             request = read_request(message, self._name)
@@ -283,6 +306,9 @@ class OnboardNode:
             reason = outcome.reason or (ENDED if self._ending else "")
             self._journal.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
 
+    def superseded(self, run: str, newest: int) -> None:
+        """Do nothing: what drives on board compares no epochs."""
+
     # --- statuses -------------------------------------------------------------------------------
 
     def _publish_status(self, status: Status) -> None:
@@ -344,14 +370,11 @@ class _Events:
         self.progress = node.progress
         self.remains = node.remains
         self.ended = node.ended
+        self.superseded = node.superseded
 
 
 def _goal(id_: str) -> UUID:
     return uuid5(IDS, id_)
-
-
-def _past(epoch: int) -> str:
-    return f"epoch {epoch} is past: another executive drives the run"
 
 
 LATE = 2.0

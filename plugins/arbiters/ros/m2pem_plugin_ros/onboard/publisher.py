@@ -11,7 +11,9 @@ from rclpy.node import Node
 
 from m2pem.api import Clock, PayloadState
 from m2pem_plugin_ros.interfaces import set_stamp
+from m2pem_plugin_ros.interfaces.behavior_command import Command
 from m2pem_plugin_ros.interfaces.behavior_status import Status, write_status
+from m2pem_plugin_ros.interfaces.command_refusal import write_refusal
 from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus, write_payload_status
 from m2pem_plugin_ros.runtime import qos
 
@@ -41,24 +43,32 @@ class StatusPublisher:
         self._behaviors: Any = None
         self._vehicle: Any = None
         self._payload: Any = None
+        self._refusals: Any = None
 
     def open(self, node: Node) -> None:
         """Create the publishers on a node."""
         create = node.create_publisher
         self._behaviors = create(interfaces.BehaviorStatus, "behavior_status", qos.BEHAVIOR_STATUS)
         self._vehicle = create(interfaces.VehicleStatus, "vehicle_status", qos.STATUS)
+        self._refusals = create(interfaces.CommandRefusal, "command_refusal", qos.COMMANDS)
         if self._payload_state is not None:
             self._payload = create(interfaces.PayloadStatus, "payload_status", qos.TELEMETRY)
 
     def close(self) -> None:
         """Publish nothing more."""
-        self._behaviors = self._vehicle = self._payload = None
+        self._behaviors = self._vehicle = self._payload = self._refusals = None
 
     def behavior(self, status: Status) -> None:
         """Publish the status of a behavior."""
         if self._behaviors is not None:
             message = write_status(interfaces.BehaviorStatus(), status, interfaces.KeyValue)
             self._publish(self._behaviors, message)
+
+    def refusal(self, command: Command, newest: int) -> None:
+        """Publish that a command is refused, as `newest` is the epoch of its run."""
+        if self._refusals is not None:
+            message = write_refusal(interfaces.CommandRefusal(), command, newest)
+            self._publish(self._refusals, message)
 
     def vehicle(self) -> None:
         """Publish the status of the vehicle."""

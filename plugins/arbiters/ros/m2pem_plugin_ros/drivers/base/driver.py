@@ -176,6 +176,9 @@ class BaseDriver:
         self._interrupted = order.goal
         return Outcome(BehaviorState.UNKNOWN, "", "the base was not commanded meanwhile")
 
+    def claim(self, run: UUID, epoch: int) -> None:
+        """Do nothing: a base knows no epochs."""
+
     def abandon(self) -> None:
         self._pilot.drop()
 
@@ -214,7 +217,7 @@ class BaseDriver:
                 joystick_age_s=self._teleop.age_s,
             )
         )
-        if step.twist is not None:
+        if step.twist is not None and self._setup.context.may_send():
             self._commands.send(step.twist)
             self._check_for_other_publishers()
         if age_s <= STALE_S and where.pose is not None:

@@ -28,10 +28,12 @@ seconds."""
 
 LOOK_S = 0.05
 
+MAY_SEND_EVERY_S = 0.05
+
 
 class Nav2:
     """A client of the Nav2 in `namespace`. `on_activity` is called with each message of Nav2, after
-    `has_answered`.
+    `has_answered`. No goal is sent while `may_send` is false.
 
     Raises:
         RosError: nav2_msgs is not installed.
@@ -43,11 +45,13 @@ class Nav2:
         namespace: str,
         on_activity: Callable[[], None],
         logger: logging.Logger,
+        may_send: Callable[[], bool] = lambda: True,
     ) -> None:
         self.messages = require_interfaces("nav2_msgs")
         self._ros = ros
         self._on_activity_reported = on_activity
         self._logger = logger
+        self._may_send = may_send
         self._name = namespace.rstrip("/")
         self._last_activity_s = self._now_s()
         self._own_goals: set[UUID] = set()
@@ -140,6 +144,8 @@ class Nav2:
             NavigationError: the goal failed.
             RosError: Nav2 does not answer.
         """
+        while not self._may_send():  # noqa: ASYNC110  # the journal answers soon
+            await asyncio.sleep(MAY_SEND_EVERY_S)
         await self._stop_others(client)
         self._own_goals = self._own_goals & client.active | {goal_id}
         try:

@@ -69,7 +69,13 @@ class Nav2Driver:
             RosError: nav2_msgs is not installed.
         """
         settings = self._setup.settings
-        self._nav2 = Nav2(self._setup.ros, settings.namespace, self._events.alive, self._logger)
+        self._nav2 = Nav2(
+            self._setup.ros,
+            settings.namespace,
+            self._events.alive,
+            self._logger,
+            self._setup.context.may_send,
+        )
         loop = asyncio.get_running_loop()
         self._polling = [
             loop.create_task(self._poll_nav2(self._nav2)),
@@ -172,6 +178,9 @@ class Nav2Driver:
             self._held = False
             self._work.replace(lambda: self._run(drive))
         return outcome
+
+    def claim(self, run: UUID, epoch: int) -> None:
+        """Do nothing: Nav2 knows no epochs."""
 
     def abandon(self) -> None:
         """Drop the order. What Nav2 still does for it is cancelled when the vehicle is received

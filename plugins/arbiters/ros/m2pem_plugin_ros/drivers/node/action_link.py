@@ -62,7 +62,7 @@ class ActionLink:
         self._setup = setup
         self._log_throttle = log_throttle
         self._client = GoalClient(setup.ros, name, Listeners(self._status, self._feedback))
-        self._pauses = Retries(setup.context.clock)
+        self._pauses = Retries(setup.context.clock, setup.context.may_send)
         self._current: _PendingGoal | None = None
         self._pending: dict[UUID, _PendingGoal] = {}
         self._shown: dict[UUID, int] = {}
@@ -204,6 +204,8 @@ class ActionLink:
         while not (pending.acknowledged or pending.over):
             if pending.cancelled and attempts:
                 break  # the goal may have arrived; `_cancel` checks it
+            while not self._setup.context.may_send():
+                await self._pauses.pause()
             try:
                 accepted = await self._client.send(pending.goal, command, CALL_S)
             except RosTimeoutError:

@@ -1,5 +1,6 @@
 """The driver of a vehicle with an m2pem node."""
 
+from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,10 +11,11 @@ from m2pem_interfaces import msg as interfaces
 from m2pem.api import BehaviorRequest, BehaviorState, ResolvedValue
 from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.node.action_link import ActionLink
-from m2pem_plugin_ros.drivers.node.link import STILL_S, NodeLink, Retries
+from m2pem_plugin_ros.drivers.node.link import REMEMBERED, STILL_S, NodeLink, Retries
 from m2pem_plugin_ros.drivers.node.topic_link import TopicLink
 from m2pem_plugin_ros.interfaces.behavior_command import Verb, adjust_command, vehicle_command
 from m2pem_plugin_ros.interfaces.behavior_status import read_status
+from m2pem_plugin_ros.interfaces.command_refusal import read_refusal
 from m2pem_plugin_ros.interfaces.key_values import WireError, encode_parameters
 from m2pem_plugin_ros.interfaces.vehicle_status import VehicleStatus, read_vehicle_status
 from m2pem_plugin_ros.log_throttle import LogThrottle
@@ -35,6 +37,7 @@ class NodeDriver:
         self._received_us = 0
         self._publisher: Any = None
         self._link: NodeLink | None = None
+        self._claims: OrderedDict[UUID, int] = OrderedDict()
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -53,6 +56,12 @@ class NodeDriver:
                 lambda message: self._on_status(link, message),
                 qos.BEHAVIOR_STATUS,
             )
+        ros.subscribe(
+            interfaces.CommandRefusal,
+            self._name("command_refusal"),
+            self._on_refusal,
+            qos.COMMANDS,
+        )
         ros.subscribe(
             interfaces.VehicleStatus,
             self._name("vehicle_status"),
@@ -116,6 +125,14 @@ class NodeDriver:
         outcome = await self._opened.query(order)
         return replace(outcome, held=self._status is not None and self._status.held)
 
+    def claim(self, run: UUID, epoch: int) -> None:
+        """Send CLAIM now, and again whenever the node is received anew."""
+        self._claims[run] = epoch
+        self._claims.move_to_end(run)
+        if len(self._claims) > REMEMBERED:
+            self._claims.popitem(last=False)
+        self._send(vehicle_command(Verb.CLAIM, run, epoch, self._clock.now_us()))
+
     def abandon(self) -> None:
         self._holding.stop_all()
         self._opened.abandon()
@@ -125,7 +142,11 @@ class NodeDriver:
     def _on_vehicle_status(self, message: Any) -> None:
         self._setup.events.alive()
         self._status = sent = read_vehicle_status(message)
+        was_silent = self._clock.now_us() - self._received_us > STILL_S * 1e6
         self._received_us = self._clock.now_us()
+        if was_silent:
+            for run, epoch in self._claims.items():
+                self._send(vehicle_command(Verb.CLAIM, run, epoch, self._received_us))
         if sent.vehicle != self._resource:
             self._log_throttle.log(
                 f"the node in {self._name('')} belongs to another vehicle", sent.vehicle
@@ -138,6 +159,10 @@ class NodeDriver:
             link.status(read_status(message))
         except WireError as error:
             self._log_throttle.log("an invalid status", str(error))
+
+    def _on_refusal(self, message: Any) -> None:
+        refusal = read_refusal(message)
+        self._setup.events.superseded(refusal.run, refusal.newest)
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -159,12 +184,20 @@ class NodeDriver:
     def _retry(self, verb: int, held: bool) -> None:
         # A status may be older than the command, so it is checked repeatedly.
         sent = 0
+        order = self._opened.order
+        run = None if order is None else order.run
+        context = self._setup.context
+        epoch = 0
+        if order is not None:
+            epoch = max(context.epoch_of(order.request.id), order.request.epoch)
 
         def send() -> bool:
             nonlocal sent
+            if not (held or context.may_send()):
+                return True
             agrees = self._status is not None and self._status.held is held
             if not (sent and agrees):
-                self._send(vehicle_command(verb, self._clock.now_us()))
+                self._send(vehicle_command(verb, run, epoch, self._clock.now_us()))
             sent += self._clock.now_us() - self._received_us < STILL_S * 1e6
             return sent < HOLD_REPEATS
 

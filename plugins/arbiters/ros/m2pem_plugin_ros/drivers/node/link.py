@@ -63,10 +63,11 @@ SHORTEST_S = 0.02
 
 class Retries:
     """Repeats messages until they are acknowledged. Each has a name; a new one replaces that of the
-    same name."""
+    same name. Nothing is repeated while `may_send` is false."""
 
-    def __init__(self, clock: Clock) -> None:
+    def __init__(self, clock: Clock, may_send: Callable[[], bool] = lambda: True) -> None:
         self._clock = clock
+        self._may_send = may_send
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     def start(self, name: str, send: Callable[[], bool]) -> None:
@@ -93,9 +94,12 @@ class Retries:
 
     async def pause(self) -> None:
         """Wait until the next repetition."""
-        async with asyncio.TaskGroup() as both:
-            both.create_task(self._clock.sleep(REPEAT_S))
-            both.create_task(asyncio.sleep(SHORTEST_S))
+        while True:
+            async with asyncio.TaskGroup() as both:
+                both.create_task(self._clock.sleep(REPEAT_S))
+                both.create_task(asyncio.sleep(SHORTEST_S))
+            if self._may_send():
+                return
 
     async def _repeat(self, send: Callable[[], bool]) -> None:
         while True:

@@ -51,7 +51,7 @@ class TopicLink:
         self._setup = setup
         self._send = send
         self._log_throttle = log_throttle
-        self._retries = Retries(setup.context.clock)
+        self._retries = Retries(setup.context.clock, setup.context.may_send)
         self._current: _PendingGoal | None = None
         self._pending: dict[str, _PendingGoal] = {}
         self._ended: dict[str, Outcome] = {}

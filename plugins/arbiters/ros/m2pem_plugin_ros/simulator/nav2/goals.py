@@ -153,6 +153,8 @@ class BaseOrders:
 
     def remains(self, goal: UUID, remaining: Mapping[str, Value]) -> None: ...
 
+    def superseded(self, run: str, newest: int) -> None: ...
+
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         waiting = self._waiting.get(goal)
         if waiting is not None and not waiting.done():
