@@ -106,8 +106,7 @@ async def take_over(
         dispatcher.keep_between_tasks(keeping.id, keeping.resource)
     _recall(runner, arbiters, dispatcher)
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
-    newest = max((report.epoch for report in reports if report is not None), default=0)
-    if newest > runner.epoch:
+    if (newest := _newest_epoch(reports)) > runner.epoch:
         runner.fail(replaced_by(runner, newest))
         return []
     resend: set[str] = set()
@@ -158,12 +157,17 @@ async def look_again(
     Returns the inputs that what was seen amounts to, and the behaviors whose start must not be
     sent any more. After an outage longer than the fleet's `max_outage`, every behavior is held and
     an operator is asked. A vehicle that cannot be asked is left to the link monitor.
+
+    Raises:
+        StaleEpochError: a vehicle has seen a newer epoch of the run.
     """
     state = runner.run.state
     max_outage_s = arbiters.fleet.max_outage_s
     too_long = max_outage_s is not None and outage_s > max_outage_s
     known = list(state.behaviors.values())
     reports = await asyncio.gather(*(_query(arbiters, behavior) for behavior in known))
+    if (newest := _newest_epoch(reports)) > runner.epoch:
+        raise replaced_by(runner, newest)
     items: list[Input] = []
     unsent: set[str] = set()
     for behavior, report in zip(known, reports, strict=True):
@@ -220,6 +224,11 @@ def _arbiter(arbiters: FleetArbiters, behavior: Behavior) -> Arbiter:
     ids = [ResourceId(name) for name in behavior.resources]
     serving = arbiters.serving(ids, behavior.name, BehaviorType(behavior.type))
     return serving or arbiters.of(ids[0])
+
+
+def _newest_epoch(reports: Iterable[BehaviorReport | None]) -> int:
+    """Return the highest epoch that a vehicle has seen; 0: none says."""
+    return max((report.epoch for report in reports if report is not None), default=0)
 
 
 def replaced_by(runner: Runner, newest: int) -> StaleEpochError:

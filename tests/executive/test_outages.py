@@ -7,7 +7,7 @@ from dataclasses import replace
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.clock import SystemClock
 from m2pem.api.runs import Alert, RunStatus
-from m2pem.errors import OperatorError
+from m2pem.errors import OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.outages import CODE, OUTAGE_S, Outages
 from m2pem.journal import MemoryJournal
@@ -53,6 +53,21 @@ def test_a_run_looks_at_its_vehicles_before_it_sends_anything(play):
         await world.fake.until_called("start", "r1.b2")
         calls = [(call.what, call.subject) for call in world.fake.calls]
         assert calls == [("start", "r1.b1"), ("query", "r1.b1"), ("start", "r1.b2")]
+
+    play(story, fleet=bounded())
+
+
+def test_a_run_that_another_executive_took_over_meanwhile_sends_nothing(play):
+    async def story(world: World):
+        await driving(world)
+        seen = BehaviorReport("r1.b1", 1, BehaviorState.RUNNING, epoch=2)
+        world.fake.known["r1.b1"] = seen
+        world.executive.outages.noticed(BOUND - 1)
+        world.fake.report("r1.b1", BehaviorState.SUCCEEDED)
+        with suppress(StaleEpochError):
+            await world.executive.control.wait("r1")
+        await world.fake.until_called("disown", "r1")
+        assert world.fake.count("start") == 1
 
     play(story, fleet=bounded())
 
