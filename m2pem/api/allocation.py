@@ -83,7 +83,7 @@ class TakeEffect:
 
 @dataclass(frozen=True, slots=True)
 class SpaceHolder:
-    """A vehicle that has a place in a shared space. `behavior`: "" if it stands there; `lost`:
+    """A vehicle that has a place in a shared space. `behavior`: "" if it is at rest there; `lost`:
     nothing is received from it."""
 
     vehicle: ResourceId
@@ -91,7 +91,7 @@ class SpaceHolder:
     lost: bool = False
 
     def __str__(self) -> str:
-        what = "lost" if self.lost else self.behavior or "stands there"
+        what = "lost" if self.lost else self.behavior or "at rest there"
         return f"{self.vehicle} ({what})"
 
 

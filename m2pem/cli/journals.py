@@ -164,9 +164,9 @@ class Interrupted:
     behaviors: Mapping[str, str]
 
     def as_text(self) -> str:
-        """For people: what may still move or stand held, and the commands to go on."""
+        """For people: what may still move or be held, and the commands to go on."""
         held = ", ".join(f"{name} ({behavior})" for name, behavior in self.behaviors.items())
-        what = f"it has {held}, which may go on or stand held" if held else "it has no vehicle"
+        what = f"it has {held}, which may go on or be held" if held else "it has no vehicle"
         return (
             f"{self.run} ({self.mission}) was interrupted, and no executive drives it: {what}; "
             f"`m2pem resume {self.run}` goes on with it, and `m2pem resume {self.run} --stop` "

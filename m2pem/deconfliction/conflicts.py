@@ -103,7 +103,7 @@ def does_what(other: Occupant, heights: str | None = None) -> str:
         return f"is lost{did}"
     if other.behavior:
         return f"does {other.behavior} ({other.name}){at}"
-    return "stands there" if heights is None else f"flies{at}"
+    return "is at rest there" if heights is None else f"flies{at}"
 
 
 def _unknown(conflict: Conflict) -> list[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 It is what Open-RMF calls a mutex group, with a capacity. A behavior whose volume enters one needs a
 place in it for each of its vehicles, from its start until the vehicle has left it and the rest of
-its way does not enter it again. A vehicle that stands in it has a place.
+its way does not enter it again. A vehicle at rest in it has a place.
 """
 
 from collections.abc import Collection, Iterable, Mapping

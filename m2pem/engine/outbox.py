@@ -171,7 +171,7 @@ def _held_for(state: RunState, resources: Iterable[str]) -> list[Command]:
 
 def _let_go(state: RunState, resources: Iterable[str]) -> list[Command]:
     """Return the commands for what an incident has kept and nothing has now: what got a behavior
-    has a command of its own, and what is being cancelled comes to a stand."""
+    has a command of its own, and what is being cancelled stops."""
     return [
         ResumeResource(resource)
         for resource in resources

@@ -228,7 +228,7 @@ JOINT_STATES = (
     ),
     JointState(
         "cancelling",
-        "Its vehicles come to a stand, or a behavior that preempts it has them already.",
+        "Its vehicles stop, or a behavior that preempts it has them already.",
         (_E.CANCELLING,),
         (_D.COMMANDED, _D.CANCELLED),
         (_A.HELD, _A.OTHER),

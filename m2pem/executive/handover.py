@@ -150,7 +150,7 @@ def refuse_busy_resources(
     """Check that everything that a mission names is free now.
 
     `taken`: the operators who have resources. `holder`: the behavior that holds a resource.
-    `over`: runs that have ended; a vehicle may still come to a stand for one.
+    `over`: runs that have ended; a vehicle may still be stopping for one.
 
     Raises:
         BusyError: it is not; the error says who has what, and what to do.
@@ -167,7 +167,7 @@ def refuse_busy_resources(
     who = [f"run {run} uses {_list(names)}" for run, names in runs.items()]
     who += [f"{operator} has {_list(names)}" for operator, names in operators.items()]
     do = [
-        f"wait until {_list(names)} has come to a stand: run {run} has ended"
+        f"wait until {_list(names)} has stopped: run {run} has ended"
         if run in over
         else f"wait until run {run} is done with {_list(names)}, or stop it"
         for run, names in runs.items()

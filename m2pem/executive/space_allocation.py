@@ -1,7 +1,7 @@
 """Reserves space for what the allocator chooses, and finds tasks that wait for each other's space.
 
 A task that waits for space holds none. Later tasks get nothing that it needs as long as behaviors
-that will end are in its way: so it is not overtaken for ever. A vehicle that stands in its way, or
+that will end are in its way: so it is not overtaken for ever. A vehicle at rest in its way, or
 that is lost, may stay there: what the task needs is then free for others.
 """
 
@@ -115,7 +115,7 @@ def _ends(blocker: "Occupant") -> bool:
 
 
 def holders_of(refusal: "Refusal") -> dict[str, str]:
-    """Return who has the space that a task waits for: behaviors, and vehicles that stand there.
+    """Return who has the space that a task waits for: behaviors, and vehicles at rest there.
 
     The keys are the name of the shared space, or that of the vehicle which is in the way.
     """
@@ -130,7 +130,7 @@ def space_circles(
     """Return the sets of requests that wait for each other's vehicles to leave.
 
     `refusals`: of the requests that wait for space. `vehicles`: by all requests that wait, those
-    that they name: a vehicle that stands is moved by the request that waits for it.
+    that they name: a vehicle at rest is moved by the request that waits for it.
     """
 
     def holder(request: str, blocker: "Occupant") -> str | None:

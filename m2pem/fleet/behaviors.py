@@ -56,7 +56,7 @@ _SHAPE = ParameterSpec(
     "shape",
     ParameterKind.TEXT,
     choices=("column", "line", "wedge", "vee", "diamond", "echelon_left", "echelon_right"),
-    doc="How the members stand to each other.",
+    doc="How the members are placed to each other.",
 )
 
 
@@ -107,7 +107,7 @@ def _vehicle_behaviors() -> tuple[BehaviorSpec, ...]:
         _behavior(
             vehicle,
             "hold",
-            "Stand for a time; without a duration, end as soon as the vehicle stands.",
+            "Stay at rest for a time; without a duration, end as soon as the vehicle is at rest.",
             _DURATION,
             resume=ResumePolicy.RESTART,
         ),

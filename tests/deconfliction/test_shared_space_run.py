@@ -134,7 +134,7 @@ def test_who_stands_on_the_bridge_has_its_place_until_it_has_left(play: Play) ->
         return delays(world)[0].reason
 
     said = rovers(play, story)
-    assert "taken by one, which stands there: start it after one has left it" in said
+    assert "taken by one, which is at rest there: start it after one has left it" in said
 
 
 def test_a_wait_ends_when_its_time_is_up(play: Play) -> None:
@@ -149,7 +149,7 @@ def test_a_wait_ends_when_its_time_is_up(play: Play) -> None:
 
     ended = rovers(play, story, policy=policy(wait_s=90.0))
     assert ended.code == "RESOURCE_UNAVAILABLE"
-    assert "which stands there" in ended.reason
+    assert "which is at rest there" in ended.reason
 
 
 def test_a_lost_rover_keeps_its_place_and_the_other_times_out(play: Play) -> None:
@@ -255,7 +255,7 @@ def test_three_in_a_ring_wait_for_each_other_and_operators_are_warned(play: Play
     assert all(f"Next of {run} (" in alerts[0] for run in ("r1", "r2", "r3"))
     assert not re.search(r"\br\d\.\w", alerts[0])
     for name in spots:
-        assert f"taken by {name}, which stands there" in alerts[0]
+        assert f"taken by {name}, which is at rest there" in alerts[0]
     assert "none of them can go on by itself" in alerts[0]
 
 

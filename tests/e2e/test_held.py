@@ -76,7 +76,7 @@ def test_what_an_interrupted_run_has_left_behind_is_said_and_can_be_stopped(
     _, shown, _ = m2pem.run("fleet", fleet, "--journal", "journal.db")
     for text in (refused, shown):
         assert "r1 (drive.bpmn) was interrupted, and no executive drives it" in text
-        assert "it has evsg1 (goto), which may go on or stand held" in text
+        assert "it has evsg1 (goto), which may go on or be held" in text
         assert "`m2pem resume r1 --stop` stops it" in text
     assert status == 1
     assert m2pem.run("resume", "r1", "--stop", "--journal", "journal.db")[0] == 130

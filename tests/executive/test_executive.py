@@ -368,7 +368,7 @@ def test_a_start_is_refused_while_a_vehicle_comes_to_a_stand_for_a_run_that_has_
             await control.start(DRIVE)
         return str(refused.value)
 
-    assert "wait until ugv1 has come to a stand: run r1 has ended" in play(story, "ugv1")
+    assert "wait until ugv1 has stopped: run r1 has ended" in play(story, "ugv1")
 
 
 def test_a_start_is_refused_while_an_operator_has_a_vehicle_of_the_mission(play):

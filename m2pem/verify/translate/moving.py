@@ -235,11 +235,11 @@ def _stopped(
 
 
 def _stands(group: Group, standing: int) -> str:
-    """Say that a vehicle stands in a shared space; "": it does not."""
+    """Say that a vehicle is at rest in a shared space; "": it is not."""
     inside = group.standings[standing]
     vehicles = group.vehicles
     who = vehicles[0] if len(vehicles) == 1 else f"one of {', '.join(vehicles)}"
-    return f"{who} stands in {_said(inside)}" if inside else ""
+    return f"{who} is at rest in {_said(inside)}" if inside else ""
 
 
 def standing_place(context: TranslationContext, group: Group, standing: int) -> int | None:
@@ -326,8 +326,8 @@ def initial_places(context: TranslationContext) -> tuple[int, ...]:
 def _note(context: TranslationContext, plan: SpacePlan, groups: Sequence[Group]) -> None:
     """Note where the net is not exactly what vehicles do."""
     if unknown := plan.unknown_homes():
-        stands = "stand" if len(unknown) > 1 else "stands"
-        what = f"where {', '.join(unknown)} {stands} at first is not known: in no shared space"
+        are = "are" if len(unknown) > 1 else "is"
+        what = f"where {', '.join(unknown)} {are} at first is not known: in no shared space"
         context.net.approximate(context.process, Exactness.BOUNDED, what)
     for node in context.mission.nodes:
         if names := plan.unknown(node, groups):

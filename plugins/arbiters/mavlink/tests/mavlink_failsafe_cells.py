@@ -115,7 +115,7 @@ FLYING = _phases(
     Phase("landing", (UP, GO, ("land", {})), lambda s: s.mode == "LAND"),
 )
 DRIVING = _phases(
-    Phase("standing", (DRIVE,), lambda s: s.located, before=True),
+    Phase("at rest", (DRIVE,), lambda s: s.located, before=True),
     Phase("in a goto", (DRIVE,), lambda s: s.mode == "GUIDED" and s.distance_m() > FAR_M),
     Phase(
         "in a survey",

@@ -21,7 +21,7 @@ No boundary event catches an error, so that a behavior that fails ends the missi
 it and go on. When the mission is over, m2pem ends, and with it its heartbeats as a ground station:
 a vehicle that stays in the air then returns by its own ground station failsafe.
 
-Phases that went alike share a row, and failsafes their rows. Where "on the ground" or "standing" is
+Phases that went alike share a row, and failsafes their rows. Where "on the ground" or "at rest" is
 missing (but for the terrain), the vehicle was not armed, and the behavior ended with `FAILED` and
 the reason, such as "not ready: prearm: Battery 1 low voltage failsafe".
 
@@ -36,7 +36,7 @@ Operators read, besides, what the vehicle says; what is missing until it is read
 that was armed, its last mode and height; and at the end of the mission which vehicles stay armed.
 
 Rovers say "Radio Failsafe" when it is the ground station that they have lost. Planes circle where
-copters stand.
+copters hover.
 
 PX4 arms without manual control, and has then no failsafe for its loss until the pilot is there
 again. Its texts say "Failsafe activated" without the cause. PX4 restarts neither in the simulation
@@ -89,7 +89,7 @@ def _page() -> Iterator[str]:
 
 def _cells(seen: dict[str, Any]) -> str:
     modes = ", ".join(seen["modes"]) or "same mode"
-    end = "stands, armed" if seen.get("stands") else "armed"
+    end = "at rest, armed" if seen.get("stands") else "armed"
     if seen["disarmed"]:
         end = "disarmed" if seen["at home"] else "disarmed away"
     said = "\n".join(seen["said"])

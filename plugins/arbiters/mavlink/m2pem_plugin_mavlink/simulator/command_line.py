@@ -92,7 +92,7 @@ class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have
 @click.option(
     "--home",
     type=PositionOption(),
-    help="Where the first vehicle stands.  [default: Zurich]",
+    help="Where the first vehicle is at first.  [default: Zurich]",
 )
 @click.option(
     "--ekf",

@@ -74,7 +74,7 @@ class PlantedTarget(click.ParamType):  # type: ignore[type-arg]  # older clicks 
     help="How vehicles without a fleet are reached.  [default: m2pem]",
 )
 @click.option(
-    "--home", type=PositionOption(), help="Where the first vehicle without a fleet stands."
+    "--home", type=PositionOption(), help="Where the first vehicle without a fleet is at first."
 )
 @click.option(
     "--target",

@@ -149,7 +149,7 @@ class WaitingTaskModel(BaseModel):
 
 
 class SpaceHolderModel(BaseModel):
-    """A vehicle that has a place in a shared space. `behavior`: "" if it stands there."""
+    """A vehicle that has a place in a shared space. `behavior`: "" if it is at rest there."""
 
     vehicle: str
     behavior: str

@@ -56,7 +56,7 @@ class CommandTopic:
             self._publisher.wait_for_all_acked, Duration(seconds=ARRIVED_WITHIN_S)
         )
         if not arrived:
-            logger.warning("%s: the last command, to stand, was not acknowledged", self.name)
+            logger.warning("%s: the last command, to stop, was not acknowledged", self.name)
 
 
 class TeleopTopic:

@@ -186,7 +186,7 @@ export interface Schedule {
 
 export interface SpaceHolder {
   vehicle: string;
-  /** "": it stands there. */
+  /** "": it is at rest there. */
   behavior: string;
   lost: boolean;
 }

@@ -36,7 +36,7 @@ export const shell = {
   offline: "Not connected to the executive. What is shown may be old.",
   offlineShort: "Not connected",
   retry: "Try now",
-  questions: "questions stand",
+  questions: "questions open",
   question: "question open",
   dismiss: "Dismiss",
   close: "Close",

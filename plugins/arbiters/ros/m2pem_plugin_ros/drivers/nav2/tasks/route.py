@@ -72,7 +72,7 @@ class Route(Nav2GoalTask):
             error = missed(waypoints)
             return Outcome(error.state, error.code, error.reason)
         if self._loops:
-            return Outcome(BehaviorState.UNKNOWN, reason="it stands at the end of a lap")
+            return Outcome(BehaviorState.UNKNOWN, reason="it is at rest at the end of a lap")
         return Outcome(BehaviorState.SUCCEEDED)
 
     def _pass(self, index: int) -> None:

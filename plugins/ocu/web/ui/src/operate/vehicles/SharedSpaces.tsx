@@ -35,7 +35,7 @@ export function SharedSpaces() {
                   ? text.free
                   : holders.map(({ vehicle, behavior, lost }) => (
                       <div key={vehicle}>
-                        {vehicle} <small>{lost ? text.lost : behavior || text.stands}</small>
+                        {vehicle} <small>{lost ? text.lost : behavior || text.atRest}</small>
                       </div>
                     ))}
               </td>
