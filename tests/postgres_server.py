@@ -88,10 +88,10 @@ class PostgresServer:
 
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[PostgresServer]:
-    """A server; skips where PostgreSQL is not installed."""
+    """A server; fails where PostgreSQL is not installed."""
     programs = _programs()
     if programs is None:
-        pytest.skip("PostgreSQL is not installed (Debian: postgresql)")
+        pytest.fail("PostgreSQL is not installed: make test installs it (Debian: postgresql)")
     server = PostgresServer(programs)
     yield server
     server.remove()
