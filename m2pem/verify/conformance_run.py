@@ -19,6 +19,7 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.arming import definition_of
 from m2pem.engine.data import reader
+from m2pem.engine.keeping import may_use
 from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunStatus, Token, Wait
 from m2pem.engine.steps import Steps
@@ -171,11 +172,14 @@ class ConformanceRun:
             return
         chosen: dict[str, tuple[str, ...]] = {}
         given: set[str] = set()
+        token = request.token
         for role, places in choices.read(detail).items():
-            for alike in places:
-                free = next((r for r in alike if r not in given and self._is_free(r)), None)
+            for filling in places:
+                unused = [each for each in filling.resources if each not in given]
+                free = next((r for r in unused if self._is_free(token, r, filling.kept)), None)
                 if free is None:
-                    raise NotPlayableError(f"{' and '.join(alike)} are not free in the engine now")
+                    names = " and ".join(filling.resources)
+                    raise NotPlayableError(f"{names} are not free in the engine now")
                 given.add(free)
                 chosen[role] = (*chosen.get(role, ()), free)
         self._give(i.ResourcesChosen(request.id, chosen, {"roles": {}, "together_with": []}))
@@ -190,10 +194,19 @@ class ConformanceRun:
         if request is not None:
             self._give(i.ResourcesNotFree(request.id, f"{space} is full", {}, "REJECTED"))
 
-    def _is_free(self, resource: str) -> bool:
+    def _is_free(self, token: Token, resource: str, kept: str) -> bool:
+        """Whether no task has a resource, and it is kept for a task until `kept` ends; "": is not
+        kept."""
         state = self.run.state
         holders = [state.behaviors[each] for each in state.held.get(ResourceId(resource), ())]
-        return all(each.phase is BehaviorPhase.CANCELLING for each in holders)
+        if any(each.phase is not BehaviorPhase.CANCELLING for each in holders):
+            return False
+        keeping = state.kept.get(resource)
+        if keeping is None or not kept:
+            return keeping is None and not kept
+        owner = keeping.until.owner
+        ends = {keeping.until.container.id, *(() if owner is None else (owner.node.id,))}
+        return kept in ends and may_use(keeping, token)
 
     def _end_work(self, element: str, code: str, writes: Mapping[str, Any]) -> None:
         token = self._token(element, "behavior", "service", "prompt")

@@ -10,6 +10,7 @@ from m2pem.allocation.needs import ConsideredRole, Occupancy, RoleEvaluator, Tas
 from m2pem.engine import inputs as i
 from m2pem.engine.data import reader
 from m2pem.engine.elements.allocations import behavior_of
+from m2pem.engine.keeping import may_use
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import AllocationRequest, BehaviorPhase, RunState
 from m2pem.fleet.allocation import resources_of
@@ -74,6 +75,11 @@ class Allocator:
             ResourceId(resource): Occupancy(holders[-1])
             for resource, holders in state.held.items()
             if any(state.behaviors[h].phase is not BehaviorPhase.CANCELLING for h in holders)
+        }
+        occupied |= {
+            ResourceId(resource): Occupancy(keeping.id)
+            for resource, keeping in state.kept.items()
+            if not may_use(keeping, request.token)
         }
         evaluator = RoleEvaluator(Candidates(self.fleet, self._graph, lambda _: None))
         behavior = behavior_of(request)

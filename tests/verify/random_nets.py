@@ -16,7 +16,13 @@ from m2pem.verify.net.petri_net import (
 )
 
 _KINDS = (Kind.INTERNAL, Kind.INTERNAL, Kind.JOIN, Kind.EXTERNAL, Kind.EXTERNAL)
-_OF_RESOURCES = (Action.ALLOCATED, Action.LEFT, Action.STANDS, Action.REFUSED)
+_OF_RESOURCES = (
+    Action.ALLOCATED,
+    Action.LEFT,
+    Action.STANDS,
+    Action.REFUSED,
+    Action.RELEASED,
+)
 _ACTIONS = [each for each in Action if each not in _OF_RESOURCES]
 _ENDS = 3
 

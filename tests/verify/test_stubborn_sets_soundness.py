@@ -18,6 +18,7 @@ from tests.engine.notation import mission as notation
 from tests.engine.random_missions import graph, structured
 from tests.seeds import seeds_for
 from tests.verify.answers import FEW, NO_FEWER, atoms_of, both, formula_of
+from tests.verify.random_keeping import keeping
 from tests.verify.random_mission_nets import random_mission_net
 from tests.verify.random_needs import branches_with_needs, net_of
 from tests.verify.random_nets import random_net
@@ -57,6 +58,10 @@ def missions(dice: Random) -> PetriNet:
 
 def needs(dice: Random) -> PetriNet:
     return net_of(notation(branches_with_needs(dice)))
+
+
+def keepings(dice: Random) -> PetriNet:
+    return net_of(notation(keeping(dice)))
 
 
 def seen(found: Exploration) -> tuple[object, ...]:
@@ -123,6 +128,7 @@ def places(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
         (transitions, 25),
         (missions, 10),
         (needs, 3),
+        (keepings, 4),
     ],
 )
 def test_nothing_that_can_be_asked_is_answered_otherwise(make: Make, models: int) -> None:
@@ -150,7 +156,9 @@ def test_nor_of_odd_models(make: Make, seed: int) -> None:
 @pytest.mark.long
 @pytest.mark.timeout(3_600)
 @pytest.mark.usefixtures("places")
-@pytest.mark.parametrize("make", [nets, sound_nets, failing_nets, transitions, missions, needs])
+@pytest.mark.parametrize(
+    "make", [nets, sound_nets, failing_nets, transitions, missions, needs, keepings]
+)
 def test_nor_of_very_many_models(make: Make) -> None:
     count: Counter[str] = Counter()
     assert not [each for seed in seeds_for(LONG_S) for each in compare(make, seed, count)]

@@ -155,6 +155,8 @@ class Follower:
                 self.candidates = set(list(found | more)[:_MOST_CANDIDATES])
                 return True
             reached = {each for number in reached for each in self._after(number)}
-            if not reached or len(reached) > _MOST_CANDIDATES:
+            if len(reached) > _MOST_CANDIDATES:
+                raise TooManyStatesError
+            if not reached:
                 break
         return False

@@ -60,6 +60,7 @@ class Concurrency:
         self.rows = [0] * len(net.places)
         self.live: set[int] = set()
         self._marked = 0
+        self._kept = bits_of(place.index for place in net.places if place.kept)
         self._wants = [_Wants(transition) for transition in net.transitions]
         by_place: dict[int, list[Transition]] = {}
         for transition in net.transitions:
@@ -106,11 +107,13 @@ class Concurrency:
             if not self.rows[place] >> place & 1:
                 beside &= ~(1 << place)
         self.live.add(transition.index)
-        moved = 0
+        moved = many = 0
         for source, target in (*transition.moves, *transition.copies):
             if beside >> source & 1:
                 moved |= 1 << target
-        twice = wants.twice | moved & wants.made
+                if self._kept >> source & self.rows[source] >> source & 1:  # all of them go
+                    many |= 1 << target
+        twice = wants.twice | moved & wants.made | many
         return self._add(wants.made | moved, beside & ~wants.reset_places, twice)
 
     def _add(self, made: int, beside: int, twice: int) -> set[int]:

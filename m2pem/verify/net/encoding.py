@@ -27,7 +27,9 @@ class CompiledTransition:
     """A transition as masks. `plain`: the masks say it all; else the lists add the rest.
 
     `erase`: of the bits that are cleared, those that go after tokens have moved; the others are
-    consumed before. `reset`: of those, the places that are emptied whatever they hold.
+    consumed before. `reset`: of those, the places that are emptied whatever they hold. `moves`:
+    masks of the first and second place, the offset of the second, whether the first is emptied, and
+    the offset of the first if all its tokens go, else -1.
     """
 
     test: int = 0
@@ -40,7 +42,7 @@ class CompiledTransition:
     at_least: list[tuple[int, int, int]] = field(default_factory=list)
     at_most: list[tuple[int, int, int]] = field(default_factory=list)
     takes: list[tuple[int, int]] = field(default_factory=list)
-    moves: list[tuple[int, int, int, bool]] = field(default_factory=list)
+    moves: list[tuple[int, int, int, bool, int]] = field(default_factory=list)
     gives: list[tuple[int, int, int, int]] = field(default_factory=list)
     reset: int = 0
     reads: int = 0
@@ -60,7 +62,8 @@ class Encoding:
         at = 0
         for place in net.places:
             width = self.wider.get(place.index, SEVERAL_BITS if place.several else 1)
-            width = max(width, len(place.free).bit_length(), place.most.bit_length())
+            most = max(len(place.free), len(place.kept), place.most)
+            width = max(width, most.bit_length())
             self.offset.append(at)
             self.width.append(width)
             self.mask.append(((1 << width) - 1) << at)
@@ -137,7 +140,10 @@ class Encoding:
             c.erase = c.reset
         for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
-                c.moves.append((self.mask[source], self.mask[target], self.offset[target], gone))
+                all_of = -1 if gone or not self.net.places[source].kept else self.offset[source]
+                c.moves.append(
+                    (self.mask[source], self.mask[target], self.offset[target], gone, all_of)
+                )
         for place, count in transition.produce:
             if self.width[place] == 1 and count == 1:
                 c.put |= self.mask[place]
@@ -164,7 +170,7 @@ class Encoding:
         c.changes = c.clear | c.put
         for place, _ in c.takes:
             c.changes |= self.mask[place]
-        for source, target, _, gone in c.moves:
+        for source, target, _, gone, _ in c.moves:
             c.reads |= source
             c.changes |= target | (source if gone else 0)
         for mask, *_ in c.gives:
@@ -207,8 +213,12 @@ class Encoding:
             if self.width[place] == 1:
                 consumed |= self.mask[place]
         state &= ~consumed
-        for source, target, offset, gone in c.moves:
+        for source, target, offset, gone, all_of in c.moves:
             if state & source:
+                if all_of >= 0:
+                    room = (target & ~state) >> offset
+                    state += min((state & source) >> all_of, room) << offset
+                    continue
                 if gone:
                     state &= ~source
                 if state & target != target:

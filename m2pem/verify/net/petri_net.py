@@ -7,8 +7,8 @@ values named. Firing, in this order:
 
 1. the tokens of `consume` are removed;
 2. for each pair of `moves`, a token on the first place goes to the second, and for each pair of
-   `copies`, a token on the first place puts one on the second; an empty first place is no
-   obstacle, and a second place that is full stays as it is;
+   `copies`, a token on the first place puts one on the second (of a place of kept resources, each
+   token does); an empty first place is no obstacle, and a second place that is full stays as it is;
 3. the places of `reset` lose all their tokens;
 4. the tokens of `produce` are added;
 5. the variables of `assign` get their values.
@@ -131,8 +131,15 @@ class Place:
     """A pool of interchangeable resources: each token says that one of them is free. It never has
     more tokens than resources."""
     returns: tuple[int, ...] = ()
-    """Pools that a resource is given back to when the place loses its token: each transition that
-    resets the place copies its token there."""
+    """Where a resource goes when the place loses its token, a pool or a place of kept resources:
+    each transition that resets the place copies its tokens there."""
+    kept: tuple[str, ...] = ()
+    """A pool of interchangeable resources: each token says that one of them is kept between tasks,
+    and that none of these has it now."""
+    keepers: tuple[str, ...] = ()
+    """Of a place of kept resources: the tasks that keep them, until the end of the process or
+    subprocess `until`."""
+    until: str = ""
     holder: int | None = None
     """Of a place with `returns`: the active place of the task that holds the resources."""
     space: str = ""
@@ -179,6 +186,8 @@ class Action(StrEnum):
     """A vehicle of an activity leaves the shared space of `detail`."""
     STANDS = "stands"
     """A vehicle of the process has stopped; `detail` says where it stands in a shared space."""
+    RELEASED = "released"
+    """A process has nothing left to do, and keeps nothing more."""
     REFUSED = "refused"
     """An activity may not enter the shared space of `detail`, which is full."""
     ALLOCATED = "allocated"

@@ -152,15 +152,20 @@ def watch_interruptions(
     """Return the extended net, and by place the vehicle; None: no vehicle can be interrupted.
 
     A vehicle of a pool that is interrupted goes to the pool's own such place, from which tasks may
-    take it as well. Payloads are not considered: a camera that no behavior commands does no harm.
+    take it as well; so does one that is kept between tasks. Payloads are not considered: a camera
+    that no behavior commands does no harm.
     """
-    pools = {p.index: p.free for p in net.places if p.free and set(p.free) <= set(vehicles)}
+    pools = {
+        p.index: pool
+        for p in net.places
+        if (pool := p.free or p.kept) and set(pool) <= set(vehicles)
+    }
     held = {
         p.index: mine
         for p in net.places
         if not p.returns and (mine := tuple(each for each in p.resources if each in vehicles))
     }
-    given = {p.index for p in net.places if set(p.returns) & pools.keys()}
+    given = {p.index for p in net.places if set(p.returns) & pools.keys() and not p.kept}
     if not any(_interrupts(net, each, {*held, *given}) for each in net.transitions):
         return None
     resources = sorted({r for each in held.values() for r in each})
@@ -169,7 +174,7 @@ def watch_interruptions(
     places = [Place(number[r], f"{r}~interrupted", net.process, 0, Role.CONTROL) for r in resources]
     stopped = {pool: first + len(places) + n for n, pool in enumerate(pools)}
     places += [
-        replace(net.places[pool], index=n, name=f"{net.places[pool].name}~interrupted")
+        replace(net.places[pool], index=n, name=f"{net.places[pool].name}~interrupted", returns=())
         for pool, n in stopped.items()
     ]
     transitions = [
@@ -214,15 +219,17 @@ def _interrupts(
 
 def _stopping(net: PetriNet, transition: Transition, stopped: dict[int, int]) -> Transition:
     """Give back what a transition interrupts to the places of interrupted vehicles."""
-    given_back = {p for p, pool in transition.copies if pool in stopped}
+    given_back = {p for p, pool in transition.copies if pool in stopped and p not in stopped}
     interrupted = {p for p, _ in _interrupts(net, transition, given_back)}
-    if not interrupted:
+    kept = [(stopped[p], stopped[pool]) for p, pool in transition.copies if p in stopped]
+    if not interrupted and not kept:
         return transition
-    copies = tuple(
+    copies = [
         (p, stopped[pool] if p in interrupted and pool in stopped else pool)
         for p, pool in transition.copies
-    )
-    return replace(transition, copies=copies)
+    ]
+    reset = tuple(sorted({*transition.reset, *(place for place, _ in kept)}))
+    return replace(transition, copies=(*copies, *kept), reset=reset)
 
 
 def _taking(transition: Transition, stopped: dict[int, int]) -> list[Transition]:
@@ -247,7 +254,11 @@ def _taking(transition: Transition, stopped: dict[int, int]) -> list[Transition]
             for part in range(most + 1)
         ]
     empty = [stopped[pool] for pool in transition.inhibit if pool in stopped]
-    if len(found) == 1 and not empty:
+    reads = [transition.read]
+    for pool in transition.read:
+        if pool in stopped:
+            reads.append(tuple(stopped[p] if p == pool else p for p in transition.read))
+    if len(found) == len(reads) == 1 and not empty:
         return [transition]
     return [
         replace(
@@ -255,8 +266,10 @@ def _taking(transition: Transition, stopped: dict[int, int]) -> list[Transition]
             consume=tuple(sorted(taken.items())),
             at_most=tuple(sorted(limits.items())),
             inhibit=(*transition.inhibit, *empty),
+            read=read,
         )
         for taken, limits in found
+        for read in reads
     ]
 
 

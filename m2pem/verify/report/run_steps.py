@@ -371,13 +371,16 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
             commanded = any(step.detail == COMMANDS for step in actions)
             return f"{name}: {commands}" if commands and commanded else f"{name} begins"
         case Action.ALLOCATED if first.detail:
-            return f"{name} is given {choices.in_words(choices.read(first.detail))}"
+            given = choices.in_words(choices.read(first.detail)).rstrip(",")
+            return f"{name} is given {given}"
         case Action.ALLOCATED:
             return f"{name} gets nothing: too few of what could fill its roles are free"
         case Action.LEFT:
             return f"the vehicle of {name} has left {first.detail}"
         case Action.REFUSED:
             return f"{name} gets nothing: {first.detail} is full"
+        case Action.RELEASED:
+            return f"nothing is left to do in {name}: it keeps nothing more"
         case Action.STANDS:
             return first.detail or "a vehicle has stopped"
         case Action.INTERRUPTED:

@@ -63,14 +63,14 @@ def waits_for_resources(
         if first is None or first.action is not Action.ALLOCATED or not first.detail:
             continue
         places = choices.read(first.detail).values()
-        wanted = (resource for alike in places for pool in alike for resource in pool)
+        wanted = (each for fillings in places for filling in fillings for each in filling.resources)
         asked.setdefault(first.element, {}).update(dict.fromkeys(wanted))
         own = (p for p, _ in transition.consume if net.places[p].element == first.element)
         if any(place in marking.tokens for place in own):
             asking[first.element] = None
             spaces = full.setdefault(first.element, {})
             spaces.update(dict.fromkeys(_only_lacks(net, transition, marking)))
-    holders = _holders(net, marking)
+    holders = _holders(net, element_names, marking)
     found: dict[str, str] = {}
     for element in asking:
         if full[element]:
@@ -78,20 +78,34 @@ def waits_for_resources(
             found[element] = f"waits for {' and '.join(said)}"
             continue
         held = {r: holders[r] for r in asked[element] if r in holders}
-        who = ", ".join(f"{r} is held by {element_names.name(by)}" for r, by in held.items())
+        who = ", ".join(f"{r} is {by}" for r, by in held.items())
         found[element] = (
             f"waits for {_any_of(list(asked[element]))}, {who or 'which it cannot get'}"
         )
     return found
 
 
-def _holders(net: PetriNet, marking: Marking) -> dict[str, str]:
-    """Return, by resource, the task that has it."""
+def _holders(net: PetriNet, element_names: ElementNames, marking: Marking) -> dict[str, str]:
+    """Say of each resource which task has it, or for which one it is kept until what ends."""
     found: dict[str, str] = {}
     for place in net.places:
-        if place.index in marking.tokens:
-            pools = [resource for pool in place.returns for resource in net.places[pool].free]
-            found.update(dict.fromkeys(place.resources or pools, place.element))
+        if place.index not in marking.tokens:
+            continue
+        if place.kept:
+            keepers = _any_of([element_names.name(each) for each in place.keepers])
+            said = f"kept by {keepers} until {element_names.name(place.until)} ends"
+            found.update(dict.fromkeys(place.kept, said))
+            continue
+        pools = [
+            resource
+            for pool in place.returns
+            for resource in net.places[pool].free or net.places[pool].kept
+        ]
+        said = f"held by {element_names.name(place.element)}"
+        ends = [net.places[pool].until for pool in place.returns if net.places[pool].until]
+        if ends:
+            said += f" and kept until {element_names.name(ends[0])} ends"
+        found.update(dict.fromkeys(place.resources or pools, said))
     return found
 
 

@@ -51,7 +51,7 @@ class ReadWriteSets:
         clears, sets = c.clear, c.put
         for place, _ in c.takes:
             clears |= encoding.mask[place]
-        for source, target, _, gone in c.moves:
+        for source, target, _, gone, _ in c.moves:
             needs |= source
             forbids |= source
             sets |= target

@@ -120,7 +120,9 @@ def safe_places(net: PetriNet) -> frozenset[int]:
     """Places that the structure proves to have one token at most, or to get tokens from one
     transition.
     """
-    counted = frozenset(place.index for place in net.places if place.free)  # by their own laws
+    counted = frozenset(  # by their own laws
+        place.index for place in net.places if place.free or place.kept
+    )
     if net.single is not None:
         return net.single | counted
     if is_small(net):

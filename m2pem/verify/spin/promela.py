@@ -162,6 +162,8 @@ class Writer:
                 said += f": {place.behavior} holds {', '.join(place.resources)}"
             if place.free:
                 said += f": free of {', '.join(place.free)}"
+            if place.kept:
+                said += f": kept of {', '.join(place.kept)}"
             first = f" = {begin[place.index]}" if place.index in begin else ""
             self._out.add(f"{kind} {name}{first}; {comment(said)}")
         for variable, name in zip(self.net.variables, self.variables, strict=True):
@@ -263,6 +265,9 @@ class Writer:
             )
         for pairs, gone in ((transition.moves, True), (transition.copies, False)):
             for source, target in pairs:
+                if not gone and self.net.places[source].kept:
+                    effects.append(self._all_of(source, target))
+                    continue
                 then = f"{places[source]} = 0; " if gone else ""
                 then += self._one_more(target)
                 effects.append(f"if :: {places[source]} -> {then} :: else fi")
@@ -282,6 +287,12 @@ class Writer:
         if self.watch is not None:
             effects += self.watch.after_transition(transition.index)
         return effects or ["skip"]
+
+    def _all_of(self, source: int, p: int) -> str:
+        """Add as many tokens as another place has, up to the number that there is room for."""
+        other, name, most = self.places[source], self.places[p], self.most[p]
+        fits = f"{name} + {other} <= {most} -> {name} = {name} + {other}"
+        return f"if :: {fits} :: else -> {name} = {most} fi"
 
     def _one_more(self, p: int) -> str:
         return self._more(p, 1)

@@ -9,7 +9,7 @@ from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.expression import literal
-from m2pem.mission.losses import PREEMPTED
+from m2pem.mission.losses import FAILED, PREEMPTED, UNAVAILABLE, is_loss
 from m2pem.units import Dimension, UnitError, quantity
 from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import (
@@ -28,6 +28,7 @@ from m2pem.verify.translate.allocations import (
     asking_place,
     choose_resources,
     lose_resources,
+    pools_among,
     take_named_resources,
 )
 from m2pem.verify.translate.catching import boundaries, caught_before_work
@@ -43,6 +44,7 @@ from m2pem.verify.translate.context import (
     resources,
     takes_from_pools,
 )
+from m2pem.verify.translate.keeping import kept_for_others
 from m2pem.verify.translate.loops import looped
 from m2pem.verify.translate.moving import (
     REJECTED,
@@ -229,14 +231,16 @@ def _behavior(
     )
     asks = Effect(consume=(wants,))
     begins = instance.begin()
-    context.contended.append(Contender(instance, held, asks, replace(begins, consume=asks.consume)))
+    begun = replace(begins, consume=asks.consume)
+    context.contended.append(Contender(instance, held, asks, lambda: [begun]))
     return [Effect(produce=(wants,))]
 
 
 def translate_contention(context: TranslationContext) -> None:
     """A behavior begins when no other behavior holds its resources; else it fails at once."""
     net = context.net
-    for contender in context.contended:
+    all_begins = [contender.begins() for contender in context.contended]  # all holders are known
+    for contender, begins in zip(context.contended, all_begins, strict=True):
         instance = contender.instance
         holders = {n: r for r in contender.resources for n in net.holders.get(r, ())}
         free = Effect(
@@ -253,7 +257,7 @@ def translate_contention(context: TranslationContext) -> None:
             unheard = replace(contender.asks, inhibit=frozenset(holders))
             fails = failing(context, instance, REJECTED, Flag.UNCAUGHT)
             context.transitions(product(product([unheard], no_room), fails), Kind.JOIN)
-        begun = product([free], [contender.begins])
+        begun = product([free], begins)
         moved = begin_moving(context, instance, behavior, movers)
         context.transitions(product(begun, moved), contender.kind)
         if not asked:
@@ -268,12 +272,17 @@ def translate_contention(context: TranslationContext) -> None:
             fails = failing(context, instance, "RESOURCE_UNAVAILABLE", Flag.CONFLICT)
             effects = product(product([contender.asks], [refused]), fails)
             context.transitions(effects, contender.kind)
+        pools = pools_among(context, map(ResourceId, contender.resources))
+        for place in kept_for_others(context, instance.outer, pools):
+            kept = product([contender.asks], [Effect(read=frozenset({place}))])
+            fails = failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT)
+            context.transitions(product(kept, fails), contender.kind)
 
 
 def _given(context: TranslationContext, node: e.FlowNode, behavior: Behavior) -> Step:
     """The step in which a task that names its resources is given them."""
     roles = allocate(behavior, context.fleet).roles
-    given = {role: [[each] for each in ids] for role, ids in roles.items()}
+    given = {role: [choices.Filling((each,)) for each in ids] for role, ids in roles.items()}
     return Step(node.id, Action.ALLOCATED, choices.written(given))
 
 
@@ -322,11 +331,25 @@ def _outside_work(
         if may_be_preempted(context.fleet, behavior_of(instance.node)):
             codes[PREEMPTED] = None
         for code in codes:
-            for effect in failing(context, instance, code, Flag.UNCAUGHT_FAILURE):
-                both = badly.then(effect)
-                if both is not None:
-                    net.transition(both, Kind.EXTERNAL, Trigger.FAILS, code)
+            failed = failing(context, instance, code, Flag.UNCAUGHT_FAILURE)
+            for effect in product(_kept_after(context, instance, code), product([badly], failed)):
+                net.transition(effect, Kind.EXTERNAL, Trigger.FAILS, code)
     return [instance.begin()]
+
+
+def _kept_after(context: TranslationContext, instance: ActivityInstance, code: str) -> list[Effect]:
+    """Return what becomes of what a task keeps when it fails: it is kept, but for a loss."""
+    behavior = behavior_of(instance.node)
+    if not context.keeps or behavior is None or not behavior.roles:
+        return [Effect()]
+    gone = Effect(releases=frozenset({instance.inside.index}))
+    if code == PREEMPTED:
+        return [gone]
+    if not all(role.on_loss is OnLoss.REASSIGN for role in behavior.roles):
+        return [Effect()]
+    if code in (FAILED, REJECTED):
+        return [Effect(), gone]  # any error that nothing catches by its name, losses among them
+    return [gone] if is_loss(behavior.type, None, code) else [Effect()]
 
 
 def _goes_on(context: TranslationContext, instance: ActivityInstance) -> bool:

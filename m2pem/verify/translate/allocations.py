@@ -3,7 +3,8 @@
 The token of such a task is on its activity as soon as it is entered, so that its boundary events
 can end it while it waits. Until it has its resources, a token on its place *asks* prevents its work
 from ending. A choice takes a token from the pools, and puts one on a place *holds*; whatever resets
-that place gives it back (`NetBuilder.finish`). Both places are in the activity's own scope.
+that place gives it back (`NetBuilder.finish`). Both places are in the activity's own scope. What
+the run keeps between tasks is taken as what is free is (`keeping`).
 
 The allocator decides when the engine has nothing left to do; so choices, and refusals, wait until
 nothing else can move, as joins do. Which of the resources that may fill a role the executive takes
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 
 from m2pem.fleet.facts import vehicle_of
 from m2pem.fleet.fleet import Fleet
-from m2pem.mission.behavior import Behavior, Keep, OnLoss
+from m2pem.mission.behavior import Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.losses import UNAVAILABLE
 from m2pem.mission.values import Value
@@ -37,9 +38,17 @@ from m2pem.verify.translate.context import (
     ActivityInstance,
     Asking,
     Contender,
+    Source,
     TranslationContext,
 )
 from m2pem.verify.translate.data import boxes, constant
+from m2pem.verify.translate.keeping import (
+    goes_to,
+    holds_place,
+    lets_go,
+    sources,
+    translate_keeping,
+)
 from m2pem.verify.translate.moving import (
     REJECTED,
     asks_for_space,
@@ -74,11 +83,22 @@ def take_named_resources(
     """Translate a task that names its resources, of which another task may choose some."""
     asks = asking_place(context, instance)
     named = tuple(map(ResourceId, resources))
-    pools = _pools(context, named)
-    begins = Effect(
-        consume=(asks, *(context.pool_place(pool) for pool in pools)),
-        produce=(_holds_named(context, instance, behavior, named),),
-    )
+    pools = pools_among(context, named)
+
+    def begins() -> list[Effect]:
+        ways = itertools.product(*(sources(context, instance.outer, pool) for pool in pools))
+        return [
+            Effect(
+                consume=(asks, *(source.place for source in way)),
+                produce=(
+                    _holds_named(
+                        context, instance, behavior, named, tuple(source.place for source in way)
+                    ),
+                ),
+            )
+            for way in ways
+        ]
+
     refused = Effect(consume=(asks, instance.active))
     kind = Kind.INTERNAL
     if asks_for_space(context, instance.node):
@@ -90,7 +110,8 @@ def take_named_resources(
     return [begun]
 
 
-def _pools(context: TranslationContext, resources: Iterable[ResourceId]) -> tuple[Pool, ...]:
+def pools_among(context: TranslationContext, resources: Iterable[ResourceId]) -> tuple[Pool, ...]:
+    """Return the pools of some resources."""
     pools = (context.pool_of.get(each) for each in resources)
     return tuple(dict.fromkeys(pool for pool in pools if pool is not None))
 
@@ -100,17 +121,10 @@ def _holds_named(
     instance: ActivityInstance,
     behavior: Behavior,
     named: Sequence[ResourceId],
+    returns: tuple[int, ...],
 ) -> int:
-    return context.net.place(
-        instance.node,
-        instance.inside,
-        Role.CONTROL,
-        f":holds {'+'.join(named)}",
-        resources=tuple(named),
-        behavior=behavior.name,
-        returns=tuple(context.pool_place(pool) for pool in _pools(context, named)),
-        holder=instance.active,
-    )
+    """`returns`: by pool of what it names, where that goes when the task ends."""
+    return holds_place(context, instance, behavior, "+".join(named), tuple(named), returns)
 
 
 # --- tasks whose resources are chosen -------------------------------------------------------------
@@ -158,7 +172,8 @@ def choose_resources(
     _note_approximations(context, instance, roles, waits=waits)
     cases = list(_cases(context, instance, roles))
     certain = len(cases) == 1 and not instance.inside.several
-    context.asking.append(_asking(context, asks, roles, certain=certain))
+    translate_keeping(context, instance, roles)
+    context.asking.append(_asking(context, instance, roles, certain=certain))
     asks_space = asks_for_space(context, instance.node)
     if waits:
         _wait_limit(context, instance, roles)
@@ -168,14 +183,14 @@ def choose_resources(
     def translate_later() -> None:
         for guard, offered in cases:
             when = Effect(guard=guard)
-            for choice in _choices(context, instance, roles, offered, fewest=False):
-                given = product([when], _given(context, instance, behavior, choice))
+            for choice, taken in _takings(context, instance, behavior, roles, offered):
+                given = product([when], _given(context, instance, behavior, choice, taken))
                 movers = movers_of(context, instance.node, (), choice.total)
                 moved = begin_moving(context, instance, behavior, movers)
                 context.transitions(product(given, moved), Kind.JOIN)
                 no_room = without_room(context, instance, behavior, movers, awaited=asks_space)
                 if asks_space:
-                    offered_to = product([when], [_not_taken(context, instance, choice)])
+                    offered_to = product([when], [_not_taken(context, instance, taken)])
                     fails = failing(context, instance, REJECTED, Flag.UNCAUGHT)
                     refused = product(product(offered_to, no_room), fails)
                 else:
@@ -185,7 +200,7 @@ def choose_resources(
             if not waits:
                 fewest = _choices(context, instance, roles, offered, fewest=True)
                 for limits in _refusals([each.total for each in fewest]):
-                    refused = product([when], [_refused(context, instance, limits)])
+                    refused = product([when], _refused(context, instance, limits))
                     fails = failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT)
                     context.transitions(product(refused, fails), Kind.JOIN)
 
@@ -211,6 +226,7 @@ def lose_resources(context: TranslationContext, instance: ActivityInstance) -> N
         read=frozenset({instance.active}),
         inhibit=frozenset({asks, once}),
         reset_scopes=frozenset({instance.inside.index}),
+        releases=frozenset({instance.inside.index}),
         produce=(asks, once),
     )
     context.net.transition(effect, Kind.EXTERNAL, Trigger.FAILS, REASSIGNED)
@@ -222,14 +238,19 @@ def lose_resources(context: TranslationContext, instance: ActivityInstance) -> N
 
 
 def _asking(
-    context: TranslationContext, asks: int, roles: Sequence[RoleCandidates], *, certain: bool
+    context: TranslationContext,
+    instance: ActivityInstance,
+    roles: Sequence[RoleCandidates],
+    *,
+    certain: bool,
 ) -> Asking:
     """Return who asks. Only of a task that needs one resource, whatever telemetry and data are, it
     is known that it gets one as soon as one is free.
     """
     urgent = certain and len(roles) == 1 and _least(roles[0]) == 1 and not roles[0].unknown
-    pools = _pools(context, (resource for each in roles for resource in each.resources))
-    return Asking(asks, _priority(roles), frozenset(pools), urgent)
+    pools = pools_among(context, (resource for each in roles for resource in each.resources))
+    asks = asking_place(context, instance)
+    return Asking(asks, _priority(roles), instance.outer, frozenset(pools), urgent)
 
 
 def _priority(roles: Sequence[RoleCandidates]) -> int:
@@ -237,15 +258,27 @@ def _priority(roles: Sequence[RoleCandidates]) -> int:
 
 
 def _served_before(
-    context: TranslationContext, roles: Sequence[RoleCandidates], wanted: Iterable[Pool]
+    context: TranslationContext, roles: Sequence[RoleCandidates], taken: Iterable["_Taken"]
 ) -> frozenset[int]:
     """The places of tasks of a greater priority that ask for some of the same."""
-    pools, priority = {*wanted}, _priority(roles)
+    priority = _priority(roles)
+    pools = {each.pool: None for each in taken}
+    places = {each.source.place for each in taken}
     return frozenset(
         each.place
         for each in context.asking
-        if each.urgent and each.priority > priority and each.pools & pools
+        if each.urgent and each.priority > priority and _may_take(context, each, pools) & places
     )
+
+
+def _may_take(context: TranslationContext, asking: Asking, pools: Iterable[Pool]) -> set[int]:
+    """The places from which a task may take resources of some pools."""
+    return {
+        source.place
+        for pool in pools
+        if pool in asking.pools
+        for source in sources(context, asking.scope, pool)
+    }
 
 
 def _note_approximations(
@@ -265,8 +298,6 @@ def _note_approximations(
         same = each.role.need.same if each.role.need is not None else ""
         if same and context.data.values_of(same, instance.outer, instance.node) is None:
             bounded(f"role '{each.role.name}': '{same}' is not followed, so it may be any resource")
-        if each.role.keep in (Keep.PROCESS, Keep.SUBPROCESS):
-            bounded(f"role '{each.role.name}': between tasks, what it keeps is taken to be free")
     wanted = sum(_least(each) for each in roles)
     others = [other for other in context.candidates if other is not instance.node]
     if waits and wanted > 1 and others:
@@ -351,7 +382,7 @@ def _fillings(
     fewest: bool,
 ) -> Iterator[_Filled]:
     least = _least(each)
-    pools = _pools(context, resources)
+    pools = pools_among(context, resources)
     if each.named:
         if len(resources) == least:
             yield _Filled(each, dict.fromkeys(pools, 1), pools)
@@ -375,65 +406,106 @@ def _spread(pools: Sequence[Pool], count: int) -> Iterator[dict[Pool, int]]:
             yield {first: taken, **rest} if taken else rest
 
 
+@dataclass(frozen=True, slots=True)
+class _Taken:
+    """A resource of a pool that fills a role, and the place it is taken from. `returns`: where it
+    goes when the task ends."""
+
+    role: RoleCandidates
+    pool: Pool
+    source: Source
+    returns: int
+
+
+def _takings(
+    context: TranslationContext,
+    instance: ActivityInstance,
+    behavior: Behavior,
+    roles: Sequence[RoleCandidates],
+    offered: Sequence[tuple[ResourceId, ...]],
+) -> Iterator[tuple[_Choice, Sequence[_Taken]]]:
+    """Yield all choices for the roles of a task, with where each resource is taken from."""
+    for choice in _choices(context, instance, roles, offered, fewest=False):
+        ways = [
+            itertools.combinations_with_replacement(
+                [
+                    _Taken(
+                        each.role,
+                        pool,
+                        source,
+                        goes_to(context, instance, behavior, each.role.role, pool, source),
+                    )
+                    for source in sources(context, instance.outer, pool)
+                ],
+                count,
+            )
+            for each in choice.filled
+            for pool, count in each.amounts.items()
+        ]
+        for way in itertools.product(*ways):
+            context.net.size_limit.count_case(instance.node.id)
+            yield choice, [taken for some in way for taken in some]
+
+
 def _given(
-    context: TranslationContext, instance: ActivityInstance, behavior: Behavior, choice: _Choice
+    context: TranslationContext,
+    instance: ActivityInstance,
+    behavior: Behavior,
+    choice: _Choice,
+    taken: Sequence[_Taken],
 ) -> list[Effect]:
     """A task is given resources, and begins its behavior."""
-    total = choice.total
     asks = asking_place(context, instance)
-    places = {pool: context.pool_place(pool) for pool in total}
-    named = [r for each in choice.filled if each.role.named for r in each.role.resources]
-    chosen: Counter[Pool] = Counter()
-    for each in choice.filled:
-        if not each.role.named:
-            chosen.update(each.amounts)
+    chosen = Counter((each.pool, each.returns) for each in taken if not each.role.named)
     holds = [
-        context.net.place(
-            instance.node,
-            instance.inside,
-            Role.CONTROL,
-            f":holds {number + 1} of {'|'.join(pool)}",
-            resources=pool if len(pool) == 1 else (),
-            behavior=behavior.name,
-            returns=(places[pool],),
-            holder=instance.active,
+        holds_place(
+            context,
+            instance,
+            behavior,
+            f"{number + 1} of {'|'.join(pool)}",
+            pool if len(pool) == 1 else (),
+            (returns,),
         )
-        for pool, count in chosen.items()
+        for (pool, returns), count in chosen.items()
         for number in range(count)
     ]
+    named = [r for each in choice.filled if each.role.named for r in each.role.resources]
     if named:
-        holds.append(_holds_named(context, instance, behavior, named))
-    detail = choices.written(
-        {
-            each.role.role.name: [
-                list(pool) for pool, count in each.amounts.items() for _ in range(count)
-            ]
-            for each in choice.filled
-            if each.count
-        }
-    )
+        returns_of = {each.pool: each.returns for each in taken if each.role.named}
+        returns = tuple(returns_of[pool] for pool in pools_among(context, named))
+        holds.append(_holds_named(context, instance, behavior, named, returns))
+    fillings: dict[str, list[choices.Filling]] = {}
+    for each in taken:
+        until = each.source.until.element.id if each.source.until is not None else ""
+        filling = choices.Filling(each.pool, until)
+        fillings.setdefault(each.role.role.name, []).append(filling)
     begins = Effect(
-        steps=(Step(instance.node.id, Action.ALLOCATED, detail),),
-        consume=(asks, *(places[pool] for pool, count in total.items() for _ in range(count))),
-        inhibit=_served_before(context, context.candidates[instance.node], total)
+        steps=(Step(instance.node.id, Action.ALLOCATED, choices.written(fillings)),),
+        consume=(asks, *(each.source.place for each in taken)),
+        inhibit=_served_before(context, context.candidates[instance.node], taken)
         | frozenset(holds if instance.inside.several else ()),
+        lets_go=lets_go(context, instance),
         produce=tuple(holds),
     )
-    effects = product([begins], _no_more(context, asks, choice))
-    for each in choice.filled:
-        need = each.role.role.need
-        if need is not None and need.store and each.count:
-            value = _stored_value(context, each, one=need.most == 1)
+    effects = product([begins], _no_more(context, instance, choice, taken))
+    for filled in choice.filled:
+        need = filled.role.role.need
+        if need is not None and need.store and filled.count:
+            value = _stored_value(context, filled, one=need.most == 1)
             source = None if value is None else constant(value)
             effects = context.data.write(effects, need.store, source, instance.outer, instance.node)
     return effects
 
 
-def _no_more(context: TranslationContext, asks: int, choice: _Choice) -> list[Effect]:
+def _no_more(
+    context: TranslationContext,
+    instance: ActivityInstance,
+    choice: _Choice,
+    taken: Sequence[_Taken],
+) -> list[Effect]:
     """Return when a choice may leave a role with fewer than it can have: no more are free, or
     another task asks for them at the same time.
     """
-    total = choice.total
     wanting: dict[Pool, None] = {}
     for each in choice.filled:
         need = each.role.role.need
@@ -441,9 +513,14 @@ def _no_more(context: TranslationContext, asks: int, choice: _Choice) -> list[Ef
             wanting.update(dict.fromkeys(each.offered))
     if not wanting:
         return [Effect()]
-    rest = Effect(at_most=tuple((context.pool_place(pool), total[pool]) for pool in wanting))
+    counts = Counter(each.source.place for each in taken)
+    places = [s.place for pool in wanting for s in sources(context, instance.outer, pool)]
+    rest = Effect(at_most=tuple((place, counts[place]) for place in places))
+    asks = asking_place(context, instance)
     others = [
-        each.place for each in context.asking if each.place != asks and each.pools & wanting.keys()
+        each.place
+        for each in context.asking
+        if each.place != asks and not _may_take(context, each, wanting).isdisjoint(places)
     ]
     return [rest, *(Effect(read=frozenset({place})) for place in others)]
 
@@ -494,21 +571,32 @@ def _covers(one: Mapping[Pool, int], other: Mapping[Pool, int]) -> bool:
 
 def _refused(
     context: TranslationContext, instance: ActivityInstance, limits: Mapping[Pool, int]
-) -> Effect:
+) -> list[Effect]:
     asks = asking_place(context, instance)
-    places = {context.pool_place(pool): count for pool, count in limits.items()}
-    return Effect(
-        steps=(Step(instance.node.id, Action.ALLOCATED),),
-        consume=(asks, instance.active),
-        inhibit=frozenset(place for place, count in places.items() if not count),
-        at_most=tuple((place, count) for place, count in places.items() if count),
-    )
+    ways: list[dict[int, int]] = [{}]
+    for pool, most in limits.items():
+        places = [source.place for source in sources(context, instance.outer, pool)]
+        ways = [
+            {**way, **Counter(shared), **{p: 0 for p in places if p not in shared}}
+            for way in ways
+            for shared in itertools.combinations_with_replacement(places, most)
+        ]
+    return [
+        Effect(
+            steps=(Step(instance.node.id, Action.ALLOCATED),),
+            consume=(asks, instance.active),
+            inhibit=frozenset(place for place, count in way.items() if not count),
+            at_most=tuple((place, count) for place, count in way.items() if count),
+        )
+        for way in ways
+    ]
 
 
-def _not_taken(context: TranslationContext, instance: ActivityInstance, choice: _Choice) -> Effect:
+def _not_taken(
+    context: TranslationContext, instance: ActivityInstance, taken: Sequence[_Taken]
+) -> Effect:
     """A task could be given what a choice says, and gets nothing."""
-    total = choice.total
-    free = tuple(context.pool_place(pool) for pool, count in total.items() for _ in range(count))
+    free = tuple(each.source.place for each in taken)
     asks = asking_place(context, instance)
     return Effect(consume=(asks, instance.active, *free), produce=free)
 

@@ -331,7 +331,7 @@ def cancel(context: TranslationContext, node: e.EndEvent, scope: ScopeDraft) -> 
     ended = context.net.place(node, scope, Role.TRIGGERED, ":cancelled")
     begins = Effect(steps=(Step(node.id, Action.TRIGGERED, COMPENSATION_BEGINS),), consume=(ended,))
     context.transitions(product([begins], [compensating.thrown]))
-    return [Effect(reset_scopes=frozenset({scope.index}), produce=(ended,))]
+    return [Effect(interrupt_scopes=frozenset({scope.index}), produce=(ended,))]
 
 
 # --- undoing ------------------------------------------------------------------------------------
@@ -482,5 +482,6 @@ def release_claims(context: TranslationContext) -> None:
         ends |= {node.id for node in container.nodes if isinstance(node, e.EndEvent)}
         for draft in context.net.drafts:
             effect = draft.effect
-            if index in effect.reset_scopes and any(step.element in ends for step in effect.steps):
+            ended = effect.reset_scopes | effect.interrupt_scopes
+            if index in ended and any(step.element in ends for step in effect.steps):
                 draft.effect = replace(effect, moves=(*claims, *effect.moves))

@@ -89,27 +89,40 @@ class CompensationEffects:
 class Contender:
     """A behavior that begins if all its resources are free, and fails at once if one is not.
 
-    `asks`: the effect that removes its token from where it asks for them. `begins`: of its begin.
-    `kind`: JOIN, if it waits for space.
+    `asks`: the effect that removes its token from where it asks for them. `begins`: returns the
+    effects of its begin, when all tasks are known. `kind`: JOIN, if it waits for space.
     """
 
     instance: ActivityInstance
     resources: tuple[str, ...]
     asks: Effect
-    begins: Effect
+    begins: Callable[[], list[Effect]]
     kind: Kind = Kind.INTERNAL
 
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """A place that has a token while a task asks for resources of `pools`. `urgent`: it gets one of
-    them as soon as one is free, as far as its priority allows.
+    """A place that has a token while a task in `scope` asks for resources of `pools`. `urgent`: it
+    gets one of them as soon as one is free, as far as its priority allows.
     """
 
     place: int
     priority: int
+    scope: ScopeDraft
     pools: frozenset[Pool]
     urgent: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A place that tasks in `until` take resources from. `until` None: a pool, for all tasks.
+
+    `keeper`: the task and role that keep it until they are executed again, if any do.
+    """
+
+    place: int
+    until: ScopeDraft | None = None
+    keeper: tuple[ActivityInstance, str] | None = None
 
 
 class TranslationContext:
@@ -162,6 +175,9 @@ class TranslationContext:
         self.later: list[Callable[[], None]] = []
         self.contended: list[Contender] = []
         self.asking: list[Asking] = []
+        self.keeps = any(each.role.keep for roles in self.candidates.values() for each in roles)
+        self.kept: dict[Pool, list[Source]] = {}
+        """By pool, the places of what is kept between tasks."""
         self.choices: list[tuple[Effect, e.FlowNode, ScopeDraft]] = []
         self.compensated_by: dict[e.Activity, CompensatedBy | None] = {}
         self.notes_scopes: dict[int, ScopeDraft] = {}

@@ -20,6 +20,7 @@ from m2pem.verify.translate.activities import translate_contention
 from m2pem.verify.translate.compensation import release_claims
 from m2pem.verify.translate.context import Catcher, TranslationContext, what_and_ref
 from m2pem.verify.translate.events import after, awaited
+from m2pem.verify.translate.keeping import release_at_the_end
 from m2pem.verify.translate.moving import initial_places
 from m2pem.verify.translate.net_builder import (
     Effect,
@@ -76,6 +77,8 @@ def translate(
         late()
     translate_contention(context)
     translate_choices(context)
+    if others:
+        release_at_the_end(context)
     _outside(context)
     release_claims(context)
     if context.options.timers_in_order:

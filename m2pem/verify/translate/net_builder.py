@@ -42,8 +42,10 @@ from m2pem.verify.net.size_limit import SizeLimit
 class Effect:
     """A part of a transition, with the fields of `Transition`.
 
-    `reset_scopes` stand for all places in them; `empty_scopes` must have no token in them. `guard`
-    and `assign` are by variable.
+    `reset_scopes` stand for all places in them, `interrupt_scopes` for all but those of what is
+    kept until their end; `empty_scopes` must have no token in them. `lets_go`: places of kept
+    resources, which are kept no longer, also those that tasks have now. `releases`: scopes of
+    activities; what they have is kept no longer. `guard` and `assign` are by variable.
     """
 
     steps: tuple[Step, ...] = ()
@@ -61,6 +63,9 @@ class Effect:
     flag: Flag | None = None
     flagged: str = ""
     at_most: tuple[tuple[int, int], ...] = ()
+    interrupt_scopes: frozenset[int] = frozenset()
+    lets_go: frozenset[int] = frozenset()
+    releases: frozenset[int] = frozenset()
 
     def then(self, other: "Effect") -> "Effect | None":
         """Return both effects together, this one first; None if they exclude each other."""
@@ -93,6 +98,9 @@ class Effect:
             self.flag or other.flag,
             self.flagged or other.flagged,
             self.at_most + other.at_most,
+            self.interrupt_scopes | other.interrupt_scopes,
+            self.lets_go | other.lets_go,
+            self.releases | other.releases,
         )
 
     def with_step(self, element: str, action: Action, detail: str = "") -> "Effect":
@@ -165,6 +173,9 @@ class NetBuilder:
         """Entry places of elements that wait as soon as they are entered (`enter_at_once`)."""
         self.holding: list[int] = []
         """Places whose resources come from pools."""
+        self.same_holding: dict[tuple[int, tuple[int, ...]], int] = {}
+        """By a place of `holding` and other places to which its resources may go, the place of the
+        same task that has the same resources and gives them back there."""
         self._at: dict[tuple[object, int, str], int] = {}
 
     # --- parts ----------------------------------------------------------------------------------
@@ -272,13 +283,20 @@ class NetBuilder:
         inside = {scope.index: self._inside(scope) for scope in reversed(self.scopes)}
 
         @cache  # whatever ends one scope shares one list of its places: there may be many of both
-        def reset_places(reset: frozenset[int], scope_indices: frozenset[int]) -> tuple[int, ...]:
-            return tuple(sorted(reset.union(*(inside[index][0] for index in scope_indices))))
+        def reset_places(
+            reset: frozenset[int], ended: frozenset[int], interrupted: frozenset[int]
+        ) -> tuple[int, ...]:
+            places = [inside[index][0] for index in ended]
+            places += [inside[index][0] - self._kept_until(index) for index in interrupted]
+            return tuple(sorted(reset.union(*places)))
 
         transitions: list[Transition] = []
         names: Counter[str] = Counter()
         for draft in self.drafts:
-            reset = reset_places(draft.effect.reset, draft.effect.reset_scopes)
+            effect = draft.effect
+            reset = reset_places(
+                effect.reset | effect.lets_go, effect.reset_scopes, effect.interrupt_scopes
+            )
             transition = self._transition(draft, len(transitions), names, inside, reset)
             if transition is not None:
                 transitions.append(transition)
@@ -308,6 +326,10 @@ class NetBuilder:
         tokens = {n for n in everything if self.places[n].role is not Role.CONTROL}
         return frozenset(everything), frozenset(tokens)
 
+    def _kept_until(self, scope: int) -> frozenset[int]:
+        """Return the places of what is kept until the end of a scope."""
+        return frozenset(n for n in self.scopes[scope].places if self.places[n].kept)
+
     def _transition(
         self,
         draft: TransitionDraft,
@@ -336,8 +358,8 @@ class NetBuilder:
             tuple(sorted(effect.read)),
             tuple(sorted(inhibit)),
             tuple(sorted(effect.guard.items())),
-            effect.moves,
-            effect.copies + self._given_back(reset),
+            effect.moves + self._kept_otherwise(effect, reset),
+            effect.copies + self._given_back(effect, reset),
             reset,
             tuple(sorted(Counter(effect.produce).items())),
             tuple(sorted(effect.assign.items())),
@@ -350,18 +372,50 @@ class NetBuilder:
             tuple(sorted(dict(sorted(effect.at_most, reverse=True)).items())),
         )
 
-    def _given_back(self, reset: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
+    def _given_back(self, effect: Effect, reset: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
         """Return the copies with which a transition that resets places gives resources back."""
         if not self.holding:
             return ()
         emptied = set(reset)
         return tuple(
-            (held, pool)
+            (held, target)
             for held in self.holding
             if held in emptied
-            for pool in self.places[held].returns
-            if pool not in emptied  # at the end of the run, all places are
+            for place in self.places[held].returns
+            if (target := self._goes_to(place, emptied, free=self._frees(effect, held))) is not None
         )
+
+    def _frees(self, effect: Effect, held: int) -> bool:
+        """Whether what goes from a place that an effect resets is kept no longer."""
+        return held in effect.lets_go or self.places[held].scope in effect.releases
+
+    def _goes_to(self, place: int, emptied: set[int], *, free: bool) -> int | None:
+        """Return where a resource goes that is given back to a place; None: the run is over.
+        `free`: it is not kept."""
+        while place in emptied or (free and self.places[place].kept):
+            returns = self.places[place].returns
+            if not returns:  # at the end of the run, all places are emptied
+                return None
+            place = returns[0]
+        return place
+
+    def _kept_otherwise(
+        self, effect: Effect, reset: tuple[int, ...]
+    ) -> tuple[tuple[int, int], ...]:
+        """Return the moves with which the resources that tasks have are kept no longer, or as those
+        of no task, when the place that they would be given back to is emptied."""
+        if not self.same_holding:
+            return ()
+        emptied = set(reset)
+        found: list[tuple[int, int]] = []
+        for (held, returns), other in self.same_holding.items():
+            goes_to = tuple(
+                self._goes_to(place, emptied, free=place in effect.lets_go)
+                for place in self.places[held].returns
+            )
+            if held not in emptied and goes_to == returns:
+                found.append((held, other))
+        return tuple(found)
 
 
 def _first_element(effect: Effect) -> str:
@@ -411,7 +465,8 @@ def _entry(net: NetBuilder, place: int) -> TransitionDraft | None:
         return None
     effect = takes[0].effect
     asks = effect.read or effect.inhibit or effect.empty_scopes or effect.guard or effect.at_most
-    does_more = effect.moves or effect.copies or effect.reset_scopes or effect.flag is not None
+    ends = effect.reset_scopes or effect.interrupt_scopes
+    does_more = effect.moves or effect.copies or ends or effect.flag is not None
     return None if effect.consume != (place,) or asks or does_more else takes[0]
 
 

@@ -225,7 +225,7 @@ def begin_handler(
     assert anew is not None
     begun = anew
     if start.interrupting:
-        stop = Effect(reset_scopes=frozenset({scope.index}), produce=cut_short(context, scope))
+        stop = Effect(interrupt_scopes=frozenset({scope.index}), produce=cut_short(context, scope))
         both = stop.then(begun)
         assert both is not None
         return [both]
