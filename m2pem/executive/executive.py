@@ -29,6 +29,7 @@ from m2pem.executive.outages import Outages
 from m2pem.executive.process_monitors import watch_space
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.schedule_entries import ScheduleEntries
+from m2pem.executive.scheduled_runs import ScheduledRuns
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.shared_space_watch import watch_shared_space
 from m2pem.executive.supervisor import RunSettings, Supervisor
@@ -111,13 +112,14 @@ class Executive:
         )
         self.ownership = self._supervisor.ownership
         self.health = ExecutiveHealth(journal)
+        starter = ScheduledRuns(self._supervisor, self.bus)
         self._schedule = ScheduleEntries(
-            self._supervisor,
+            starter,
             self.events.publish,
             self._supervisor.marks,
             real=not self.arbiters.nothing_is_real,
         )
-        self._scheduler = Scheduler(self._supervisor, self._schedule)
+        self._scheduler = Scheduler(starter, self._schedule)
         self._supervisor.on_change = self._schedule.changed.set
         self.control = Control(
             self._supervisor,

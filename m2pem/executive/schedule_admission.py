@@ -10,6 +10,7 @@ from m2pem.executive.scheduled_start import vehicles_of
 from m2pem.executive.supervisor import Supervisor
 from m2pem.fleet.allocation import resources_of_mission
 from m2pem.fleet.facts import fleet_facts
+from m2pem.fleet.fleet import Fleet, real_resources
 from m2pem.mission.candidate_facts import FLEET_FACTS
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression import Expression
@@ -38,7 +39,7 @@ async def planned(
         MissionError: with every finding, when the mission is not well or does not fit the fleet.
         ScheduleError: `when` makes no sense; or no mission may start unattended.
     """
-    supervisor.refuse_unattended()
+    refuse_unattended(supervisor.fleet)
     now_us = supervisor.clock.now_us()
     when = resolved(when, now_us, host_time_zone())
     loaded, process_id = await asyncio.to_thread(supervisor.load, mission, process, data)
@@ -58,6 +59,20 @@ async def planned(
         by,
     )
     return plan, named
+
+
+def refuse_unattended(fleet: Fleet) -> None:
+    """Check that missions may start with no operator present.
+
+    Raises:
+        ScheduleError: the fleet has real vehicles, and its file does not say that they may.
+    """
+    real = real_resources(fleet)
+    if real and not fleet.unattended:
+        raise ScheduleError(
+            f"{', '.join(real)} of {fleet.file} would start with no operator present: say "
+            "`schedule: {unattended: true}` in the fleet file if they may"
+        )
 
 
 async def _refuse_unknown(

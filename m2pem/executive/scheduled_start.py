@@ -51,7 +51,7 @@ class LeftToOthersError(M2pemError):
 
 
 class Starter(Protocol):
-    """Starts missions: `m2pem.executive.supervisor.Supervisor`."""
+    """Starts missions: `m2pem.executive.scheduled_runs.ScheduledRuns`."""
 
     @property
     def fleet(self) -> Fleet: ...

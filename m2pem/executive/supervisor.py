@@ -14,15 +14,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from m2pem.allocation.assignment import load_solver
-from m2pem.allocation.candidates import Candidates, Facts
 from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
-from m2pem.api.authoring import MissionFiles, MissionSource
+from m2pem.api.authoring import MissionSource
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.epoch_fence import run_of
 from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
-from m2pem.api.telemetry import LinkState, TeamState, Telemetry
+from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.engine.commands import Command
 from m2pem.engine.inputs import GeometrySet, Input, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
@@ -33,7 +32,6 @@ from m2pem.errors import (
     M2pemError,
     NotDrivenError,
     OperatorError,
-    ScheduleError,
     StaleCommandError,
     StaleEpochError,
 )
@@ -68,8 +66,8 @@ from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
 from m2pem.executive.waiting_tasks import waiting_tasks
 from m2pem.findings import Finding, Severity
-from m2pem.fleet.allocation import Availability, resources_of_mission
-from m2pem.fleet.fleet import Fleet, dump, real_resources
+from m2pem.fleet.allocation import Availability
+from m2pem.fleet.fleet import Fleet, dump
 from m2pem.fleet.space import waits_for_space
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
@@ -81,7 +79,7 @@ from m2pem.mission.losses import LINK_LOST
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
-from m2pem.scheduling.entry import EntryChange, SchedulePlan
+from m2pem.scheduling.entry import EntryChange
 from m2pem.telemetry.bus import Bus
 from m2pem.units import US_PER_S
 
@@ -335,9 +333,26 @@ class Supervisor:
         loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
         if even_if_busy:
             return await self.begin(loaded, process_id, data, by)
+        return await self.begin_if_free(loaded, process_id, data, by)
+
+    async def begin_if_free(
+        self,
+        loaded: Mission,
+        process_id: str,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        started: EntryChange | None = None,
+        still: Callable[[], bool] = lambda: True,
+    ) -> RunId:
+        """Begin a run if all that its mission names is free; the rest as for `begin`.
+
+        Raises:
+            BusyError: other runs or operators have some of it.
+        """
         async with self._starting:
             self.refuse_busy(loaded)
-            return await self.begin(loaded, process_id, data, by)
+            return await self.begin(loaded, process_id, data, by, started=started, still=still)
 
     def refuse_busy(self, loaded: Mission) -> None:
         """Check that everything that a mission names is free now.
@@ -402,88 +417,6 @@ class Supervisor:
             self.runners.pop(number, None)
             raise NotBegunError(number, str(error)) from error
         return number
-
-    # --- what the scheduler asks ------------------------------------------------------------------
-
-    def admitted(self, plan: SchedulePlan) -> tuple[Mission, str]:
-        """Read and check the mission of an entry of the schedule; it blocks.
-
-        Raises:
-            MissionError: with every finding.
-            ScheduleError: the fleet does not allow that it starts unattended.
-        """
-        self.refuse_unattended()
-        files = MissionFiles(plan.mission_name, plan.mission, plan.library)
-        loaded = load_source(files)
-        process, _ = self.admit(loaded, plan.process, plan.data)
-        return loaded, process
-
-    def has_others(self) -> bool:
-        """Whether other executives are on the journal now; it blocks."""
-        return self.settings.has_others()
-
-    def refuse_unattended(self) -> None:
-        """Check that missions may start with no operator present.
-
-        Raises:
-            ScheduleError: the fleet has real vehicles, and its file does not say that they may.
-        """
-        real = real_resources(self.fleet)
-        if real and not self.fleet.unattended:
-            raise ScheduleError(
-                f"{', '.join(real)} of {self.fleet.file} would start with no operator present: say "
-                "`schedule: {unattended: true}` in the fleet file if they may"
-            )
-
-    async def begin_scheduled(
-        self,
-        loaded: Mission,
-        process: str,
-        plan: SchedulePlan,
-        by: str,
-        started: EntryChange,
-        still: Callable[[], bool],
-    ) -> RunId:
-        """Begin the run of an entry of the schedule; see `scheduled_start.Starter`."""
-        async with self._starting:
-            self.refuse_busy(loaded)
-            return await self.begin(loaded, process, plan.data, by, started=started, still=still)
-
-    def outcome_of(self, run: RunId) -> str | None:
-        """How a run has ended; "": it goes on; None: it is not driven here."""
-        runner = self.runners.get(run)
-        if runner is None:
-            return None
-        outcome = runner.run.state.outcome
-        return outcome.value if runner.done.is_set() and outcome is not None else ""
-
-    def users(self) -> dict[ResourceId, str]:
-        """What runs and operators use: all that a run names until it has ended."""
-        found: dict[ResourceId, str] = {}
-        for resource, holder in self.handover.holders().items():
-            if holder and resource not in self.handover.taken:
-                found[resource] = f"{holder} has it"
-        for runner in self.runners.values():
-            if not runner.done.is_set():
-                for resource in resources_of_mission(runner.run.state.mission, self.fleet):
-                    found[resource] = f"{runner.id} uses it"
-        for resource, operator in self.handover.taken.items():
-            found[resource] = f"{operator} has it"
-        return found
-
-    def unusable(self, resource: ResourceId) -> str:
-        """Why no mission gets a resource now; "": nothing is known against it, nor its vehicle."""
-        if reason := self.availability.reason(resource):
-            return reason
-        vehicle = ResourceId(resource.partition("/")[0])
-        state = self._bus.latest(vehicle)
-        if state is None:  # what only carries payloads may say nothing itself
-            return "nothing was received from it yet" if resource == vehicle else ""
-        return "its link is lost" if state.link is LinkState.LOST else ""
-
-    def facts(self, vehicle: ResourceId) -> Facts:
-        """The facts of a vehicle now, as conditions of the schedule read them."""
-        return Candidates(self.fleet, self.arbiters.graph, self._bus.latest).facts(vehicle)
 
     async def resume(self, runs: Sequence[RunId]) -> dict[RunId, M2pemError]:
         """Take up runs that their executive left without ending them.
