@@ -106,6 +106,7 @@ class Dispatcher:
         self._starts: dict[str, asyncio.Task[None]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._barred: set[str] = set()
+        self._stopped: set[str] = set()
         self._disowned: dict[str, tuple[ResourceId, ...]] = {}
 
     # --- commands -------------------------------------------------------------------------------
@@ -153,6 +154,7 @@ class Dispatcher:
         """Have all vehicles refuse what an earlier executive commands for a run, from now on driven
         here."""
         self._barred.discard(run)
+        self._stopped.discard(run)
         for resource in self._disowned.pop(run, ()):
             if self._availability.reason(resource) == _driven_elsewhere(run):
                 self._availability.restore(resource)
@@ -180,14 +182,13 @@ class Dispatcher:
         active = self._active_of(run)
         resources = tuple(dict.fromkeys(each for _, one in active for each in one.resources))
         self._disowned[run] = resources
-        is_stopped = run in self._barred
         self._barred.add(run)
         for behavior, _ in active:
             self.ended(behavior)
         for resource in resources:
             self._availability.withdraw(resource, _driven_elsewhere(run))
         self._enqueue((), lambda: self._let_go(run))
-        if is_stopped:
+        if run in self._stopped:
             for resource in resources:
                 self.hold(resource)
 
@@ -207,6 +208,7 @@ class Dispatcher:
         is held: its vehicles refuse to cancel what another executive drives.
         """
         self._barred.add(run)
+        self._stopped.add(run)
         if run in self._disowned:
             return {
                 each: self._order((each,), partial(self._turn, "hold", each))

@@ -1,41 +1,52 @@
-"""Whether this executive still drives its runs, asked of the journal after it was stopped a while.
+"""Whether this executive still drives its runs: after it was stopped a while, and by its lease.
 
 A process that was stopped (SIGSTOP, a suspended machine, a blocked event loop) may have lost its
 runs to another executive, and learns of it at its next entry in the journal. That is too late: what
 it was about to send goes out first. So after such a time nothing is sent before the journal has
 said that the claims of all runs hold. Holds and an operator's STOP do not wait for that.
+
+In a journal that several hosts share, claims hold for a lease, which the journal renews. When two
+thirds of it have passed without that, the runs are held and end here, as when the journal fails:
+nobody else may command their vehicles yet. When all of it has passed, nothing more is sent.
 """
 
 import asyncio
 import logging
+import math
 from collections.abc import Callable, Mapping
 
-from m2pem.api.clock import boot_time_ns
 from m2pem.api.runs import RunId
 from m2pem.errors import JournalError, M2pemError, StaleEpochError
 from m2pem.executive.runner import Runner
+from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.base import Journal
 
 log = logging.getLogger("m2pem.executive")
 
 TICK_S = 0.25
 STOPPED_AFTER_S = 1.0
-"""A process that has not run for so long asks the journal. It is less than any lease of a claim."""
+"""A process that has not run for so long asks the journal; with a short lease, a third of it."""
 
 ANSWERED_WITHIN_S = 2.0
 """A journal that has not answered by then counts as failed: the run is held."""
 
 
-def awake_s() -> float:
-    """Seconds of a clock that goes on while the process is stopped, or the machine suspended."""
-    return boot_time_ns() / 1_000_000_000
+_NOT_RENEWED = (
+    "the journal has not confirmed for {passed_s:.1f} s that this executive drives {run}; after "
+    "{lease_s:g} s another one may"
+)
+_ENDED = (
+    "the journal did not renew the lease of this executive in time, so another one may drive {run} "
+    "from now on"
+)
 
 
 class Ownership:
     """The claims of an executive's runs.
 
-    `replaced` is called for a run that another executive has claimed, `unknown` for one of which
-    the journal cannot say it: when they return, nothing that moves a vehicle goes out for the run.
+    `replaced` is called for a run that another executive has claimed, or may have claimed because
+    the lease has ended; `unknown` for one of which the journal cannot say it: when they return,
+    nothing that moves a vehicle goes out for the run.
     Times during which `watch` does not run do not count.
     """
 
@@ -55,6 +66,7 @@ class Ownership:
         self._confirmed = 0
         self._opened = 0
         self._asking = asyncio.Lock()
+        self._held: dict[RunId, tuple[Runner, float]] = {}
 
     def may_send(self) -> bool:
         """Whether arbiters may send by themselves: see `ArbiterContext.may_send`."""
@@ -74,23 +86,53 @@ class Ownership:
                 self._confirmed = stops
 
     async def watch(self) -> None:
-        """Ask the journal each time that the process was stopped, until cancelled."""
+        """Look at the lease, and ask the journal each time that the process was stopped, until
+        cancelled."""
         self._seen_s = awake_s()
         try:
             while True:
+                await self._look_at_lease()
                 await self.confirmed()
-                await asyncio.sleep(TICK_S)
+                await asyncio.sleep(self._tick_s)
         finally:
             self._seen_s = None
 
     # --- inside ---------------------------------------------------------------------------------
+
+    @property
+    def _tick_s(self) -> float:
+        return min(TICK_S, (self._journal.lease_s or TICK_S) / 20)
+
+    async def _look_at_lease(self) -> None:
+        """Hold runs while they surely are this executive's; let go of them when they are not."""
+        now_s = awake_s()
+        for run, (runner, ends_s) in tuple(self._held.items()):
+            if now_s >= ends_s:
+                del self._held[run]
+                if self._runners.get(run) is runner:
+                    self._replaced(run, StaleEpochError(_ENDED.format(run=run)))
+        until_s, lease_s = self._journal.owned_until_s, self._journal.lease_s
+        if until_s is None or lease_s is None or now_s < until_s - lease_s / 3:
+            return
+        if now_s >= until_s:
+            await self._ask()  # too late for a hold: another one may command the vehicles
+            return
+        passed_s = now_s - (until_s - lease_s)
+        for runner in self._driven():
+            if runner.id not in self._held:
+                self._held[runner.id] = runner, until_s
+                text = _NOT_RENEWED.format(run=runner.id, passed_s=passed_s, lease_s=lease_s)
+                self._unknown(runner.id, JournalError(text))
+
+    def _driven(self) -> list[Runner]:
+        return [each for each in self._runners.values() if not each.done.is_set()]
 
     def _look(self) -> int:
         """How often this process was stopped until now."""
         if self._seen_s is not None:
             now_s = awake_s()
             stopped_s, self._seen_s = now_s - self._seen_s, now_s
-            if stopped_s > STOPPED_AFTER_S:
+            if stopped_s > min(STOPPED_AFTER_S, (self._journal.lease_s or math.inf) / 3):
                 self._stops += 1
                 log.warning(
                     "the executive did not run for %.1f s: it asks its journal before it goes on",
@@ -99,8 +141,7 @@ class Ownership:
         return self._stops
 
     async def _ask(self) -> None:
-        driven = [each for each in self._runners.values() if not each.done.is_set()]
-        await asyncio.gather(*(self._ask_of(runner) for runner in driven))
+        await asyncio.gather(*(self._ask_of(runner) for runner in self._driven()))
 
     async def _ask_of(self, runner: Runner) -> None:
         try:

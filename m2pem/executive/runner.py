@@ -122,6 +122,7 @@ class Runner:
         self.replaced = False
         """Another executive drives the run."""
         self._broken: Exception | None = None
+        self._committing: asyncio.Task[None] | None = None
         self.prompts: dict[str, OpenPrompt] = {}
         self._context = context
         self._steps_between_waits = steps_between_waits
@@ -195,9 +196,14 @@ class Runner:
         self._wake.set()
 
     def fail(self, error: Exception) -> None:
-        """Hold what the run commands and end its task, as after an exception of the engine."""
+        """Hold what the run commands and end its task, as after an exception of the engine.
+
+        It does not wait for the journal.
+        """
         self._broken = error
         self._wake.set()
+        if self._committing is not None:
+            self._committing.cancel()
 
     # --- the loop -------------------------------------------------------------------------------
 
@@ -307,6 +313,8 @@ class Runner:
         await self._commit(steps)
         seen, unsent = await self._look_after_outage()
         self._inbox[:0] = seen
+        if self._broken is not None:
+            raise self._broken
         if any(isinstance(step.input, PauseRun) for step in steps):
             self._let_strays_go()
         for step in steps:
@@ -346,6 +354,7 @@ class Runner:
     async def _commit(self, steps: Sequence[Step]) -> None:
         loop = asyncio.get_running_loop()
         stalled = loop.call_later(STALLED_AFTER_S, self._alert_of_stall)
+        self._committing = task = asyncio.current_task()
         try:
             await self._context.journal.append(
                 [
@@ -361,7 +370,13 @@ class Runner:
                     for step in steps
                 ]
             )
+        except asyncio.CancelledError:
+            if self._broken is None or task is None:
+                raise
+            task.uncancel()
+            raise self._broken from None
         finally:
+            self._committing = None
             stalled.cancel()
 
     def _alert_of_stall(self) -> None:

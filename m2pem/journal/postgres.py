@@ -14,10 +14,10 @@ from uuid import UUID, uuid4
 import psycopg
 
 from m2pem.errors import JournalError, StaleEpochError
-from m2pem.journal.codec import run_id
+from m2pem.journal.awake_clock import awake_s
+from m2pem.journal.codec import run_id, run_number
 from m2pem.journal.database_journal import DatabaseJournal
 from m2pem.journal.lease import Executive, Lease, end_dead, lease_s, process_space
-from m2pem.journal.lease_clock import lease_clock_s
 from m2pem.journal.marks import MarkFile, find_losses
 from m2pem.journal.position import RunPosition
 from m2pem.journal.postgres_address import PostgresAddress, without_password, write_address
@@ -146,9 +146,10 @@ class PostgresStorage:
             )
 
     def driver(self, number: int, position: RunPosition) -> str:
-        """See `Storage.driver`."""
+        """See `Storage.driver`, after `fence`: who is still there had a lease then."""
         row = self.connection.execute(
-            f"SELECT pid, host, command FROM {_LIVE} WHERE run = ?", (number,)
+            "SELECT pid, host, command FROM owners JOIN executives ON id = executive WHERE run = ?",
+            (number,),
         ).fetchone()
         if row is None:
             return ""
@@ -158,10 +159,7 @@ class PostgresStorage:
     def refuse_lost(self, number: int) -> None:
         """See `Storage.refuse_lost`."""
         if self.owners.lost(number):
-            raise StaleEpochError(
-                f"{run_id(number)}: the lease of this executive has ended, so another may have "
-                "claimed it: this one must stop driving it"
-            )
+            raise _lost(number)
 
     def give_up(self, number: int) -> bool:
         """See `Storage.give_up`."""
@@ -243,12 +241,12 @@ class PostgresStorage:
     def _connected_again(self) -> bool:
         """Connect again, as long as this executive surely has its runs."""
         lease = self.owners.lease
-        until_s = lease.until_s if lease.until_s is not None else lease_clock_s() + lease.length_s
+        until_s = lease.until_s if lease.until_s is not None else awake_s() + lease.length_s
         while True:
             with suppress(psycopg.Error):
                 self.connection.execute("SELECT 1")
                 return True
-            if lease_clock_s() + _BETWEEN_TRIES_S > until_s - lease.length_s / 3:
+            if awake_s() + _BETWEEN_TRIES_S > until_s - lease.length_s / 3:
                 return False
             time.sleep(_BETWEEN_TRIES_S)
 
@@ -287,6 +285,13 @@ class PostgresStorage:
         if not again:
             self._tries = 0
         return again
+
+
+def _lost(number: int) -> StaleEpochError:
+    return StaleEpochError(
+        f"{run_id(number)}: the lease of this executive has ended, so another may have claimed it: "
+        "this one must stop driving it"
+    )
 
 
 def _columns(rows: Sequence[tuple[Any, ...]]) -> list[list[Any]]:
@@ -395,6 +400,18 @@ class PostgresJournal(DatabaseJournal):
         """See `Journal.lease_s`."""
         return self._lease.length_s
 
+    async def check_claim(self, run: str, epoch: int) -> None:
+        """See `Journal.check_claim`: also whether the lease, under which it was claimed, lasts."""
+        await super().check_claim(run, epoch)
+        number = run_number(run)
+        found = await self._read(
+            lambda: self._pooled.execute(
+                f"SELECT 1 FROM {_LIVE} WHERE run = ? AND id = ?", (number, self._lease.id)
+            ).fetchone()
+        )
+        if found is None or self._owners.lost(number):
+            raise _lost(number)
+
     @contextmanager
     def _snapshot(self) -> Iterator[None]:
         self._pooled.execute("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
@@ -417,12 +434,12 @@ class PostgresJournal(DatabaseJournal):
         except psycopg.OperationalError:
             if not self._pooled.lost:
                 raise
-        until_s = lease_clock_s() + self._lease.length_s
+        until_s = awake_s() + self._lease.length_s
         while True:
             try:
                 return work()
             except psycopg.OperationalError:
-                if not self._pooled.lost or lease_clock_s() > until_s:
+                if not self._pooled.lost or awake_s() > until_s:
                     raise
             time.sleep(_BETWEEN_TRIES_S)
 

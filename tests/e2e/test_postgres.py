@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine, Program, fleet_with_state
 from tests.postgres_server import PostgresServer, postgres, postgres_url
 
@@ -120,3 +122,22 @@ def test_what_is_wrong_with_the_server_is_told_without_a_traceback(
         assert "no PostgreSQL server answers" in out + errors
         assert SECRET not in out + errors
         assert "Traceback" not in errors
+
+
+def test_a_run_is_held_before_its_lease_ends_and_resumed_when_the_server_is_back(
+    m2pem: CommandLine, tmp_path: Path, postgres: PostgresServer, url: str
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    program = driving(m2pem, fleet, url, M2PEM_LEASE_S="1")
+    postgres.stop()
+    try:
+        status, errors = program.rest()
+    finally:
+        postgres.start()
+    assert status != 0
+    assert "r1: held: " in errors
+    assert "go on with `m2pem resume r1`" in errors
+    assert SECRET not in errors
+    assert recorded_effects(state)[-1].kind is EffectKind.HOLD
+    status, out, _ = m2pem.run("resume", "r1", "--stop", "--ocu", "none", "--journal", url)
+    assert "stopped" in out

@@ -1,7 +1,7 @@
 """An executive that was stopped for a while, or replaced, moves nothing that it does not drive."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
 import pytest
@@ -10,7 +10,7 @@ from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.runs import Alert
 from m2pem.errors import JournalError, OperatorError, StaleCommandError, StaleEpochError
 from m2pem.executive import ownership
-from m2pem.journal import MemoryJournal
+from m2pem.journal import Entry, MemoryJournal
 from m2pem.mission.catalogue import BehaviorState
 
 from .conftest import World, behavior, mission, sequence
@@ -205,3 +205,107 @@ def test_a_takeover_fences_its_run_before_it_asks_and_gets_the_vehicles_back(pla
         await world.executive.control.wait(run)
 
     play(story, "ugv1")
+
+
+LEASE_S = 6.0
+
+
+class LeasedJournal(MemoryJournal):
+    """Its lease begins with the first run, and is renewed when the test says so."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__()
+        self._clock = clock
+        self._until_s: float | None = None
+        self.hangs = False
+
+    @property
+    def lease_s(self) -> float | None:
+        return LEASE_S
+
+    @property
+    def owned_until_s(self) -> float | None:
+        return self._until_s
+
+    def renew(self) -> None:
+        self._until_s = self._clock.now_s + LEASE_S
+
+    async def append(self, entries: Sequence[Entry]) -> None:
+        if self.hangs:
+            await asyncio.Event().wait()
+        await super().append(entries)
+
+
+async def pass_by(world: World, awake: Clock, seconds: float) -> None:
+    """Let time go by, for the executive as well as for its lease."""
+    for _ in range(round(seconds / 0.5)):
+        awake.now_s += 0.5
+        await world.clock.sleep(0.5)
+
+
+def test_a_lease_that_is_renewed_interrupts_nothing(play, awake: Clock) -> None:
+    journal = LeasedJournal(awake)
+
+    async def story(world: World) -> None:
+        journal.renew()
+        async with watched(world):
+            run = await driving(world)
+            for _ in range(5):
+                await pass_by(world, awake, LEASE_S / 2)
+                journal.renew()
+            assert not world.executive.runner(run).done.is_set()
+            world.fake.report(f"{run}.b1", BehaviorState.SUCCEEDED)
+            await world.executive.control.wait(run)
+
+    play(story, "ugv1", journal=journal)
+
+
+@pytest.mark.parametrize("hangs", [False, True])
+def test_a_run_is_held_before_its_lease_ends_and_let_go_of_afterwards(
+    play, awake: Clock, hangs: bool
+) -> None:
+    """Also when an entry waits for a database that does not answer."""
+    journal = LeasedJournal(awake)
+
+    async def story(world: World) -> None:
+        journal.renew()
+        async with watched(world):
+            run = await driving(world)
+            held, replaced = alerted(world, "RUN_HELD"), alerted(world, "RUN_REPLACED")
+            await asyncio.sleep(0)
+            if hangs:
+                journal.hangs = True
+                world.fake.report(f"{run}.b1", BehaviorState.SUCCEEDED)
+            await pass_by(world, awake, LEASE_S * 0.5)
+            assert world.fake.count("hold") == 0
+            await pass_by(world, awake, LEASE_S * 0.25)
+            assert "the journal has not confirmed for" in (await held).text
+            await world.fake.until_called("hold", "ugv1")
+            assert world.executive.runner(run).done.is_set()
+            assert world.fake.count("disown") == 0
+            holds = world.fake.count("hold")
+            await pass_by(world, awake, LEASE_S * 0.25)
+            assert "another one may drive r1 from now on" in (await replaced).text
+            await world.fake.until_called("disown", run)
+            assert world.fake.count("hold") == holds
+
+    play(story, "ugv1", journal=journal)
+
+
+def test_an_executive_that_notices_too_late_asks_and_holds_nothing_of_another(
+    play, awake: Clock
+) -> None:
+    journal = LeasedJournal(awake)
+
+    async def story(world: World) -> None:
+        journal.renew()
+        async with watched(world):
+            run = await driving(world)
+            replaced = alerted(world, "RUN_REPLACED")
+            await claimed_by_another(world, run)
+            awake.now_s += 2 * LEASE_S
+            assert "claimed by another executive since" in (await replaced).text
+            await world.fake.until_called("disown", run)
+            assert world.fake.count("hold") == 0
+
+    play(story, "ugv1", journal=journal)

@@ -30,6 +30,7 @@ from m2pem.engine.records import (
     RunStarted,
 )
 from m2pem.errors import InternalError, JournalError, StaleEntryError, StaleEpochError
+from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.library import Source
@@ -488,6 +489,23 @@ class JournalContract(Contract):
             with pytest.raises(InternalError, match="r1"):
                 await journal.append([entry(run, 1)])
             assert await written(journal, run) == []
+
+    async def test_a_claim_lasts_as_long_as_the_journal_says(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Until the end of a lease that it names, which is renewed; else as long as the process."""
+        async with opened(open_journal) as journal:
+            assert journal.owned_until_s is None
+            before_s = awake_s()
+            run = await journal.create(HEADER)
+            until_s = journal.owned_until_s
+            if journal.lease_s is None:
+                assert until_s is None
+            else:
+                assert until_s is not None
+                assert before_s < until_s <= awake_s() + journal.lease_s
+            await journal.release(run)
+            assert journal.owned_until_s is None
 
     # --- cancelling and closing -----------------------------------------------------------------
 
