@@ -210,9 +210,13 @@ class TerminalApp(Display):
         """Choose a vehicle or payload of which to acquire or release control."""
         try:
             holders = await self.control.holders()
+            labels = await self.control.holder_labels()
         except M2pemError as error:
             self.say(str(error), alarm=True)
             return
+
+        def task(holder: str) -> str:
+            return self._task_label(holder) or labels.get(holder, holder)
 
         def chosen(resource: str | None) -> None:
             if resource is None:
@@ -225,7 +229,7 @@ class TerminalApp(Display):
             else:
                 self._carry_out("Take", self._ask_to_take(resource))
 
-        listed = choices(self.control.fleet(), holders, self.by, self._task_label)
+        listed = choices(self.control.fleet(), holders, self.by, task)
         await self.push_screen(Choose(TITLE, listed, TEXT), chosen)
         self.show()
 
@@ -381,7 +385,7 @@ class TerminalApp(Display):
     def _task_label(self, holder: str) -> str:
         view = self.follower.views.get(holder.rpartition(".")[0])
         found = view and (view.behaviors.get(holder) or view.allocations.get(holder))
-        return view.label(found.element) if view and found else holder
+        return view.label(found.element) if view and found else ""
 
     async def action_runs(self) -> None:
         """Choose the run to show."""

@@ -18,12 +18,13 @@ TITLE = "Take, or give back"
 TEXT = "Take a resource that is free or in a mission, or give one of yours back."
 RETURNED = "Missions may command it again from then on: it may move."
 REMARK_CELLS = 34
-OF_MISSIONS = re.compile(r"r\d+\.[ab]\d+")
-"""The id of a behavior or request: `MissionControl.holders` has one, or the name of an operator."""
+OF_MISSIONS = re.compile(r"r\d+\.[abik]\d+")
+"""The id of a behavior, request, incident or of what a run keeps between tasks:
+`MissionControl.holders` has one, or the name of an operator."""
 
 
 def with_operator(holder: str) -> bool:
-    """Return whether a holder is an operator, not a behavior or request."""
+    """Return whether a holder is an operator, not what a run has."""
     return bool(holder) and OF_MISSIONS.fullmatch(holder) is None
 
 
@@ -37,7 +38,7 @@ def choices(
 ) -> list[Choice]:
     """Return the choices: vehicles, each with its payloads, and who controls them.
 
-    `by` is the operator here; `task` gives the label of a task by its behavior or request.
+    `by` is the operator here; `task` gives the label of a task by what has a resource for it.
     """
     return [
         Choice(resource, resource, shortened(_who(holders[resource], by, task), REMARK_CELLS))

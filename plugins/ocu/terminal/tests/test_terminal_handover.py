@@ -147,6 +147,8 @@ async def test_escape_takes_nothing(world: World) -> None:
 
 def test_a_behavior_of_a_run_not_known_here_is_listed_by_its_id() -> None:
     who = {"scout": "r7.b2", "uav": "x" * 90, "uav/eye": ""}
+    of_runs = {ResourceId("scout"): "r7.k1", ResourceId("uav"): "r7.i2", ResourceId("eye"): "r7.a3"}
+    assert taken(of_runs) == {}
     holders = {ResourceId(resource): holder for resource, holder in who.items()}
     listed = choices(fleet(), holders, "anna", lambda behavior: behavior)
     assert [each.remark for each in listed] == ["r7.b2", "x" * 33 + "…", "free"]

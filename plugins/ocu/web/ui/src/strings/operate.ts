@@ -213,6 +213,8 @@ export const operate = {
     idle: "nothing",
     heldBy: "with {by}",
     heldByRun: "driven by run {run}",
+    keptByRun: "kept by run {run} between tasks",
+    heldForIncident: "held for incident {incident}",
     take: "Take over",
     giveBack: "Give back",
     takeHint: "Steer it by hand; what it does for a mission ends",

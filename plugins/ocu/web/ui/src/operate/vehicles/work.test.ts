@@ -21,20 +21,26 @@ describe("work", () => {
   });
 
   it("tells operators from behaviors", () => {
-    expect(["anna@gcs1", "r1.b3", "", "r12.a144"].map(isOperator)).toEqual([
-      true,
-      false,
-      false,
-      false,
-    ]);
+    const runs = ["r1.b3", "", "r12.a144", "r1.i1", "r2.k1"];
+    expect(runs.filter(isOperator)).toEqual([]);
+    expect(["anna@gcs1", "anna"].map(isOperator)).toEqual([true, true]);
   });
 
   it("knows the run that drives a vehicle, whichever page it is shown on", () => {
     expect(["r12.b144", "r2.a1", "anna@gcs1", ""].map(runOf)).toEqual(["r12", "r2", "", ""]);
+    expect(["r3.k1", "r4.i2"].map(runOf)).toEqual(["r3", "r4"]);
   });
 
   it("says who else has a vehicle", () => {
     const said = ["r12.b144", "r1.b2", "anna@gcs1", ""].map((each) => heldElsewhere(each, "r1"));
     expect(said).toEqual(["driven by run r12", "", "with anna@gcs1", ""]);
+  });
+
+  it("says what a run has that commands nothing now, its own run, too", () => {
+    expect(["r1.k1", "r2.k1", "r1.i3"].map((each) => heldElsewhere(each, "r1"))).toEqual([
+      "kept by run r1 between tasks",
+      "kept by run r2 between tasks",
+      "held for incident r1.i3",
+    ]);
   });
 });

@@ -17,17 +17,24 @@ export function workOf(resource: string, commands: Record<string, Command>): Wor
     .sort((one, other) => one.command.since - other.command.since);
 }
 
-/** Holders are operators, behaviors ("r1.b3"), requests ("r1.a2"), or "" for none. */
-export const isOperator = (holder: string): boolean =>
-  holder !== "" && !/^r\d+\.[ab]\d+$/.test(holder);
+/** Of a run: a behavior ("r1.b3"), request (a), incident (i), or what it keeps between tasks (k). */
+const OF_RUN = /^(r\d+)\.([abik])\d+$/;
 
-/** The run whose behavior or request holds a resource; "": none does. */
-export const runOf = (holder: string): string => /^(r\d+)\.[ab]\d+$/.exec(holder)?.[1] ?? "";
+/** Holders are operators, what runs have, or "" for none. */
+export const isOperator = (holder: string): boolean => holder !== "" && !OF_RUN.test(holder);
 
-/** Which other run or operator has a resource, in words; "": none has. */
+/** The run that holds a resource; "": none does. */
+export const runOf = (holder: string): string => OF_RUN.exec(holder)?.[1] ?? "";
+
+/**
+ * Which other run or operator has a resource, or for what a run has it that commands nothing now,
+ * in words; "": none has.
+ */
 export function heldElsewhere(holder: string, run: string): string {
   if (isOperator(holder)) return fill(text.heldBy, { by: holder });
-  const other = runOf(holder);
+  const [, other, kind] = OF_RUN.exec(holder) ?? [];
+  if (other && kind === "k") return fill(text.keptByRun, { run: other });
+  if (other && kind === "i") return fill(text.heldForIncident, { incident: holder });
   return other && other !== run ? fill(text.heldByRun, { run: other }) : "";
 }
 
