@@ -9,7 +9,6 @@ import asyncio
 import math
 from collections import OrderedDict
 from collections.abc import Coroutine
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Protocol
 from uuid import UUID, uuid4
@@ -244,6 +243,7 @@ class ArbiterHost:
                     await arbiter.hold(resource)
                 elif resource in held:
                     await arbiter.resume(resource)
+                    self._note(f"{resource} goes on with {kept.id}")
         self._store.hold(())
 
     def _ping(self, request: m.Request, ping: m.Ping) -> m.Answer:
@@ -435,22 +435,30 @@ class ArbiterHost:
                 policy = self._hosted.when_cut_off[resource]
                 if alone_s < policy.after_s:
                     continue
-                with suppress(Exception):
+                try:
                     await self._act(arbiter, kept, resource, policy.of(kept.name))
+                except Exception:  # it is tried again, and the other vehicles have their turn
+                    self._log.exception("%s without contact", resource)
 
     async def _act(
         self, arbiter: Arbiter, kept: Kept, resource: ResourceId, action: WhenCutOff
     ) -> None:
         if action is WhenCutOff.END and kept.id not in self._ending:
-            self._log.warning("%s: ended, as there is no contact", kept.id)
-            self._ending.add(kept.id)
             await arbiter.cancel(kept.id, self._store.epoch(kept.id))
+            self._ending.add(kept.id)
+            self._note(f"{kept.id} of {resource} was ended, as there was no contact")
         elif action is WhenCutOff.HOLD:
             held = self._store.held()
             if resource not in held and resource not in self._held_for_executive:
-                self._log.warning("%s: held, as there is no contact", resource)
                 await arbiter.hold(resource)
                 self._store.hold(held | {resource})
+                self._note(f"{resource} was held, as there was no contact")
+
+    def _note(self, text: str) -> None:
+        """Have operators told, once there is contact."""
+        self._log.warning("%s", text)
+        self._store.note(text)
+        self._news.set()
 
     # --- inside ---------------------------------------------------------------------------------
 

@@ -141,7 +141,7 @@ Answer: TypeAlias = Welcome | Done | Found | Refused
 
 
 class Item(msgspec.Struct, frozen=True):
-    """A report or a state with detections. `number` rises by the order in which they came."""
+    """A report, a state with detections, or a note. `number` rises in the order of their coming."""
 
     number: int
     kind: str
@@ -159,8 +159,8 @@ class Received(msgspec.Struct, frozen=True):
     number: int
 
 
-REPORT, STATE = "report", "state"
-"""Kinds of items."""
+REPORT, STATE, NOTE = "report", "state", "note"
+"""Kinds of items; a note is a text for operators."""
 
 _encoder = msgspec.msgpack.Encoder()
 

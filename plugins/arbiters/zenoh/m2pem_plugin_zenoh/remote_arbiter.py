@@ -31,7 +31,10 @@ from m2pem_plugin_zenoh import messages as m
 from m2pem_plugin_zenoh.arbiter_host import LinkError, lost_after_s
 from m2pem_plugin_zenoh.link import Endpoints, Link, settings
 
-CONNECT_WITHIN_S = 3.0
+APPEARS_WITHIN_S = 3.0
+CONNECTS_WITHIN_S = 20.0
+"""How long a host that is there may take to connect its arbiter to the vehicles."""
+
 STATES_WAITING = 10_000
 PINGS_IN_SILENCE = 4
 """Pings in the time after which silence means that the contact is lost."""
@@ -100,7 +103,8 @@ class RemoteArbiter:
         self._latest: dict[ResourceId, VehicleState | PayloadState] = {}
         self._reports: AsyncQueue[BehaviorReport] = AsyncQueue()
         self._states: AsyncQueue[Telemetry] = AsyncQueue(STATES_WAITING)
-        self._appeared, self._has_contact = asyncio.Event(), asyncio.Event()
+        self._is_there, self._greeted = asyncio.Event(), asyncio.Event()
+        self._appeared = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
 
     # --- what is known here ---------------------------------------------------------------------
@@ -126,7 +130,7 @@ class RemoteArbiter:
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Look for the host; return when there is contact, or soon.
+        """Look for the host; return when there is contact, or soon if it is not there.
 
         Raises:
             PluginError: an endpoint or a file of its security cannot be used.
@@ -139,8 +143,10 @@ class RemoteArbiter:
         self._create(self._keep_contact(self._link), "contact")
         self._create(self._watch(), "watch the contact")
         try:
-            async with asyncio.timeout(CONNECT_WITHIN_S):
-                await self._has_contact.wait()
+            async with asyncio.timeout(APPEARS_WITHIN_S):
+                await self._is_there.wait()
+            async with asyncio.timeout(CONNECTS_WITHIN_S):
+                await self._greeted.wait()
         except TimeoutError:
             self._log.warning("%s", self._unreached)
 
@@ -350,7 +356,7 @@ class RemoteArbiter:
         await link.open()
         await link.answer(f"{self._key}/{self._id}/items", self._take_items)
         await link.subscribe(f"{self._key}/{self._id}/state", self._take_state)
-        await link.watch(f"{self._key}/alive", self._appeared.set)
+        await link.watch(f"{self._key}/alive", self._appears)
         pings: set[asyncio.Task[None]] = set()
         while True:
             if self._contact:
@@ -367,6 +373,10 @@ class RemoteArbiter:
                 await asyncio.wait({waiting}, timeout=AGAIN_S)
                 waiting.cancel()
 
+    def _appears(self) -> None:
+        self._is_there.set()
+        self._appeared.set()
+
     async def _wait_for_host(self) -> None:
         await self._appeared.wait()
 
@@ -379,6 +389,8 @@ class RemoteArbiter:
         except LinkError as error:
             self._log.debug("host %s: %s", self._host.name, error)
             return
+        if isinstance(answer, m.Welcome | m.Refused):
+            self._greeted.set()
         if isinstance(answer, m.Refused):
             if answer.reason != self._refusal:
                 self._log.error("host %s refuses contact: %s", self._host.name, answer.reason)
@@ -392,7 +404,6 @@ class RemoteArbiter:
         self._answered_s = self._now_s
         self._clock_ahead_us = None
         self._lost.clear()
-        self._has_contact.set()
         self._log.info("contact with host %s", self._host.name)
 
     async def _ping(self) -> None:
@@ -430,7 +441,6 @@ class RemoteArbiter:
         """The contact is over. Until there is a new one nothing is started."""
         self._log.warning("no contact with host %s: %s", self._host.name, reason)
         self._contact = ""
-        self._has_contact.clear()
 
     def _lose(self, resource: ResourceId, reason: str) -> None:
         self._lost.add(resource)
@@ -461,6 +471,9 @@ class RemoteArbiter:
                     self._report(m.decode_report(item.content))
                 elif item.kind == m.STATE:
                     self._take_state(item.content)
+                elif item.kind == m.NOTE:
+                    text = item.content.decode(errors="replace")
+                    self._log.warning("host %s: %s", self._host.name, text)
             except m.MessageError as error:
                 self._log.error("host %s: %s", self._host.name, error)
         return m.encode(m.Received(self._received))

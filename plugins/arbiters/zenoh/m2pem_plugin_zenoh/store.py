@@ -12,7 +12,7 @@ from uuid import uuid4
 
 from m2pem.api import BehaviorId, BehaviorReport, BehaviorRequest, ResourceId
 from m2pem.errors import PluginError
-from m2pem_plugin_zenoh.messages import REPORT, STATE, Item, decode_report, encode_report
+from m2pem_plugin_zenoh.messages import NOTE, REPORT, STATE, Item, decode_report, encode_report
 
 
 def run_of(behavior: BehaviorId) -> str:
@@ -202,6 +202,12 @@ class HostStore:
         with self._database:
             self._database.execute("BEGIN")
             self._add(STATE, False, content)
+
+    def note(self, text: str) -> None:
+        """Keep what operators must know of, to be delivered."""
+        with self._database:
+            self._database.execute("BEGIN")
+            self._add(NOTE, False, text.encode())
 
     def waiting(self, most: int) -> list[Item]:
         """Return the oldest items that were not received."""

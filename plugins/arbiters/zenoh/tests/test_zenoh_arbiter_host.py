@@ -57,6 +57,10 @@ class Executive:
         return [m.decode_report(each.content) for each in self.items if each.kind == m.REPORT]
 
     @property
+    def notes(self) -> list[str]:
+        return [each.content.decode() for each in self.items if each.kind == m.NOTE]
+
+    @property
     def ended(self) -> list[tuple[str, BehaviorState, str]]:
         return [(r.id, r.state, r.reason) for r in self.reports if r.state.terminal]
 
@@ -477,6 +481,25 @@ def test_a_host_that_is_cut_off_holds_its_vehicle_and_lets_it_go_on_for_the_run(
         assert [call.subject for call in world.arbiter.calls if call.what == "hold"] == [UGV1]
         await world.executive.greet("r1.b1")
         assert world.arbiter.count("resume", UGV1) == 1
+        await world.clock.sleep(1)
+        assert world.executive.notes == [
+            "ugv1 was held, as there was no contact",
+            "ugv1 goes on with r1.b1",
+        ]
+
+    play(main)
+
+
+def test_what_a_host_cannot_do_alone_it_tries_again(play: Callable[..., None]) -> None:
+    async def main(world: World) -> None:
+        await world.executive.start("r1.b1")
+        world.arbiter.raises["hold"] = OSError("the serial line is gone")
+        await world.clock.sleep(12)
+        tried = world.arbiter.count("hold")
+        assert tried > 1
+        world.arbiter.raises.clear()
+        await world.clock.sleep(5)
+        assert world.arbiter.count("hold") == tried + 1
 
     play(main)
 

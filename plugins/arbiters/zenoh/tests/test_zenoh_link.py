@@ -7,10 +7,13 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
+from m2pem_plugin_zenoh import m2pem_check_host
 from m2pem_plugin_zenoh.arbiter_host import LinkError
+from m2pem_plugin_zenoh.host_checks import check_hosts
 from m2pem_plugin_zenoh.link import Endpoints, Link, settings
 from zenoh_world import free_port
 
+from m2pem import load_fleet
 from m2pem.api import Host
 from m2pem.errors import PluginError
 
@@ -119,6 +122,22 @@ def test_a_secret_that_others_may_read_is_refused(keys: Path, tmp_path: Path, fi
     (copy / file).chmod(0o640)
     with pytest.raises(PluginError, match=rf"{file}: others may read it .*chmod 600 .*{file}"):
         settings(host(copy, credentials="users"), Endpoints(listen=("tls/127.0.0.1:1",)))
+
+
+def test_the_doctor_names_files_that_cannot_be_used(keys: Path) -> None:
+    (keys / "fleet.yaml").write_text(
+        "version: 1\n"
+        "hosts:\n"
+        "  here: {connect: ['tcp/127.0.0.1:7447']}\n"
+        "  good: {connect: ['tls/10.0.0.7:7447'], tls: {ca: ca.pem, certificate: link.pem,"
+        " key: link.key}}\n"
+        "  bad: {connect: ['tls/10.0.0.8:7447'], tls: {ca: ca.pem, certificate: none.pem,"
+        " key: link.key}}\n"
+    )
+    here, good, bad = check_hosts(load_fleet(keys / "fleet.yaml"))
+    assert (here.status, good.status, bad.status) == ("ok", "ok", "error")
+    assert "none.pem: No such file" in bad.message
+    assert m2pem_check_host(None) == ()
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

@@ -56,6 +56,8 @@ class HostProcess:
     vehicles.
     """
 
+    program = "zenoh_host_process.py"
+
     def __init__(
         self,
         port: int,
@@ -65,9 +67,10 @@ class HostProcess:
         lost_after_s: float = 3.0,
     ) -> None:
         self.port = port
+        program = str(Path(__file__).with_name(self.program))
         self._command = [
-            *(sys.executable, str(Path(__file__).with_name("zenoh_host_process.py"))),
-            *(str(port), str(folder), str(speed), policy, str(lost_after_s)),
+            *(sys.executable, program, str(port), str(folder)),
+            *(str(speed), policy, str(lost_after_s)),
         ]
         self._process = self._start()
 
