@@ -269,7 +269,14 @@ class Teams:
             state = TeamState(request.id, request.behavior, now_us, kept, spacing_m)
             self._states.put(state)
 
-        members = {each: Member(each, self._arbiter_of(each), failed) for each in request.resources}
+        def superseded(newest: int) -> None:
+            self._ledger.superseded(request.id, newest)
+
+        may_send = self._context.may_send
+        members = {
+            each: Member(each, self._arbiter_of(each), failed, superseded, may_send)
+            for each in request.resources
+        }
         behavior = TeamBehavior(
             request,
             scheme.plan,

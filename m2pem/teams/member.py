@@ -6,6 +6,7 @@ import math
 from collections.abc import Awaitable, Callable
 
 from m2pem.api.arbiter import Arbiter, BehaviorReport, BehaviorRequest, adjusts, sights
+from m2pem.errors import StaleCommandError
 from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.teams.plan import Leg
 
@@ -14,6 +15,8 @@ CALL_TIMEOUT_S = 10.0
 
 TURN_TIMEOUT_S = 8.0
 """Of a hold or resume by the run: the team must fail before the dispatcher's own timeout."""
+
+MAY_SEND_EVERY_S = 0.05
 
 SPEED_STEP_SHARE = 0.05
 """Share of the last commanded speed: smaller changes are not sent."""
@@ -28,7 +31,9 @@ class Member:
     `part`: the id of its part, "" before and between parts. `state`: the part's last reported
     state; None: no report yet. `paused`: a run holds the member. `halted`: the controller holds it.
     `lost`: why the team goes on without it. `failed` is called with the reason when the arbiter's
-    `start` raises or hangs.
+    `start` raises or hangs, `superseded` with the newer epoch when it refuses a command because
+    another executive drives the run. `may_send`: as in `ArbiterContext`; until it is true, a part
+    does not begin, and the controller's commands are dropped.
     """
 
     def __init__(
@@ -36,6 +41,8 @@ class Member:
         member: ResourceId,
         arbiter: Arbiter,
         failed: Callable[[ResourceId, str], None],
+        superseded: Callable[[int], None],
+        may_send: Callable[[], bool],
     ) -> None:
         self.id = member
         self.limits = arbiter.limits(member)
@@ -48,6 +55,8 @@ class Member:
         self.lost = ""
         self._arbiter = arbiter
         self._failed = failed
+        self._superseded = superseded
+        self._may_send = may_send
         self._sighted = sights(arbiter)
         self._adjusting = arbiter if adjusts(arbiter) else None
         self._speed_m_s: float | None = None
@@ -102,7 +111,12 @@ class Member:
         async def start() -> None:
             try:
                 async with asyncio.timeout(CALL_TIMEOUT_S):
+                    while not self._may_send():  # noqa: ASYNC110  # the journal answers soon
+                        await asyncio.sleep(MAY_SEND_EVERY_S)
                     await self._arbiter.start(request)
+            except StaleCommandError as error:
+                self._superseded(error.newest)
+                return
             except TimeoutError:
                 self._failed(self.id, f"its arbiter did not return within {CALL_TIMEOUT_S:g} s")
             except Exception as error:  # an arbiter's fault is the member's, not the team's
@@ -136,6 +150,8 @@ class Member:
 
     def go(self, speed_m_s: float, epoch: int) -> None:
         """Command a speed, or (0) a halt; skipped while an earlier command still waits."""
+        if not self._may_send():
+            return
         if self.paused or not self.goes or (self._tail is not None and not self._tail.done()):
             return
         if speed_m_s == 0.0:
@@ -225,6 +241,10 @@ class Member:
         try:
             async with asyncio.timeout(timeout_s):
                 await call
+        except StaleCommandError as error:
+            _log.error("%s: %s", what, error)
+            self._superseded(error.newest)
+            return str(error)
         except TimeoutError:
             _log.error("%s: the arbiter did not return within %g s", what, timeout_s)
             return f"its arbiter did not return within {timeout_s:g} s"

@@ -53,6 +53,17 @@ def test_the_journal_has_one_accepted_one_running_and_one_end(play: Play, arbite
     assert progress == [(1, BehaviorState.ACCEPTED), (2, BehaviorState.RUNNING)]
 
 
+def test_members_that_another_executive_drives_are_held_by_a_stop(play: Play) -> None:
+    async def story(world: World) -> Any:
+        run = await under_way(world)
+        await world.arbiter("carts").cancel(f"{run}.b9", 5)  # of the executive with epoch 5
+        await world.executive.control.stop(run)
+        await world.until(lambda: world.yard.count("hold") == 3)
+        return world.executive.runner(run).replaced, world.yard.count("cancel")
+
+    assert play(story, column(), geometries=ROAD) == (True, 0)
+
+
 @KINDS
 def test_stopping_the_run_stops_every_member_before_the_behavior_has_ended(
     play: Play, arbiter: str
