@@ -30,10 +30,12 @@ class RoleOptions:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A task that asks for resources: its id and its roles."""
+    """A task that asks for resources: its id and its roles. `waits`: until it can have them; while
+    it waits for several, later ones do not get those of them that are free."""
 
     id: str
     roles: tuple[RoleOptions, ...]
+    waits: bool = True
 
 
 @dataclass(slots=True)
@@ -121,7 +123,7 @@ def assign(
     for request in requests:
         if matching.add(list(_slots(request, kept))):
             served.append(request)
-        else:
+        elif request.waits:
             kept.update(_kept_for(request, kept, matching))
     for request in served:
         for role in request.roles:

@@ -196,8 +196,14 @@ class Allocator:
             return
         self._give_preempted()
         waiting, behind = self._queue.consider()
+        preempts = self._arbiters.fleet.preemption
         requests = {
-            each.request.id: Request(each.request.id, tuple(role.options for role in each.roles))
+            each.request.id: Request(
+                each.request.id,
+                tuple(role.options for role in each.roles),
+                # One that does not get what it needs now may take the rest from other runs.
+                waits=each.waits or preempts,
+            )
             for each in waiting
         }
         chosen, without_space = self._assign(waiting, requests)
@@ -502,4 +508,4 @@ def _not_free(request: Request, vehicle: ResourceId) -> Request:
         else role
         for role in request.roles
     )
-    return Request(request.id, roles)
+    return replace(request, roles=roles)

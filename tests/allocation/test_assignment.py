@@ -53,6 +53,11 @@ def test_a_request_that_waits_for_several_keeps_what_is_free() -> None:
     assert choose(waiting, ask("r2.a1", role(a=1, c=50))) == {"r2.a1": {"r": ("c",)}}
 
 
+def test_a_request_that_does_not_wait_keeps_nothing() -> None:
+    fails = Request("r1.a1", (role(least=2, a=1, busy=["b"]),), waits=False)
+    assert choose(fails, ask("r2.a1", role(a=1))) == {"r2.a1": {"r": ("a",)}}
+
+
 def test_a_request_for_what_is_lost_keeps_nothing() -> None:
     hopeless = ask("r1.a1", role(least=2, a=1))
     assert choose(hopeless, ask("r2.a1", role(a=1))) == {"r2.a1": {"r": ("a",)}}

@@ -126,6 +126,24 @@ def test_a_task_that_does_not_wait_fails_with_what_is_in_its_way(play):
     assert error.reason == "role 'driver': ugv1 is held by A of r1 (r1.a1)"
 
 
+def test_a_task_that_needs_two_and_does_not_wait_keeps_nothing_from_a_later_one(play):
+    two = "requires='true'/><m2pem:role name='second' requires='true'"
+    caught = '<boundaryEvent id="C" attachedToRef="A"><errorEventDefinition/></boundaryEvent>'
+
+    async def story(world: World):
+        control = world.executive.control
+        for number, vehicle in enumerate(("ugv2", "ugv3"), 1):
+            await control.start(one(f"vehicle='{vehicle}' wait='unlimited'"))
+            await world.fake.until_called("start", f"r{number}.b1")
+        source = both(two, "requires='true'").replace(b"</process>", f"{caught}</process>".encode())
+        run = await control.start(source)
+        await world.fake.until_called("start", f"{run}.b1")
+        world.fake.report(f"{run}.b1", SUCCEEDED)
+        return (await control.wait(run)).status, given(world)["B"]
+
+    assert play(story, "ugv1", "ugv2", "ugv3") == (RunStatus.COMPLETED, ("ugv1",))
+
+
 @pytest.mark.parametrize("role", ["vehicle='ugv1'", "requires='true'"])
 def test_two_runs_that_need_one_vehicle_complete_one_after_the_other(play, role):
     async def story(world: World):
