@@ -27,6 +27,11 @@ class KeepingFollower(Follower):
             return False
         return state.status is RunStatus.ENDED or self.kept(number) == self.kept_by(state)
 
+    @property
+    def may_be_stuck(self) -> bool:
+        """Whether nothing can happen any more in a state of the net that the run may be in."""
+        return any(not self._after(number) for number in self.candidates)
+
     def kept(self, number: int) -> Kept:
         """What is kept in a state of the net."""
         found: Kept = Counter()
@@ -69,12 +74,21 @@ class KeepingWalk(Walk):
     def __init__(self, mission: Mission, fleet: Fleet, net: PetriNet, seed: int) -> None:
         super().__init__(mission, fleet, net, seed, Allocator(fleet, Random(seed)))
         self.follower: KeepingFollower = KeepingFollower(net)
+        self.fails = True
+        """Whether behaviors may fail."""
+
+    def give(self, item: i.Input) -> bool:
+        """Each input comes later than the one before: who asks first is served first."""
+        self.now_us += 1
+        return super().give(item)
 
     def things(self) -> list[i.Input]:
         """Failures after which tasks are executed again are more frequent than others."""
         found = super().things()
         again = [each for each in found if _fails(each, AGAIN)]
         others = [each for each in found if not _fails(each)]
+        if not self.fails:
+            return others
         ends = [each for each in found if _fails(each) and not _fails(each, AGAIN)]
         return [*others, *again, *again, *(ends if self.dice.random() < ENDS else ())]
 

@@ -248,6 +248,7 @@ def _asking(
     is known that it gets one as soon as one is free.
     """
     urgent = certain and len(roles) == 1 and _least(roles[0]) == 1 and not roles[0].unknown
+    urgent = urgent and not asks_for_space(context, instance.node)  # what it needs may have no room
     pools = pools_among(context, (resource for each in roles for resource in each.resources))
     asks = asking_place(context, instance)
     return Asking(asks, _priority(roles), instance.outer, frozenset(pools), urgent)
