@@ -94,3 +94,24 @@ def test_a_broken_mission_is_caught(text: str, broken: str, element: str) -> Non
     assert result.verdict is Verdict.VIOLATED
     assert element in {each for violation in result.violations for each in violation.elements}
     assert report.verdict is Verdict.VIOLATED
+
+
+@pytest.mark.parametrize(
+    ("named", "uncaught"),
+    [([], "FAILED"), (["LINK_LOST"], "FAILED"), (["FAILED"], "LINK_LOST"), ([""], None)],
+)
+def test_an_error_that_no_event_names_is_not_caught(named: list[str], uncaught: str | None) -> None:
+    events = "".join(
+        f'<boundaryEvent id="b{code}" attachedToRef="go">error {code}</boundaryEvent>\n'
+        for code in named
+    )
+    flows = "".join(f"b{code} -> e\n" for code in named)
+    text = f"""
+<startEvent id="s"/><scriptTask id="go">do goto uav1</scriptTask><endEvent id="e"/>
+{events}s -> go -> e
+{flows}"""
+    (result,) = [
+        each for each in check(mission(text)).results if each.property == "failures-handled"
+    ]
+    found = [each.message.partition("(")[2].partition(")")[0] for each in result.violations]
+    assert found == ([] if uncaught is None else [uncaught])

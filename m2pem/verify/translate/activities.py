@@ -1,5 +1,6 @@
 """Tasks and other activities: how they begin, work and end."""
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from m2pem.engine.execution import Waits, waits_when_entered
@@ -9,7 +10,16 @@ from m2pem.mission import elements as e
 from m2pem.mission.behavior import Assignment, Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.expression.expression import literal
-from m2pem.mission.losses import FAILED, PREEMPTED, UNAVAILABLE, is_loss
+from m2pem.mission.losses import (
+    BATTERY_LOW,
+    FAILED,
+    LINK_LOST,
+    PREEMPTED,
+    REJECTED,
+    TAKEN_OVER,
+    UNAVAILABLE,
+    is_loss,
+)
 from m2pem.units import Dimension, UnitError, quantity
 from m2pem.verify.net import choices
 from m2pem.verify.net.petri_net import (
@@ -47,7 +57,6 @@ from m2pem.verify.translate.context import (
 from m2pem.verify.translate.keeping import kept_for_others
 from m2pem.verify.translate.loops import looped
 from m2pem.verify.translate.moving import (
-    REJECTED,
     begin_moving,
     may_be_refused,
     movers_of,
@@ -327,18 +336,32 @@ def _outside_work(
     for effect in product(well, instance.done()):
         net.transition(effect, Kind.EXTERNAL, Trigger.SUCCEEDS, unasked)
     if context.options.failures:
-        codes = dict.fromkeys((*catchable(context, instance.outer, instance), "FAILED"))
+        named = catchable(context, instance.outer, instance)
+        other = _other_error(named)
+        codes = dict.fromkeys((*named, other))
         if may_be_preempted(context.fleet, behavior_of(instance.node)):
             codes[PREEMPTED] = None
         for code in codes:
             failed = failing(context, instance, code, Flag.UNCAUGHT_FAILURE)
-            for effect in product(_kept_after(context, instance, code), product([badly], failed)):
+            kept = _kept_after(context, instance, code, is_any=code == other)
+            for effect in product(kept, product([badly], failed)):
                 net.transition(effect, Kind.EXTERNAL, Trigger.FAILS, code)
     return [instance.begin()]
 
 
-def _kept_after(context: TranslationContext, instance: ActivityInstance, code: str) -> list[Effect]:
-    """Return what becomes of what a task keeps when it fails: it is kept, but for a loss."""
+def _other_error(named: Collection[str]) -> str:
+    """Return a code that no event names: it stands for all errors that none catches by its name."""
+    known = (FAILED, LINK_LOST, REJECTED, BATTERY_LOW, TAKEN_OVER, UNAVAILABLE)
+    return next((code for code in known if code not in named), "ERROR")
+
+
+def _kept_after(
+    context: TranslationContext, instance: ActivityInstance, code: str, *, is_any: bool
+) -> list[Effect]:
+    """Return what becomes of what a task keeps when it fails: it is kept, but for a loss.
+
+    `is_any`: the code stands for all errors that nothing catches by its name, losses among them.
+    """
     behavior = behavior_of(instance.node)
     if not context.keeps or behavior is None or not behavior.roles:
         return [Effect()]
@@ -347,8 +370,8 @@ def _kept_after(context: TranslationContext, instance: ActivityInstance, code: s
         return [gone]
     if not all(role.on_loss is OnLoss.REASSIGN for role in behavior.roles):
         return [Effect()]
-    if code in (FAILED, REJECTED):
-        return [Effect(), gone]  # any error that nothing catches by its name, losses among them
+    if is_any or code in (FAILED, REJECTED):
+        return [Effect(), gone]
     return [gone] if is_loss(behavior.type, None, code) else [Effect()]
 
 

@@ -20,7 +20,7 @@ from m2pem.fleet.facts import vehicle_of
 from m2pem.fleet.fleet import Fleet
 from m2pem.mission.behavior import Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
-from m2pem.mission.losses import UNAVAILABLE
+from m2pem.mission.losses import REJECTED, UNAVAILABLE
 from m2pem.mission.values import Value
 from m2pem.units import US_PER_S
 from m2pem.verify.net import choices
@@ -50,7 +50,6 @@ from m2pem.verify.translate.keeping import (
     translate_keeping,
 )
 from m2pem.verify.translate.moving import (
-    REJECTED,
     asks_for_space,
     begin_moving,
     movers_of,

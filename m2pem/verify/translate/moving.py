@@ -19,9 +19,6 @@ from m2pem.verify.translate.net_builder import Effect
 from m2pem.verify.translate.pools import Pool
 from m2pem.verify.translate.space import Departure, Group, Move, Mover, SpacePlan, Spaces
 
-REJECTED = "REJECTED"
-"""The error of a task whose vehicle may not enter a shared space, and which does not wait."""
-
 
 def movers_of(
     context: TranslationContext,

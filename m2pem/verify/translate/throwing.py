@@ -24,7 +24,7 @@ Catching = TypeVar("Catching", bound=e.Event)
 def catchable(
     context: TranslationContext, scope: ScopeDraft, instance: ActivityInstance | None
 ) -> list[str]:
-    """The error codes that events around a place name, and one that no event names."""
+    """The error codes that events around a place name."""
     codes: dict[str, None] = {}
     for event in _around(scope, instance):
         for definition in event.definitions:
