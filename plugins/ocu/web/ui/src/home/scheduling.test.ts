@@ -91,6 +91,11 @@ describe("what is wrong", () => {
 
   it("is a name that is given twice", () => {
     expect(dataOf("a=1\na=2")).toBeNull();
+    const words = { ...WORDS, notData: "not {line}" };
+    const wrongs = ["a=1\na=2", 'a=1\n\n b={"c": 1 ', "speed", "a = 1"].map(
+      (data) => errorsOf({ ...EMPTY, data }, words).data,
+    );
+    expect(wrongs).toEqual(["not a=2", 'not b={"c": 1', "not speed", undefined]);
   });
 
   it.each([

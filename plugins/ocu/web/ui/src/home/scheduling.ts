@@ -1,6 +1,7 @@
 // What the dialog asks for when a mission is to start later, as the server takes it.
 import { readValue, type Value } from "../editor/panels/begin/values";
 import { ApiError } from "../shared/api";
+import { fill } from "../strings";
 
 export type Kind = "free" | "at" | "cron";
 export type Outcome = "completed" | "terminated" | "failed" | "stopped";
@@ -73,7 +74,8 @@ export function errorsOf(form: Form, words: Messages): Errors {
   if (form.condition.trim() && !isDuration(form.heldForS)) errors.heldForS = words.notNumber;
   if (!isDuration(form.deadlineMin)) errors.deadlineMin = words.notNumber;
   if (!/^[-+]?\d+$/.test(form.priority.trim())) errors.priority = words.notInteger;
-  if (dataOf(form.data) === null) errors.data = words.notData;
+  const { wrong } = readData(form.data);
+  if (wrong) errors.data = fill(words.notData, { line: wrong });
   return errors;
 }
 
@@ -84,15 +86,22 @@ const isDuration = (text: string): boolean => {
 
 /** The values by their names; null: a line is not of the form. */
 export function dataOf(text: string): Record<string, Value> | null {
-  const found: Record<string, Value> = {};
+  const { values, wrong } = readData(text);
+  return wrong ? null : values;
+}
+
+/** The values by their names, and the first line that is not of the form; "": all are. */
+function readData(text: string): { values: Record<string, Value>; wrong: string } {
+  const values: Record<string, Value> = {};
   for (const line of text.split("\n").filter((each) => each.trim())) {
     const [, name, written] = /^\s*([^=\s]+)\s*=(.*)$/.exec(line) ?? [];
-    if (name === undefined || written === undefined || name in found) return null;
-    const { kind, value } = readValue(written);
-    if (kind === "unreadable") return null;
-    found[name] = value;
+    const read = written === undefined ? undefined : readValue(written);
+    if (name === undefined || name in values || !read || read.kind === "unreadable") {
+      return { values, wrong: line.trim() };
+    }
+    values[name] = read.value;
   }
-  return found;
+  return { values, wrong: "" };
 }
 
 /** What is sent. Only what was filled in is in it. */

@@ -106,7 +106,7 @@ export const home = {
         needed: "This is needed.",
         notNumber: "This is no number of 0 or more.",
         notInteger: "This is no whole number.",
-        notData: "Write a line for each value, as name = 3, and each name once.",
+        notData: "Not readable: {line}. Write a line for each value, as name = 3, each name once.",
       },
       note: "Times are those of {zone}. It is checked now, and again before each start.",
       submit: "Schedule",
