@@ -15,13 +15,6 @@ MOVES = {"MISSION_COUNT", "MISSION_ITEM_INT", "SET_POSITION_TARGET_GLOBAL_INT"}
 STARTS = {dialect.MAV_CMD_MISSION_START, dialect.MAV_CMD_DO_REPOSITION}
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("127.0.0.1", 0))
-        port: int = taken.getsockname()[1]
-        return port
-
-
 class Relay:
     """Between the copter, which sends to `port`, and m2pem at `ground`.
 

@@ -13,56 +13,30 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mavlink_relay import Relay, free_port
+from mavlink_copters import simulated, task, write
+from mavlink_relay import Relay
+from mavlink_sitl import free_port
+
+from tests.executive.conftest import mission, sequence
 
 SPEED = "10"
 WITHIN_S = 40
 AUTO = 3
 """The mode of a copter that flies its uploaded mission."""
 
-FLEET = """
-version: 1
-origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
-vehicles:
-  uav1:
-    domain: air
-    arbiter: mavlink
-    connection: {{url: "udpin://127.0.0.1:{port}", system_id: 1}}
-    lost_after: {lost_after}
-    sitl: true
-routes: {{around: around.geojson}}
-"""
-ROUND = [[-77.3192, 38.1080], [-77.3182, 38.1080], [-77.3182, 38.1090], [-77.3192, 38.1090]]
-AROUND = {"type": "LineString", "coordinates": ROUND * 6}
-
-
-def mission() -> str:
-    """The copter takes off and flies its route; when it is lost, it is to do the rest itself."""
-    return """
-<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="urn:t"
-             xmlns:m2pem="https://m2pem.org/schema/1">
-  <process id="P" isExecutable="true">
-    <startEvent id="S"/>
-    <scriptTask id="Up"><extensionElements><m2pem:behavior type="vehicle" name="takeoff">
-      <m2pem:properties><m2pem:property name="altitude" value="20"/></m2pem:properties>
-      <m2pem:resources><m2pem:role name="pilot" vehicle="uav1"/></m2pem:resources>
-    </m2pem:behavior></extensionElements></scriptTask>
-    <scriptTask id="Fly"><extensionElements>
-      <m2pem:behavior type="vehicle" name="single_vehicle_routing">
-        <m2pem:properties><m2pem:property name="route" value="around"/>
-          <m2pem:property name="speed" value="4 m/s"/></m2pem:properties>
-        <m2pem:resources>
-          <m2pem:role name="pilot" requires="true" onLoss="reassign" wait="unlimited"/>
-        </m2pem:resources>
-      </m2pem:behavior>
-    </extensionElements></scriptTask>
-    <endEvent id="E"/>
-    <sequenceFlow id="f" sourceRef="S" targetRef="Up"/>
-    <sequenceFlow id="g" sourceRef="Up" targetRef="Fly"/>
-    <sequenceFlow id="h" sourceRef="Fly" targetRef="E"/>
-  </process>
-</definitions>
-"""
+MISSION = mission(
+    sequence(
+        task("Up", "takeoff", "vehicle='uav1'", altitude="20"),
+        task(
+            "Fly",
+            "single_vehicle_routing",
+            "requires='true' onLoss='reassign' wait='unlimited'",
+            route="around",
+            speed="4 m/s",
+        ),
+    )
+)
+"""The copter takes off and flies its route; when it is lost, it is to do the rest itself."""
 
 
 class World:
@@ -71,20 +45,13 @@ class World:
     def __init__(self, folder: Path, lost_after: str) -> None:
         port = free_port()
         self.folder = folder
-        fleet = FLEET.format(port=port, lost_after=lost_after)
-        (folder / "fleet.yaml").write_text(fleet, encoding="utf-8")
-        (folder / "around.geojson").write_text(json.dumps(AROUND), encoding="utf-8")
-        (folder / "m.bpmn").write_text(mission(), encoding="utf-8")
+        write(folder, port, MISSION, lost_after=lost_after, rounds=6)
         self.relay = Relay(port)
         self.records: list[dict[str, Any]] = []
         self.errors = folder / "errors.txt"
         self._readers: list[threading.Thread] = []
         self._programs: list[subprocess.Popen[Any]] = []
-        self.start(
-            *("sim", "mavlink", "--copters", 1, "--speed", SPEED, "--ekf", "6s"),
-            *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{self.relay.port}"),
-            *("--set", "FS_GCS_ENABLE=0"),
-        )
+        self.start(*simulated(self.relay.port, SPEED))
 
     def start(self, *words: object) -> subprocess.Popen[Any]:
         """Start a command of m2pem."""

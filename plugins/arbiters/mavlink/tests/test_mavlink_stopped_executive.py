@@ -5,7 +5,6 @@ has ended would be.
 """
 
 import asyncio
-import json
 import os
 import signal
 import subprocess
@@ -17,54 +16,27 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mavlink_relay import Relay, free_port
+from mavlink_copters import simulated, task, write
+from mavlink_relay import Relay
+from mavlink_sitl import free_port
 
 from m2pem.journal.run_locks import RunLocks
 from m2pem.journal.sqlite import SqliteJournal
+from tests.executive.conftest import flow, mission
 
 WITHIN_S = 60
 SPEED = "10"
 
-FLEET = """
-version: 1
-origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
-vehicles:
-  uav1:
-    domain: air
-    arbiter: mavlink
-    connection: {{url: "udpin://127.0.0.1:{port}", system_id: 1}}
-    lost_after: 1000 s
-    sitl: true
-  evsg1: {{domain: ground, arbiter: sim}}
-routes: {{around: around.geojson}}
-"""
-ROUND = [[-77.3192, 38.1080], [-77.3182, 38.1080], [-77.3182, 38.1090], [-77.3192, 38.1090]]
-AROUND = {"type": "LineString", "coordinates": ROUND * 20}
-
-
-def task(element: str, name: str, vehicle: str, **properties: str) -> str:
-    inside = "".join(
-        f'<m2pem:property name="{key}" value="{value}"/>' for key, value in properties.items()
-    )
-    return (
-        f'<scriptTask id="{element}"><extensionElements>'
-        f'<m2pem:behavior type="vehicle" name="{name}">'
-        f"<m2pem:properties>{inside}</m2pem:properties><m2pem:resources>"
-        f'<m2pem:role name="driver" vehicle="{vehicle}"/></m2pem:resources></m2pem:behavior>'
-        "</extensionElements></scriptTask>"
-    )
-
-
 FLOWS = [("S", "F"), ("F", "Drive"), ("F", "Up"), ("Up", "Follow"), ("Follow", "E"), ("Drive", "E")]
-MISSION = (
-    '<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" targetNamespace="urn:t" '
-    'xmlns:m2pem="https://m2pem.org/schema/1"><process id="P" isExecutable="true">'
-    '<startEvent id="S"/><parallelGateway id="F"/><endEvent id="E"/>'
-    + task("Drive", "single_vehicle_routing", "evsg1", route="around", speed="4 m/s")
-    + task("Up", "takeoff", "uav1", altitude="20")
-    + task("Follow", "follow", "uav1", target="evsg1")
-    + "".join(f'<sequenceFlow id="{a}{b}" sourceRef="{a}" targetRef="{b}"/>' for a, b in FLOWS)
-    + "</process></definitions>"
+TASKS = [
+    task("Drive", "single_vehicle_routing", "vehicle='evsg1'", route="around", speed="4 m/s"),
+    task("Up", "takeoff", "vehicle='uav1'", altitude="20"),
+    task("Follow", "follow", "vehicle='uav1'", target="evsg1"),
+]
+MISSION = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'
+    f'<endEvent id="E"/>{"".join(xml for _, xml in TASKS)}'
+    f"{''.join(flow(*each) for each in FLOWS)}</process>"
 )
 
 
@@ -96,10 +68,8 @@ def test_a_stopped_executive_that_lost_its_run_sends_nothing_when_it_goes_on(
     tmp_path: Path, relay: Relay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     errors = tmp_path / "errors.txt"
-    fleet = FLEET.format(port=relay.ground)
-    (tmp_path / "fleet.yaml").write_text(fleet, encoding="utf-8")
-    (tmp_path / "around.geojson").write_text(json.dumps(AROUND), encoding="utf-8")
-    (tmp_path / "m.bpmn").write_text(MISSION, encoding="utf-8")
+    rover = "evsg1: {domain: ground, arbiter: sim}"
+    file, fleet = write(tmp_path, relay.ground, MISSION, rover, lost_after="1000 s", rounds=20)
     with ExitStack() as stack, errors.open("a") as out:
 
         def start(*words: object) -> "subprocess.Popen[bytes]":
@@ -109,13 +79,9 @@ def test_a_stopped_executive_that_lost_its_run_sends_nothing_when_it_goes_on(
             stack.callback(program.kill)
             return program
 
-        start(
-            *("sim", "mavlink", "--copters", 1, "--speed", SPEED, "--ekf", "6s"),
-            *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{relay.port}"),
-            *("--set", "FS_GCS_ENABLE=0"),
-        )
+        start(*simulated(relay.port, SPEED))
         executive = start(
-            *("run", tmp_path / "m.bpmn", "--fleet", tmp_path / "fleet.yaml", "--speed", SPEED),
+            *("run", file, "--fleet", fleet, "--speed", SPEED),
             *("--ocu", "none", "--journal", tmp_path / "journal.db"),
         )
         until(lambda: len([what for what, _ in relay.seen if what == "sent"]) > 8, errors)
