@@ -144,6 +144,12 @@ class Desk:
         assert (await self.control.wait(run)).status is RunStatus.COMPLETED
 
 
+async def until_incident(control: MissionControl, clock: Clock, code: str) -> None:
+    """Wait until an incident with an error code is open."""
+    while code not in {each.code for each in await control.incidents()}:
+        await clock.sleep(LOOK_EVERY_S)
+
+
 @asynccontextmanager
 async def over_socket(executive: Executive, folder: Path) -> AsyncIterator[MissionControl]:
     """What operators have of an executive over its control socket."""

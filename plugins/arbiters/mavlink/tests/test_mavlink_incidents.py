@@ -34,6 +34,7 @@ from tests.incident_rows import (
     act,
     decide_after_kill,
     over_socket,
+    until_incident,
 )
 
 STARTS = {1: (0.0, 0.0), 2: (0.0, 20.0)}
@@ -82,12 +83,12 @@ def test_a_rover_stands_until_an_operator_decides_and_another_one_takes_over(
             async with executive:
                 control = executive.control
                 run = await control.start(drive, data={"speed": "fast"})
-                await until_incident(clock, executive, "REJECTED")
+                await until_incident(control, clock, "REJECTED")
                 await control.resolve_incident(run, "i1", "set_data", data={"speed": 5})
                 await control.resolve_incident(run, "i1", "retry")
                 await simulator.until(lambda: east_of(simulator, 1) > 5)
                 await control.take("rover1", by="anna")
-                await until_incident(clock, executive, "TAKEN_OVER")
+                await until_incident(control, clock, "TAKEN_OVER")
                 await control.give_back("rover1", by="anna")
                 await control.resolve_incident(
                     run, f"{run}.i2", "retry_with", roles={"actor": ["rover2"]}, by="anna"
@@ -102,11 +103,6 @@ def test_a_rover_stands_until_an_operator_decides_and_another_one_takes_over(
     assert choices == ["retry", "retry_with"]
     driven = [each.resources for each in records if isinstance(each, r.BehaviorRequested)]
     assert driven == [("rover1",), ("rover1",), ("rover2",)]
-
-
-async def until_incident(clock: Clock, executive: Executive, code: str) -> None:
-    while code not in {each.code for each in await executive.control.incidents()}:
-        await clock.sleep(0.05)
 
 
 # --- every error and every choice -----------------------------------------------------------------

@@ -167,6 +167,11 @@ class Programs:
         self._started.append(Program([str(word) for word in words], self.folder, variables))
         return self._started[-1]
 
+    def run(self, mission: Path, fleet: Path, speed: float, **environment: str) -> Program:
+        """Start an executive that runs a mission and prints its records."""
+        words = ("--fleet", fleet, "--speed", f"{speed:g}", "--ocu", "none", "--format", "json")
+        return self.m2pem("run", mission, *words, **environment)
+
     def simulate(self, fleet: Path, speed: float, *words: object) -> Program:
         """Start the simulated vehicles of a fleet, and wait until they are there."""
         vehicles = self.m2pem("sim", "ros", "--fleet", fleet, "--speed", f"{speed:g}", *words)

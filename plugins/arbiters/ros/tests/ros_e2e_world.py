@@ -11,6 +11,7 @@ from m2pem_plugin_ros.frames import to_geodetic
 ORIGIN = (38.1075, -77.3192, 60.0)
 APART_M = 20.0
 SPEED_M_S = 5.0
+BY_NAME = 'vehicle="NAME"'
 
 NODES: Mapping[str, Mapping[str, Any]] = {
     "topics": {},
@@ -84,15 +85,23 @@ def fleet_file(
     return file
 
 
-def convoy(folder: Path, vehicles: Iterable[str], *, again: str = "", name: str = "convoy") -> Path:
+def convoy(
+    folder: Path,
+    vehicles: Iterable[str],
+    *,
+    again: str = "",
+    name: str = "convoy",
+    role: str = BY_NAME,
+) -> Path:
     """A mission in which all drive their routes at the same time: `Drive_NAME` of each.
 
+    `role`: the attributes of each role, in which NAME is that of the vehicle.
     `again`: an ISO 8601 duration; whose link is lost waits for so long (`Wait_NAME`), and then
     drives its route once more (`Again_NAME`).
     """
     parts, flows = "", [("Start", "Fork"), ("Join", "End")]
     for each in vehicles:
-        parts += _drive(f"Drive_{each}", each) + f'<exclusiveGateway id="Merge_{each}"/>'
+        parts += _drive(f"Drive_{each}", each, role) + f'<exclusiveGateway id="Merge_{each}"/>'
         flows += [("Fork", f"Drive_{each}"), (f"Drive_{each}", f"Merge_{each}")]
         flows += [(f"Merge_{each}", "Join")]
         if again:
@@ -102,7 +111,7 @@ def convoy(folder: Path, vehicles: Iterable[str], *, again: str = "", name: str 
                 f'<intermediateCatchEvent id="Wait_{each}"><timerEventDefinition><timeDuration>'
                 f"{again}</timeDuration></timerEventDefinition></intermediateCatchEvent>"
             )
-            parts += _drive(f"Again_{each}", each)
+            parts += _drive(f"Again_{each}", each, role)
             flows += [(f"Lost_{each}", f"Wait_{each}"), (f"Wait_{each}", f"Again_{each}")]
             flows += [(f"Again_{each}", f"Merge_{each}")]
     lines = "".join(
@@ -121,12 +130,12 @@ def convoy(folder: Path, vehicles: Iterable[str], *, again: str = "", name: str 
     return file
 
 
-def _drive(element: str, vehicle: str) -> str:
+def _drive(element: str, vehicle: str, role: str) -> str:
     return (
         f'<scriptTask id="{element}"><extensionElements>'
         '<m2pem:behavior type="vehicle" name="single_vehicle_routing"><m2pem:properties>'
         f'<m2pem:property name="route" value="route_{vehicle}"/>'
         f'<m2pem:property name="speed" value="{SPEED_M_S:g} m/s"/></m2pem:properties>'
-        f'<m2pem:resources><m2pem:role name="driver" vehicle="{vehicle}"/></m2pem:resources>'
-        "</m2pem:behavior></extensionElements></scriptTask>"
+        f'<m2pem:resources><m2pem:role name="driver" {role.replace("NAME", vehicle)}/>'
+        "</m2pem:resources></m2pem:behavior></extensionElements></scriptTask>"
     )

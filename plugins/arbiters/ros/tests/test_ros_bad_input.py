@@ -3,13 +3,12 @@
 import json
 import random
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from ros_e2e_programs import Program, Programs, Record, programs
-from ros_e2e_watch import Watch, watching
+from ros_e2e_programs import Program, Programs, Record
+from ros_e2e_watch import Watch
 from ros_e2e_world import convoy, fleet_file
 
 from m2pem.testing import scenarios
@@ -22,23 +21,12 @@ DRIVEN_WITHIN_S = 90.0
 
 GOOD = {"good": {}}
 BAD = {"liar": {}, "blind": {"driver": "base"}, "frozen": {"driver": "nav2"}}
+WATCHED = (*GOOD, *BAD)
 MOST_MB = 150
 """More memory than before; the 50 MB that are refused are there several times for a moment."""
 
 LINES = 40
 UNKNOWN = "8d9f0c55-0000-4000-8000-000000000001"
-
-
-@pytest.fixture
-def m2pem(tmp_path: Path, ros_domain: int) -> Iterator[Programs]:
-    with programs(tmp_path, ros_domain) as started:
-        yield started
-
-
-@pytest.fixture
-def watch(ros_domain: int) -> Iterator[Watch]:
-    with watching([*GOOD, *BAD], ros_domain) as heard:
-        yield heard
 
 
 class Operator:

@@ -31,6 +31,7 @@ from tests.incident_rows import (
     act,
     decide_after_kill,
     over_socket,
+    until_incident,
 )
 
 FLEET = """
@@ -62,22 +63,14 @@ async def test_a_base_stands_with_an_incident_and_drives_after_a_retry(
                 load_fleet(file), MemoryJournal(), PluginManager(), SystemClock()
             ) as executive,
         ):
-            control, truth = executive.control, Truth(ros)
-
-            async def until_incident(code: str) -> None:
-                async def found() -> bool:
-                    return any(each.code == code for each in await control.incidents())
-
-                while not await found():
-                    await SystemClock().sleep(0.02)
-
+            control, clock, truth = executive.control, SystemClock(), Truth(ros)
             run = await control.start(drive, data={"speed": "fast"})
-            await until_incident("REJECTED")
+            await until_incident(control, clock, "REJECTED")
             await control.resolve_incident(run, "i1", "set_data", data={"speed": 1}, by="anna")
             await control.resolve_incident(run, "i1", "retry", by="anna")
             await until(lambda: truth.speed() > 0.3)
             await control.take("ugv1", by="anna")
-            await until_incident("TAKEN_OVER")
+            await until_incident(control, clock, "TAKEN_OVER")
             await until(lambda: truth.speed() == 0.0)
             await control.give_back("ugv1", by="anna")
             assert (await control.holders())["ugv1"] == f"{run}.i2"

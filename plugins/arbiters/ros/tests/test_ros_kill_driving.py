@@ -2,12 +2,10 @@
 
 import signal
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
-from ros_e2e_programs import Program, Programs, programs
-from ros_e2e_watch import Watch, watching
+from ros_e2e_programs import Program, Programs
+from ros_e2e_watch import Watch
 from ros_e2e_world import ALL_WAYS, convoy, fleet_file
 
 SPEED = 4.0
@@ -17,6 +15,7 @@ FAR_M, NEAR_M = 350.0, 60.0
 END_M = 15.0
 """Nearer to its end, whoever brakes too late on a busy computer may come back to it."""
 
+WATCHED = ALL_WAYS
 ON_BOARD = ("topics", "action", "nav")
 """Those that are steered on board, and need no executive for that."""
 
@@ -44,18 +43,6 @@ if "DIE_WHEN_TOLD" in os.environ:
 what a vehicle tells of is not in the journal yet when `Vehicle` hears of it."""
 
 
-@pytest.fixture
-def m2pem(tmp_path: Path, ros_domain: int) -> Iterator[Programs]:
-    with programs(tmp_path, ros_domain) as started:
-        yield started
-
-
-@pytest.fixture
-def watch(ros_domain: int) -> Iterator[Watch]:
-    with watching(ALL_WAYS, ros_domain) as heard:
-        yield heard
-
-
 def drive(
     m2pem: Programs, watch: Watch, length_m: float, speed: float = SPEED, **settings: str
 ) -> Program:
@@ -68,9 +55,7 @@ def drive(
     file = fleet_file(m2pem.folder, ALL_WAYS, length_m, **of_fleet)
     m2pem.simulate(file, speed)
     watch.until_heard()
-    words = ("--speed", f"{speed:g}", "--ocu", "none", "--format", "json")
-    mission = convoy(m2pem.folder, ALL_WAYS)
-    return m2pem.m2pem("run", mission, "--fleet", file, *words, **environment)
+    return m2pem.run(convoy(m2pem.folder, ALL_WAYS), file, speed, **environment)
 
 
 def resume(m2pem: Programs) -> Program:

@@ -1,14 +1,13 @@
 """The m2pem node of a surveying vehicle is killed (SIGKILL): another does the rest, over DDS."""
 
 import json
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 from m2pem_plugin_ros.frames import to_geodetic
-from ros_e2e_programs import Program, Programs, programs
+from ros_e2e_programs import Program, Programs
 from ros_e2e_world import ORIGIN
 
 from m2pem.api import LocalFrame
@@ -17,12 +16,6 @@ HERE = Path(__file__).parent
 SPEED = 4.0
 WIDTH_M, HEIGHT_M, SPACING_M = 60.0, 120.0, 20.0
 NAMES = ("first", "second")
-
-
-@pytest.fixture
-def m2pem(tmp_path: Path, ros_domain: int) -> Iterator[Programs]:
-    with programs(tmp_path, ros_domain) as started:
-        yield started
 
 
 def at(east_m: float, north_m: float) -> tuple[float, float]:
@@ -88,8 +81,7 @@ def test_another_vehicle_does_the_rest_of_a_survey_whose_node_is_killed(m2pem: P
         place = at(east_m, 0.0)
         nodes[name] = m2pem.python(HERE / "ros_survey_peer.py", SPEED, name, *place)
         nodes[name].until_line("ready")
-    words = ("--fleet", fleet_file(m2pem.folder), "--speed", f"{SPEED:g}", "--ocu", "none")
-    program = m2pem.m2pem("run", mission(m2pem.folder), *words, "--format", "json")
+    program = m2pem.run(mission(m2pem.folder), fleet_file(m2pem.folder), SPEED)
 
     def left() -> list[Any]:
         seen = program.those("BehaviorProgressed", behavior="r1.b1")
