@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, TextIO
 
-from tests.preloaded import Process, preloaded
+from tests.preloaded import Preloaded, Process, preloaded
 
 REPOSITORY = Path(__file__).parents[1]
 MISSION = REPOSITORY / "missions" / "vignette1.bpmn"
@@ -83,10 +83,19 @@ class Program:
 
 
 class CommandLine:
-    """m2pem with a home and a working folder of its own."""
+    """m2pem with a home and a working folder of its own.
 
-    def __init__(self, folder: Path, environment: dict[str, str] | None = None) -> None:
+    `forked_from`: the process from which m2pem is forked; None: the one that all tests share.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        environment: dict[str, str] | None = None,
+        forked_from: Preloaded | None = None,
+    ) -> None:
         self.folder = folder
+        self._forked_from = forked_from
         self.environment = {
             **{key: value for key, value in os.environ.items() if not key.startswith("XDG_")},
             "HOME": str(folder),
@@ -133,7 +142,9 @@ class CommandLine:
                 cwd=self.folder,
                 env=variables,
             )
-        return preloaded().start([*map(str, words)], self.folder, variables, streams)
+        return (self._forked_from or preloaded()).start(
+            [*map(str, words)], self.folder, variables, streams
+        )
 
     def end(self) -> None:
         """Leave nothing running."""

@@ -80,14 +80,18 @@ class Process:
 
 
 class Preloaded:
-    """The process that has imported m2pem and its plugins. It ends with this one."""
+    """The process that has imported m2pem and its plugins. It ends with this one.
 
-    def __init__(self) -> None:
+    `environment`: what it has besides this one's.
+    """
+
+    def __init__(self, environment: Mapping[str, str] | None = None) -> None:
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             subprocess.Popen(
                 [sys.executable, "-m", "tests.preloaded", str(theirs.fileno())],
                 cwd=REPOSITORY,
+                env={**os.environ, **(environment or {})},
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
             )

@@ -1,10 +1,9 @@
 """Opens the journal that a command names, and finds runs in it."""
 
-import os
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Mapping
-from contextlib import ExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -44,34 +43,39 @@ async def journal_at(url: str) -> AsyncIterator[Journal]:
         await journal.close()
 
 
-FULL_BYTES = 1_000_000
-"""With less free space SQLite cannot even open a journal."""
-
-
 @asynccontextmanager
 async def journal_to_read(url: str | None) -> AsyncIterator[Journal]:
-    """As `existing_journal`, for a command that writes nothing: on a full disk, a copy of it.
+    """As `existing_journal`, for a command that writes nothing: a copy of it where nothing can be
+    written, as on a full disk or a file system that is mounted read-only.
 
     What the vehicles were doing must be known then, too.
     """
+    from m2pem.journal.database import needs_copy
+
     path = file_of(url_of(url))
-    elsewhere = is_postgres(url_of(url))
-    if elsewhere or path is None or not path.exists() or not _is_full(path):
-        async with existing_journal(url) as journal:
-            yield journal
-        return
+    async with AsyncExitStack() as stack:
+        try:
+            journal = await stack.enter_async_context(existing_journal(url))
+        except JournalError as error:
+            if path is None or is_postgres(url_of(url)) or not needs_copy(error.__cause__):
+                raise
+            journal = await stack.enter_async_context(_copy_of(path.resolve(), error))
+        yield journal
+
+
+@asynccontextmanager
+async def _copy_of(path: Path, why: JournalError) -> AsyncIterator[Journal]:
     with ExitStack() as stack:
         try:
             folder = stack.enter_context(tempfile.TemporaryDirectory(dir=runtime_directory()))
-            copy = _copied(path.resolve(), Path(folder))
+            copy = _copied(path, Path(folder))
         except OSError as error:
             raise JournalError(
-                f"{path}: the disk is full, and {runtime_directory()} cannot take a copy of it: "
-                f"{error.strerror}; make room on one of them"
+                f"{why}. {runtime_directory()} cannot take a copy of it: {error.strerror}"
             ) from error
         try:
             async with journal_at(str(copy)) as journal:
-                click.echo(f"m2pem: {path}: the disk is full; a copy of it is read", err=True)
+                click.echo(f"m2pem: {why}; a copy of it is read", err=True)
                 yield journal
         except JournalError as error:
             raise JournalError(str(error).replace(str(copy), str(path))) from error
@@ -86,11 +90,6 @@ def _copied(path: Path, folder: Path) -> Path:
             shutil.copyfile(beside, copy.with_name(copy.name + what))
     copy.with_name(f"{copy.name}-lock").symlink_to(f"{path}-lock")
     return copy
-
-
-def _is_full(path: Path) -> bool:
-    disk = os.statvfs(path.parent)
-    return disk.f_bavail * disk.f_frsize < FULL_BYTES
 
 
 @asynccontextmanager

@@ -64,7 +64,8 @@ def _prepare(connection: sqlite3.Connection, path: Path, marked: UUID | None) ->
         if marked is not None and not _is(connection, marked):
             raise of_another_journal(path.with_name(f"{path.name}-mark"))
     finally:
-        connection.execute("ROLLBACK")
+        if connection.in_transaction:  # after a failure SQLite itself has rolled back
+            connection.execute("ROLLBACK")
     if _turn_wal_on(connection) != "wal":
         raise JournalError(f"{path}: its file system can't carry a write-ahead log; use another")
     connection.execute("PRAGMA synchronous = FULL")
@@ -141,7 +142,7 @@ def open_unchanged(path: Path, stack: ExitStack) -> sqlite3.Connection:
     try:
         return _opened_unchanged(path)
     except sqlite3.OperationalError as error:
-        if _primary_code(error) not in _NEEDS_COPY:
+        if not needs_copy(error):
             raise explained_error(error, path) from error
     try:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="m2pem-")))
@@ -165,7 +166,7 @@ def _opened_unchanged(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA writable_schema = ON")
         connection.execute("SELECT 1 FROM sqlite_master").fetchone()
     except sqlite3.DatabaseError as error:
-        if _primary_code(error) in _NEEDS_COPY:
+        if needs_copy(error):
             connection.close()
             raise
     except BaseException:
@@ -192,8 +193,10 @@ _EXPLANATIONS = {
     "`m2pem journal salvage`",
     sqlite3.SQLITE_BUSY: f"another program has kept it locked for {BUSY_TIMEOUT_S:g} s; end that",
     sqlite3.SQLITE_CANTOPEN: "it cannot be opened; check the permissions of it and its folder",
-    sqlite3.SQLITE_IOERR: "the disk failed to read or write",
+    sqlite3.SQLITE_IOERR: "the disk failed to read or write; look at it and its file system",
 }
+
+_NO_INDEX = ("SQLITE_IOERR_SHMOPEN", "SQLITE_IOERR_SHMSIZE", "SQLITE_IOERR_SHMMAP")
 
 _NEEDS_COPY = (
     sqlite3.SQLITE_CANTOPEN,
@@ -209,7 +212,14 @@ def explained_error(error: sqlite3.Error, path: Path) -> JournalError:
     """Return an error that says what is wrong with a journal's file, and the remedy."""
     explanation = _EXPLANATIONS.get(_primary_code(error), "SQLite refused")
     name = getattr(error, "sqlite_errorname", type(error).__name__)
+    if name in _NO_INDEX:
+        explanation = "the disk is full or failed as SQLite made its index (-shm); make room"
     return JournalError(f"{path}: {explanation} ({error}, {name})")
+
+
+def needs_copy(error: BaseException | None) -> bool:
+    """Whether a journal could not be opened because something beside it cannot be written."""
+    return isinstance(error, sqlite3.Error) and _primary_code(error) in _NEEDS_COPY
 
 
 def is_transient(error: sqlite3.Error) -> bool:

@@ -4,6 +4,7 @@ It is apart from the rest of the journal, which needs no parser of BPMN.
 """
 
 from m2pem.bpmn import parse_mission
+from m2pem.errors import JournalError
 from m2pem.fleet.fleet import Fleet, restore, simulated_fleet
 from m2pem.journal.base import RunHeader
 from m2pem.mission.library import KeptLibrary
@@ -28,7 +29,13 @@ def fleet_of(header: RunHeader) -> Fleet:
     journal of 0.1.0 keeps the fleet as it was before.
 
     Raises:
-        JournalError: it is of a newer version.
+        JournalError: it is damaged, or of a newer version.
     """
-    fleet = restore(header.fleet)
+    try:
+        fleet = restore(header.fleet)
+    except JournalError as error:
+        raise JournalError(
+            f"the fleet that the journal has of the run cannot be read: {error}. `m2pem journal "
+            "check` says what is intact"
+        ) from error
     return simulated_fleet(fleet) if header.simulated else fleet

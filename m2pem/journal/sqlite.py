@@ -34,7 +34,8 @@ _ROWS = 90
 class SqliteStorage:
     """The file of an open journal, and its locks; see `Storage`."""
 
-    errors: tuple[type[Exception], ...] = (sqlite3.Error,)
+    errors: tuple[type[Exception], ...] = (sqlite3.Error, OSError)
+    """The files beside the database raise OSError."""
     locking = ""
 
     def __init__(
@@ -107,13 +108,18 @@ class SqliteStorage:
 
     def explained(self, error: Exception) -> JournalError:
         """See `Storage.explained`."""
+        if isinstance(error, OSError):
+            name = error.filename or self._path
+            return JournalError(f"{name}: the disk failed to read or write ({error.strerror})")
         assert isinstance(error, sqlite3.Error)
         return explained_error(error, self._path)
 
     def is_transient(self, error: Exception) -> bool:
         """See `Storage.is_transient`."""
-        assert isinstance(error, sqlite3.Error)
-        return is_transient(error)
+        # Files beside the database are read before anything is written; see `MarkFile`.
+        return isinstance(error, OSError) or (
+            isinstance(error, sqlite3.Error) and is_transient(error)
+        )
 
     def is_worth_a_retry(self, error: Exception) -> bool:
         """See `Storage.is_worth_a_retry`: SQLite itself has waited."""
