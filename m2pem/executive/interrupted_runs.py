@@ -7,7 +7,7 @@ An operator's STOP counts for them as for any other run.
 from collections.abc import Iterable
 
 from m2pem.api.runs import RunId
-from m2pem.errors import OperatorError
+from m2pem.errors import NotDrivenError, OperatorError
 from m2pem.executive.emergency import StopMark, StopMarks
 
 
@@ -32,6 +32,18 @@ class InterruptedRuns:
             raise OperatorError(
                 f"no run begins: {', '.join(self._runs)} was interrupted, and is just taken up "
                 "with its vehicles; try again in a few seconds"
+            )
+
+    def refuse_request(self, run: RunId) -> None:
+        """Check that a run is not about to be driven here.
+
+        Raises:
+            NotDrivenError: it is.
+        """
+        if run in self._runs:
+            raise NotDrivenError(
+                f"{run} was interrupted, and is just taken up with its vehicles; try again in a "
+                "few seconds"
             )
 
     def stop(self, run: RunId, by: str, reason: str) -> bool:

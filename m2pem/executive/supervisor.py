@@ -698,6 +698,7 @@ class Supervisor:
         """
         runner = self.runners.get(run)
         if runner is None:
+            self.interrupted.refuse_request(run)
             known = ", ".join(self.runners) or "none"
             raise NotDrivenError(f"{run} is not driven by this executive; it drives: {known}")
         return runner

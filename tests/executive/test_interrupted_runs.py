@@ -12,7 +12,7 @@ from m2pem.api.runs import RunStatus
 from m2pem.bpmn import parse_mission
 from m2pem.engine.inputs import BehaviorReported, Input, StartRun
 from m2pem.engine.run import MissionRun
-from m2pem.errors import BusyError, OperatorError
+from m2pem.errors import BusyError, NotDrivenError, OperatorError
 from m2pem.fleet.fleet import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
@@ -65,6 +65,14 @@ def after_a_crash(play: Any, story: Any, *left: tuple[bytes, ...]) -> Any:
         return await story(world, runs)
 
     return play(all_of_it, fleet=VEHICLES, journal=journal, start_us=START_US + OUTAGE_US)
+
+
+def test_a_request_to_a_run_that_is_just_taken_up_says_so(play):
+    async def story(world: World, runs):
+        with pytest.raises(NotDrivenError, match="r1 was interrupted, and is just taken up"):
+            await world.executive.control.wait(*runs)
+
+    after_a_crash(play, story, (DRIVE, accepted, running))
 
 
 @pytest.mark.parametrize("source", [DRIVE, BY_NEED], ids=["named", "by need"])
