@@ -339,6 +339,11 @@ class ArbiterHost:
             found = await arbiter.query(body.behavior, reference)
         found = replace(found, epoch=self._store.epoch(body.behavior))
         resources = kept.resources if kept is not None else ()
+        # The arbiter says it of holds that it finds, not of those that it was asked for: an
+        # executive that has just begun knows of neither.
+        held = self._held_for_executive | self._store.held()
+        if found.state in (BehaviorState.ACCEPTED, BehaviorState.RUNNING) and held & {*resources}:
+            found = replace(found, held=True)
         return m.Found(m.encode_report(found), resources)
 
     def _require(self, what: str, behavior: str, epoch: int) -> None:

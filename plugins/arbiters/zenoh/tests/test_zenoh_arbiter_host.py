@@ -531,6 +531,28 @@ def test_what_the_host_holds_stays_held_for_a_restarted_executive(
     play(main)
 
 
+@pytest.mark.parametrize("by_executive", [True, False])
+def test_a_restarted_executive_is_told_of_a_hold_that_came_before_it(
+    play: Callable[..., None], by_executive: bool
+) -> None:
+    async def main(world: World) -> None:
+        await world.executive.start("r1.b1")
+        world.arbiter.known["r1.b1"] = BehaviorReport("r1.b1", 2, BehaviorState.RUNNING)
+        if by_executive:
+            await world.executive.ask(m.Hold(UGV1))
+        await world.clock.sleep(12)
+        await world.executive.greet(fresh=True, executive="e2")
+        found = await world.executive.ask(m.Query("r1.b1", None, 2), executive="e2")
+        assert isinstance(found, m.Found)
+        assert m.decode_report(found.report).held
+        await world.executive.ask(m.Resume(UGV1), executive="e2")
+        found = await world.executive.ask(m.Query("r1.b1", None, 2), executive="e2")
+        assert isinstance(found, m.Found)
+        assert not m.decode_report(found.report).held
+
+    play(main)
+
+
 def test_a_restarted_host_lets_go_on_what_it_held_before(play: Callable[..., None]) -> None:
     async def main(world: World) -> None:
         await world.executive.start("r1.b1")
