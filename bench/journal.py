@@ -1,8 +1,9 @@
 """Measure the journals: bulk records, many runs at once, one run alone, replay. Prints JSON.
 
-    python bench/journal.py [folder]
+    python bench/journal.py [folder] [URL]
 
-The folder (default: the current one) should be on the disk that a journal would be on.
+The folder (default: the current one) should be on the disk that a journal would be on. With the URL
+of an empty database of PostgreSQL, a journal there is measured, too, in turns with SQLite.
 """
 
 import asyncio
@@ -25,7 +26,8 @@ from m2pem.engine.records import (
     TokenLeft,
     TokenOutcome,
 )
-from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader
+from m2pem.journal import Entry, Journal, MemoryJournal, RunHeader, open_journal
+from m2pem.journal.database_journal import DatabaseJournal
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.mission.catalogue import BehaviorState
 
@@ -100,7 +102,7 @@ async def drive(journal: Journal, run: str, inputs: int) -> None:
         seq += len(records)
 
 
-async def concurrent(journal: SqliteJournal, runs: int, inputs: int) -> dict[str, float]:
+async def concurrent(journal: DatabaseJournal, runs: int, inputs: int) -> dict[str, float]:
     """`runs` runs at once, each with one input after the other."""
     names = [await journal.create(HEADER) for _ in range(runs)]
     commits = journal.commits
@@ -129,7 +131,7 @@ def fsync_s(path: Path, count: int) -> float:
     return took / count
 
 
-async def single(journal: SqliteJournal, scratch: Path, inputs: int) -> dict[str, float]:
+async def single(journal: DatabaseJournal, scratch: Path, inputs: int) -> dict[str, float]:
     """One run alone, beside the disk's own fsync, measured in turns."""
     syncs, appends = [], []
     for turn in range(5):
@@ -161,7 +163,29 @@ async def measure(folder: Path) -> dict[str, dict[str, float]]:
     return results
 
 
+async def compare(folder: Path, url: str) -> dict[str, dict[str, float]]:
+    """Many runs and one run, in SQLite and in PostgreSQL by turns; the medians of their ratios."""
+    many, one = [], []
+    for turn in range(3):
+        rates, appends = [], []
+        for journal in (SqliteJournal.open(folder / f"turn{turn}.db"), open_journal(url)):
+            assert isinstance(journal, DatabaseJournal)
+            rates.append((await concurrent(journal, 100, 40))["inputs_per_s"])
+            appends.append((await single(journal, folder, 50))["append_ms"])
+            await journal.close()
+        many.append((rates[1] / rates[0], rates[1]))
+        one.append((appends[1] / appends[0], appends[1]))
+    (rate_ratio, rate), (append_ratio, append) = sorted(many)[1], sorted(one)[1]
+    return {
+        "postgresql, 100 runs": {"inputs_per_s": rate, "of_sqlite": round(rate_ratio, 2)},
+        "postgresql, 1 run": {"append_ms": append, "of_sqlite": round(append_ratio, 2)},
+    }
+
+
 if __name__ == "__main__":
     where = Path(sys.argv[1]) if len(sys.argv) > 1 else Path.cwd()
     with tempfile.TemporaryDirectory(dir=where) as scratch:
-        print(json.dumps(asyncio.run(measure(Path(scratch))), indent=2))
+        found = asyncio.run(measure(Path(scratch)))
+        for url in sys.argv[2:]:
+            found |= asyncio.run(compare(Path(scratch), url))
+        print(json.dumps(found, indent=2))
