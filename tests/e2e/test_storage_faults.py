@@ -237,7 +237,7 @@ def test_a_journal_that_another_program_keeps_locked_is_told_at_open_and_during_
 def flip(place: Callable[[bytes], int]) -> Callable[[Path], None]:
     def harm(file: Path) -> None:
         content = bytearray(file.read_bytes())
-        content[place(content)] ^= 0x10
+        content[place(bytes(content))] ^= 0x10
         file.write_bytes(content)
 
     return harm
