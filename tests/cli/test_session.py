@@ -3,6 +3,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
+from uuid import uuid4
 
 import click
 import pytest
@@ -121,7 +122,10 @@ def test_the_file_goes_when_no_run_needs_it(
         name.touch()
     run = SimpleNamespace(state=SimpleNamespace(status=status))
     runners = {"r1": SimpleNamespace(run=run, failure=failure)}
-    tidy_up(cast("Executive", SimpleNamespace(fleet=fleet, runners=runners)), journal)
+    executive = SimpleNamespace(
+        fleet=fleet, runners=runners, journal=SimpleNamespace(identity=uuid4())
+    )
+    tidy_up(cast("Executive", executive), journal)
     assert Path(state).exists() is kept
     assert Path(f"{state}-wal").exists() is kept
     assert journal.exists()
