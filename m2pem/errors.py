@@ -117,6 +117,12 @@ class StaleEntryError(JournalError):
     held; nothing was written."""
 
 
+class FleetServedError(JournalError):
+    """Another executive serves the fleet on this journal."""
+
+    exit_status = 2
+
+
 class StaleEpochError(JournalError):
     """Another executive has claimed the run since; this one must stop driving it."""
 

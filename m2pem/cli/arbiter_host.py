@@ -114,7 +114,7 @@ async def _serve(
     link = plugins.arbiter(HOST_LINK)
     # As an executive here would have them: what is wrong with a setting is said at once, and no
     # executive of this host may command the same vehicles meanwhile.
-    locks = VehicleLocks(addresses_of(FleetArbiters(_alone(fleet, name), plugins, context), None))
+    locks = VehicleLocks(addresses_of(FleetArbiters(_alone(fleet, name), plugins, context)))
     locks.acquire()
     try:
         serving = asyncio.ensure_future(

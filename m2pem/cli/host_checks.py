@@ -276,7 +276,7 @@ def check_fleet(
     checks.append(HealthCheck("fleet", OK, f"{file} can be used"))
     try:
         journal = file_of(journal_url or default_url())
-        locks = VehicleLocks(addresses_of(arbiters, journal), journal)
+        locks = VehicleLocks(addresses_of(arbiters), journal)
         locks.acquire()
         locks.release()
     except VehicleInUseError as error:

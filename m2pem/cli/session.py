@@ -86,6 +86,15 @@ async def driving(
             if operators.take_terminal:
                 output.cover()
 
+            superseded = asyncio.create_task(executive.superseded.wait())
+            superseded.add_done_callback(
+                lambda task: (
+                    None
+                    if task.cancelled()
+                    else interruption.stop("another executive serves the fleet")
+                )
+            )
+
             def left() -> None:
                 output.uncover()
                 running = [key for key, each in executive.runners.items() if not each.done.is_set()]
@@ -97,6 +106,7 @@ async def driving(
                 operators.begin(executive.control, left)
                 yield interruption
             finally:
+                superseded.cancel()
                 await operators.end()
                 output.uncover()
         await printing

@@ -18,7 +18,7 @@ from typing import Self
 from m2pem.api.arbiter import ArbiterContext, BehaviorId
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
-from m2pem.errors import M2pemError
+from m2pem.errors import FleetServedError, JournalError, M2pemError
 from m2pem.executive.behavior_lifecycle import ExecutiveViews
 from m2pem.executive.control import Control, Rehearse
 from m2pem.executive.control_events import ControlEvents, LoggedAlerts, RecordObservers
@@ -33,11 +33,12 @@ from m2pem.executive.scheduled_runs import ScheduledRuns
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.shared_space_watch import watch_shared_space
 from m2pem.executive.supervisor import RunSettings, Supervisor
-from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
+from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of, refusal
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import Availability, spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
+from m2pem.journal.fleet_server import FleetServer
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
@@ -131,7 +132,9 @@ class Executive:
             foresee,
         )
         self._scheduling: asyncio.Task[None] | None = None
-        self._locks = VehicleLocks(addresses_of(self.arbiters, journal.file), journal.file)
+        self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file)
+        self.superseded = asyncio.Event()
+        """Set when another executive serves the fleet, after the lease on the journal had ended."""
         self._speed = speed
         self._watch_links = watch_links
         self._listeners: list[asyncio.Task[None]] = []
@@ -146,8 +149,9 @@ class Executive:
             VehicleInUseError: another executive commands a vehicle of the fleet.
             PluginError: an arbiter cannot connect.
         """
-        self._locks.acquire()
+        await self._serve_fleet()
         try:
+            self._locks.acquire()
             await self._connections.connect()
         except BaseException:
             self._locks.release()
@@ -162,6 +166,8 @@ class Executive:
             self._listen(group, what, listening)
         if isinstance(self.clock, SystemClock):
             self._listen(group, "watch of the runs' claims", self.ownership.watch)
+            if self.journal.lease_s is not None and self._locks.resources:
+                self._listen(group, "watch of who serves the fleet", self._watch_fleet)
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
@@ -201,6 +207,38 @@ class Executive:
             self.bus.close()
             self.events.end()
             await self._stack.aclose()
+
+    async def _serve_fleet(self) -> None:
+        """Let no other executive on the journal command the vehicles, until it is closed; those
+        that exist in this process alone need it not.
+
+        Raises:
+            VehicleInUseError: another one serves the fleet.
+        """
+        if not self._locks.resources:
+            return
+        try:
+            await self._locks.serve(self.journal, self.fleet)
+        except FleetServedError as error:
+            commanded = self._locks.resources
+            server = await self.journal.fleet_server(self.fleet.name, commanded) or FleetServer()
+            why = refusal(server, str(self.journal.file or ""))
+            raise VehicleInUseError(f"{', '.join(commanded)}: {why}") from error
+
+    async def _watch_fleet(self) -> None:
+        """Serve the fleet again after the lease had ended; end when another executive serves it."""
+        assert self.journal.lease_s is not None
+        while not self.superseded.is_set():
+            await asyncio.sleep(self.journal.lease_s / 3)
+            try:
+                await self._locks.serve(self.journal, self.fleet)
+            except FleetServedError as error:
+                # Before anyone stops the runs: a STOP would be sent to vehicles of the other one.
+                await self.ownership.ask()
+                log.error("%s; this executive commands no vehicle any more", error)
+                self.superseded.set()
+            except JournalError as error:
+                log.info("who serves %s is not known: %s", self.fleet.name, error)
 
     async def load_schedule(self) -> None:
         """Read what the journal has scheduled for this fleet, before runs are taken up.

@@ -82,7 +82,7 @@ class Ownership:
             return
         async with self._asking:
             while (stops := self._look()) != self._confirmed:
-                await self._ask()
+                await self.ask()
                 self._confirmed = stops
 
     async def watch(self) -> None:
@@ -96,6 +96,10 @@ class Ownership:
                 await asyncio.sleep(self._tick_s)
         finally:
             self._seen_s = None
+
+    async def ask(self) -> None:
+        """Ask the journal whether the claims of all runs hold."""
+        await asyncio.gather(*(self._ask_of(runner) for runner in self._driven()))
 
     # --- inside ---------------------------------------------------------------------------------
 
@@ -115,7 +119,7 @@ class Ownership:
         if until_s is None or lease_s is None or now_s < until_s - lease_s / 3:
             return
         if now_s >= until_s:
-            await self._ask()  # too late for a hold: another one may command the vehicles
+            await self.ask()  # too late for a hold: another one may command the vehicles
             return
         passed_s = now_s - (until_s - lease_s)
         for runner in self._driven():
@@ -139,9 +143,6 @@ class Ownership:
                     stopped_s,
                 )
         return self._stops
-
-    async def _ask(self) -> None:
-        await asyncio.gather(*(self._ask_of(runner) for runner in self._driven()))
 
     async def _ask_of(self, runner: Runner) -> None:
         try:

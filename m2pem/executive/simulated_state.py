@@ -1,6 +1,5 @@
 """The file beside a journal in which simulated vehicles keep where they are, for a resume."""
 
-import hashlib
 import secrets
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,7 +9,7 @@ from typing import Any
 from m2pem.engine.state import RunStatus
 from m2pem.executive.executive import Executive
 from m2pem.executive.lost_marks import LostMarks
-from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, dump
+from m2pem.fleet.fleet import SIMULATED, Fleet, Payload, Vehicle, digest_of
 
 STATE = "state"
 """The setting of a simulated resource that names its file."""
@@ -26,8 +25,7 @@ def with_shared_state(fleet: Fleet, journal: Path | None, written: Fleet) -> Fle
 
     `written`: the fleet as its own file says.
     """
-    name = hashlib.sha256(dump(written)).hexdigest()[:8]
-    return _with_state(fleet, journal, name)
+    return _with_state(fleet, journal, digest_of(written)[:8])
 
 
 def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
@@ -57,13 +55,18 @@ def _with_state(fleet: Fleet, journal: Path | None, name: str) -> Fleet:
 
 
 def tidy_up(executive: Executive, journal: Path | None) -> None:
-    """Delete the files made here, unless a run has not ended and needs them to be resumed.
+    """Delete the files made here, unless a run has not ended and needs them to be resumed, or
+    another executive serves the fleet by now.
 
     Simulated vehicles do nothing more then: none is marked as lost.
     """
-    if journal is None or any(
-        runner.failure is not None or runner.run.state.status is not RunStatus.ENDED
-        for runner in executive.runners.values()
+    if (
+        journal is None
+        or executive.superseded.is_set()
+        or any(
+            runner.failure is not None or runner.run.state.status is not RunStatus.ENDED
+            for runner in executive.runners.values()
+        )
     ):
         return
     everything: list[Vehicle | Payload] = [

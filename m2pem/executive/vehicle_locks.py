@@ -1,5 +1,8 @@
 """Locks that say which executive of this user commands a vehicle: one locked file for each address.
 
+They exclude executives with other journals, or other fleets, on this host. That one executive alone
+serves a fleet is for the journal to say: `Journal.serve_fleet`.
+
 The kernel holds a lock for as long as its process lives: a killed executive locks nothing.
 """
 
@@ -8,15 +11,15 @@ import hashlib
 import json
 import os
 import shlex
-import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from m2pem.errors import M2pemError
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.runtime_directory import VARIABLE, runtime_directory
-from m2pem.fleet.fleet import SIMULATED
-from m2pem.journal.postgres_address import without_password
+from m2pem.fleet.fleet import Fleet, digest_of
+from m2pem.journal.base import Journal
+from m2pem.journal.fleet_server import FleetServer, command_line
 from m2pem.mission.catalogue import ResourceId
 
 
@@ -38,6 +41,20 @@ class VehicleLocks:
         self._addresses = addresses
         self._journal = journal
         self._held: dict[Path, int] = {}
+
+    @property
+    def resources(self) -> list[ResourceId]:
+        """The vehicles and payloads that others may command, too."""
+        return [resource for resource, addresses in self._addresses.items() if addresses]
+
+    async def serve(self, journal: Journal, fleet: Fleet) -> None:
+        """Let no other executive on the journal, on any host, serve these of the fleet.
+
+        Raises:
+            FleetServedError: another one does.
+            JournalError: the journal cannot say or note it.
+        """
+        await journal.serve_fleet(fleet.name, self.resources, digest_of(fleet))
 
     def acquire(self) -> None:
         """Take the locks of all, or none.
@@ -89,7 +106,7 @@ class VehicleLocks:
         self._held[path] = file
         me = {
             "pid": os.getpid(),
-            "command": without_password(shlex.join(_command())),
+            "command": command_line(),
             "address": address,
             "journal": str(self._journal or ""),
         }
@@ -98,20 +115,32 @@ class VehicleLocks:
         return None
 
 
-def addresses_of(arbiters: FleetArbiters, journal: Path | None) -> dict[ResourceId, list[str]]:
+def addresses_of(arbiters: FleetArbiters) -> dict[ResourceId, list[str]]:
     """What must have one executive only, for each vehicle and payload.
 
     A real one is known by its arbiter and what that connects to. A simulated one is what its state
-    file says it is; the vehicles of a fleet with one journal count as the same, whichever file
-    they are in. One without a state file exists in this process alone.
+    file says it is. One without a state file exists in this process alone.
     """
-    found: dict[ResourceId, list[str]] = {}
-    for resource, (arbiter, own) in arbiters.addresses().items():
-        addresses = [f"{arbiter}: {each}" for each in own]
-        if arbiter == SIMULATED and addresses and journal is not None:
-            addresses.append(f"{journal.resolve()}: {arbiters.fleet.name}: {resource}")
-        found[resource] = addresses
-    return found
+    return {
+        resource: [f"{arbiter}: {each}" for each in own]
+        for resource, (arbiter, own) in arbiters.addresses().items()
+    }
+
+
+def refusal(server: FleetServer, journal: str) -> str:
+    """Say who has a vehicle, and what to do. `journal`: what names its journal; "": in memory."""
+    if not server.pid:
+        return "another executive commands it, which has just begun; try again"
+    where = "" if server.is_here else f" on {server.host}"
+    start = "Start the mission there"
+    if journal:
+        option = f"--journal {shlex.quote(journal)} " if server.is_here else ""
+        start += f" (m2pem start MISSION {option}--run-on {server.pid}{where and ','}{where})"
+    return (
+        f"process {server.pid}{where} commands it already: {server.command}; one executive "
+        f"commands a vehicle. {start}, or end that one first: kill {server.pid}{where} (it stops "
+        "its missions and releases its vehicles)"
+    )
 
 
 def _is_at(file: int, path: Path) -> bool:
@@ -121,23 +150,11 @@ def _is_at(file: int, path: Path) -> bool:
         return False
 
 
-def _command() -> list[str]:
-    program = Path(sys.argv[0])
-    name = "m2pem" if program.name in ("m2pem", "__main__.py") else str(program)
-    return [name, *sys.argv[1:]]
-
-
 def _refusal(holder: str) -> str:
     """Who has a vehicle, of what the holder of its lock has written, and what to do."""
     try:
         read = json.loads(holder)
-        pid, command, journal = int(read["pid"]), str(read["command"]), read.get("journal")
+        server = FleetServer("", int(read["pid"]), str(read["command"]))
     except (ValueError, KeyError, TypeError):
-        return "another executive commands it, which has just begun; try again"
-    start = "Start the mission there"
-    if journal:
-        start += f" (m2pem start MISSION --journal {shlex.quote(journal)} --run-on {pid})"
-    return (
-        f"process {pid} commands it already: {command}; one executive commands a vehicle. {start}, "
-        f"or end that one first: kill {pid} (it stops its missions and releases its vehicles)"
-    )
+        return refusal(FleetServer(), "")
+    return refusal(server, str(read.get("journal") or ""))

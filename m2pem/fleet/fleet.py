@@ -1,5 +1,6 @@
 """The fleet: vehicles, payloads, teams and named geometries, also as self-contained JSON."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -229,6 +230,11 @@ def dump(fleet: Fleet) -> bytes:
         for name, geometry in fleet.geometries.items()
     }
     return msgspec.json.encode({"version": VERSION, "fleet": content})
+
+
+def digest_of(fleet: Fleet) -> str:
+    """Return what is the same for fleets of the same content, whatever their files are named."""
+    return hashlib.sha256(dump(replace(fleet, file=""))).hexdigest()[:16]
 
 
 def restore(content: bytes) -> Fleet:

@@ -3,7 +3,7 @@
 `JournalContract` checks every promise made here.
 """
 
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +12,7 @@ from uuid import UUID
 
 from m2pem.engine.inputs import Input
 from m2pem.engine.records import Record, RunOutcome
+from m2pem.journal.fleet_server import FleetServer
 from m2pem.mission.library import Source
 from m2pem.scheduling.entry import EntryChange, EntryState, Hold, ScheduleEntry, SchedulePlan
 from m2pem.units import US_PER_S
@@ -177,6 +178,27 @@ class Journal(Protocol):
         None: as long as its process lives, or no run was. When it is over, another executive may
         claim them, and `append` raises StaleEpochError until they are released.
         """
+        ...
+
+    async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
+        """Let no other executive on this journal serve these vehicles and payloads in a fleet of
+        this name, until `leave_fleet` or `close`, the end of its process or of its lease. Again:
+        check that it is so still; what nobody serves is taken again. `digest`: of the fleet's
+        content, for `fleet_server`.
+
+        Raises:
+            FleetServedError: another executive serves one of them, and this one none; host, process
+                and command are named.
+            JournalError: the journal cannot say or note it.
+        """
+        ...
+
+    async def leave_fleet(self, fleet: str) -> None:
+        """Let another executive serve what is served here of a fleet."""
+        ...
+
+    async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
+        """Return which executive serves one of these in a fleet of this name; None: nobody does."""
         ...
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:

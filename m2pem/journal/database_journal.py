@@ -23,6 +23,7 @@ from m2pem.journal.codec import (
     run_id,
     run_number,
 )
+from m2pem.journal.fleet_server import FleetServer
 from m2pem.journal.hash_chain import entry_hash, header_hash
 from m2pem.journal.marks import MarkFile, find_losses
 from m2pem.journal.position import RunPosition
@@ -93,6 +94,10 @@ class DatabaseJournal(ABC):
         """Return which of these runs a living executive drives; the reading thread asks."""
 
     @abstractmethod
+    def _fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
+        """Return who serves one of these of a fleet; the reading thread asks."""
+
+    @abstractmethod
     def _finish(self) -> None:
         """Close everything; the writing thread does it last."""
 
@@ -120,6 +125,22 @@ class DatabaseJournal(ABC):
     def commits(self) -> int:
         """How many transactions have been written since it was opened."""
         return self._writer.commits
+
+    async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
+        """See `Journal.serve_fleet`."""
+        self._check_open()
+        await self._writer.submit(
+            lambda transaction: transaction.serve_fleet(fleet, resources, digest)
+        )
+
+    async def leave_fleet(self, fleet: str) -> None:
+        """See `Journal.leave_fleet`."""
+        self._check_open()
+        await self._writer.submit(lambda transaction: transaction.leave_fleet(fleet))
+
+    async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
+        """See `Journal.fleet_server`."""
+        return await self._read(lambda: self._fleet_server(fleet, resources))
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """See `Journal.create`."""

@@ -1,9 +1,10 @@
 """The lease of an executive on a journal in PostgreSQL: by it, its runs stay its own.
 
-An executive that takes a run has a row in the table `executives`, whose lease ends at a time of the
-server's clock. It is renewed every third of the lease, over a connection of its own, so that slow
-appends do not delay it. Another executive takes a run when the lease of its owner has ended; it
-removes the row of the owner then, so that this lease is never renewed again.
+An executive that serves a fleet or takes a run has a row in the table `executives`, whose lease
+ends at a time of the server's clock. It is renewed every third of the lease, over a connection of
+its own, so that slow appends do not delay it. Another executive serves the fleet, or takes a run,
+when the lease of its owner has ended; it removes the row of the owner then, so that this lease is
+never renewed again.
 
 The executive knows by its own clock until when it surely has its runs: the lease counts from the
 moment before the last successful renewal was sent. So the clocks of the hosts need not agree.
@@ -98,7 +99,7 @@ def end_dead(connection: Connection) -> None:
 
 
 class Lease:
-    """The lease of one executive; `begin` is called before it takes its first run.
+    """The lease of one executive; `begin` is called before it serves a fleet or takes a run.
 
     `id`: of the row in `executives`; a new one when a lease has ended. `may_begin_again`: whether
     nothing is left of what the executive had under a lease that has ended.
@@ -139,7 +140,7 @@ class Lease:
             self._thread.start()
         elif self._ended or awake_s() >= self.until_s:
             raise JournalError(
-                "no run is taken: the lease of this executive has ended, and is not renewed yet"
+                "nothing is taken: the lease of this executive has ended, and is not renewed yet"
             )
 
     def end(self) -> None:
@@ -164,6 +165,7 @@ class Lease:
                 return  # the server does not answer: the lease ends by itself
             with self._connected().transaction() as _:
                 self._connected().execute("DELETE FROM owners WHERE executive = %s", (self.id,))
+                self._connected().execute("DELETE FROM fleets WHERE executive = %s", (self.id,))
                 self._connected().execute("DELETE FROM executives WHERE id = %s", (self.id,))
         except psycopg.Error as error:
             log.info("the lease is left to end by itself: %s", error)

@@ -3,7 +3,7 @@
 import os
 import time
 from bisect import bisect_right
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
@@ -12,6 +12,7 @@ from uuid import UUID, uuid4
 from m2pem.errors import InternalError, JournalError, StaleEntryError
 from m2pem.journal.base import Deletion, Entry, RunHeader, RunInfo
 from m2pem.journal.codec import encode_part, run_id, run_number, unknown_entry, unknown_run
+from m2pem.journal.fleet_server import FleetServer, this_process
 from m2pem.journal.position import RunPosition
 from m2pem.scheduling.entry import (
     EntryChange,
@@ -50,6 +51,7 @@ class MemoryJournal:
         self._entries: dict[str, ScheduleEntry] = {}
         self._holds: dict[str, Hold | None] = {}
         self._last_entry = 0
+        self._fleets: dict[str, dict[str, FleetServer]] = {}
         self._closed = False
 
     @property
@@ -71,6 +73,22 @@ class MemoryJournal:
     def owned_until_s(self) -> float | None:
         """See `Journal.owned_until_s`."""
         return None
+
+    async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
+        """See `Journal.serve_fleet`: no other executive has this journal."""
+        self._check_open()
+        self._fleets.setdefault(fleet, {}).update(dict.fromkeys(resources, this_process(digest)))
+
+    async def leave_fleet(self, fleet: str) -> None:
+        """See `Journal.leave_fleet`."""
+        self._check_open()
+        self._fleets.pop(fleet, None)
+
+    async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
+        """See `Journal.fleet_server`."""
+        self._check_open()
+        served = self._fleets.get(fleet, {})
+        return next((served[each] for each in resources if each in served), None)
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:
         """See `Journal.create`."""

@@ -1,9 +1,7 @@
 """The journal in a PostgreSQL database, for executives on any number of hosts."""
 
 import os
-import shlex
 import socket
-import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -17,10 +15,11 @@ from m2pem.errors import JournalError, StaleEpochError
 from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.codec import run_id, run_number
 from m2pem.journal.database_journal import DatabaseJournal
+from m2pem.journal.fleet_server import FleetServer, command_line
 from m2pem.journal.lease import Executive, Lease, end_dead, lease_s, process_space
 from m2pem.journal.marks import MarkFile, find_losses
 from m2pem.journal.position import RunPosition
-from m2pem.journal.postgres_address import PostgresAddress, without_password, write_address
+from m2pem.journal.postgres_address import PostgresAddress, write_address
 from m2pem.journal.postgres_database import (
     PostgresConnection,
     check_server,
@@ -41,6 +40,11 @@ _TRIES = 10
 
 _BETWEEN_TRIES_S = 0.1
 
+_SERVER = (
+    "SELECT host, pid, command, digest FROM fleets JOIN executives ON id = executive"
+    " AND lease_until > clock_timestamp() WHERE fleet = ? AND resource = ANY(?)"
+)
+
 _LIVE = "owners JOIN executives ON id = executive AND lease_until > clock_timestamp()"
 
 
@@ -51,11 +55,15 @@ class LeasedRuns:
         self._connection = connection
         self._held: set[int] = set()
         self._lost: set[int] = set()
+        self.fleets: dict[str, set[str]] = {}
+        """What this executive serves of each fleet, unless its lease has ended since."""
         self.lease: Lease
 
     def acquire(self, number: int) -> bool:
         """See `RunOwners.acquire`, after `PostgresStorage.fence`."""
         self.lease.begin()
+        for fleet in self.fleets:
+            self._check_served(fleet)
         taken = self._connection.execute(
             "SELECT 1 FROM owners JOIN executives ON id = executive WHERE run = ?", (number,)
         ).fetchone()
@@ -68,6 +76,17 @@ class LeasedRuns:
         )
         self._held.add(number)
         return True
+
+    def _check_served(self, fleet: str) -> None:
+        served = self._connection.execute(
+            "SELECT count(*) FROM fleets WHERE fleet = ? AND executive = ?",
+            (fleet, self.lease.id),
+        ).fetchone()
+        if served != (len(self.fleets[fleet]),):
+            raise JournalError(
+                f"nothing is taken: the lease of this executive has ended, and it does not serve "
+                f"{fleet} again yet"
+            )
 
     def release(self, number: int) -> None:
         """See `RunOwners.release`."""
@@ -131,12 +150,15 @@ class PostgresStorage:
     def fence(self, number: int) -> None:
         """See `Storage.fence`. A transaction of it that is under way is ended: the process may
         stand still in the middle of it."""
+        self._end_owner("owners", "run", number)
+
+    def _end_owner(self, table: str, column: str, value: int | str) -> None:
         end_dead(self.connection)
         # It can never renew its lease, once its row is gone; one that does so now is waited for.
         ended = self.connection.execute(
-            "DELETE FROM executives USING owners WHERE executives.id = owners.executive"
-            " AND owners.run = ? AND lease_until <= clock_timestamp() RETURNING session",
-            (number,),
+            f"DELETE FROM executives USING {table} WHERE executives.id = {table}.executive"
+            f" AND {table}.{column} = ? AND lease_until <= clock_timestamp() RETURNING session",
+            (value,),
         ).fetchone()
         if ended is not None:
             self.connection.execute(
@@ -167,6 +189,42 @@ class PostgresStorage:
             "DELETE FROM owners WHERE run = ? AND executive = ?", (number, self.owners.lease.id)
         )
         return True
+
+    def serve_fleet(
+        self, fleet: str, resources: Collection[str], digest: str
+    ) -> FleetServer | None:
+        """See `Storage.serve_fleet`: for as long as the lease lasts."""
+        lease = self.owners.lease
+        self._end_owner("fleets", "fleet", fleet)
+        names = list(resources)
+        other = self.connection.execute(
+            f"{_SERVER} AND id <> ?", (fleet, names, lease.id)
+        ).fetchone()
+        if other is not None:
+            return FleetServer(*other)
+        lease.begin()
+        lives = self.connection.execute(
+            "SELECT 1 FROM executives WHERE id = ? AND lease_until > clock_timestamp()", (lease.id,)
+        ).fetchone()
+        if lives is None:
+            lease.end()
+            lease.begin()  # says so
+        self.connection.execute(
+            "INSERT INTO fleets SELECT ?, resource, ?, ? FROM unnest(CAST(? AS text[])) AS resource"
+            " ON CONFLICT (fleet, resource)"
+            " DO UPDATE SET executive = excluded.executive, digest = excluded.digest"
+            " WHERE fleets.executive <> excluded.executive",
+            (fleet, lease.id, digest, names),
+        )
+        self.owners.fleets.setdefault(fleet, set()).update(names)
+        return None
+
+    def leave_fleet(self, fleet: str) -> None:
+        """See `Storage.leave_fleet`."""
+        self.owners.fleets.pop(fleet, None)
+        self.connection.execute(
+            "DELETE FROM fleets WHERE fleet = ? AND executive = ?", (fleet, self.owners.lease.id)
+        )
 
     def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:
         """See `Storage.add_to_schedule`."""
@@ -337,7 +395,7 @@ class PostgresJournal(DatabaseJournal):
             socket.gethostname(),
             process_space(),
             os.getpid(),
-            _command(),
+            command_line(),
             str(address.file),
             session,
         )
@@ -424,6 +482,10 @@ class PostgresJournal(DatabaseJournal):
     def _driven(self, numbers: Collection[int]) -> Collection[int]:
         return {row[0] for row in self._pooled.execute(f"SELECT run FROM {_LIVE}")}
 
+    def _fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
+        row = self._pooled.execute(_SERVER, (fleet, list(resources))).fetchone()
+        return None if row is None else FleetServer(*row)
+
     async def _read(self, work: Callable[[], T]) -> T:
         return await super()._read(partial(self._read_again, work))
 
@@ -449,7 +511,3 @@ class PostgresJournal(DatabaseJournal):
         self._lease.close()
         self._writing.close()
         self._marks.close()
-
-
-def _command() -> str:
-    return without_password(shlex.join(sys.argv))

@@ -214,7 +214,16 @@ def first_tables(connection: psycopg.Connection[Any]) -> None:
     connection.execute("INSERT INTO identity VALUES (%s, 0)", (str(uuid4()),))
 
 
-MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (first_tables,)
+def fleets(connection: psycopg.Connection[Any]) -> None:
+    """0.3: which executive serves a vehicle or payload, for as long as its lease lasts."""
+    connection.execute(
+        "CREATE TABLE fleets"
+        " (fleet TEXT NOT NULL, resource TEXT NOT NULL, executive UUID NOT NULL,"
+        " digest TEXT NOT NULL, PRIMARY KEY (fleet, resource))"
+    )
+
+
+MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (first_tables, fleets)
 """A released step is never changed; a change becomes a new step at the end."""
 
 

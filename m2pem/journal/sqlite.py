@@ -1,6 +1,8 @@
 """The journal in an SQLite file, for any number of executives on one host."""
 
+import hashlib
 import logging
+import os
 import sqlite3
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -19,6 +21,7 @@ from m2pem.journal.database import (
     open_for_writing,
 )
 from m2pem.journal.database_journal import DatabaseJournal
+from m2pem.journal.fleet_server import FleetServer, decode, encode, this_process
 from m2pem.journal.marks import MarkFile, find_losses, identity_in, of_another_journal
 from m2pem.journal.position import RunPosition
 from m2pem.journal.run_locks import RunLocks, run_locks
@@ -47,6 +50,7 @@ class SqliteStorage:
         self._path = path
         self._files = OpenFiles([path, _beside(path, "wal"), _beside(path, "lock"), mark])
         self._data_version = 0
+        self._fleets: dict[str, set[str]] = {}
 
     def begin(self) -> bool:
         """See `Storage.begin`: whether no other process has written since."""
@@ -71,6 +75,37 @@ class SqliteStorage:
     def give_up(self, number: int) -> bool:
         """See `Storage.give_up`: its lock is noted elsewhere."""
         return False
+
+    def serve_fleet(
+        self, fleet: str, resources: Collection[str], digest: str
+    ) -> FleetServer | None:
+        """See `Storage.serve_fleet`: by locks of the kernel; files beside them say whose they are.
+
+        No other process takes some of them meanwhile: it does so in a transaction, too.
+        """
+        for resource in resources:
+            lock = _fleet_lock(fleet, resource)
+            if not self.owners.mine(lock) and self.owners.held(lock):
+                return fleet_server(self._path, self.owners, fleet, (resource,)) or FleetServer()
+        for resource in resources:
+            lock = _fleet_lock(fleet, resource)
+            if not self.owners.mine(lock):
+                self.owners.acquire(lock)
+                self._fleets.setdefault(fleet, set()).add(resource)
+                _write_note(_fleet_note(self._path, lock), this_process(digest))
+        return None
+
+    def leave_fleet(self, fleet: str) -> None:
+        """See `Storage.leave_fleet`."""
+        for resource in self._fleets.pop(fleet, set()):
+            lock = _fleet_lock(fleet, resource)
+            _fleet_note(self._path, lock).unlink(missing_ok=True)
+            self.owners.release(lock)
+
+    def leave_fleets(self) -> None:
+        """Serve nothing any more."""
+        for fleet in tuple(self._fleets):
+            self.leave_fleet(fleet)
 
     def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:
         """See `Storage.add_to_schedule`."""
@@ -150,8 +185,8 @@ class SqliteJournal(DatabaseJournal):
         self._closing = reading.close
         self._data_version: int | None = None
         self._revisions: Mapping[str, int] = {}
-        storage = SqliteStorage(path, writing, locks, marks.path)
-        super().__init__(path, identity, storage, reading, marks)
+        self._served = SqliteStorage(path, writing, locks, marks.path)
+        super().__init__(path, identity, self._served, reading, marks)
 
     @classmethod
     def open(cls, path: Path) -> "SqliteJournal":
@@ -207,6 +242,9 @@ class SqliteJournal(DatabaseJournal):
     def _driven(self, numbers: Collection[int]) -> Collection[int]:
         return {number for number in numbers if self._locks.held(number)}
 
+    def _fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
+        return fleet_server(self._path, self._locks, fleet, resources)
+
     def _finish(self) -> None:
         self._reader.submit(self._closing)
         self._reader.shutdown()
@@ -214,11 +252,46 @@ class SqliteJournal(DatabaseJournal):
         with suppress(sqlite3.Error):
             self._writing.close()
         self._marks.close()
+        with suppress(OSError):
+            self._served.leave_fleets()
         self._locks.close()
 
 
 def _beside(path: Path, what: str) -> Path:
     return path.with_name(f"{path.name}-{what}")
+
+
+def fleet_server(
+    path: Path, locks: RunLocks, fleet: str, resources: Collection[str]
+) -> FleetServer | None:
+    """Who serves one of these of a fleet on the journal `path`; None: no living process."""
+    for resource in resources:
+        lock = _fleet_lock(fleet, resource)
+        if locks.held(lock):
+            try:
+                return decode(_fleet_note(path, lock).read_bytes())
+            except OSError:
+                return FleetServer()
+    return None
+
+
+def _write_note(note: Path, server: FleetServer) -> None:
+    new = note.with_name(f"{note.name}-new")
+    new.unlink(missing_ok=True)
+    file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    with os.fdopen(file, "wb") as writing:
+        writing.write(encode(server))
+    new.replace(note)
+
+
+def _fleet_note(path: Path, lock: int) -> Path:
+    return _beside(path, f"fleet-{lock:016x}")
+
+
+def _fleet_lock(fleet: str, resource: str) -> int:
+    """The number of a vehicle or payload among the locks: far above those of runs."""
+    name = f"{fleet}\0{resource}".encode()
+    return (1 << 62) | int.from_bytes(hashlib.sha256(name).digest()[:7])
 
 
 def _identity_of(connection: sqlite3.Connection, path: Path) -> UUID:

@@ -4,10 +4,11 @@ All statements are written for both, with `?` for parameters; see `transaction` 
 `database_journal`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 from m2pem.errors import JournalError
+from m2pem.journal.fleet_server import FleetServer
 from m2pem.journal.position import RunPosition
 
 
@@ -119,6 +120,21 @@ class Storage(Protocol):
     def exclude_others(self) -> None:
         """Let no other executive take or delete runs, or change the schedule, until the end of the
         transaction."""
+        ...
+
+    def serve_fleet(
+        self, fleet: str, resources: Collection[str], digest: str
+    ) -> FleetServer | None:
+        """Serve these of a fleet, within a transaction that excludes others; returns who else
+        serves one of them, and None when all are served here.
+
+        Raises:
+            OSError: it cannot be noted.
+        """
+        ...
+
+    def leave_fleet(self, fleet: str) -> None:
+        """Serve a fleet no more, if it is served here; within a transaction."""
         ...
 
     def add_to_schedule(self, fleet: str, plan: str, state: str, revision: int) -> int:

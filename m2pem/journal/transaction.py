@@ -6,7 +6,7 @@ transaction.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -148,6 +148,23 @@ class WriteTransaction:
                 f"no run begins: {run}: {loss}, so its vehicles may do what no mission knows. "
                 f"{loss.remedy(run)}"
             )
+
+    def serve_fleet(self, fleet: str, resources: Collection[str], digest: str) -> None:
+        """Serve a fleet, unless another executive does."""
+        self._storage.exclude_others()
+        try:
+            other = self._storage.serve_fleet(fleet, resources, digest)
+        except OSError as error:
+            raise JournalError(
+                f"{error.filename or self._storage.place}: which executive serves {fleet} cannot "
+                f"be noted: {error.strerror}"
+            ) from error
+        if other is not None:
+            raise other.refusal(fleet)
+
+    def leave_fleet(self, fleet: str) -> None:
+        """Serve a fleet no more."""
+        self._storage.leave_fleet(fleet)
 
     def claim(self, number: int) -> int:
         """Take a run's lock and raise its epoch, which is returned."""

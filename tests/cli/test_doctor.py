@@ -195,7 +195,7 @@ def test_an_arbiter_without_a_plugin_is_an_error(invoke: Invoke, tmp_path: Path)
 def test_vehicles_of_another_executive_are_a_warning(invoke: Invoke, tmp_path: Path) -> None:
     file, _ = fleet_with_state(tmp_path)
     arbiters = arbiters_of(load_fleet(str(file)), PluginManager())
-    locks = VehicleLocks(addresses_of(arbiters, None))
+    locks = VehicleLocks(addresses_of(arbiters))
     locks.acquire()
     try:
         status, checks = doctor(invoke, "--fleet", file)

@@ -1,9 +1,9 @@
+import asyncio
 import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
-from uuid import uuid4
 
 import click
 import pytest
@@ -14,6 +14,7 @@ from m2pem.executive.executive import Executive
 from m2pem.executive.simulated_state import tidy_up, with_own_state, with_shared_state
 from m2pem.fleet.fleet import Fleet, simulated_fleet
 from m2pem.fleet.fleet_file import load_fleet
+from m2pem.journal import MemoryJournal
 from tests.command_line import FLEET
 
 MIXED_FLEET = """
@@ -105,16 +106,25 @@ def test_what_the_fleet_says_itself_is_kept(fleet: Fleet, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("status", "failure", "kept"),
+    ("status", "failure", "replaced", "kept"),
     [
-        (RunStatus.ENDED, None, False),
-        (RunStatus.RUNNING, None, True),
-        (RunStatus.ENDED, ValueError(), True),
+        (RunStatus.ENDED, None, False, False),
+        (RunStatus.RUNNING, None, False, True),
+        (RunStatus.ENDED, ValueError(), False, True),
+        (RunStatus.ENDED, None, True, True),
     ],
 )
-def test_the_file_goes_when_no_run_needs_it(
-    fleet: Fleet, tmp_path: Path, status: RunStatus, failure: Exception | None, kept: bool
+def test_the_file_goes_when_nobody_needs_it(
+    fleet: Fleet,
+    tmp_path: Path,
+    status: RunStatus,
+    failure: Exception | None,
+    replaced: bool,
+    kept: bool,
 ) -> None:
+    superseded = asyncio.Event()
+    if replaced:
+        superseded.set()
     journal = tmp_path / "journal.db"
     fleet = with_own_state(simulated_fleet(fleet), journal)
     (state,) = set(states(fleet).values())
@@ -123,7 +133,7 @@ def test_the_file_goes_when_no_run_needs_it(
     run = SimpleNamespace(state=SimpleNamespace(status=status))
     runners = {"r1": SimpleNamespace(run=run, failure=failure)}
     executive = SimpleNamespace(
-        fleet=fleet, runners=runners, journal=SimpleNamespace(identity=uuid4())
+        fleet=fleet, runners=runners, superseded=superseded, journal=MemoryJournal()
     )
     tidy_up(cast("Executive", executive), journal)
     assert Path(state).exists() is kept

@@ -43,7 +43,7 @@ class Plugins:
 def locks(arbiter: str, **settings: Any) -> VehicleLocks:
     fleet = Fleet("fleet", "fleet.yaml", {UAV1: Vehicle(UAV1, Domain.AIR, arbiter, settings)})
     plugins, context = cast("ArbiterPlugins", Plugins()), cast("ArbiterContext", object())
-    return VehicleLocks(addresses_of(FleetArbiters(fleet, plugins, context), None))
+    return VehicleLocks(addresses_of(FleetArbiters(fleet, plugins, context)))
 
 
 @pytest.mark.parametrize(

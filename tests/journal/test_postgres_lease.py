@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.errors import JournalError, StaleEpochError
+from m2pem.errors import FleetServedError, JournalError, StaleEpochError
 from m2pem.journal import open_journal
 from m2pem.journal.awake_clock import awake_s
 from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
@@ -178,3 +178,47 @@ def test_a_lease_that_is_no_length_is_refused(postgres_url, monkeypatch, text):
     monkeypatch.setenv("M2PEM_LEASE_S", text)
     with pytest.raises(JournalError, match="M2PEM_LEASE_S="):
         open_journal(postgres_url)
+
+
+async def test_a_fleet_is_free_when_the_lease_of_who_serves_it_has_ended(postgres, url):
+    async with opened(lambda: open_journal(url)) as one, opened(lambda: open_journal(url)) as two:
+        await one.serve_fleet("north", ["ugv1", "ugv2"])
+        until_s = one.owned_until_s
+        assert until_s is None  # it has no run
+        with pytest.raises(FleetServedError, match=f"process {os.getpid()} on"):
+            await two.serve_fleet("north", ["ugv1", "ugv2"])
+        end_leases(postgres, url)
+        await two.serve_fleet("north", ["ugv1", "ugv2"])
+        with pytest.raises(FleetServedError):
+            await one.serve_fleet("north", ["ugv1", "ugv2"])
+
+
+async def test_a_lease_begins_with_a_fleet_and_is_renewed_without_a_run(postgres, url):
+    async with opened(lambda: open_journal(url)) as one, opened(lambda: open_journal(url)) as two:
+        await one.serve_fleet("north", ["ugv1", "ugv2"])
+        end_s = awake_s() + 2 * one.lease_s
+        while awake_s() < end_s:
+            with pytest.raises(FleetServedError):
+                await two.serve_fleet("north", ["ugv1", "ugv2"])
+            await asyncio.sleep(0.05)
+    assert postgres.execute("SELECT * FROM fleets", url) == []
+
+
+async def test_who_has_lost_its_fleet_takes_no_run_before_it_serves_it_again(postgres, url):
+    async with opened(lambda: open_journal(url)) as one, opened(lambda: open_journal(url)) as two:
+        await one.serve_fleet("north", ["ugv1", "ugv2"])
+        end_leases(postgres, url)
+        await two.serve_fleet("north", ["ugv1", "ugv2"])
+        with pytest.raises(JournalError, match="nothing is taken"):
+            await one.create(HEADER)
+        await two.leave_fleet("north")
+        end_s = awake_s() + 60
+        while True:  # its lease begins again
+            try:
+                await one.serve_fleet("north", ["ugv1", "ugv2"])
+                break
+            except JournalError as error:
+                assert "lease of this executive has ended" in str(error)
+                assert awake_s() < end_s
+                await asyncio.sleep(0.02)
+        assert await one.create(HEADER) == "r1"

@@ -29,7 +29,13 @@ from m2pem.engine.records import (
     RunResumed,
     RunStarted,
 )
-from m2pem.errors import InternalError, JournalError, StaleEntryError, StaleEpochError
+from m2pem.errors import (
+    FleetServedError,
+    InternalError,
+    JournalError,
+    StaleEntryError,
+    StaleEpochError,
+)
 from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.mission.catalogue import BehaviorState
@@ -131,6 +137,53 @@ class JournalContract(Contract):
     def open_journal(self) -> OpenJournal:
         """Opens a journal; each call on the same storage, which is empty at first."""
         raise NotImplementedError("override this fixture")
+
+    # --- who serves a fleet ---------------------------------------------------------------------
+
+    async def test_an_executive_serves_a_fleet_until_it_leaves_it(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """It is named by its process; to ask again changes nothing, and to leave twice neither."""
+        async with opened(open_journal) as journal:
+            assert await journal.fleet_server("north", ["ugv2"]) is None
+            for _ in range(2):
+                await journal.serve_fleet("north", ["ugv1", "ugv2"])
+                server = await journal.fleet_server("north", ["ugv2"])
+                assert server is not None
+                assert server.pid == os.getpid()
+            assert await journal.fleet_server("north 2", ["ugv2"]) is None
+            for _ in range(2):
+                await journal.leave_fleet("north")
+                assert await journal.fleet_server("north", ["ugv2"]) is None
+
+    @needs("durability")
+    async def test_of_two_executives_on_a_journal_one_serves_a_fleet(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """The other may serve another one, and this one when the first has left it or is closed."""
+        async with opened(open_journal) as second:
+            async with opened(open_journal) as first:
+                await first.serve_fleet("north", ["ugv1", "ugv2"])
+                with pytest.raises(FleetServedError, match=str(os.getpid())):
+                    await second.serve_fleet("north", ["ugv1", "ugv2"])
+                server = await second.fleet_server("north", ["ugv2"])
+                assert server is not None
+                assert server.pid == os.getpid()
+                await second.serve_fleet("south", ["ugv1", "ugv2"])
+                await second.serve_fleet("north", ["ugv3"])
+                with pytest.raises(FleetServedError):
+                    await second.serve_fleet("north", ["ugv4", "ugv2"])
+                assert await first.fleet_server("north", ["ugv4"]) is None
+                await second.leave_fleet("north")  # the others are not this one's to leave
+                with pytest.raises(FleetServedError):
+                    await second.serve_fleet("north", ["ugv1", "ugv2"])
+                await first.leave_fleet("north")
+                await second.serve_fleet("north", ["ugv1", "ugv2"])
+                with pytest.raises(FleetServedError):
+                    await first.serve_fleet("north", ["ugv1", "ugv2"])
+                await second.leave_fleet("north")
+                await first.serve_fleet("north", ["ugv1", "ugv2"])
+            await second.serve_fleet("north", ["ugv1", "ugv2"])
 
     # --- the schedule ---------------------------------------------------------------------------
 
