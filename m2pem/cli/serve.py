@@ -3,6 +3,7 @@
 import asyncio
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from m2pem.executive.executive import Executive
     from m2pem.fleet.fleet import Fleet
     from m2pem.journal.base import Journal, RunHeader, RunInfo
+    from m2pem.plugins import PluginManager
 
 
 class DaysOption(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
@@ -47,6 +49,12 @@ class DaysOption(click.ParamType):  # type: ignore[type-arg]  # older clicks hav
 @simulate_option
 @speed_option
 @click.option(
+    "--standby",
+    is_flag=True,
+    help="Wait while another executive on this journal serves the fleet, and take its runs over "
+    "when it has died.",
+)
+@click.option(
     "--keep",
     "keep_s",
     type=DaysOption(),
@@ -62,6 +70,7 @@ def serve(
     search_path: tuple[Path, ...],
     simulate: bool,
     speed: float,
+    standby: bool,
     keep_s: float | None,
     output: str,
 ) -> int:
@@ -71,7 +80,17 @@ def serve(
     stop the runs, wait until their vehicles are released, and end it with 0.
     """
     return asyncio.run(
-        _serve(fleet_file, journal, ocu_names, search_path, simulate, speed, keep_s, output)
+        _serve(
+            fleet_file,
+            journal,
+            ocu_names,
+            search_path,
+            simulate,
+            speed,
+            keep_s,
+            output,
+            standby=standby,
+        )
     )
 
 
@@ -84,6 +103,8 @@ async def _serve(
     speed: float,
     keep_s: float | None,
     output: str,
+    *,
+    standby: bool,
 ) -> int:
     from m2pem.api.clock import SystemClock
     from m2pem.api.operator import operator_name
@@ -111,7 +132,10 @@ async def _serve(
     fleet = simulated_fleet(written) if simulated else written
     fleet = with_shared_state(fleet, file_of(url), written)
     refuse_speed(fleet, speed)
+    _refuse_memory(url, standby=standby)
     async with journal_at(url) as journal:
+        if standby and not await standing_by(journal, fleet, plugins, speed):
+            return 0
         mine, _ = await interrupted_runs(journal, fleet, speed)
         clock = SystemClock(speed, await _start_us(journal, mine, speed))
         executive = make_executive(fleet, journal, plugins, clock, search_path=search_path)
@@ -141,32 +165,94 @@ async def _serve(
                 if retention is not None:
                     retention.cancel()
         tidy_up(executive, file_of(url))
-    return 0
+        return 1 if executive.superseded.is_set() else 0
+
+
+def _refuse_memory(url: str, *, standby: bool) -> None:
+    from m2pem.journal import file_of
+
+    if standby and file_of(url) is None:
+        raise click.UsageError(
+            "--standby: a journal in memory ends with its executive; name the file or database of "
+            "the executive whose runs are to be taken over with --journal"
+        )
+
+
+async def standing_by(
+    journal: "Journal", fleet: "Fleet", plugins: "PluginManager", speed: float
+) -> bool:
+    """Wait until this executive serves the fleet; False: SIGINT or SIGTERM ended it before.
+
+    Raises:
+        FleetError: another fleet of that name is served.
+    """
+    from m2pem.api.clock import SystemClock
+    from m2pem.cli.notes import note
+    from m2pem.cli.session import SIGNALS, make_executive
+    from m2pem.executive.standby import stand_by
+    from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
+    from m2pem.scripting.sources import arbiters_of
+
+    # What is wrong with the fleet, an arbiter or a mission is found before it is needed.
+    make_executive(fleet, journal, plugins, SystemClock(speed))
+    locks = VehicleLocks(addresses_of(arbiters_of(fleet, plugins)), journal.file)
+    for text in await unreadable(journal, fleet, speed):
+        note(f"m2pem: {text}")
+    waiting = asyncio.create_task(
+        stand_by(journal, fleet, locks, lambda text: note(f"m2pem: {text}"))
+    )
+    loop = asyncio.get_running_loop()
+    for number in SIGNALS:
+        loop.add_signal_handler(number, waiting.cancel)
+    try:
+        await waiting
+    except asyncio.CancelledError:
+        return False
+    finally:
+        for number in SIGNALS:
+            loop.remove_signal_handler(number)
+    return True
+
+
+async def unreadable(journal: "Journal", fleet: "Fleet", speed: float) -> list[str]:
+    """Say which runs that have not ended could not be taken up here, and why."""
+    from m2pem.errors import M2pemError
+    from m2pem.journal.mission import mission_of
+
+    found: list[str] = []
+    for line in await journal.runs():
+        if line.outcome is None and is_of_fleet(line.header, fleet, speed):
+            try:
+                mission_of(line.header)
+            except M2pemError as error:
+                found.append(f"{line.run} could not be taken over here: {error}")
+    return found
 
 
 async def interrupted_runs(
     journal: "Journal", fleet: "Fleet", speed: float
 ) -> "tuple[list[RunInfo], list[RunInfo]]":
     """The runs that no executive drives: those with the same fleet, and the others."""
-    from m2pem.errors import JournalError
-    from m2pem.fleet.fleet import dump, restore
-    from m2pem.journal.mission import fleet_of
-
-    here = restore(dump(fleet))
-
-    def is_of_this_fleet(header: "RunHeader") -> bool:
-        try:
-            return header.speed == speed and fleet_of(header) == here
-        except JournalError:
-            return False
-
     mine: list[RunInfo] = []
     others: list[RunInfo] = []
     for line in await journal.runs():
         taken_up = line.loss is None or line.loss.resumable
         if line.outcome is None and not line.driven and taken_up:
-            (mine if is_of_this_fleet(line.header) else others).append(line)
+            (mine if is_of_fleet(line.header, fleet, speed) else others).append(line)
     return mine, others
+
+
+def is_of_fleet(header: "RunHeader", fleet: "Fleet", speed: float) -> bool:
+    """Whether a run has this fleet, whatever its file is named, and this speed."""
+    from m2pem.errors import JournalError
+    from m2pem.fleet.fleet import dump, restore
+    from m2pem.journal.mission import fleet_of
+
+    here = replace(restore(dump(fleet)), file="")
+    try:
+        return header.speed == speed and replace(fleet_of(header), file="") == here
+    except JournalError:
+        return False
 
 
 async def _start_us(journal: "Journal", lines: "list[RunInfo]", speed: float) -> int:

@@ -1,0 +1,108 @@
+"""A second executive on the journal takes over the runs of one that is killed, or stands still."""
+
+import json
+import signal
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from m2pem.simulation.executions import EffectKind
+from m2pem.simulation.state_file import recorded_effects
+from tests.command_line import MISSION, CommandLine, Program, Record, fleet_with_state
+from tests.postgres_server import postgres, postgres_url
+
+__all__ = ["postgres", "postgres_url"]
+
+LEASE = {"M2PEM_LEASE_S": "2"}
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def journal(request: pytest.FixtureRequest) -> str:
+    if request.param == "sqlite":
+        return "journal.db"
+    url: str = request.getfixturevalue("postgres_url")
+    return url
+
+
+def serve(m2pem: CommandLine, fleet: Path, journal: str, *words: str) -> Program:
+    return m2pem.start(
+        "serve", "--fleet", fleet, "--ocu", "none", "--format", "json", "--journal", journal,
+        *words, **LEASE,
+    )  # fmt: skip
+
+
+def until_said(program: Program, text: str) -> str:
+    """Read standard error until a line of it has this text."""
+    for line in program.stderr:
+        if text in line:
+            return line
+    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
+
+
+def start_mission(m2pem: CommandLine, journal: str) -> None:
+    status, _, errors = m2pem.run("start", MISSION, "--journal", journal)
+    assert (status, errors) == (0, "")
+
+
+def answer(m2pem: CommandLine, journal: str, prompt: str, decision: str) -> None:
+    status, _, errors = m2pem.run("answer", "r1", prompt, decision, "--journal", journal)
+    assert status == 0, errors
+
+
+def prompted(program: Program) -> str:
+    found: str = program.until_record("PromptOpened")["prompt"]
+    return found
+
+
+def assert_each_behavior_began_once(state: Path, records: list[Record]) -> None:
+    starts = Counter(
+        effect.behavior for effect in recorded_effects(state) if effect.kind is EffectKind.START
+    )
+    requested = [each["behavior"] for each in records if each["record"] == "BehaviorRequested"]
+    assert requested
+    assert starts == Counter(requested)
+
+
+def test_a_standby_takes_over_from_a_killed_executive(
+    m2pem: CommandLine, tmp_path: Path, journal: str
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, journal)
+    until_said(owner, "serving")
+    standbys = [serve(m2pem, fleet, journal, "--standby") for _ in range(2)]
+    for each in standbys:
+        assert f"process {owner.process.pid} on" in until_said(each, "standing by for")
+    start_mission(m2pem, journal)
+    answer(m2pem, journal, prompted(owner), "continue")
+    owner.until_record("BehaviorProgressed", state="RUNNING")
+    owner.kill()
+    again, other = who_took_over(standbys, owner)
+    again.until_record("RunClaimed", epoch=2)
+    status, _, errors = m2pem.run("stop", "r1", "--journal", journal)
+    assert status == 0, errors
+    again.until_record("RunEnded", outcome="stopped")
+    status, out, _ = m2pem.run("replay", "r1", "--format", "json", "--journal", journal)
+    assert_each_behavior_began_once(state, [json.loads(line) for line in out.splitlines()])
+    assert m2pem.run("replay", "r1", "--verify", "--journal", journal)[0] == 0
+    again.send(signal.SIGTERM)
+    assert again.rest()[0] == 0
+    until_said(other, "serving")  # nothing is left to take over: it serves
+    other.send(signal.SIGTERM)
+    assert other.rest()[0] == 0
+
+
+def who_took_over(standbys: list[Program], before: Program) -> tuple[Program, Program]:
+    """The standby that serves now, and the one that stands by for it."""
+    said = {}
+    for each in standbys:
+        for line in each.stderr:
+            named = f"process {before.process.pid} on" in line or "just begun" in line
+            if not named:
+                said[each.process.pid] = line
+                break
+    (again,) = (each for each in standbys if "taking over" in said[each.process.pid])
+    (other,) = (each for each in standbys if each is not again)
+    assert f"process {again.process.pid} on" in said[other.process.pid]
+    until_said(again, "serving")
+    return again, other
