@@ -86,13 +86,18 @@ class PostgresServer:
         assert code == 0, (self.folder / "output").read_text()
 
 
-@pytest.fixture(scope="session")
-def postgres() -> Iterator[PostgresServer]:
-    """A server; fails where PostgreSQL is not installed."""
+def start_server() -> PostgresServer:
+    """Start a server; fails where PostgreSQL is not installed."""
     programs = _programs()
     if programs is None:
         pytest.fail("PostgreSQL is not installed: make test installs it (Debian: postgresql)")
-    server = PostgresServer(programs)
+    return PostgresServer(programs)
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[PostgresServer]:
+    """A server; fails where PostgreSQL is not installed."""
+    server = start_server()
     yield server
     server.remove()
 

@@ -46,7 +46,7 @@ class _Run:
 async def judge(evidence: "Evidence", expected: Mapping[str, End] | None) -> Verdict:
     """Judge a round. `expected`: how each mission ends undisturbed; None: that is not known."""
     verdict = Verdict()
-    journal = open_journal(evidence.url)
+    journal = open_journal(str(evidence.journal))
     try:
         runs = [await _read(journal, info) for info in await journal.runs()]
     finally:

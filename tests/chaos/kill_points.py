@@ -12,15 +12,21 @@ import os
 import signal
 import sqlite3
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from inspect import iscoroutinefunction
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 RANDOM = "at a random moment"
 """The name of no point: the process is killed from outside."""
+
+
+WAIT_FOR_ANSWER = 1
+"""`psycopg.waiting.Wait.R`, which most executives need not import."""
 
 
 class When(StrEnum):
@@ -29,7 +35,8 @@ class When(StrEnum):
     BEFORE = "before"
     AFTER = "after"
     AT_COMMIT = "at each COMMIT of the SQLite connection that it returns"
-    AT_STATEMENT = "at each statement of the SQLite connection that it is given"
+    AT_STATEMENT = "at each statement of the connection that it is given"
+    SENT = "when the last statement of the PostgreSQL transaction is sent, and not answered"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,21 +53,32 @@ class KillPoint:
 
 @dataclass(frozen=True, slots=True)
 class JournalKind:
-    """A kind of journal. `type`: `module:name` of its class. `url`: with `{folder}` of a round."""
+    """A kind of journal. `type`: `module:name` of its class. `file`: its name in the folder of a
+    round; others are beside it. `migrates`: whether there are older formats than the newest.
+    `lease_s`: of its executives; "": there is none."""
 
     name: str
     type: str
-    url: str
+    file: str
     points: tuple[KillPoint, ...]
+    migrates: bool = True
+    lease_s: str = ""
 
 
 _TRANSACTION = "m2pem.journal.transaction:WriteTransaction"
 _MARKS = "m2pem.journal.marks:MarkFile"
 
+_MARKED = (
+    KillPoint("group commit: before the mark", f"{_MARKS}.write", When.BEFORE),
+    KillPoint("group commit: after the mark", f"{_MARKS}.write", When.AFTER),
+    KillPoint("group commit: not acknowledged yet", f"{_TRANSACTION}.commit", When.AFTER),
+    KillPoint("create: before the mark's slot", f"{_MARKS}.reserve", When.BEFORE),
+)
+
 SQLITE = JournalKind(
     "sqlite",
     "m2pem.journal.sqlite:SqliteJournal",
-    "{folder}/journal.db",
+    "journal.db",
     (
         KillPoint("group commit: begun", f"{_TRANSACTION}.begin", When.AFTER),
         KillPoint(
@@ -68,14 +86,43 @@ SQLITE = JournalKind(
             "m2pem.journal.sqlite:open_for_writing",
             When.AT_COMMIT,
         ),
-        KillPoint("group commit: before the mark", f"{_MARKS}.write", When.BEFORE),
-        KillPoint("group commit: after the mark", f"{_MARKS}.write", When.AFTER),
-        KillPoint("group commit: not acknowledged yet", f"{_TRANSACTION}.commit", When.AFTER),
-        KillPoint("create: before the mark's slot", f"{_MARKS}.reserve", When.BEFORE),
+        *_MARKED,
         KillPoint("migration", "m2pem.journal.database:migrate", When.AT_STATEMENT, opening=True),
     ),
 )
-JOURNALS: Mapping[str, JournalKind] = {SQLITE.name: SQLITE}
+
+_STORAGE = "m2pem.journal.postgres:PostgresStorage"
+_LEASE = "m2pem.journal.lease:Lease"
+
+POSTGRES = JournalKind(
+    "postgres",
+    "m2pem.journal.postgres:PostgresJournal",
+    "journal.postgresql",
+    (
+        KillPoint("group commit: begun", f"{_TRANSACTION}.begin", When.AFTER),
+        KillPoint("group commit: rows not written", f"{_STORAGE}.commit"),
+        KillPoint("group commit: before COMMIT", f"{_STORAGE}._commit"),
+        KillPoint("group commit: COMMIT sent", f"{_STORAGE}._commit", When.SENT),
+        *_MARKED,
+        KillPoint("migration", "m2pem.journal.postgres:migrate", When.AT_STATEMENT, opening=True),
+        KillPoint("lease: begun", f"{_LEASE}.begin", When.AFTER),
+        KillPoint("lease: before a renewal", f"{_LEASE}._renewed"),
+        KillPoint("lease: renewed", f"{_LEASE}._renewed", When.AFTER),
+        KillPoint("lease: before it is given up", f"{_LEASE}.close"),
+        KillPoint("open: leases of the dead ended", "m2pem.journal.postgres:end_dead", When.AFTER),
+        KillPoint("claim: before the fence", f"{_STORAGE}.fence", resuming=True),
+        KillPoint("claim: fenced", f"{_STORAGE}.fence", When.AFTER, resuming=True),
+        KillPoint(
+            "claim: taken, not committed",
+            "m2pem.journal.postgres:LeasedRuns.acquire",
+            When.AFTER,
+        ),
+        KillPoint("release: not committed", f"{_STORAGE}.give_up", When.AFTER),
+    ),
+    migrates=False,
+    lease_s="2",
+)
+JOURNALS: Mapping[str, JournalKind] = {each.name: each for each in (SQLITE, POSTGRES)}
 
 _DISPATCHER = "m2pem.executive.dispatcher:Dispatcher"
 _SUPERVISOR = "m2pem.executive.supervisor"
@@ -194,12 +241,46 @@ def _at_commit(function: Callable[..., Any], passed: Callable[[], None]) -> Call
 
 def _at_statement(function: Callable[..., Any], passed: Callable[[], None]) -> Callable[..., Any]:
     @functools.wraps(function)
-    def around(connection: sqlite3.Connection, *arguments: Any, **named: Any) -> Any:
+    def around(connection: Any, *arguments: Any, **named: Any) -> Any:
+        with _watched(connection, passed):
+            return function(connection, *arguments, **named)
+
+    return around
+
+
+@contextmanager
+def _watched(connection: Any, passed: Callable[[], None]) -> Iterator[None]:
+    """Have `passed` called at each statement of a connection within the block."""
+    if isinstance(connection, sqlite3.Connection):
         connection.set_trace_callback(lambda _: passed())
         try:
-            return function(connection, *arguments, **named)
+            yield
         finally:
             connection.set_trace_callback(None)
+    else:
+        with mock.patch.object(connection, "execute", _before(connection.execute, passed)):
+            yield
+
+
+def _sent(function: Callable[..., Any], passed: Callable[[], None]) -> Callable[..., Any]:
+    def until_sent(steps: Generator[Any, Any, Any]) -> Generator[Any, Any, Any]:
+        wanted, sent = next(steps), False
+        while True:
+            # psycopg waits for the answer alone when all of the statement has been sent.
+            if wanted == WAIT_FOR_ANSWER and not sent:
+                sent = True
+                passed()
+            try:
+                wanted = steps.send((yield wanted))
+            except StopIteration as end:
+                return end.value
+
+    @functools.wraps(function)
+    def around(storage: Any, *arguments: Any, **named: Any) -> Any:
+        raw = storage.connection.raw
+        wait = raw.wait
+        with mock.patch.object(raw, "wait", lambda steps, **more: wait(until_sent(steps), **more)):
+            return function(storage, *arguments, **named)
 
     return around
 
@@ -209,6 +290,7 @@ _WRAPPERS = {
     When.AFTER: _after,
     When.AT_COMMIT: _at_commit,
     When.AT_STATEMENT: _at_statement,
+    When.SENT: _sent,
 }
 
 

@@ -8,10 +8,9 @@ import json
 import os
 import random
 import signal
-import sqlite3
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -19,13 +18,14 @@ from tempfile import TemporaryDirectory
 
 from m2pem.api import MissionControl
 from m2pem.api.authoring import MissionFiles
-from m2pem.api.runs import OpenPrompt, RunId
+from m2pem.api.runs import OpenPrompt, RunId, RunStatus
 from m2pem.control_socket.paths import ControlSocketError, live_sockets
 from m2pem.control_socket.remote import RemoteControl
 from m2pem.errors import M2pemError, OperatorError
-from m2pem.journal.migrations import MIGRATIONS
+from m2pem.journal.lease import LEASE_VARIABLE
+from tests.chaos import journals
 from tests.chaos.judge import Verdict, judge
-from tests.chaos.kill_points import JOURNALS, RANDOM, JournalKind, points_of
+from tests.chaos.kill_points import JOURNALS, RANDOM, points_of
 from tests.chaos.worlds import WORLDS, ChaosMission, World
 from tests.command_line import CommandLine
 from tests.preloaded import Process, preloaded
@@ -33,12 +33,8 @@ from tests.preloaded import Process, preloaded
 LOOK_EVERY_S = 0.01
 ROUND_WITHIN_S = 120.0
 MOST_KILLS = 3
-
-UNDONE = {
-    "deletions": ("DROP TABLE deletions",),
-    "schedule": ("DROP TABLE schedule", "DROP TABLE schedule_holds"),
-}
-"""How the last steps of migration are undone in a journal with no deletion and no schedule."""
+STATEMENTS_OF_AN_UPGRADE = 4
+"""At least so many has the migration of a journal that was made an older one."""
 
 _STARTER = """
 import runpy, sys
@@ -105,11 +101,12 @@ def plan_round(seed: int, number: int, world: str, journal: str, point: str = ""
     names = [RANDOM, *points]
     first = point or names[number % len(names)]
     kills: list[Kill] = []
-    after = first != RANDOM and (points[first].resuming or points[first].opening)
-    if after and (points[first].resuming or chance.random() < 0.7):
+    older = first != RANDOM and points[first].opening and kind.migrates
+    if first != RANDOM and (points[first].resuming or (older and chance.random() < 0.7)):
         early = [RANDOM, *(each for each in points if passages.get(each, 0) > 1)]
         kills.append(_kill(chance, chance.choice(early), passages))
-    kills.append(_kill(chance, first, passages))
+    upgrades = kills and points[first].opening
+    kills.append(_kill(chance, first, {first: STATEMENTS_OF_AN_UPGRADE} if upgrades else passages))
     while len(kills) < MOST_KILLS and chance.random() < 0.3:
         kills.append(_kill(chance, chance.choice(names), passages))
     return Plan(number, world, journal, tuple(kills), pauses=chance.random() < 0.15)
@@ -117,8 +114,9 @@ def plan_round(seed: int, number: int, world: str, journal: str, point: str = ""
 
 def _kill(chance: random.Random, point: str, passages: Mapping[str, int]) -> Kill:
     # A point that is passed only in a resume is passed once for each run or behavior.
-    most = max(2, passages.get(point, 0))
-    return Kill(point, chance.randint(1, most), chance.uniform(0.0, 1.5))
+    most = passages.get(point) or 2
+    # A computer with other work has fewer commits, each of more calls.
+    return Kill(point, chance.randint(1, -(-most * 2 // 3)), chance.uniform(0.0, 1.5))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +148,7 @@ class Evidence:
     """What is known of a round from outside: see `m2pem`'s judge."""
 
     world: World
-    url: str
-    journal: JournalKind
+    journal: Path
     printed: Sequence[str] = ()
     acknowledged: Mapping[str, Sequence[RunId]] = field(default_factory=dict)
     answered: Sequence[tuple[RunId, str]] = ()
@@ -171,8 +168,9 @@ class Play:
         self._world: World = WORLDS[plan.world](folder)
         self._folder = folder
         self._kind = JOURNALS[plan.journal]
-        self._url = self._kind.url.format(folder=folder)
-        self._environment = CommandLine(folder).environment
+        self._file = journals.make(self._kind, folder)
+        lease = {LEASE_VARIABLE: self._kind.lease_s} if self._kind.lease_s else {}
+        self._environment = CommandLine(folder, lease).environment
         self._process: Process | None = None
         self._chance = random.Random(f"{plan.number}")
         self._lives = 0
@@ -193,15 +191,13 @@ class Play:
         # What a killed process had not printed whole, no operator has read.
         lines = [line.rstrip("\n") for life in printed for line in life if line.endswith("\n")]
         errors = "\n".join(self._errors(life).read_text() for life in lives)
-        return Evidence(
-            self._world, self._url, self._kind, lines, self._runs, self._answered, errors
-        )
+        return Evidence(self._world, self._file, lines, self._runs, self._answered, errors)
 
     async def whole(self) -> None:
         """Play the plan."""
         for kill in self.plan.kills:
             if kill.point == "migration" and self._lives:
-                downgrade(Path(self._url))
+                journals.downgrade(self._kind, self._file)
             if await self._life(kill):
                 self.reached += 1
             elif self._over:
@@ -247,7 +243,7 @@ class Play:
     def _start(self, arm: str, spoil: str) -> Process:
         self._lives += 1
         words = [
-            *("serve", "--fleet", str(self._world.fleet), "--journal", self._url),
+            *("serve", "--fleet", str(self._world.fleet), "--journal", str(self._file)),
             *("--speed", f"{self._world.speed:g}", "--ocu", "none", "--format", "json"),
         ]
         code = _STARTER.format(arm=arm, spoil=spoil, words=words)
@@ -294,7 +290,7 @@ class Play:
     async def _control(self, process: Process) -> Path:
         """Wait until the executive can be asked."""
         while True:
-            for path in live_sockets(Path(self._kind.url.format(folder=self._folder))):
+            for path in live_sockets(self._file):
                 if path.stem == str(process.pid):
                     return path
             await asyncio.sleep(LOOK_EVERY_S)
@@ -312,6 +308,8 @@ class Play:
                 while not await self._all_ended(control):
                     for prompt in control.prompts():
                         await self._answer(control, prompt)
+                    if pausing.done():
+                        await self._resume_paused(control)
                     await asyncio.sleep(LOOK_EVERY_S)
                 await pausing
             finally:
@@ -369,6 +367,13 @@ class Play:
                 with suppress(OperatorError):
                     await act(run, by="anna")
 
+    async def _resume_paused(self, control: MissionControl) -> None:
+        """Resume what was paused by an operator of an executive that was killed."""
+        for each in await control.runs():
+            if each.status is RunStatus.PAUSED:
+                with suppress(OperatorError):  # it is not taken up yet
+                    await control.resume(each.run, by="anna")
+
 
 def play_round(plan: Plan, folder: Path | None = None) -> Round:
     """Play a round and judge it. `folder`: where it is played; None: one that is removed."""
@@ -385,18 +390,3 @@ def play_round(plan: Plan, folder: Path | None = None) -> Round:
     finally:
         play.close()
     return Round(plan, verdict, play.reached)
-
-
-def downgrade(path: Path) -> None:
-    """Make a journal of the newest format one of an older m2pem: it is migrated when opened."""
-    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        connection.execute("BEGIN IMMEDIATE")
-        (version,) = connection.execute("PRAGMA user_version").fetchone()
-        while version and MIGRATIONS[version - 1].__name__ in UNDONE:
-            version -= 1
-            for statement in UNDONE[MIGRATIONS[version].__name__]:
-                connection.execute(statement)
-        if version == len(MIGRATIONS):
-            raise AssertionError(f"say in UNDONE how {MIGRATIONS[-1].__name__} is undone")
-        connection.execute(f"PRAGMA user_version = {version}")
-        connection.execute("COMMIT")

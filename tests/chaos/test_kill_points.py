@@ -4,12 +4,25 @@ import os
 import signal
 import sqlite3
 from contextlib import closing
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
+import psycopg
 import pytest
 
 from tests.chaos import kill_points
-from tests.chaos.kill_points import JOURNALS, KillPoint, When, die_at, install, place_of, points_of
+from tests.chaos.journals import make
+from tests.chaos.kill_points import (
+    JOURNALS,
+    POSTGRES,
+    KillPoint,
+    When,
+    die_at,
+    install,
+    place_of,
+    points_of,
+)
 from tests.chaos.worlds import WORLDS
 
 POINTS = {
@@ -40,6 +53,11 @@ def test_every_kill_point_has_a_name_of_its_own() -> None:
             )
 
 
+def url_of(folder: Path) -> str:
+    """The URL of an empty database."""
+    return make(POSTGRES, folder).read_text().strip()
+
+
 class Stage:
     """What is wrapped. `seen`: what happened, in order."""
 
@@ -57,16 +75,24 @@ class Stage:
     def open(self) -> sqlite3.Connection:
         return sqlite3.connect(":memory:", isolation_level=None)
 
-    def migrate(self, connection: sqlite3.Connection) -> None:
-        connection.execute("CREATE TABLE a (b)")
-        connection.execute("CREATE TABLE c (d)")
+    def migrate(self, connection: Any) -> None:
+        connection.execute("CREATE TABLE a (b INTEGER)")
+        connection.execute("CREATE TABLE c (d INTEGER)")
+
+    def commit(self, storage: Any) -> None:
+        storage.connection.raw.execute("COMMIT")
+        self.seen.append("answered")
 
 
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     made = Stage()
     module = SimpleNamespace(
-        act=made.act, act_later=made.act_later, open=made.open, migrate=made.migrate
+        act=made.act,
+        act_later=made.act_later,
+        open=made.open,
+        migrate=made.migrate,
+        commit=made.commit,
     )
     monkeypatch.setattr(kill_points, "place_of", lambda target: kill_points.Place(module, target))
     made.module = module  # type: ignore[attr-defined]
@@ -101,6 +127,40 @@ def test_each_statement_of_a_migration_is_a_passage(stage: Stage) -> None:
         stage.module.migrate(connection)  # type: ignore[attr-defined]
         connection.execute("SELECT 1")
     assert stage.seen == ["passed", "passed"]
+
+
+def test_each_statement_of_a_postgresql_connection_is_a_passage(
+    stage: Stage, tmp_path: Path
+) -> None:
+    install(KillPoint("", "migrate", When.AT_STATEMENT), lambda: stage.seen.append("passed"))
+    with psycopg.connect(url_of(tmp_path)) as connection:
+        stage.module.migrate(connection)  # type: ignore[attr-defined]
+        connection.execute("SELECT 1")
+    assert stage.seen == ["passed", "passed"]
+
+
+def test_a_commit_that_is_sent_and_not_answered_reaches_the_server(
+    stage: Stage, tmp_path: Path
+) -> None:
+    url = url_of(tmp_path)
+
+    def committed() -> bool:
+        with psycopg.connect(url) as other:
+            return other.execute("SELECT to_regclass('a') IS NOT NULL").fetchone() == (True,)
+
+    def passed() -> None:
+        while not committed():
+            pass
+        stage.seen.append("passed")
+
+    install(KillPoint("", "commit", When.SENT), passed)
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute("BEGIN")
+        connection.execute("CREATE TABLE a (b INTEGER)")
+        assert not committed()
+        storage = SimpleNamespace(connection=SimpleNamespace(raw=connection))
+        stage.module.commit(storage)  # type: ignore[attr-defined]
+    assert stage.seen == ["passed", "answered"]
 
 
 def test_the_process_dies_at_the_passage_that_was_chosen(

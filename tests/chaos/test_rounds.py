@@ -8,27 +8,39 @@ import pytest
 
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
-from tests.chaos.kill_points import RANDOM, SQLITE, points_of
-from tests.chaos.rounds import downgrade, plan_round, play_round
+from tests.chaos.journals import downgrade
+from tests.chaos.kill_points import JOURNALS, POSTGRES, RANDOM, SQLITE, points_of
+from tests.chaos.rounds import plan_round, play_round
 from tests.chaos.worlds import SimulatedVehicles
 
 SEED = 1
 WORLD = SimulatedVehicles.name
-POINTS = [RANDOM, *points_of(SQLITE, SimulatedVehicles.arbiter)]
+POINTS = [
+    (kind.name, point)
+    for kind in JOURNALS.values()
+    for point in (RANDOM, *points_of(kind, SimulatedVehicles.arbiter))
+]
+SHORT = [(SQLITE.name, point) for point in (RANDOM, *points_of(SQLITE, SimulatedVehicles.arbiter))]
+SHORT += [(POSTGRES.name, each.name) for each in POSTGRES.points]
 
 
-@pytest.mark.parametrize("point", POINTS)
-def test_nothing_is_lost_when_the_executive_dies(point: str) -> None:
-    played = play_round(plan_round(SEED, POINTS.index(point), WORLD, SQLITE.name, point))
+@pytest.mark.parametrize(
+    ("journal", "point"),
+    [each if each in SHORT else pytest.param(*each, marks=pytest.mark.long) for each in POINTS],
+)
+def test_nothing_is_lost_when_the_executive_dies(journal: str, point: str) -> None:
+    number = POINTS.index((journal, point))
+    played = play_round(plan_round(SEED, number, WORLD, journal, point))
     assert not played.verdict.faults, f"{played.plan}: {played.verdict.faults}"
     assert played.reached
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("journal", JOURNALS)
 @pytest.mark.parametrize("number", range(1, 101))
-def test_nothing_is_lost_in_a_round_by_chance(number: int) -> None:
+def test_nothing_is_lost_in_a_round_by_chance(number: int, journal: str) -> None:
     seed = random.SystemRandom().randrange(10**6)
-    played = play_round(plan_round(seed, number, WORLD, SQLITE.name))
+    played = play_round(plan_round(seed, number, WORLD, journal))
     assert not played.verdict.faults, f"seed {seed}, {played.plan}: {played.verdict.faults}"
 
 
@@ -41,7 +53,7 @@ def test_a_round_can_be_played_again_by_its_number() -> None:
 async def test_a_journal_can_be_made_one_of_an_older_format(tmp_path: Path) -> None:
     path = tmp_path / "j.db"
     await SqliteJournal.open(path).close()
-    downgrade(path)
+    downgrade(SQLITE, path)
     (version,) = sqlite3.connect(path).execute("PRAGMA user_version").fetchone()
     assert version < len(MIGRATIONS)
     await SqliteJournal.open(path).close()
