@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 from m2pem.api.arbiter import ArbiterContext, BehaviorReport, Connection
 from m2pem.api.clock import VirtualClock, VirtualLoop
 from m2pem.api.runs import RunId
-from m2pem.engine.records import Record
+from m2pem.engine.records import Record, RunEnded
+from m2pem.engine.state import RunOutcome
 from m2pem.errors import M2pemError
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet_file import load_fleet
@@ -25,6 +26,7 @@ from m2pem.journal.sqlite import SqliteJournal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.plugins import PluginManager
 from m2pem.simulation.arbiters import SimArbiter
+from m2pem.simulation.executions import EffectKind
 from tests.chaos.worlds import SimulatedVehicles
 
 T = TypeVar("T")
@@ -107,10 +109,14 @@ class _Plugins(PluginManager):
 
 
 class Life:
-    """One executive, from its start until it is dropped. `seen`: the records that it committed."""
+    """One executive, from its start until it is dropped. `seen`: the records that it committed.
+
+    `cancelled`: by stopped run, what vehicles had been told to cancel when the stop was committed.
+    """
 
     def __init__(self, folder: Path, vehicles: SimulatedVehicles, now_us: int) -> None:
         self.seen: list[tuple[RunId, Record]] = []
+        self.cancelled: dict[RunId, set[str]] = {}
         self._handlers = list(logging.getLogger().handlers)
         self._loop = VirtualLoop()
         self.clock = VirtualClock(self._loop, now_us)
@@ -119,6 +125,9 @@ class Life:
 
         def on_records(run: RunId, records: Sequence[Record]) -> None:
             self.seen.extend((run, each) for each in records)
+            if any(isinstance(e, RunEnded) and e.outcome is RunOutcome.STOPPED for e in records):
+                told = (e.behavior for e in made[0].effects if e.kind is EffectKind.CANCEL)
+                self.cancelled[run] = set(told)
 
         self.executive = Executive(
             load_fleet(vehicles.fleet),

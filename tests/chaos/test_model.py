@@ -9,6 +9,7 @@ from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -19,13 +20,15 @@ from hypothesis.stateful import (
     rule,
 )
 
+from m2pem.api.arbiter import BehaviorId
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.runs import RunId
 from m2pem.engine import records as r
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.mission.catalogue import ResourceId
-from tests.chaos.model import Life
+from m2pem.simulation.arbiters import SimArbiter
+from tests.chaos.model import Life, Unreliable
 from tests.chaos.worlds import SimulatedVehicles
 from tests.executive.conftest import START_US
 from tests.incident_rows import verify_replays
@@ -90,10 +93,10 @@ class Faults(RuleBasedStateMachine):
             if each.phase is BehaviorPhase.ACTIVE and each.state is not None
         ]
         self._life.ask(self._life.control.stop(run, by="anna"))
+        cancelled = self._life.cancelled.get(run, set())
         for each in active:
             if not self._cut.intersection(each.resources):
                 doing = [self._life.vehicles.doing(ResourceId(name)) for name in each.resources]
-                cancelled = {e.behavior for e in self._life.vehicles.effects if e.kind == "cancel"}
                 assert each.id in cancelled or each.id not in doing, f"{each.id} goes on"
 
     @rule(number=RUN, decision=st.sampled_from(["yes", "no", "resume", "skip", "abort"]))
@@ -171,6 +174,11 @@ class Faults(RuleBasedStateMachine):
             holder = self._life.executive.availability.holder(ResourceId(name))
             assert holder == behavior, f"{name} does {behavior}, and {holder} has it"
 
+    def give_up(self) -> None:
+        """End without a look at how the runs end."""
+        self._life.drop()
+        self._folder.cleanup()
+
     def teardown(self) -> None:
         """What is broken is mended, what is asked is answered: every run ends."""
         life = self._life
@@ -212,3 +220,34 @@ class Faults(RuleBasedStateMachine):
 
 TestFaults = Faults.TestCase
 TestFaults.settings = settings(max_examples=20, stateful_step_count=25)
+
+
+async def _no_cancel(vehicles: Unreliable, behavior: BehaviorId, epoch: int) -> None:
+    """A cancel that reaches no vehicle."""
+
+
+async def _late_cancel(vehicles: Unreliable, behavior: BehaviorId, epoch: int) -> None:
+    """A cancel that comes when the stop has been committed."""
+    await asyncio.sleep(2.0)
+    await SimArbiter.cancel(vehicles, behavior, epoch)
+
+
+@pytest.mark.parametrize("mutant", [_no_cancel, _late_cancel])
+def test_a_stop_that_reaches_no_vehicle_or_comes_late_is_found(
+    mutant: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped() -> Faults:
+        played = Faults()
+        played.begin()
+        played.start(0)
+        played.time_passes(3.0)
+        return played
+
+    sound = stopped()
+    sound.stop(0)
+    sound.give_up()
+    monkeypatch.setattr(Unreliable, "cancel", mutant)
+    worse = stopped()
+    with pytest.raises(AssertionError, match="goes on"):
+        worse.stop(0)
+    worse.give_up()
