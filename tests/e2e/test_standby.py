@@ -25,10 +25,12 @@ def journal(request: pytest.FixtureRequest) -> str:
     return url
 
 
-def serve(m2pem: CommandLine, fleet: Path, journal: str, *words: str) -> Program:
+def serve(
+    m2pem: CommandLine, fleet: Path, journal: str, *words: str, **environment: str
+) -> Program:
     return m2pem.start(
         "serve", "--fleet", fleet, "--ocu", "none", "--format", "json", "--journal", journal,
-        *words, **LEASE,
+        *words, **LEASE, **environment,
     )  # fmt: skip
 
 
@@ -106,3 +108,58 @@ def who_took_over(standbys: list[Program], before: Program) -> tuple[Program, Pr
     assert f"process {again.process.pid} on" in said[other.process.pid]
     until_said(again, "serving")
     return again, other
+
+
+def test_an_executive_that_stood_still_moves_nothing_after_it_was_replaced(
+    m2pem: CommandLine, tmp_path: Path, postgres_url: str
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, postgres_url)
+    until_said(owner, "serving")
+    # As on another host: on this one the kernel keeps the locks of a process that stands still.
+    elsewhere = {"M2PEM_RUNTIME_DIR": str(tmp_path / "elsewhere")}
+    standby = serve(m2pem, fleet, postgres_url, "--standby", **elsewhere)
+    until_said(standby, "standing by for")
+    start_mission(m2pem, postgres_url)
+    answer(m2pem, postgres_url, prompted(owner), "continue")
+    owner.until_record("BehaviorProgressed", state="RUNNING")
+    owner.send(signal.SIGSTOP)
+    try:
+        until_said(standby, "taking over")  # when the lease has ended
+        standby.until_record("RunClaimed", epoch=2)
+        before = recorded_effects(state)
+    finally:
+        owner.send(signal.SIGCONT)
+    status, errors = owner.rest()
+    assert status == 1, errors
+    assert f"process {standby.process.pid} on" in errors
+    assert "this executive commands no vehicle any more" in errors
+    sent = [each.kind for each in recorded_effects(state)[len(before) :]]
+    assert EffectKind.CANCEL not in sent
+    status, _, errors = m2pem.run("stop", "r1", "--journal", postgres_url)
+    assert status == 0, errors
+    standby.until_record("RunEnded", outcome="stopped")
+    status, out, _ = m2pem.run("replay", "r1", "--format", "json", "--journal", postgres_url)
+    assert_each_behavior_began_once(state, [json.loads(line) for line in out.splitlines()])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--journal", "memory:"), "a journal in memory ends with its executive"),
+        (("--journal", "journal.db"), "serves another fleet with the name mehds-vignette-1"),
+    ],
+)
+def test_a_standby_that_could_take_nothing_over_is_refused(
+    m2pem: CommandLine, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    fleet, _ = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, "journal.db")
+    until_said(owner, "serving")
+    other = fleet.with_name("other.yaml")
+    other.write_text(fleet.read_text().replace("max_outage: 10 min", "max_outage: 9 min"))
+    status, _, errors = m2pem.run(
+        "serve", "--standby", "--fleet", other, "--ocu", "none", *words
+    )  # fmt: skip
+    assert status == 2
+    assert said in errors
