@@ -1,6 +1,6 @@
 """Play rounds of chaos, and print what came of each kill point.
 
-python -m tests.chaos [--rounds 1000] [--seed N] [--world NAME] [--journal NAME]
+python -m tests.chaos [--rounds 1000] [--seed N] [--vehicles NAME] [--journal NAME]
 python -m tests.chaos --seed N --round K    # one round alone, kept in a folder
 """
 
@@ -9,27 +9,24 @@ import random
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 from tests.chaos.kill_points import JOURNALS, SQLITE, points_of
-from tests.chaos.rounds import Round, plan_round, play_round
+from tests.chaos.rounds import Plan, Round, plan_round, play_round
 from tests.chaos.table import as_table
-from tests.chaos.worlds import WORLDS
+from tests.chaos.worlds import WORLDS, SimulatedVehicles
 
 
 def main() -> int:
     """Play rounds; 1 if the judge found a fault."""
     given = _arguments()
-    worlds = [given.world] if given.world else list(WORLDS)
     if given.round is not None:
-        return _one(given.seed, given.round, worlds, given.journal, given.point)
+        return _one(given)
     print(f"seed {given.seed}", flush=True)
     began_s = time.monotonic()
     played: list[Round] = []
     for number in range(1, given.rounds + 1):
-        world = worlds[number % len(worlds)]
-        played.append(play_round(plan_round(given.seed, number, world, given.journal, given.point)))
+        played.append(play_round(_plan(given, number)))
         _say(played[-1], given)
     print(f"\n{as_table(played)}\n")
     wrong = [each.plan.number for each in played if each.verdict.faults]
@@ -43,7 +40,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--rounds", type=int, default=100)
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(10**6))
     parser.add_argument("--round", type=int, help="play this one alone")
-    parser.add_argument("--world", choices=list(WORLDS))
+    parser.add_argument("--vehicles", choices=list(WORLDS), default=SimulatedVehicles.name)
     parser.add_argument("--journal", choices=list(JOURNALS), default=SQLITE.name)
     points = {
         name: None
@@ -55,9 +52,13 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _one(seed: int, number: int, worlds: Sequence[str], journal: str, point: str) -> int:
-    folder = Path(tempfile.mkdtemp(prefix=f"m2pem-chaos-{number}-"))
-    plan = plan_round(seed, number, worlds[number % len(worlds)], journal, point)
+def _plan(given: argparse.Namespace, number: int) -> Plan:
+    return plan_round(given.seed, number, given.vehicles, given.journal, given.point)
+
+
+def _one(given: argparse.Namespace) -> int:
+    folder = Path(tempfile.mkdtemp(prefix=f"m2pem-chaos-{given.round}-"))
+    plan = _plan(given, given.round)
     played = play_round(plan, folder)
     print(plan)
     print(f"kills that happened: {played.reached}; {played.verdict}")
@@ -71,10 +72,10 @@ def _say(played: Round, given: argparse.Namespace) -> None:
     print(played.plan)
     for fault in played.verdict.faults:
         print(f"  {fault}")
-    world = f" --world {given.world}" if given.world else ""
     point = f" --point '{given.point}'" if given.point else ""
-    again = f"--seed {given.seed} --round {played.plan.number} --journal {given.journal}"
-    print(f"  again: python -m tests.chaos {again}{world}{point}", flush=True)
+    again = f"--seed {given.seed} --round {played.plan.number}"
+    again += f" --vehicles {given.vehicles} --journal {given.journal}{point}"
+    print(f"  again: python -m tests.chaos {again}", flush=True)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -134,7 +134,13 @@ def _vehicle_faults(runs: Sequence[_Run], evidence: "Evidence", verdict: Verdict
     again = Counter(each.behavior for each in records if isinstance(each, r.BehaviorRestarted))
     ended = [each for each in records if isinstance(each, r.BehaviorEnded)]
     done = {each.behavior for each in ended if each.state is BehaviorState.SUCCEEDED}
-    begun = evidence.world.begun()
+    by_element = {each.element: each.behavior for each in requested.values()}
+    begun = [
+        each
+        if each.behavior
+        else replace(each, behavior=by_element.get(each.element, each.element))
+        for each in evidence.world.begun()
+    ]
     counts = Counter(each.behavior for each in begun)
     verdict.begun, verdict.requested = len(begun), len(requested)
     faults = []

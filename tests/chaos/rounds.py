@@ -109,7 +109,8 @@ def plan_round(seed: int, number: int, world: str, journal: str, point: str = ""
     kills.append(_kill(chance, first, {first: STATEMENTS_OF_AN_UPGRADE} if upgrades else passages))
     while len(kills) < MOST_KILLS and chance.random() < 0.3:
         kills.append(_kill(chance, chance.choice(names), passages))
-    return Plan(number, world, journal, tuple(kills), pauses=chance.random() < 0.15)
+    pauses = WORLDS[world].pauses and chance.random() < 0.15
+    return Plan(number, world, journal, tuple(kills), pauses)
 
 
 def _kill(chance: random.Random, point: str, passages: Mapping[str, int]) -> Kill:

@@ -77,6 +77,15 @@ def test_two_behaviors_at_once_on_one_vehicle_are_a_fault(evidence: Evidence) ->
     assert fault == f"{first.vehicle} began {first.behavior} while it did r2.b1"
 
 
+def test_a_vehicle_that_knows_no_behavior_is_judged_by_the_element(evidence: Evidence) -> None:
+    elements = ["Out", "Back", "Up", "Fly", "Home", "Last", "Near", "Shared", "Reverse"]
+    notes = [Begun("v1", "", element=each) for each in elements]
+    world = Noted(evidence.world, notes)  # type: ignore[arg-type]
+    assert judged(replace(evidence, world=world)).faults == []  # type: ignore[arg-type]
+    fault = noted(evidence, [*notes, Begun("v1", "", element="Fly")])
+    assert fault.endswith("was begun 2 times, and restarted 0")
+
+
 def test_a_behavior_that_succeeded_without_beginning_is_a_fault(evidence: Evidence) -> None:
     first, *others = evidence.world.begun()
     assert noted(evidence, others) == f"{first.behavior} succeeded, and was never begun"

@@ -11,7 +11,7 @@ from m2pem.journal.sqlite import SqliteJournal
 from tests.chaos.journals import downgrade
 from tests.chaos.kill_points import JOURNALS, POSTGRES, RANDOM, SQLITE, points_of
 from tests.chaos.rounds import plan_round, play_round
-from tests.chaos.worlds import SimulatedVehicles
+from tests.chaos.worlds import MavlinkVehicles, SimulatedVehicles
 
 SEED = 1
 WORLD = SimulatedVehicles.name
@@ -41,6 +41,15 @@ def test_nothing_is_lost_when_the_executive_dies(journal: str, point: str) -> No
 def test_nothing_is_lost_in_a_round_by_chance(number: int, journal: str) -> None:
     seed = random.SystemRandom().randrange(10**6)
     played = play_round(plan_round(seed, number, WORLD, journal))
+    assert not played.verdict.faults, f"seed {seed}, {played.plan}: {played.verdict.faults}"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("journal", JOURNALS)
+@pytest.mark.parametrize("point", ["started, not reported", "resume: after a query"])
+def test_autopilots_begin_nothing_twice(point: str, journal: str) -> None:
+    seed = random.SystemRandom().randrange(10**6)
+    played = play_round(plan_round(seed, 1, MavlinkVehicles.name, journal, point))
     assert not played.verdict.faults, f"seed {seed}, {played.plan}: {played.verdict.faults}"
 
 

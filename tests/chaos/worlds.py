@@ -4,6 +4,10 @@ The vehicles outlive every executive, and note themselves what they begin: the j
 with the journal.
 """
 
+import json
+import math
+import os
+import socket
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,17 +16,20 @@ from typing import Protocol
 
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
+from tests.command_line import CommandLine
 from tests.executive.conftest import flow, mission, question, task
+from tests.preloaded import preloaded
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A vehicle began a behavior. `behavior`: its id, such as r1.b2; "": the vehicle does not know.
-    `overlaps`: the behavior that it was still doing, "" if none."""
+    """A vehicle began a behavior. `behavior`: its id, such as r1.b2; "": the vehicle does not know,
+    and `element` is what it was. `overlaps`: the behavior that it was still doing, "" if none."""
 
     vehicle: str
     behavior: str
     overlaps: str = ""
+    element: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +51,8 @@ class World(Protocol):
     arbiter: str
     """`module:name` of the class of their arbiter."""
     speed: float
+    pauses: bool
+    """Whether they begin nothing anew when a pause ends."""
     missions: tuple[ChaosMission, ...]
     fleet: Path
 
@@ -65,9 +74,20 @@ def place(east_m: float, north_m: float) -> str:
     return f"[{latitude:.6f}, {longitude:.6f}]"
 
 
-def goto(element: str, role: str, east_m: float, north_m: float) -> str:
-    """A task that moves a vehicle to a place."""
-    target = f'<m2pem:property name="target" value="{place(east_m, north_m)}"/>'
+PLACES = {
+    "Out": (12.0, 0.0),
+    "Back": (0.0, 0.0),
+    "Fly": (0.0, 25.0),
+    "Last": (6.0, 8.0),
+    "Near": (5.0, -10.0),
+    "Shared": (10.0, 5.0),
+}
+"""Where tasks move vehicles; metres east and north."""
+
+
+def goto(element: str, role: str) -> str:
+    """A task that moves a vehicle to its place of `PLACES`."""
+    target = f'<m2pem:property name="target" value="{place(*PLACES[element])}"/>'
     return task(element, role, "goto", target)
 
 
@@ -94,13 +114,13 @@ def two_ways(ground: str, air: str) -> ChaosMission:
     altitude = '<m2pem:property name="altitude" value="10"/>'
     elements = (
         FORK,
-        goto("Out", f'vehicle="{ground}"', 12, 0),
+        goto("Out", f'vehicle="{ground}"'),
         question("Ask"),
-        goto("Back", f'vehicle="{ground}" wait="unlimited"', 0, 0),
+        goto("Back", f'vehicle="{ground}" wait="unlimited"'),
         task("Up", f'vehicle="{air}"', "takeoff", altitude),
-        goto("Fly", f'vehicle="{air}"', 0, 25),
+        goto("Fly", f'vehicle="{air}"'),
         task("Home", f'vehicle="{air}"', "land"),
-        goto("Last", 'requires="vehicle.domain == \'ground\'" wait="unlimited"', 6, 8),
+        goto("Last", 'requires="vehicle.domain == \'ground\'" wait="unlimited"'),
     )
     ways = ("S Fork Out Ask Back Join Last E", "Fork Up Fly Home Join")
     orders = (("Out", "Ask", "Back", "Last"), ("Up", "Fly", "Home", "Last"))
@@ -111,8 +131,8 @@ def in_turn(first: str, second: str) -> ChaosMission:
     """One vehicle after a timer, then one that another run may have: its task waits."""
     elements = (
         PAUSE,
-        goto("Near", f'vehicle="{first}"', 5, -10),
-        goto("Shared", f'vehicle="{second}" wait="unlimited"', 10, 5),
+        goto("Near", f'vehicle="{first}"'),
+        goto("Shared", f'vehicle="{second}" wait="unlimited"'),
         task("Reverse", f'vehicle="{second}" wait="unlimited"', "reverse"),
     )
     source = process("".join(elements), "S Wait Near Shared Reverse E")
@@ -135,6 +155,7 @@ class SimulatedVehicles:
     name = "simulated"
     arbiter = "m2pem.simulation.arbiters:SimArbiter"
     speed = 60.0
+    pauses = True
     missions = (two_ways("ugv1", "uav1"), in_turn("ugv2", "ugv1"))
 
     def __init__(self, folder: Path) -> None:
@@ -160,4 +181,107 @@ class SimulatedVehicles:
         """They end with the executive."""
 
 
-WORLDS: Mapping[str, type[SimulatedVehicles]] = {SimulatedVehicles.name: SimulatedVehicles}
+_MAVLINK = """version: 1
+name: chaos
+origin: {lat: 38.1075, lon: -77.3192, alt: 60.0}
+vehicles:
+"""
+_MAVLINK_VEHICLE = """  {name}:
+    domain: {domain}
+    arbiter: mavlink
+    sitl: true
+    lost_after: 120 s
+    connection: {{url: "udpin://{address}", system_id: {system}}}
+"""
+_BY_SYSTEM = {1: "uav1", 2: "ugv1", 3: "ugv2"}
+
+_AUTOPILOTS = """
+import json, runpy, sys
+from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
+
+notes = open({notes!r}, "a", buffering=1)
+log_event = Autopilot.log_event
+
+def noted(self, kind, detail=""):
+    notes.write(json.dumps([self.spec.system, kind, detail]) + "\\n")
+    log_event(self, kind, detail)
+
+Autopilot.log_event = noted
+sys.argv = ["m2pem", *{words!r}]
+runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
+"""
+
+
+class MavlinkVehicles:
+    """Simulated autopilots in a process of their own, over UDP, which note what they begin: a
+    takeoff, a landing, a motion to another place."""
+
+    name = "mavlink"
+    arbiter = "m2pem_plugin_mavlink.arbiter:MavlinkArbiter"
+    speed = 20.0
+    pauses = False
+    missions = SimulatedVehicles.missions
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind(("127.0.0.1", 0))
+            address = f"127.0.0.1:{free.getsockname()[1]}"
+        self.fleet = folder / "fleet.yaml"
+        vehicles = (
+            _MAVLINK_VEHICLE.format(
+                name=name,
+                domain="air" if name.startswith("uav") else "ground",
+                address=address,
+                system=system,
+            )
+            for system, name in _BY_SYSTEM.items()
+        )
+        self.fleet.write_text(_MAVLINK + "".join(vehicles), encoding="utf-8")
+        self._notes = folder / "vehicles.jsonl"
+        words = [
+            *("sim", "mavlink", "--copters", "1", "--rovers", "2", "--speed", f"{self.speed:g}"),
+            *(
+                "--to",
+                f"udp://{address}",
+                "--ekf",
+                "1s",
+                "--home",
+                ",".join(map(str, (*_HOME, 60))),
+            ),
+            *("--set", "FS_GCS_ENABLE=0"),
+        ]
+        code = _AUTOPILOTS.format(notes=str(self._notes), words=words)
+        with Path(os.devnull).open("r+b") as nothing, (folder / "vehicles.txt").open("wb") as said:
+            streams = (nothing.fileno(), nothing.fileno(), said.fileno())
+            environment = CommandLine(folder).environment
+            self._process = preloaded().start(["-c", code], folder, environment, streams)
+
+    def begun(self) -> list[Begun]:
+        """See `World.begun`. Each place to which missions send a vehicle is another one."""
+        lines = self._notes.read_text(encoding="utf-8").splitlines()
+        found = (_begun(*json.loads(line)) for line in lines)
+        return [each for each in found if each is not None]
+
+    def close(self) -> None:
+        """See `World.close`."""
+        self._process.kill()
+        self._process.wait()
+
+
+def _begun(system: int, kind: str, detail: str) -> Begun | None:
+    vehicle = _BY_SYSTEM[system]
+    if kind == "takeoff":
+        return Begun(vehicle, "", element="Up")
+    if (kind, detail) == ("mode", "LAND"):
+        return Begun(vehicle, "", element="Home")
+    if kind != "motion":
+        return None
+    latitude, longitude = map(float, detail.split(","))
+    east_m, north_m = (longitude - _HOME[1]) * 87_500, (latitude - _HOME[0]) * 111_000
+    near = [name for name, at in PLACES.items() if math.dist(at, (east_m, north_m)) < 0.5]
+    return Begun(vehicle, "", element=near[0] if near else "Reverse")
+
+
+WORLDS: Mapping[str, type[SimulatedVehicles] | type[MavlinkVehicles]] = {
+    each.name: each for each in (SimulatedVehicles, MavlinkVehicles)
+}
