@@ -2,13 +2,15 @@
 
 import atexit
 import sqlite3
+from collections.abc import Sequence
 from contextlib import closing
 from functools import cache
 from pathlib import Path
 
-from m2pem.journal import postgres_database
-from m2pem.journal.migrations import MIGRATIONS
-from m2pem.journal.postgres_address import PostgresAddress, write_address
+import psycopg
+
+from m2pem.journal import migrations, postgres_database
+from m2pem.journal.postgres_address import PostgresAddress, read_address, write_address
 from tests.chaos.kill_points import POSTGRES, JournalKind
 from tests.postgres_server import PostgresServer, start_server
 
@@ -16,9 +18,10 @@ UNDONE = {
     "deletions": ("DROP TABLE deletions",),
     "schedule": ("DROP TABLE schedule", "DROP TABLE schedule_holds"),
     "origin_of_salvaged_runs": ("DROP TABLE origin",),
+    "fleets": ("DROP TABLE fleets",),
 }
 """How the last steps of migration are undone in a journal with no deletion and no schedule,
-which was not salvaged."""
+which was not salvaged, and whose executives are dead."""
 
 
 @cache
@@ -40,17 +43,24 @@ def make(kind: JournalKind, folder: Path) -> Path:
 def downgrade(kind: JournalKind, file: Path) -> None:
     """Make a journal of the newest format one of an older m2pem: it is migrated when opened."""
     if kind is POSTGRES:
-        if len(postgres_database.MIGRATIONS) > 1:
-            raise AssertionError("POSTGRES.migrates, and say here how the last step is undone")
+        statements, version = _undone([each.__name__ for each in postgres_database.MIGRATIONS])
+        with psycopg.connect(read_address(file).url) as server:
+            for statement in statements:
+                server.execute(statement.encode())
+            server.execute("UPDATE m2pem_format SET version = %s", (version,))
         return
+    statements, version = _undone([each.__name__ for each in migrations.MIGRATIONS])
     with closing(sqlite3.connect(file, isolation_level=None)) as connection:
         connection.execute("BEGIN IMMEDIATE")
-        (version,) = connection.execute("PRAGMA user_version").fetchone()
-        while version and MIGRATIONS[version - 1].__name__ in UNDONE:
-            version -= 1
-            for statement in UNDONE[MIGRATIONS[version].__name__]:
-                connection.execute(statement)
-        if version == len(MIGRATIONS):
-            raise AssertionError(f"say in UNDONE how {MIGRATIONS[-1].__name__} is undone")
-        connection.execute(f"PRAGMA user_version = {version}")
-        connection.execute("COMMIT")
+        for statement in (*statements, f"PRAGMA user_version = {version}", "COMMIT"):
+            connection.execute(statement)
+
+
+def _undone(steps: Sequence[str]) -> tuple[list[str], int]:
+    """Return what undoes the last steps of migration, and how many are left."""
+    left = len(steps)
+    while left and steps[left - 1] in UNDONE:
+        left -= 1
+    if left == len(steps):
+        raise AssertionError(f"say in UNDONE how {steps[-1]} is undone")
+    return [statement for step in steps[: left - 1 : -1] for statement in UNDONE[step]], left

@@ -54,14 +54,12 @@ class KillPoint:
 @dataclass(frozen=True, slots=True)
 class JournalKind:
     """A kind of journal. `type`: `module:name` of its class. `file`: its name in the folder of a
-    round; others are beside it. `migrates`: whether there are older formats than the newest.
-    `lease_s`: of its executives; "": there is none."""
+    round; others are beside it. `lease_s`: of its executives; "": there is none."""
 
     name: str
     type: str
     file: str
     points: tuple[KillPoint, ...]
-    migrates: bool = True
     lease_s: str = ""
 
 
@@ -110,6 +108,7 @@ POSTGRES = JournalKind(
         KillPoint("lease: renewed", f"{_LEASE}._renewed", When.AFTER),
         KillPoint("lease: before it is given up", f"{_LEASE}.close"),
         KillPoint("open: leases of the dead ended", "m2pem.journal.postgres:end_dead", When.AFTER),
+        KillPoint("serve: not committed", f"{_STORAGE}.serve_fleet", When.AFTER),
         KillPoint("claim: before the fence", f"{_STORAGE}.fence", resuming=True),
         KillPoint("claim: fenced", f"{_STORAGE}.fence", When.AFTER, resuming=True),
         KillPoint(
@@ -119,7 +118,6 @@ POSTGRES = JournalKind(
         ),
         KillPoint("release: not committed", f"{_STORAGE}.give_up", When.AFTER),
     ),
-    migrates=False,
     lease_s="2",
 )
 JOURNALS: Mapping[str, JournalKind] = {each.name: each for each in (SQLITE, POSTGRES)}

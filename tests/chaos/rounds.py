@@ -101,7 +101,7 @@ def plan_round(seed: int, number: int, world: str, journal: str, point: str = ""
     names = [RANDOM, *points]
     first = point or names[number % len(names)]
     kills: list[Kill] = []
-    older = first != RANDOM and points[first].opening and kind.migrates
+    older = first != RANDOM and points[first].opening
     if first != RANDOM and (points[first].resuming or (older and chance.random() < 0.7)):
         early = [RANDOM, *(each for each in points if passages.get(each, 0) > 1)]
         kills.append(_kill(chance, chance.choice(early), passages))

@@ -1,16 +1,23 @@
 """Rounds of chaos: one for each kill point in `make test`, many others in `make test-long`."""
 
 import random
-import sqlite3
 from pathlib import Path
 
 import pytest
 
-from m2pem.journal.migrations import MIGRATIONS
-from m2pem.journal.sqlite import SqliteJournal
-from tests.chaos.journals import downgrade
-from tests.chaos.kill_points import JOURNALS, POSTGRES, RANDOM, SQLITE, points_of
-from tests.chaos.rounds import plan_round, play_round
+from m2pem.journal import open_journal
+from tests.chaos.journals import downgrade, make
+from tests.chaos.kill_points import (
+    JOURNALS,
+    POSTGRES,
+    RANDOM,
+    SQLITE,
+    JournalKind,
+    install,
+    place_of,
+    points_of,
+)
+from tests.chaos.rounds import STATEMENTS_OF_AN_UPGRADE, plan_round, play_round
 from tests.chaos.worlds import MavlinkVehicles, SimulatedVehicles
 
 SEED = 1
@@ -59,10 +66,19 @@ def test_a_round_can_be_played_again_by_its_number() -> None:
     assert first != plan_round(8, 12, WORLD, SQLITE.name)
 
 
-async def test_a_journal_can_be_made_one_of_an_older_format(tmp_path: Path) -> None:
-    path = tmp_path / "j.db"
-    await SqliteJournal.open(path).close()
-    downgrade(SQLITE, path)
-    (version,) = sqlite3.connect(path).execute("PRAGMA user_version").fetchone()
-    assert version < len(MIGRATIONS)
-    await SqliteJournal.open(path).close()
+@pytest.mark.parametrize("kind", JOURNALS.values(), ids=lambda kind: kind.name)
+async def test_a_journal_can_be_made_one_of_an_older_format(
+    kind: JournalKind, tmp_path: Path
+) -> None:
+    file = make(kind, tmp_path)
+    point = next(each for each in kind.points if each.name == "migration")
+    place = place_of(point.target)
+    passages: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(place.owner, place.name, place.function)  # put back in the end
+        install(point, lambda: passages.append(""))
+        await open_journal(str(file)).close()
+        downgrade(kind, file)
+        passages.clear()
+        await open_journal(str(file)).close()
+    assert len(passages) >= STATEMENTS_OF_AN_UPGRADE
