@@ -22,7 +22,7 @@ file_argument = click.argument("file", metavar="[FILE]", required=False, shell_c
 
 @click.group(epilog=example("m2pem journal info"))
 def journal() -> None:
-    """Show the state of a journal, check it, back it up, salvage it, or make its file smaller.
+    """Show the state of a journal, check it, back it up, salvage or compact it.
 
     FILE is a path or a URL, as of --journal of other commands; else your own journal.
     """

@@ -39,7 +39,7 @@ async def stand_by(
 async def _try(journal: Journal, fleet: Fleet, locks: VehicleLocks) -> str | None:
     """Serve the fleet, if nobody else does; else return what is waited for."""
     try:
-        server = await _served_by(journal, fleet)
+        server = await _served_by(journal, fleet, locks)
     except JournalError as error:
         if journal.lease_s is None:
             raise
@@ -62,10 +62,10 @@ async def _try(journal: Journal, fleet: Fleet, locks: VehicleLocks) -> str | Non
     return None
 
 
-async def _served_by(journal: Journal, fleet: Fleet) -> FleetServer | None:
+async def _served_by(journal: Journal, fleet: Fleet, locks: VehicleLocks) -> FleetServer | None:
     """Serve the fleet; returns who else does, and None if this executive does now."""
     try:
-        await journal.serve_fleet(fleet.name, digest_of(fleet))
+        await locks.serve(journal, fleet)
     except FleetServedError:
-        return await journal.fleet_server(fleet.name) or FleetServer()
+        return await journal.fleet_server(fleet.name, locks.resources) or FleetServer()
     return None
