@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import suppress
+from typing import ClassVar
 
 
 def interrupted() -> asyncio.Event:
@@ -28,15 +29,27 @@ class Lines:
     """Lines as they are typed, without their ends; iteration stops at the end of the input.
 
     A thread reads the descriptor itself: it may wait for ever, and must then neither hold up the
-    event loop nor keep the program from ending, which a lock on `sys.stdin` would.
+    event loop nor keep the program from ending, which a lock on `sys.stdin` would. Who reads the
+    same descriptor after another one of this event loop goes on with its thread: no line is lost.
     """
+
+    _reading: ClassVar[dict[int, tuple[asyncio.AbstractEventLoop, asyncio.Queue[str | None]]]] = {}
 
     def __init__(self, descriptor: int = STDIN) -> None:
         self._descriptor = descriptor
 
     async def __aiter__(self) -> AsyncIterator[str]:
         loop = asyncio.get_running_loop()
-        lines: asyncio.Queue[str | None] = asyncio.Queue()
+        reading, lines = self._reading.get(self._descriptor, (None, asyncio.Queue()))
+        if reading is not loop:
+            lines = asyncio.Queue()
+            self._reading[self._descriptor] = loop, lines
+            self._begin(loop, lines)
+        while (line := await lines.get()) is not None:
+            yield line
+        self._reading.pop(self._descriptor, None)
+
+    def _begin(self, loop: asyncio.AbstractEventLoop, lines: "asyncio.Queue[str | None]") -> None:
         with suppress(ValueError):  # not in the main thread: the program around us decides
             # Read from in the background, a terminal would stop the whole executive.
             signal.signal(signal.SIGTTIN, signal.SIG_IGN)
@@ -44,8 +57,6 @@ class Lines:
             target=self._read, args=(loop, lines), name="standard input", daemon=True
         )
         read.start()
-        while (line := await lines.get()) is not None:
-            yield line
 
     def _read(self, loop: asyncio.AbstractEventLoop, lines: "asyncio.Queue[str | None]") -> None:
         decoder = codecs.getincrementaldecoder("utf-8")("replace")

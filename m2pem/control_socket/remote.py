@@ -65,6 +65,10 @@ class RemoteControl:
         await asyncio.gather(self._listening, return_exceptions=True)
         self._writer.close()
 
+    async def gone(self) -> None:
+        """Return when the executive has ended, or the connection to it."""
+        await asyncio.wait((self._listening,))
+
     def prompts(self) -> Sequence[OpenPrompt]:
         """The prompts that are open now."""
         return list(self._prompts.values())

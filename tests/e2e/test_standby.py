@@ -163,3 +163,22 @@ def test_a_standby_that_could_take_nothing_over_is_refused(
     )  # fmt: skip
     assert status == 2
     assert said in errors
+
+
+def test_an_attached_operator_goes_on_at_the_executive_that_has_taken_over(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, _ = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, "journal.db")
+    until_said(owner, "serving")
+    standby = serve(m2pem, fleet, "journal.db", "--standby")
+    until_said(standby, "standing by for")
+    start_mission(m2pem, "journal.db")
+    prompted(owner)
+    attached = m2pem.start("attach", "--ocu", "plain", "--journal", "journal.db")
+    attached.until_text("[p1] UserSendRoute")
+    owner.kill()
+    assert f"process {standby.process.pid} has taken over" in until_said(attached, "taken over")
+    attached.until_text("[p1] UserSendRoute")
+    attached.type("abort")
+    standby.until_record("RunEnded", outcome="terminated")
