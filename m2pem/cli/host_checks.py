@@ -285,8 +285,28 @@ def check_fleet(
     except M2pemError:
         pass  # the check of the journal says it
     else:
-        checks.append(HealthCheck("vehicles", OK, "no executive of this user commands them"))
+        checks += _served(fleet, journal_url)
     return checks, fleet
+
+
+def _served(fleet: "Fleet", journal_url: str | None) -> Iterator[HealthCheck]:
+    """Say which executive serves the fleet on the journal, on any host."""
+    from m2pem.cli.journals import journal_to_read
+
+    async def ask() -> str:
+        async with journal_to_read(journal_url) as journal:
+            server = await journal.fleet_server(fleet.name, [*fleet.vehicles, *fleet.payloads])
+        return str(server) if server is not None else ""
+
+    try:
+        server = asyncio.run(ask())
+    except M2pemError:
+        return  # the check of the journal says it
+    if server:
+        remedy = "start missions there (m2pem start), or let another one stand by: serve --standby"
+        yield HealthCheck("vehicles", WARNING, f"{server} serves {fleet.name}", remedy)
+    else:
+        yield HealthCheck("vehicles", OK, "no executive of this user commands them")
 
 
 def _findings(error: FleetError, file: str) -> list[HealthCheck]:

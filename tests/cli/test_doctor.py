@@ -1,5 +1,6 @@
 """`m2pem doctor`: every check says what is right, or what to do."""
 
+import asyncio
 import ctypes
 import json
 import os
@@ -16,9 +17,11 @@ from m2pem.cli import host_checks
 from m2pem.executive.runtime_directory import VARIABLE
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.fleet.fleet_file import load_fleet
+from m2pem.journal import open_journal
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 from m2pem.plugins import PluginManager
 from m2pem.scripting.sources import arbiters_of
+from m2pem.testing.contracts.journal import opened
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, CommandLine, fleet_with_state, install_plugin
 
@@ -204,6 +207,16 @@ def test_vehicles_of_another_executive_are_a_warning(invoke: Invoke, tmp_path: P
     assert (status, checks["vehicles"]["status"]) == (0, "warning")
     assert f"process {os.getpid()} commands it" in checks["vehicles"]["message"]
     assert doctor(invoke, "--fleet", file)[1]["vehicles"]["status"] == "ok"
+
+
+async def test_who_serves_the_fleet_on_the_journal_is_said(invoke: Invoke, tmp_path: Path) -> None:
+    fleet = load_fleet(str(FLEET))
+    async with opened(lambda: open_journal(str(tmp_path / "journal.db"))) as journal:
+        await journal.serve_fleet(fleet.name, list(fleet.vehicles))
+        words = ("--fleet", FLEET, "--journal", tmp_path / "journal.db")
+        status, checks = await asyncio.to_thread(doctor, invoke, *words)
+    assert (status, checks["vehicles"]["status"]) == (0, "warning")
+    assert f"process {os.getpid()} on" in checks["vehicles"]["message"]
 
 
 def test_a_fleet_that_is_made_up_is_refused(invoke: Invoke) -> None:
