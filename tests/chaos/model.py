@@ -9,6 +9,7 @@ import gc
 import logging
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -39,7 +40,9 @@ class JournalInThread:
         self._loop = asyncio.new_event_loop()
         self._journal = SqliteJournal.open(path)
         self.identity, self.file = self._journal.identity, self._journal.file
-        threading.Thread(target=self._loop.run_forever, daemon=True).start()
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        self._thread.start()
+        self._calls = ThreadPoolExecutor(thread_name_prefix="calls of a journal")
 
     def __getattr__(self, name: str) -> Callable[..., Awaitable[Any]]:
         method = getattr(self._journal, name)
@@ -62,12 +65,15 @@ class JournalInThread:
         def wait() -> Any:
             return asyncio.run_coroutine_threadsafe(call(), self._loop).result()
 
-        return await asyncio.get_running_loop().run_in_executor(None, wait)
+        return await asyncio.get_running_loop().run_in_executor(self._calls, wait)
 
     def drop(self) -> None:
         """Let go of its files, as the system does when a process ends."""
         asyncio.run_coroutine_threadsafe(self._journal.close(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+        self._calls.shutdown(wait=False)
 
 
 class Unreliable(SimArbiter):
@@ -119,6 +125,8 @@ class Life:
         self.cancelled: dict[RunId, set[str]] = {}
         self._handlers = list(logging.getLogger().handlers)
         self._loop = VirtualLoop()
+        self._threads = ThreadPoolExecutor(thread_name_prefix="a life")
+        self._loop.set_default_executor(self._threads)
         self.clock = VirtualClock(self._loop, now_us)
         self.journal = JournalInThread(folder / "journal.db")
         made: list[Unreliable] = []
@@ -181,6 +189,7 @@ class Life:
     def drop(self) -> None:
         """The process is gone."""
         self.journal.drop()
+        self._threads.shutdown(wait=False)
         for task in asyncio.all_tasks(self._loop):
             task.set_name("dropped")
         logging.getLogger().handlers[:] = self._handlers
