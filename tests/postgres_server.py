@@ -77,11 +77,17 @@ class PostgresServer:
 
     def _run(self, program: str, *arguments: object) -> None:
         words = [str(self._programs / program), *map(str, arguments)]
-        if os.geteuid() == 0:
-            words = ["runuser", "-u", "postgres", "--", *words]
+        user = pwd.getpwnam("postgres") if os.geteuid() == 0 else None
         with (self.folder / "output").open("ab") as output:
             code = subprocess.run(
-                words, cwd=self.folder, stdout=output, stderr=output, check=False
+                words,
+                cwd=self.folder,
+                stdout=output,
+                stderr=output,
+                check=False,
+                user=user and user.pw_uid,
+                group=user and user.pw_gid,
+                extra_groups=user and os.getgrouplist("postgres", user.pw_gid),
             ).returncode
         assert code == 0, (self.folder / "output").read_text()
 
