@@ -9,6 +9,7 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from errno import ENOSPC
 from typing import Any
 
 from m2pem.engine.records import RunOutcome
@@ -155,9 +156,10 @@ class WriteTransaction:
         try:
             other = self._storage.serve_fleet(fleet, resources, digest)
         except OSError as error:
+            why = "the disk is full; make room" if error.errno == ENOSPC else error.strerror
             raise JournalError(
-                f"{error.filename or self._storage.place}: which executive serves {fleet} cannot "
-                f"be noted: {error.strerror}"
+                f"{error.filename or self._storage.place}: {why}; which executive serves {fleet} "
+                "cannot be noted"
             ) from error
         if other is not None:
             raise other.refusal(fleet)

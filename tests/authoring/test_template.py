@@ -12,7 +12,7 @@ import pytest
 from tests.authoring.author import REPOSITORY, Author
 
 KINDS = {
-    "arbiter": ("arbiter sea-boat", r"ArbiterContract of .*: 33 kept, 1 not supported$"),
+    "arbiter": ("arbiter sea-boat", r"ArbiterContract of .*: 37 kept, 1 not supported$"),
     "ocu": ("ocu sea-boat", r"OcuContract of .*: 17 kept$"),
     "service": ("service SeaBoat", r"ServiceContract of .*: 4 kept$"),
 }

@@ -76,12 +76,6 @@ def test_a_full_disk_holds_the_vehicles_and_after_room_is_made_the_run_goes_on(
     assert (status, "the disk is full; make room" in errors) == (1, True), errors
     status, printed, errors = m2pem.run("fleet", fleet, "--journal", journal)
     assert (status, "it has evsg1 (goto), which may go on or be held" in printed) == (0, True)
-    assert f"{journal}: the disk is full; make room" in errors
-    assert "a copy of it is read" in errors
-    status, _, errors = m2pem.run(
-        "runs", "--journal", journal, M2PEM_RUNTIME_DIR=str(small_disk.folder)
-    )
-    assert (status, "cannot take a copy of it: No space left on device" in errors) == (1, True)
     assert "r1   interrupted" in m2pem.run("runs", "--journal", journal)[1]
     assert "evsg1 begins goto" in m2pem.run("replay", "r1", "--journal", journal)[1]
     status, _, errors = m2pem.run("stop", "r1", "--journal", journal)

@@ -146,7 +146,9 @@ def test_a_fault_at_the_first_write_starts_nothing_and_is_told(world: World, fau
     calls, said = WRITTEN[fault]
     program = world.serve()
     program.type("start nothing.bpmn")
-    program.until_text("nothing.bpmn")  # it serves
+    program.until_text("nothing.bpmn")
+    while "no executive serves" in world.m2pem.run("schedule", "--journal", world.journal)[2]:
+        assert program.process.poll() is None, program.rest()
     world.have(*calls)
     program.type("start drive.bpmn")
     program.until_text(said)

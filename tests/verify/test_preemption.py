@@ -35,9 +35,9 @@ b -> o
 @pytest.mark.parametrize(
     ("name", "code", "may_fail"),
     [
-        ("drive_stop", "FAILED", {"PREEMPTED"}),
+        ("drive_stop", "FAILED", {"PREEMPTED", "LINK_LOST"}),
         ("drive_stop", "PREEMPTED", {"FAILED"}),
-        ("land", "FAILED", set()),
+        ("land", "FAILED", {"LINK_LOST"}),
     ],
 )
 def test_a_task_may_be_preempted_unless_it_brings_its_vehicle_down(

@@ -212,6 +212,7 @@ class ArbiterLinks(ArbiterFixtures):
             await start(harness, "r1.b1", case.long, case.vehicle)
             moving = await harness.until(lambda: is_moving(harness, case), 30)
             assert moving, "the long behavior must move the vehicle"
+            await harness.running("r1.b1", 30)  # what begins it in steps has no more to send
             await arbiter.disown("r1")
             assert not terminal(harness, "r1.b1"), harness.of("r1.b1")
             await harness.clock.sleep(case.watch_s / 2)

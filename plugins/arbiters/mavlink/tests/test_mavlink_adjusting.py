@@ -71,7 +71,6 @@ def test_the_new_speed_holds_after_a_hold(behavior: str, parameters: Any) -> Non
     [
         ("r1.b1", 1, {"altitude": 30.0}),
         ("r1.b1", 1, {"speed": 0.0}),
-        ("r1.b1", 0, {"speed": 3.0}),
         ("r1.b7", 1, {"speed": 3.0}),
     ],
 )
