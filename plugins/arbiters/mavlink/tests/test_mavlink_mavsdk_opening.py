@@ -95,7 +95,7 @@ async def test_what_mavsdk_cannot_open_is_an_error_and_leaves_nothing():
     for _ in range(2):
         with pytest.raises(PluginError, match=f"{url}: MAVSDK cannot open it: Connection failed: "):
             await open_mavsdk_link(ONE, [url], None)
-    assert native_threads() == before
+    assert native_threads() <= before
 
 
 async def test_a_url_that_is_wrong_is_not_even_tried():

@@ -1,6 +1,7 @@
 """An executive and a host in two processes, with a link that is slow, breaks, or loses an end."""
 
 import asyncio
+import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -50,6 +51,8 @@ async def drive(harness: ArbiterHarness, id_: str = "r1.b1", vehicle: str = UGV1
 
 def speed_m_s(harness: ArbiterHarness) -> float:
     state = harness.latest(UGV1)
+    if state is None:
+        return math.nan  # not received yet: no comparison holds
     assert isinstance(state, VehicleState)
     assert state.velocity_enu_m_s is not None
     return max(map(abs, state.velocity_enu_m_s))
