@@ -408,9 +408,13 @@ class Reservations:
         self, wanted: Reservation, occupants: Sequence[Occupant]
     ) -> SpaceConflict | None:
         """The first shared space that has no place for all vehicles of a behavior. A vehicle that
-        is in it already has a place."""
+        is in it already has a place, and one whose place is reserved for this behavior keeps it:
+        another that leaves may have swerved since then."""
         one_by_one = wanted.kind is BehaviorType.TEAM and wanted.request.behavior in ONE_BY_ONE
+        reserved = self._reservations.get(wanted.request.id)
         for shared in self._regions:
+            if reserved is not None and _has_places(reserved, wanted, shared):
+                continue
             own = {}
             for vehicle, volume in (wanted.volumes or {}).items():
                 participant = self._participant(vehicle)
@@ -508,6 +512,13 @@ class Reservations:
         if participant is None:
             return False
         return not volume.passes(participant.place, seen_s - limit_s / 2, seen_s + limit_s / 2)
+
+
+def _has_places(reserved: Reservation, wanted: Reservation, shared: SharedRegion) -> bool:
+    """Whether all vehicles that would enter a shared space have places in it reserved."""
+    before = reserved.volumes or {}
+    entering = [name for name, each in (wanted.volumes or {}).items() if shared.entered_by(each)]
+    return all(name in before and shared.entered_by(before[name]) for name in entering)
 
 
 def reservations_for(fleet: Fleet) -> Reservations | None:
