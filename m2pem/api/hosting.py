@@ -1,6 +1,6 @@
 """Arbiters that run on other hosts, beside their vehicles: what a link to such a host implements.
 
-The executive makes an arbiter of the link, which stands for the one on the host. `m2pem
+The executive makes an arbiter of the link, which represents the one on the host. `m2pem
 arbiter-host` runs the arbiter there and hands it to `serve` of the same link.
 """
 
@@ -42,7 +42,7 @@ class HostLink(Protocol):
         context: ArbiterContext,
         hosted: HostedArbiter | None = None,
     ) -> Arbiter:
-        """Make the arbiter that stands for `hosted` in the executive."""
+        """Make the arbiter that represents `hosted` in the executive."""
         ...
 
     async def serve(

@@ -48,7 +48,7 @@ def _located(finding: Finding, fleet: Fleet) -> Finding:
 
 
 HOST_LINK = "zenoh"
-"""The arbiter that stands for those on other hosts."""
+"""The arbiter that represents those on other hosts."""
 
 
 def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connection]]:

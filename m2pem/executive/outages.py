@@ -1,7 +1,7 @@
 """Outages of a living executive: its computer was suspended, its process stopped, or its event loop
 blocked.
 
-Vehicles went on meanwhile, and nobody observed them. So each run looks at its vehicles before it
+Vehicles went on meanwhile without an observer. So each run looks at its vehicles before it
 decides or sends anything (`m2pem.executive.recovery.look_again`), as after a restart. STOP and
 pause of operators do not wait for that.
 """

@@ -7,7 +7,7 @@ said that the claims of all runs hold. Holds and an operator's STOP do not wait 
 
 In a journal that several hosts share, claims hold for a lease, which the journal renews. When two
 thirds of it have passed without that, the runs are held and end here, as when the journal fails:
-nobody else may command their vehicles yet. When all of it has passed, nothing more is sent.
+no other executive may command their vehicles yet. When all of it has passed, nothing more is sent.
 """
 
 import asyncio

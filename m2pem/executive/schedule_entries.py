@@ -313,7 +313,7 @@ class ScheduleEntries:
         """Write a hold of the whole schedule to the journal.
 
         Raises:
-            OperatorError: it has not written it within `WRITTEN_WITHIN_S`; the hold stands.
+            OperatorError: it has not written it within `WRITTEN_WITHIN_S`; the hold stays in force.
         """
         writing = self._starter.journal.hold_schedule(self._starter.fleet.name, hold)
         try:

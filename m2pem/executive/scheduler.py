@@ -300,7 +300,7 @@ class Scheduler:
         self, entry: ScheduleEntry, due_us: int, number: int, *, owed: bool, ends: str = ""
     ) -> ScheduleEntry:
         """Settle times that were missed, and tell operators. `owed`: it had been missed before, and
-        the start that stands for it does not come any more."""
+        the start that replaces it does not come any more."""
         look, plan = self._entries.looks[entry.id], entry.plan
         why = (
             ends or self._entries.why_held(entry) or look.reason or "it was not served at that time"
@@ -364,7 +364,7 @@ class Scheduler:
         return None
 
     async def start(self, number: EntryId, by: str) -> RunId:
-        """Start the mission of an entry now; the start stands for the time that has come, or for
+        """Start the mission of an entry now; the start counts as the time that has come, or for
         the only one that is to come. Times of cron that are to come stay.
 
         Raises:

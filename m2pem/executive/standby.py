@@ -37,7 +37,7 @@ async def stand_by(
 
 
 async def _try(journal: Journal, fleet: Fleet, locks: VehicleLocks) -> str | None:
-    """Serve the fleet, if nobody else does; else return what is waited for."""
+    """Serve the fleet, if no other executive does; else return what is waited for."""
     try:
         server = await _served_by(journal, fleet, locks)
     except JournalError as error:

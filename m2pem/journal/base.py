@@ -183,7 +183,7 @@ class Journal(Protocol):
     async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
         """Let no other executive on this journal serve these vehicles and payloads in a fleet of
         this name, until `leave_fleet` or `close`, the end of its process or of its lease. Again:
-        check that it is so still; what nobody serves is taken again. `digest`: of the fleet's
+        check that it is so still; what no executive serves is taken again. `digest`: of the fleet's
         content, for `fleet_server`.
 
         Raises:
@@ -198,7 +198,7 @@ class Journal(Protocol):
         ...
 
     async def fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
-        """Return which executive serves one of these in a fleet of this name; None: nobody does."""
+        """Return which executive serves one of these in a fleet of this name; None: none does."""
         ...
 
     async def create(self, header: RunHeader, started: EntryChange | None = None) -> str:

@@ -73,7 +73,7 @@ class PostgresConnection:
 
     @property
     def raw(self) -> psycopg.Connection[Any]:
-        """The connection, made anew if it was lost."""
+        """The connection; a new one if it was lost."""
         if self._made is None or self._made.closed:
             self._made = self._connect()
         return self._made
@@ -140,9 +140,9 @@ def check_server(connection: psycopg.Connection[Any], shown: str) -> None:
 def first_tables(connection: psycopg.Connection[Any]) -> None:
     """0.3: those of the SQLite journal's format 6 (`m2pem.journal.migrations`), and who owns runs.
 
-    `identity.last_entry` is the last number given in `schedule`; its row is the lock of whoever
-    takes a run. `owners` says which executive has a run, for as long as that one is in `executives`
-    and its lease has not ended, by the clock of the server.
+    `identity.last_entry` is the last number given in `schedule`; its row is the lock of the
+    executive that takes a run. `owners` says which executive has a run, for as long as that one is
+    in `executives` and its lease has not ended, by the clock of the server.
     """
     for statement in (
         "CREATE TABLE identity (uuid TEXT NOT NULL, last_entry BIGINT NOT NULL)",

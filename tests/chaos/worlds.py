@@ -52,7 +52,7 @@ class World(Protocol):
     """`module:name` of the class of their arbiter."""
     speed: float
     pauses: bool
-    """Whether they begin nothing anew when a pause ends."""
+    """Whether they begin nothing again when a pause ends."""
     missions: tuple[ChaosMission, ...]
     fleet: Path
 

@@ -350,7 +350,7 @@ def _outside_work(
 
 
 def _other_error(named: Collection[str]) -> str:
-    """Return a code that no event names: it stands for all errors that none catches by its name."""
+    """Return a code that no event names: it represents all errors that none catches by its name."""
     known = (FAILED, LINK_LOST, REJECTED, BATTERY_LOW, TAKEN_OVER, UNAVAILABLE)
     return next((code for code in known if code not in named), "ERROR")
 
@@ -360,7 +360,7 @@ def _kept_after(
 ) -> list[Effect]:
     """Return what becomes of what a task keeps when it fails: it is kept, but for a loss.
 
-    `is_any`: the code stands for all errors that nothing catches by its name, losses among them.
+    `is_any`: the code represents all errors that nothing catches by its name, losses among them.
     """
     behavior = behavior_of(instance.node)
     if not context.keeps or behavior is None or not behavior.roles:

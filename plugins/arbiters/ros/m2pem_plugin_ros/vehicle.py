@@ -451,7 +451,7 @@ class Vehicle:
         return Order(request, goal, run, preempts)
 
     def _remember_run(self, run: UUID, behavior: BehaviorId) -> None:
-        """Remember of which run a refusal may be; the newest behavior of it stands for it."""
+        """Remember of which run a refusal may be; the newest behavior of it is named."""
         self._runs.pop(str(run), None)
         self._runs[str(run)] = behavior
         if len(self._runs) > REMEMBERED:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @hookimpl
 def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], None]") -> None:
-    """Register `zenoh`, which stands for the arbiters of other hosts."""
+    """Register `zenoh`, which represents the arbiters of other hosts."""
     from m2pem_plugin_zenoh.plugin import ZenohHosts  # noqa: PLC0415  # starting up must be fast
 
     register("zenoh", ZenohHosts())

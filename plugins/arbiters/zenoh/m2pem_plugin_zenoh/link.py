@@ -146,7 +146,7 @@ class Link:
     async def request(
         self, key: str, content: bytes, timeout_s: float, *, urgent: bool = False
     ) -> bytes:
-        """Send a request to whoever answers at a key; returns the answer.
+        """Send a request to what answers at a key; returns the answer.
 
         `urgent`: it goes before everything else, and is never dropped.
 

@@ -31,7 +31,7 @@ class ZenohHosts:
         context: ArbiterContext,
         hosted: HostedArbiter | None = None,
     ) -> RemoteArbiter:
-        """Make the arbiter that stands for `hosted` in the executive.
+        """Make the arbiter that represents `hosted` in the executive.
 
         Raises:
             PluginError: a vehicle names it as its arbiter.

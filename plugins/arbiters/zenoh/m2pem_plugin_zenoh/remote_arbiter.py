@@ -1,4 +1,4 @@
-"""The executive's end: stands for an arbiter that runs on another host."""
+"""The executive's end: represents an arbiter that runs on another host."""
 
 import asyncio
 import os

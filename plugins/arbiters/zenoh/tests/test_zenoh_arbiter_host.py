@@ -336,7 +336,7 @@ def test_another_journal_gets_the_host_only_when_nothing_goes_on(
         await world.clock.sleep(1)
         assert isinstance(await world.executive.greet(fresh=True, **other), m.Welcome)
         assert world.arbiter.context.journal == UUID(OTHER_JOURNAL)
-        # Its ids and epochs begin anew, and the reports of the other one are not for it.
+        # Its ids and epochs begin again, and the reports of the other one are not for it.
         await world.executive.start("r1.b1", epoch=1, **other)
         assert world.arbiter.count("start") == 1
         assert world.executive.ended == []

@@ -176,7 +176,7 @@ class OnboardNode:
             self.start(message)
             return
         is_past = bool(command.run) and self._is_past(command)
-        if command.verb is Verb.HOLD:  # whoever sends it
+        if command.verb is Verb.HOLD:  # from any sender
             self._hold()
         elif command.verb is Verb.QUERY:
             self._journal.repeat(command.id)

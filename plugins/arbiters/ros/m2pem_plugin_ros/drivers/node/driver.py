@@ -126,7 +126,7 @@ class NodeDriver:
         return replace(outcome, held=self._status is not None and self._status.held)
 
     def claim(self, run: UUID, epoch: int) -> None:
-        """Send CLAIM now, and again whenever the node is received anew."""
+        """Send CLAIM now, and again whenever the node is received again."""
         self._claims[run] = epoch
         self._claims.move_to_end(run)
         if len(self._claims) > REMEMBERED:

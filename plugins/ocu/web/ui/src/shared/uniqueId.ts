@@ -1,4 +1,4 @@
-// Preact's useId counts anew in each tree that is rendered, as in that of each dialog: two elements
+// Preact's useId counts from the beginning in each tree that is rendered, as in that of each dialog: two elements
 // of the page could have the same id.
 import { useState } from "preact/hooks";
 
