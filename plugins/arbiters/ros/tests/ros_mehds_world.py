@@ -22,6 +22,7 @@ from m2pem.api import LinkState, OpenPrompt, ResourceId, StampedRecord, VehicleS
 from m2pem.api.clock import SystemClock
 from m2pem.engine import records as r
 from m2pem.executive.executive import Executive
+from m2pem.fleet.allocation import MANNED
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
 from m2pem.rehearsal.answers import Answers, load_answers
@@ -214,7 +215,7 @@ class Play:
         async with executive, asyncio.timeout(within_s):
             self._executive = executive
             self._failed = asyncio.get_running_loop().create_future()
-            await self._all_heard()
+            await self._all_ready()
             self._run = await executive.control.start(self._story.mission)
             act = self._script.act(
                 executive.control, self._run, self._clock, default_first_decision=False
@@ -287,22 +288,23 @@ class Play:
             self._world.problem(problem)
 
     async def _answer(self, prompt: OpenPrompt) -> None:
-        """As the answers file says, once all vehicles are heard that are to be."""
+        """As the answers file says, once all vehicles are received and free that are to be:
+        one that has returned ends first what it did."""
         decisions = self._decisions.get(prompt.element) or []
         assert decisions, f"nothing is scripted for {prompt.element} any more: {self.told.errors}"
         decision = decisions.pop(0)
         await self._clock.sleep(THINKS_S)
-        await self._all_heard()
+        await self._all_ready()
         log.info("%s: %s", prompt.element, decision)
         await self._executive.control.answer(prompt.run, prompt.prompt, decision, by="operator")
 
-    async def _all_heard(self) -> None:
+    async def _all_ready(self) -> None:
         async with asyncio.timeout(PATIENCE_S):
-            while missing := self._unheard():
+            while missing := self._not_ready():
                 assert missing
                 await asyncio.sleep(0.05)
 
-    def _unheard(self) -> Sequence[str]:
+    def _not_ready(self) -> Sequence[str]:
         states: Mapping[str, object] = {
             name: self._executive.bus.latest(ResourceId(name))
             for name in self._executive.fleet.vehicles
@@ -314,4 +316,5 @@ class Play:
             if not isinstance(state, VehicleState)
             or state.link is not LinkState.CONNECTED
             or (name == "uav1" and state.position is None)
+            or self._executive.availability.reason(ResourceId(name)) not in ("", MANNED)
         ]
