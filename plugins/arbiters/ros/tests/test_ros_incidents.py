@@ -15,12 +15,13 @@ from ros_e2e_programs import Program, programs
 from ros_e2e_world import APART_M, Lane, fleet_file
 from test_ros_plain_vehicles import ORIGIN, PEER, Truth, until
 
-from m2pem.api import RunStatus
+from m2pem.api import ResourceId, RunStatus, VehicleState
 from m2pem.api.clock import SystemClock
 from m2pem.executive.executive import Executive
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import MemoryJournal
 from m2pem.plugins import PluginManager
+from m2pem.telemetry.bus import Bus
 from m2pem.testing import scenarios
 from tests.incident_rows import (
     CHOICES,
@@ -94,6 +95,12 @@ class Street(Table):
 
     vehicle = "rover1"
     simulation: Simulation
+    bus: Bus
+
+    async def is_ready(self) -> bool:
+        """Whether Nav2 answers, too: a vehicle that is received may not have started it yet."""
+        state = self.bus.latest(ResourceId(self.vehicle))
+        return isinstance(state, VehicleState) and bool(state.ready)
 
     def data(self) -> dict[str, Any]:
         """To the other end of the street."""
@@ -119,6 +126,7 @@ class Street(Table):
         async def start(_: str) -> None:
             simulated.start()
             await self.available()
+            await self.desk.until(self.is_ready, "", f"{self.vehicle} is ready")
 
         return {
             **self.common(),
@@ -162,6 +170,7 @@ async def play_rows(folder: Path, domain: int, rows: Sequence[tuple[str, str]]) 
         async with executive, over_socket(executive, folder) as control:
             street = Street()
             street.simulation, street.desk = simulation, Desk(control, clock)
+            street.bus = executive.bus
             await street.play(rows, journal)
 
 

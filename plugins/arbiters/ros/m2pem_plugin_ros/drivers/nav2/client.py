@@ -85,6 +85,10 @@ class Nav2:
         """Whether Nav2 has answered, or had the time to. Answers may be lost during discovery."""
         return bool(self.state) or self._refreshes >= UNANSWERED
 
+    def ask_again(self) -> None:
+        """The vehicle is silent: when it is back, Nav2 has time to answer, as at first."""
+        self._refreshes = 0
+
     @property
     def problem(self) -> str:
         """Why Nav2 accepts no goals; "" if it does."""

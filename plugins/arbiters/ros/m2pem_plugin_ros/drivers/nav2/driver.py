@@ -321,7 +321,9 @@ class Nav2Driver:
     async def _poll_localization(self, nav2: Nav2) -> None:
         """Report the vehicle as alive while its odometry arrives, however slowly Nav2 answers."""
         while True:
-            if nav2.has_answered and self._setup.localization.age_s <= FRESH_S:
+            if self._setup.localization.age_s > FRESH_S:
+                nav2.ask_again()
+            elif nav2.has_answered:
                 self._events.alive()
             await self._pause()
 
