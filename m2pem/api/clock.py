@@ -59,6 +59,11 @@ def boot_time_ns() -> int:
     return time.monotonic_ns()
 
 
+def boot_time_s() -> float:
+    """The same in seconds."""
+    return boot_time_ns() / 1_000_000_000
+
+
 class SystemClock:
     """The wall clock at start plus steady time: it never goes back, and never jumps with NTP. It
     goes on while the computer is suspended, as vehicles and the day do.

@@ -15,10 +15,10 @@ import logging
 import math
 from collections.abc import Callable, Mapping
 
+from m2pem.api.clock import boot_time_s
 from m2pem.api.runs import RunId
 from m2pem.errors import JournalError, M2pemError, StaleEpochError
 from m2pem.executive.runner import Runner
-from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.base import Journal
 
 log = logging.getLogger("m2pem.executive")
@@ -88,7 +88,7 @@ class Ownership:
     async def watch(self) -> None:
         """Look at the lease, and ask the journal each time that the process was stopped, until
         cancelled."""
-        self._seen_s = awake_s()
+        self._seen_s = boot_time_s()
         try:
             while True:
                 await self._look_at_lease()
@@ -109,7 +109,7 @@ class Ownership:
 
     async def _look_at_lease(self) -> None:
         """Hold runs while they surely are this executive's; let go of them when they are not."""
-        now_s = awake_s()
+        now_s = boot_time_s()
         for run, (runner, ends_s) in tuple(self._held.items()):
             if now_s >= ends_s:
                 del self._held[run]
@@ -134,7 +134,7 @@ class Ownership:
     def _look(self) -> int:
         """How often this process was stopped until now."""
         if self._seen_s is not None:
-            now_s = awake_s()
+            now_s = boot_time_s()
             stopped_s, self._seen_s = now_s - self._seen_s, now_s
             if stopped_s > min(STOPPED_AFTER_S, (self._journal.lease_s or math.inf) / 3):
                 self._stops += 1

@@ -21,8 +21,8 @@ from uuid import UUID, uuid4
 
 import psycopg
 
+from m2pem.api.clock import boot_time_s
 from m2pem.errors import JournalError
-from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.storage import Connection
 
 log = logging.getLogger("m2pem.journal")
@@ -116,7 +116,7 @@ class Lease:
         self.id: UUID = uuid4()
         self.length_s = length_s
         self.until_s: float | None = None
-        """Until when the lease lasts at least, by `awake_s`; None: it has not begun."""
+        """Until when the lease lasts at least, by `boot_time_s`; None: it has not begun."""
         self._connect = connect
         self._executive = executive
         self._on_end = on_end
@@ -138,7 +138,7 @@ class Lease:
             self._register()
             self._thread = threading.Thread(target=self._serve, name="lease", daemon=True)
             self._thread.start()
-        elif self._ended or awake_s() >= self.until_s:
+        elif self._ended or boot_time_s() >= self.until_s:
             raise JournalError(
                 "nothing is taken: the lease of this executive has ended, and is not renewed yet"
             )
@@ -190,7 +190,7 @@ class Lease:
                     self._register()
                     self._ended = False
                 return not self._ended
-            asked_s = awake_s()
+            asked_s = boot_time_s()
             found = self._connected().execute(
                 "UPDATE executives SET lease_until = clock_timestamp() + %s * interval '1 second'"
                 " WHERE id = %s AND lease_until > clock_timestamp()",
@@ -209,7 +209,7 @@ class Lease:
         return True
 
     def _register(self) -> None:
-        asked_s = awake_s()
+        asked_s = boot_time_s()
         it = self._executive
         connection = self._connected()
         # What is long over says nothing to anyone.

@@ -11,8 +11,8 @@ from uuid import UUID, uuid4
 
 import psycopg
 
+from m2pem.api.clock import boot_time_s
 from m2pem.errors import JournalError, StaleEpochError
-from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.codec import run_id, run_number
 from m2pem.journal.database_journal import DatabaseJournal
 from m2pem.journal.fleet_server import FleetServer, command_line
@@ -299,12 +299,12 @@ class PostgresStorage:
     def _connected_again(self) -> bool:
         """Connect again, as long as this executive surely has its runs."""
         lease = self.owners.lease
-        until_s = lease.until_s if lease.until_s is not None else awake_s() + lease.length_s
+        until_s = lease.until_s if lease.until_s is not None else boot_time_s() + lease.length_s
         while True:
             with suppress(psycopg.Error):
                 self.connection.execute("SELECT 1")
                 return True
-            if awake_s() + _BETWEEN_TRIES_S > until_s - lease.length_s / 3:
+            if boot_time_s() + _BETWEEN_TRIES_S > until_s - lease.length_s / 3:
                 return False
             time.sleep(_BETWEEN_TRIES_S)
 
@@ -496,12 +496,12 @@ class PostgresJournal(DatabaseJournal):
         except psycopg.OperationalError:
             if not self._pooled.lost:
                 raise
-        until_s = awake_s() + self._lease.length_s
+        until_s = boot_time_s() + self._lease.length_s
         while True:
             try:
                 return work()
             except psycopg.OperationalError:
-                if not self._pooled.lost or awake_s() > until_s:
+                if not self._pooled.lost or boot_time_s() > until_s:
                     raise
             time.sleep(_BETWEEN_TRIES_S)
 

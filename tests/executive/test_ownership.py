@@ -32,7 +32,7 @@ class Clock:
 @pytest.fixture
 def awake(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(ownership, "awake_s", lambda: clock.now_s)
+    monkeypatch.setattr(ownership, "boot_time_s", lambda: clock.now_s)
     return clock
 
 

@@ -16,6 +16,7 @@ from typing import ClassVar, TypeAlias
 
 import pytest
 
+from m2pem.api.clock import boot_time_s
 from m2pem.engine.inputs import BehaviorReported, Continue, Input, PauseRun, StartRun, Tick
 from m2pem.engine.records import (
     BehaviorProgressed,
@@ -36,7 +37,6 @@ from m2pem.errors import (
     StaleEntryError,
     StaleEpochError,
 )
-from m2pem.journal.awake_clock import awake_s
 from m2pem.journal.base import Entry, Journal, RunHeader, RunInfo
 from m2pem.mission.catalogue import BehaviorState
 from m2pem.mission.library import Source
@@ -549,14 +549,14 @@ class JournalContract(Contract):
         """Until the end of a lease that it names, which is renewed; else as long as the process."""
         async with opened(open_journal) as journal:
             assert journal.owned_until_s is None
-            before_s = awake_s()
+            before_s = boot_time_s()
             run = await journal.create(HEADER)
             until_s = journal.owned_until_s
             if journal.lease_s is None:
                 assert until_s is None
             else:
                 assert until_s is not None
-                assert before_s < until_s <= awake_s() + journal.lease_s
+                assert before_s < until_s <= boot_time_s() + journal.lease_s
             await journal.release(run)
             assert journal.owned_until_s is None
 
