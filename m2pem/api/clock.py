@@ -13,7 +13,6 @@ import asyncio
 import itertools
 import math
 import selectors
-import sys
 import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +20,7 @@ from contextlib import suppress
 from contextvars import Context, copy_context
 from typing import Any, Protocol, TypeVar, TypeVarTuple, Unpack
 
+from m2pem.boot_time import boot_time_ns
 from m2pem.errors import InternalError
 from m2pem.units import US_PER_S
 
@@ -50,18 +50,6 @@ class DeadlockError(InternalError):
 
 _LONGEST_SLEEP_US = 2_000_000
 """So much later than due, at most, a wait ends during which the computer was suspended."""
-
-
-def boot_time_ns() -> int:
-    """Nanoseconds since the computer was started, those in which it was suspended included."""
-    if sys.platform == "linux":
-        return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
-    return time.monotonic_ns()
-
-
-def boot_time_s() -> float:
-    """The same in seconds."""
-    return boot_time_ns() / 1_000_000_000
 
 
 class SystemClock:

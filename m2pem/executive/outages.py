@@ -9,8 +9,9 @@ pause of operators do not wait for that.
 import asyncio
 from collections.abc import Callable
 
-from m2pem.api.clock import SystemClock, boot_time_ns
+from m2pem.api.clock import SystemClock
 from m2pem.api.runs import Alert
+from m2pem.boot_time import boot_time_ns
 from m2pem.executive.control_events import ControlEvents
 
 OUTAGE_S = 5.0

@@ -15,8 +15,8 @@ import logging
 import math
 from collections.abc import Callable, Mapping
 
-from m2pem.api.clock import boot_time_s
 from m2pem.api.runs import RunId
+from m2pem.boot_time import boot_time_s
 from m2pem.errors import JournalError, M2pemError, StaleEpochError
 from m2pem.executive.runner import Runner
 from m2pem.journal.base import Journal

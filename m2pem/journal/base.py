@@ -173,7 +173,7 @@ class Journal(Protocol):
     @property
     def owned_until_s(self) -> float | None:
         """Until when the runs that were claimed or created here surely are this executive's, by
-        `m2pem.api.clock.boot_time_s`; it moves on as the lease is renewed.
+        `m2pem.boot_time.boot_time_s`; it moves on as the lease is renewed.
 
         None: as long as its process lives, or no run was. When it is over, another executive may
         claim them, and `append` raises StaleEpochError until they are released.

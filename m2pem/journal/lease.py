@@ -21,7 +21,7 @@ from uuid import UUID, uuid4
 
 import psycopg
 
-from m2pem.api.clock import boot_time_s
+from m2pem.boot_time import boot_time_s
 from m2pem.errors import JournalError
 from m2pem.journal.storage import Connection
 

@@ -11,7 +11,7 @@ from uuid import UUID, uuid4
 
 import psycopg
 
-from m2pem.api.clock import boot_time_s
+from m2pem.boot_time import boot_time_s
 from m2pem.errors import JournalError, StaleEpochError
 from m2pem.journal.codec import run_id, run_number
 from m2pem.journal.database_journal import DatabaseJournal

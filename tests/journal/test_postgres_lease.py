@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from m2pem.api.clock import boot_time_s
+from m2pem.boot_time import boot_time_s
 from m2pem.errors import FleetServedError, JournalError, StaleEpochError
 from m2pem.journal import open_journal
 from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written

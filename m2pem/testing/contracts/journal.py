@@ -16,7 +16,7 @@ from typing import ClassVar, TypeAlias
 
 import pytest
 
-from m2pem.api.clock import boot_time_s
+from m2pem.boot_time import boot_time_s
 from m2pem.engine.inputs import BehaviorReported, Continue, Input, PauseRun, StartRun, Tick
 from m2pem.engine.records import (
     BehaviorProgressed,
