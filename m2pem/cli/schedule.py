@@ -250,6 +250,7 @@ def _ask(
     from m2pem.cli.journals import existing_journal
     from m2pem.cli.notes import note
     from m2pem.control_socket.client import ask
+    from m2pem.errors import OperatorError
 
     name = by or operator_name()
     serving = list(_sockets(journal_file(url)))
@@ -260,8 +261,13 @@ def _ask(
     ]
     if entry is None and method == "release_schedule":  # executives of other fleets hold nothing
         served = [path for path, found in serving if found.hold] or served
-    for path in served:
-        ask(path, method, entry=entry, by=name, **params)
+    for number, path in enumerate(served):
+        try:
+            ask(path, method, entry=entry, by=name, **params)
+        except OperatorError:
+            # An executive of the same fleet may have read in the journal what the one before did.
+            if method != "release_schedule" or not number or ask(path, "scheduled")["hold"]:
+                raise
 
     async def change() -> None:
         async with existing_journal(url) as journal:
