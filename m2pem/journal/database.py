@@ -14,6 +14,7 @@ from uuid import UUID
 from m2pem.errors import JournalError, JournalUrlError
 from m2pem.journal.marks import of_another_journal
 from m2pem.journal.migrations import check, migrate
+from m2pem.journal.storage_checks import DISK_FAILED, DISK_FULL, READ_ONLY
 
 _logger = logging.getLogger(__name__)
 
@@ -186,14 +187,14 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
 
 
 _EXPLANATIONS = {
-    sqlite3.SQLITE_FULL: "the disk is full; make room",
-    sqlite3.SQLITE_READONLY: "it, its folder or its file system can only be read; allow writing",
+    sqlite3.SQLITE_FULL: DISK_FULL,
+    sqlite3.SQLITE_READONLY: READ_ONLY,
     sqlite3.SQLITE_NOTADB: "it is not a journal of m2pem, nor any SQLite database",
     sqlite3.SQLITE_CORRUPT: "it is damaged; use a backup, or save what is intact with "
     "`m2pem journal salvage`",
     sqlite3.SQLITE_BUSY: f"another program has kept it locked for {BUSY_TIMEOUT_S:g} s; end that",
     sqlite3.SQLITE_CANTOPEN: "it cannot be opened; check the permissions of it and its folder",
-    sqlite3.SQLITE_IOERR: "the disk failed to read or write; look at it and its file system",
+    sqlite3.SQLITE_IOERR: DISK_FAILED,
 }
 
 _NO_INDEX = ("SQLITE_IOERR_SHMOPEN", "SQLITE_IOERR_SHMSIZE", "SQLITE_IOERR_SHMMAP")

@@ -25,7 +25,7 @@ from m2pem.journal.fleet_server import FleetServer, decode, encode, this_process
 from m2pem.journal.marks import MarkFile, find_losses, identity_in, of_another_journal
 from m2pem.journal.position import RunPosition
 from m2pem.journal.run_locks import RunLocks, run_locks
-from m2pem.journal.storage_checks import OpenFiles, min_free_mb
+from m2pem.journal.storage_checks import OpenFiles, disk_fault, min_free_mb
 from m2pem.journal.transaction import mark_of, position_columns, position_from
 
 log = logging.getLogger("m2pem.journal")
@@ -145,7 +145,7 @@ class SqliteStorage:
         """See `Storage.explained`."""
         if isinstance(error, OSError):
             name = error.filename or self._path
-            return JournalError(f"{name}: the disk failed to read or write ({error.strerror})")
+            return JournalError(f"{name}: {disk_fault(error)}")
         assert isinstance(error, sqlite3.Error)
         return explained_error(error, self._path)
 
@@ -219,7 +219,7 @@ class SqliteJournal(DatabaseJournal):
             except sqlite3.Error as error:
                 raise explained_error(error, path) from error
             except OSError as error:
-                raise JournalError(f"{marks.path}: {error.strerror}") from error
+                raise JournalError(f"{marks.path}: {disk_fault(error)}") from error
             undo.pop_all()
         return cls(path, writing, reading, locks, marks, identity)
 

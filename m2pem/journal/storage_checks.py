@@ -1,9 +1,11 @@
-"""Checks of where a journal is kept: free space, and files that were removed or replaced.
+"""Checks of where a journal is kept: free space, and files that were removed or replaced; and what
+the faults of a disk are called.
 
 Too little free space is reported before the disk is full. What is written to a removed file is gone
 when the last process closes it, and SQLite does not report it.
 """
 
+import errno
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,6 +18,24 @@ MIN_FREE_VARIABLE = "M2PEM_MIN_FREE_MB"
 DEFAULT_MB = 200
 
 _BYTES = 1_000_000
+
+DISK_FULL = "the disk is full; make room"
+READ_ONLY = "it, its folder or its file system can only be read; allow writing"
+DISK_FAILED = "the disk failed to read or write; look at it and its file system"
+
+_FAULTS = {
+    errno.ENOSPC: DISK_FULL,
+    errno.EDQUOT: DISK_FULL,
+    errno.EROFS: READ_ONLY,
+    errno.EACCES: READ_ONLY,
+    errno.EIO: DISK_FAILED,
+}
+
+
+def disk_fault(error: OSError) -> str:
+    """Return what is wrong with the storage of a file, and the remedy."""
+    fault = _FAULTS.get(error.errno or 0)
+    return f"{fault} ({error.strerror})" if fault else str(error.strerror)
 
 
 def min_free_mb() -> float:

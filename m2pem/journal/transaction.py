@@ -9,7 +9,6 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from errno import ENOSPC
 from typing import Any
 
 from m2pem.engine.records import RunOutcome
@@ -29,7 +28,7 @@ from m2pem.journal.hash_chain import entry_hash, header_hash, position_seal
 from m2pem.journal.marks import NO_HASH, Mark, MarkFile, MarkState, find_loss, find_losses
 from m2pem.journal.position import RunPosition
 from m2pem.journal.storage import Connection, Storage
-from m2pem.journal.storage_checks import space_shortage
+from m2pem.journal.storage_checks import disk_fault, space_shortage
 from m2pem.scheduling.entry import (
     EntryChange,
     EntryId,
@@ -156,10 +155,9 @@ class WriteTransaction:
         try:
             other = self._storage.serve_fleet(fleet, resources, digest)
         except OSError as error:
-            why = "the disk is full; make room" if error.errno == ENOSPC else error.strerror
             raise JournalError(
-                f"{error.filename or self._storage.place}: {why}; which executive serves {fleet} "
-                "cannot be noted"
+                f"{error.filename or self._storage.place}: {disk_fault(error)}; which executive "
+                f"serves {fleet} cannot be noted"
             ) from error
         if other is not None:
             raise other.refusal(fleet)
@@ -389,7 +387,7 @@ class WriteTransaction:
             self._marks.write(marks)
         except OSError as error:
             raise JournalError(
-                f"{self._marks.path}: the mark cannot be written: {error.strerror}"
+                f"{self._marks.path}: the mark cannot be written: {disk_fault(error)}"
             ) from error
 
     def rollback(self) -> None:
