@@ -104,10 +104,22 @@ def test_systemd_accepts_the_unit_and_finds_it_hardened(unit: Path) -> None:
     assert judged.returncode == 0, judged.stdout[-500:]
 
 
+def read(unit: Path) -> RawConfigParser:
+    parser = RawConfigParser(strict=False)
+    parser.optionxform = str  # type: ignore[assignment,method-assign]
+    parser.read(unit)
+    return parser
+
+
+def test_a_unit_that_ends_leaves_the_locks_of_the_other_one(unit: Path) -> None:
+    """Else a second executive could command the vehicles of the first."""
+    service = read(unit)["Service"]
+    assert service["RuntimeDirectory"] == "m2pem"
+    assert service["RuntimeDirectoryPreserve"] == "yes"
+
+
 def test_the_unit_and_the_containers_serve_with_options_that_exist(m2pem: CommandLine) -> None:
-    unit = RawConfigParser(strict=False)
-    unit.optionxform = str  # type: ignore[assignment,method-assign]
-    unit.read(DEPLOY / "m2pem.service")
+    unit = read(DEPLOY / "m2pem.service")
     program, *words = unit["Service"]["ExecStart"].split()
     assert program == "/opt/m2pem/bin/m2pem"
     assert f"python3 -m venv {Path(program).parents[1]}\n" in PAGE
@@ -119,9 +131,7 @@ def test_the_unit_and_the_containers_serve_with_options_that_exist(m2pem: Comman
 
 
 def test_the_unit_of_a_host_has_options_that_exist(m2pem: CommandLine) -> None:
-    unit = RawConfigParser(strict=False)
-    unit.optionxform = str  # type: ignore[assignment,method-assign]
-    unit.read(DEPLOY / "m2pem-arbiter-host.service")
+    unit = read(DEPLOY / "m2pem-arbiter-host.service")
     _, command, *words = unit["Service"]["ExecStart"].split()
     status, usage, _ = m2pem.run(command, "--help")
     assert status == 0
