@@ -28,6 +28,8 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 
+from m2pem.plugins import PluginManager
+
 REPOSITORY = Path(__file__).parents[1]
 MOST_BYTES = 100_000
 """Of a request to start a process."""
@@ -135,6 +137,9 @@ def _import_all() -> None:
             importlib.import_module(module.name)
     for point in entry_points(group="m2pem"):
         point.load()
+    plugins = PluginManager()  # their hooks import what they register
+    for offers in (plugins.arbiters, plugins.ocus, plugins.services):
+        offers()
 
 
 def _become(
