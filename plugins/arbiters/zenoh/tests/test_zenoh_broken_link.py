@@ -143,8 +143,8 @@ async def test_a_hold_overtakes_what_a_slow_link_carries(
 async def test_a_killed_host_takes_its_vehicles_up_again(
     start_host: StartHost, tmp_path: Path
 ) -> None:
-    host = start_host(lost_after_s=60.0)
-    async with connected(host.port, tmp_path, 60.0) as harness:
+    host = start_host(lost_after_s=8.0)
+    async with connected(host.port, tmp_path, 8.0) as harness:
         await harness.start("r1.b1", "goto", UGV1, target=NEAR)
         await harness.running("r1.b1")
         host.kill()

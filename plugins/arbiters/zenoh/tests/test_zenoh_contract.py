@@ -12,7 +12,7 @@ from m2pem.api import Arbiter, ArbiterContext, Point, ResourceId, Route
 from m2pem.testing import ArbiterCase, ArbiterContract
 from m2pem.testing.contracts.arbiter_harness import CutLink, Effects, MakeArbiter
 
-SPEED = 8.0
+SPEED = 16.0
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -48,7 +48,7 @@ class TestHostedArbiter(ArbiterContract):
             long=("single_vehicle_routing", {"route": route}),
             short=("goto", {"target": Point((38.1077, -77.3192, None))}),
             bad=("speed", -1.0),
-            short_s=40.0,
+            short_s=20.0,
             route=("single_vehicle_routing", {"route": route, "speed": 4.0}),
         )
 

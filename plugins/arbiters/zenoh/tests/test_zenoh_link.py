@@ -87,16 +87,6 @@ async def test_hosts_with_certificates_of_one_ca_are_connected(keys: Path) -> No
     assert await answer_of(host(keys), host(keys)) == b"got this"
 
 
-async def test_a_host_with_a_certificate_of_another_ca_is_not(keys: Path) -> None:
-    with pytest.raises(LinkError):
-        await answer_of(host(keys), host(keys, "stranger"))
-
-
-async def test_a_host_without_tls_is_not(keys: Path) -> None:
-    with pytest.raises(LinkError):
-        await answer_of(host(keys), Host("pi", ca=str(keys / "ca.pem")))
-
-
 async def test_a_password_takes_the_place_of_a_certificate(keys: Path) -> None:
     # The end that connects has no files but these two.
     connecting = Host(
@@ -109,10 +99,23 @@ async def test_a_password_takes_the_place_of_a_certificate(keys: Path) -> None:
     assert await answer_of(host(keys, credentials="users"), connecting) == b"got this"
 
 
-@pytest.mark.parametrize("credentials", ["wrong", ""])
-async def test_a_wrong_password_or_none_is_not_let_in(keys: Path, credentials: str) -> None:
-    with pytest.raises(LinkError):
-        await answer_of(host(keys, credentials="users"), host(keys, credentials=credentials))
+async def test_without_a_certificate_of_the_ca_or_the_right_password_there_is_no_connection(
+    keys: Path,
+) -> None:
+    with_password = host(keys, credentials="users")
+    refused = {
+        "a certificate of another CA": (host(keys), host(keys, "stranger")),
+        "no TLS": (host(keys), Host("pi", ca=str(keys / "ca.pem"))),
+        "a wrong password": (with_password, host(keys, credentials="wrong")),
+        "no password": (with_password, host(keys)),
+    }
+    answers = await asyncio.gather(
+        *(answer_of(*hosts) for hosts in refused.values()), return_exceptions=True
+    )
+    connected = [
+        why for why, got in zip(refused, answers, strict=True) if not isinstance(got, LinkError)
+    ]
+    assert not connected, answers
 
 
 @pytest.mark.parametrize("file", ["link.key", "users"])

@@ -1,10 +1,8 @@
 """Hosts with simulated vehicles in processes of their own, and a link that can be cut."""
 
 import asyncio
-import signal
+import os
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 from m2pem.api import (
@@ -16,7 +14,9 @@ from m2pem.api import (
     ResourceId,
 )
 from m2pem.simulation.arbiters import SimArbiter
+from tests.command_line import REPOSITORY, CommandLine, Program
 
+HERE = Path(__file__).parent
 UGV1, UGV2 = ResourceId("ugv1"), ResourceId("ugv2")
 
 
@@ -67,45 +67,35 @@ class HostProcess:
         lost_after_s: float = 3.0,
     ) -> None:
         self.port = port
-        program = str(Path(__file__).with_name(self.program))
-        self._command = [
-            *(sys.executable, program, str(port), str(folder)),
-            *(str(speed), policy, str(lost_after_s)),
-        ]
+        words = [self.program, str(port), str(folder), str(speed), policy, str(lost_after_s)]
+        self._code = (
+            f"import runpy, sys; sys.argv[:] = {words!r}; "
+            f"runpy.run_path({str(HERE / self.program)!r}, run_name='__main__')"
+        )
+        modules = os.pathsep.join(map(str, (HERE, REPOSITORY)))
+        self._command_line = CommandLine(folder, {"PYTHONPATH": modules})
         self._process = self._start()
 
-    def _start(self) -> "subprocess.Popen[str]":
-        process = subprocess.Popen(
-            self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert "listens" in line, line
+    def _start(self) -> Program:
+        process = self._command_line.start("-c", self._code)
+        process.until_text("listens")
         return process
 
     def say(self, words: str) -> str:
         """Have it do something; returns what it answers."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(f"{words}\n")
-        self._process.stdin.flush()
+        self._process.type(words)
         return self._process.stdout.readline().strip()
 
     def kill(self) -> None:
         """End it at once, as a power failure would."""
-        self._process.send_signal(signal.SIGKILL)
-        self._process.wait()
+        self._process.kill()
 
     def restart(self) -> None:
         """Start it again, as systemd would."""
         self._process = self._start()
 
     def close(self) -> None:
-        if self._process.poll() is None:
-            self.kill()
-        for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
-            pipe.close()
+        self._command_line.end()
 
 
 def warm_up() -> None:
