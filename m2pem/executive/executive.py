@@ -111,6 +111,7 @@ class Executive:
         self._connections = FleetConnections(
             self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
         )
+        self.stalls = self._supervisor.stalls
         self.ownership = self._supervisor.ownership
         self.health = ExecutiveHealth(journal)
         starter = ScheduledRuns(self._supervisor, self.bus)
@@ -165,15 +166,13 @@ class Executive:
         for what, listening in self._connections.listeners():
             self._listen(group, what, listening)
         if isinstance(self.clock, SystemClock):
+            self._listen(group, "watch of stalls", self.stalls.watch)
             self._listen(group, "watch of the runs' claims", self.ownership.watch)
             if self.journal.lease_s is not None and self._locks.resources:
                 self._listen(group, "watch of who serves the fleet", self._watch_fleet)
         if self.journal.file is not None:
             watching = partial(watch_space, self.journal.file, self.events)
             self._listen(group, "watch of free space", watching)
-        if isinstance(self.clock, SystemClock):
-            watching = partial(self.outages.watch, self.clock)
-            self._listen(group, "watch of outages", watching)
         if self._supervisor.fleet.shared_space and isinstance(self.clock, SystemClock):
             spaces, publish = self._supervisor.shared_space, self.events.publish
             watching = partial(watch_shared_space, self.clock, spaces, publish)

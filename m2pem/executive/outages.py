@@ -1,67 +1,82 @@
-"""Outages of a living executive: its computer was suspended, its process stopped, or its event loop
-blocked.
+"""Times in which this process did not run: its computer was suspended, it was stopped (SIGSTOP), or
+its event loop was blocked.
 
-Vehicles went on meanwhile without an observer. So each run looks at its vehicles before it
-decides or sends anything (`m2pem.executive.recovery.look_again`), as after a restart. STOP and
-pause of operators do not wait for that.
+`StallMonitor` finds them. `Ownership` acts on those after which the executive may have lost its
+runs, and `Outages` on longer ones: vehicles went on without an observer, so each run looks at its
+vehicles before it decides or sends anything (`m2pem.executive.recovery.look_again`), as after a
+restart. STOP and pause of operators do not wait for that.
 """
 
 import asyncio
 from collections.abc import Callable
 
-from m2pem.api.clock import SystemClock
 from m2pem.api.runs import Alert
-from m2pem.boot_time import boot_time_ns
+from m2pem.boot_time import boot_time_s
 from m2pem.executive.control_events import ControlEvents
+
+TICK_S = 0.25
 
 OUTAGE_S = 5.0
 """An executive that did nothing for so long was away, in real seconds."""
 
 CODE = "OUTAGE"
 
-_EVERY_S = 0.5
-_NS_PER_S = 1_000_000_000
+
+class StallMonitor:
+    """Finds the stalls of this process while `watch` runs."""
+
+    def __init__(self) -> None:
+        self._actions: list[tuple[float, Callable[[float], None]]] = []
+        self._tick_s = TICK_S
+        self._seen_s: float | None = None
+
+    def after(self, shortest_s: float, act: Callable[[float], None]) -> None:
+        """Have `act` called with the length of each stall of `shortest_s` or more, in real
+        seconds."""
+        self._actions.append((shortest_s, act))
+        self._tick_s = min(self._tick_s, shortest_s / 4)
+
+    async def watch(self) -> None:
+        """Find stalls until cancelled."""
+        self._seen_s = boot_time_s()
+        try:
+            while True:
+                await asyncio.sleep(self._tick_s)
+                self.look()
+        finally:
+            self._seen_s = None
+
+    def look(self) -> None:
+        """Find a stall that has just ended, before anything else is done."""
+        if self._seen_s is None:
+            return
+        now_s = boot_time_s()
+        seen_s, self._seen_s = self._seen_s, now_s
+        for shortest_s, act in self._actions:
+            if now_s - seen_s >= shortest_s:
+                act(now_s - seen_s)
 
 
 class Outages:
     """Counts the outages of one executive; `number` is how many there were.
 
-    `length_s`: of the last one, in seconds of the executive's clock. `shortest_s`: real seconds
-    from which on it is one. `steady_ns`: time that goes on while the computer is suspended.
-    `on_outage` is called for each.
+    `length_s`: of the last one, in seconds of the executive's clock, of which `speed` pass in a
+    real one. `shortest_s`: real seconds from which on a stall is one. `on_outage` is called for
+    each.
     """
 
     def __init__(
         self,
         events: ControlEvents,
+        stalls: StallMonitor,
         shortest_s: float = OUTAGE_S,
-        steady_ns: Callable[[], int] = boot_time_ns,
+        speed: float = 1.0,
     ) -> None:
         self.number = 0
         self.length_s = 0.0
         self.on_outage: Callable[[], None] = lambda: None
         self._events = events
-        self._shortest_ns = round(shortest_s * _NS_PER_S)
-        self._steady_ns = steady_ns
-        self._seen_ns: int | None = None
-        self._speed = 1.0
-
-    async def watch(self, clock: SystemClock) -> None:
-        """Notice outages until cancelled."""
-        self._speed = clock.speed
-        self._seen_ns = self._steady_ns()
-        while True:
-            await asyncio.sleep(_EVERY_S)
-            self.look()
-
-    def look(self) -> None:
-        """Notice an outage that has just ended; none before `watch` was begun."""
-        if self._seen_ns is None:
-            return
-        now_ns = self._steady_ns()
-        seen_ns, self._seen_ns = self._seen_ns, now_ns
-        if now_ns - seen_ns >= self._shortest_ns:
-            self.noticed((now_ns - seen_ns) / _NS_PER_S * self._speed)
+        stalls.after(shortest_s, lambda stalled_s: self.noticed(stalled_s * speed))
 
     def noticed(self, length_s: float) -> None:
         """Count an outage, and tell operators."""

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping
 from m2pem.api.runs import RunId
 from m2pem.boot_time import boot_time_s
 from m2pem.errors import JournalError, M2pemError, StaleEpochError
+from m2pem.executive.outages import StallMonitor
 from m2pem.executive.runner import Runner
 from m2pem.journal.base import Journal
 
@@ -46,27 +47,28 @@ class Ownership:
 
     `replaced` is called for a run that another executive has claimed, or may have claimed because
     the lease has ended; `unknown` for one of which the journal cannot say it: when they return,
-    nothing that moves a vehicle goes out for the run.
-    Times during which `watch` does not run do not count.
+    nothing that moves a vehicle goes out for the run. `stalls` says when the process was stopped.
     """
 
     def __init__(
         self,
         journal: Journal,
+        stalls: StallMonitor,
         runners: Mapping[RunId, Runner],
         replaced: Callable[[RunId, StaleEpochError], None],
         unknown: Callable[[RunId, M2pemError], None],
     ) -> None:
         self._journal = journal
+        self._stalls = stalls
         self._runners = runners
         self._replaced = replaced
         self._unknown = unknown
-        self._seen_s: float | None = None
         self._stops = 0
         self._confirmed = 0
         self._opened = 0
         self._asking = asyncio.Lock()
         self._held: dict[RunId, tuple[Runner, float]] = {}
+        stalls.after(min(STOPPED_AFTER_S, (journal.lease_s or math.inf) / 3), self._stopped)
 
     def may_send(self) -> bool:
         """Whether arbiters may send by themselves: see `ArbiterContext.may_send`."""
@@ -88,24 +90,17 @@ class Ownership:
     async def watch(self) -> None:
         """Look at the lease, and ask the journal each time that the process was stopped, until
         cancelled."""
-        self._seen_s = boot_time_s()
-        try:
-            while True:
-                await self._look_at_lease()
-                await self.confirmed()
-                await asyncio.sleep(self._tick_s)
-        finally:
-            self._seen_s = None
+        tick_s = min(TICK_S, (self._journal.lease_s or TICK_S) / 20)
+        while True:
+            await self._look_at_lease()
+            await self.confirmed()
+            await asyncio.sleep(tick_s)
 
     async def ask(self) -> None:
         """Ask the journal whether the claims of all runs hold."""
         await asyncio.gather(*(self._ask_of(runner) for runner in self._driven()))
 
     # --- inside ---------------------------------------------------------------------------------
-
-    @property
-    def _tick_s(self) -> float:
-        return min(TICK_S, (self._journal.lease_s or TICK_S) / 20)
 
     async def _look_at_lease(self) -> None:
         """Hold runs while they surely are this executive's; let go of them when they are not."""
@@ -133,16 +128,14 @@ class Ownership:
 
     def _look(self) -> int:
         """How often this process was stopped until now."""
-        if self._seen_s is not None:
-            now_s = boot_time_s()
-            stopped_s, self._seen_s = now_s - self._seen_s, now_s
-            if stopped_s > min(STOPPED_AFTER_S, (self._journal.lease_s or math.inf) / 3):
-                self._stops += 1
-                log.warning(
-                    "the executive did not run for %.1f s: it asks its journal before it goes on",
-                    stopped_s,
-                )
+        self._stalls.look()
         return self._stops
+
+    def _stopped(self, stopped_s: float) -> None:
+        self._stops += 1
+        log.warning(
+            "the executive did not run for %.1f s: it asks its journal before it goes on", stopped_s
+        )
 
     async def _ask_of(self, runner: Runner) -> None:
         try:

@@ -77,7 +77,7 @@ class LoopMonitor:
             slept_s, worked_s = time.monotonic() - woken_s, time.process_time() - used_s
             woken_s, used_s = woken_s + slept_s, used_s + worked_s
             if slept_s > LATE_AFTER_S and worked_s < slept_s / 2:
-                continue  # the whole process was stopped: see `Outages`
+                continue  # the whole process was stopped: see `StallMonitor`
             late_s = time.monotonic() - self._ticked_s - TICK_S
             if late_s < LATE_AFTER_S or self._blocked_by:
                 continue

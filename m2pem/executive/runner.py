@@ -31,7 +31,7 @@ from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.errors import InternalError, M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher
-from m2pem.executive.outages import Outages
+from m2pem.executive.outages import Outages, StallMonitor
 from m2pem.executive.services import Services
 from m2pem.journal.base import Entry, Journal
 
@@ -96,6 +96,7 @@ class RunContext:
     observe: OnRecords
     hold: Callable[[RunId, Sequence[str]], None]
     """Holds what failed work commanded, at once, and warns of what may not have received it."""
+    stalls: StallMonitor
     outages: Outages
     look_again: LookAgain
     limit: RunLimit | None = None
@@ -334,7 +335,7 @@ class Runner:
         """Look at the vehicles if this executive was away. Returns what was seen, and the behaviors
         that must not be started any more."""
         outages = self._context.outages
-        outages.look()
+        self._context.stalls.look()
         if outages.number == self._outages_seen:
             return [], frozenset()
         self._outages_seen = outages.number

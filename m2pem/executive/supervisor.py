@@ -55,7 +55,7 @@ from m2pem.executive.journal_loss import JournalLossPrompts
 from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
-from m2pem.executive.outages import OUTAGE_S, Outages
+from m2pem.executive.outages import OUTAGE_S, Outages, StallMonitor
 from m2pem.executive.ownership import Ownership
 from m2pem.executive.recovery import claim, look_again, replaced_by, replay, take_over
 from m2pem.executive.returns import Returns, still_lost
@@ -148,7 +148,9 @@ class Supervisor:
         self.availability = Availability(self.fleet)
         self._bus = bus
         self._observers = observers
-        self.outages = Outages(events, min(OUTAGE_S, self.fleet.max_outage_s or OUTAGE_S))
+        self.stalls = StallMonitor()
+        outage_s = min(OUTAGE_S, self.fleet.max_outage_s or OUTAGE_S)
+        self.outages = Outages(events, self.stalls, outage_s, settings.speed)
         self.outages.on_outage = self._look_at_all
         self._separation = separation_for(self.fleet, clock)
         self.marks = StopMarks(journal.file, journal.identity)
@@ -157,7 +159,9 @@ class Supervisor:
         self._group: asyncio.TaskGroup | None = None
         # Of two starts at once the second must see what the first one takes.
         self._starting = asyncio.Lock()
-        self.ownership = Ownership(journal, self.runners, self.replaced, self._claim_unknown)
+        self.ownership = Ownership(
+            journal, self.stalls, self.runners, self.replaced, self._claim_unknown
+        )
         self.dispatcher = Dispatcher(
             arbiters,
             self.availability,
@@ -520,6 +524,7 @@ class Supervisor:
             self.events,
             self._observe,
             self.emergency.hold,
+            self.stalls,
             self.outages,
             self._look_again,
             self.settings.limit,

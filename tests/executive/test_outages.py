@@ -5,11 +5,10 @@ from contextlib import suppress
 from dataclasses import replace
 
 from m2pem.api.arbiter import BehaviorReport
-from m2pem.api.clock import SystemClock
 from m2pem.api.runs import Alert, RunStatus
 from m2pem.errors import OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
-from m2pem.executive.outages import CODE, OUTAGE_S, Outages
+from m2pem.executive.outages import CODE, OUTAGE_S, Outages, StallMonitor
 from m2pem.journal import MemoryJournal
 from m2pem.mission.catalogue import BehaviorState
 
@@ -165,19 +164,21 @@ def test_stop_reaches_a_vehicle_whose_arbiter_does_not_say_how_it_is(play):
     play(story, fleet=bounded())
 
 
-async def test_time_in_which_nothing_ran_is_an_outage_and_operators_are_told() -> None:
+async def test_time_in_which_nothing_ran_is_an_outage_and_operators_are_told(monkeypatch) -> None:
     events = ControlEvents()
     alerts = events.subscribe(None, 10)
-    now = [0]
-    outages = Outages(events, steady_ns=lambda: now[0])
-    watching = asyncio.create_task(outages.watch(SystemClock(speed=2.0)))
+    now_s = [0.0]
+    monkeypatch.setattr("m2pem.executive.outages.boot_time_s", lambda: now_s[0])
+    stalls = StallMonitor()
+    outages = Outages(events, stalls, speed=2.0)
+    watching = asyncio.create_task(stalls.watch())
     await asyncio.sleep(0)
-    now[0] += round((OUTAGE_S - 1) * 1e9)
-    outages.look()
+    now_s[0] += OUTAGE_S - 1
+    stalls.look()
     assert outages.number == 0
-    now[0] += round(7_200e9)
-    outages.look()
-    outages.look()
+    now_s[0] += 7_200
+    stalls.look()
+    stalls.look()
     assert (outages.number, outages.length_s) == (1, 14_400.0)
     alert = await anext(alerts)
     assert isinstance(alert, Alert)

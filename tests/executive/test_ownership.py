@@ -9,7 +9,7 @@ import pytest
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.runs import Alert
 from m2pem.errors import JournalError, OperatorError, StaleCommandError, StaleEpochError
-from m2pem.executive import ownership
+from m2pem.executive import outages, ownership
 from m2pem.journal import Entry, MemoryJournal
 from m2pem.mission.catalogue import BehaviorState
 
@@ -32,7 +32,8 @@ class Clock:
 @pytest.fixture
 def awake(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(ownership, "boot_time_s", lambda: clock.now_s)
+    for module in (ownership, outages):
+        monkeypatch.setattr(module, "boot_time_s", lambda: clock.now_s)
     return clock
 
 
@@ -49,10 +50,12 @@ class UnreadableJournal(MemoryJournal):
 
 @asynccontextmanager
 async def watched(world: World) -> AsyncIterator[None]:
-    watching = asyncio.create_task(world.executive.ownership.watch())
+    watched = (world.executive.stalls, world.executive.ownership)
+    watching = [asyncio.create_task(each.watch()) for each in watched]
     await asyncio.sleep(0)
     yield
-    watching.cancel()
+    for each in watching:
+        each.cancel()
 
 
 async def driving(world: World) -> str:
