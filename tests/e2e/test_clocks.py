@@ -4,43 +4,28 @@ The fleet has `max_outage: 10 min`.
 """
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import CommandLine, fleet_with_state
-from tests.faults import Faults, with_faults
+from tests.faults import Faults
 
 from .test_full_disk import DRIVE, wait_until_recorded
 
 DAY_S = 86_400
 
 
-@pytest.fixture
-def faults(tmp_path: Path) -> Faults:
-    return Faults(tmp_path)
-
-
-@pytest.fixture
-def m2pem(tmp_path: Path, faults: Faults) -> Iterator[CommandLine]:
-    made = CommandLine(tmp_path, faults.variables, with_faults())
-    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
-    yield made
-    made.end()
-
-
 def test_a_run_that_is_resumed_when_the_clock_went_back_holds_its_vehicles_and_asks(
-    m2pem: CommandLine, faults: Faults, tmp_path: Path
+    faulty: CommandLine, faults: Faults, tmp_path: Path
 ) -> None:
+    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
     fleet, state = fleet_with_state(tmp_path)
-    program = m2pem.start("run", "drive.bpmn", "--fleet", fleet, "--ocu", "plain")
+    program = faulty.start("run", "drive.bpmn", "--fleet", fleet, "--ocu", "plain")
     program.until_text("Noted")
     program.kill()
     faults.set(f"clock {time.CLOCK_REALTIME} {-3 * DAY_S}")
-    resumed = m2pem.start("resume", "r1", "--ocu", "plain")
+    resumed = faulty.start("resume", "r1", "--ocu", "plain")
     resumed.until_text("is not known: the clock went back")
     wait_until_recorded(state, EffectKind.HOLD)
     resumed.type("stop")
@@ -50,10 +35,11 @@ def test_a_run_that_is_resumed_when_the_clock_went_back_holds_its_vehicles_and_a
 
 
 def test_a_clock_that_is_set_during_a_run_changes_nothing_in_it(
-    m2pem: CommandLine, faults: Faults, tmp_path: Path
+    faulty: CommandLine, faults: Faults, tmp_path: Path
 ) -> None:
+    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
     fleet, state = fleet_with_state(tmp_path)
-    program = m2pem.start("run", "drive.bpmn", "--fleet", fleet, "--ocu", "plain")
+    program = faulty.start("run", "drive.bpmn", "--fleet", fleet, "--ocu", "plain")
     program.until_text("Noted")
     for days in (3, -3):
         faults.set(f"clock {time.CLOCK_REALTIME} {days * DAY_S}")

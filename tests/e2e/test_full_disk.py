@@ -65,8 +65,8 @@ def test_a_full_disk_holds_the_vehicles_and_after_room_is_made_the_run_goes_on(
     fleet, state = fleet_with_state(tmp_path)
     journal = small_disk.folder / "journal.db"
     status, _, errors = m2pem.run(
-        "run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", "--journal", journal,
-        M2PEM_MIN_FREE_MB="0",
+        "run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", "--speed", "10",
+        "--journal", journal, M2PEM_MIN_FREE_MB="0",
     )  # fmt: skip
     assert (status, "the disk is full; make room" in errors) == (1, True), errors
     assert "Commanded to hold: evsg1." in errors

@@ -1,12 +1,14 @@
 """An executive ends while its vehicles are held: the next one asks before they go on."""
 
+import errno
 import signal
 from pathlib import Path
 
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
-from tests.command_line import CommandLine, Program, fleet_with_state, install_plugin
+from tests.command_line import CommandLine, Program, fleet_with_state
 from tests.executive.conftest import behavior, flow, mission
+from tests.faults import Faults
 
 TARGET = '<m2pem:property name="target" value="[38.10822, -77.3192, 60]"/>'
 DRIVE = mission(
@@ -18,32 +20,23 @@ DRIVE = mission(
 )
 """A drive of some 80 m, in which a timer has something written to the journal."""
 
-LOCKING = """
-import os, sqlite3
-
-held = []
-
-@hookimpl
-def m2pem_records_committed(run_id, records):
-    if any(type(record).__name__ == "BehaviorProgressed" for record in records) and not held:
-        held.append(sqlite3.connect(os.environ["LOCKS"], isolation_level=None))
-        held[0].execute("BEGIN IMMEDIATE")
-"""
-"""Another process writes to the journal and does not end: commits fail after a while."""
+SPEED = "10"
 
 
-def held_by_a_dying_executive(m2pem: CommandLine, tmp_path: Path) -> Path:
+def held_by_a_dying_executive(faulty: CommandLine, faults: Faults) -> Path:
     """A run whose journal failed while a vehicle drove; returns the state file of the vehicles."""
-    (tmp_path / "drive.bpmn").write_bytes(DRIVE)
-    fleet, state = fleet_with_state(tmp_path)
-    journal = tmp_path / "journal.db"
-    installed = install_plugin(tmp_path, "locking", LOCKING)
-    status, _, errors = m2pem.run(
-        "run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", "--journal", journal,
-        LOCKS=str(journal), **installed,
+    (faulty.folder / "drive.bpmn").write_bytes(DRIVE)
+    fleet, state = fleet_with_state(faulty.folder)
+    program = faulty.start(
+        "run", "drive.bpmn", "--fleet", fleet, "--ocu", "none", "--speed", SPEED,
+        "--journal", "journal.db",
     )  # fmt: skip
-    assert (status, "locked" in errors) == (1, True), errors
+    program.until_text("evsg1 begins goto")
+    faults.fail(errno.EIO, "write", name="journal.db")
+    status, errors = program.rest()
+    assert (status, "the disk failed to read or write" in errors) == (1, True), errors
     assert [effect.kind for effect in recorded_effects(state)][-1] is EffectKind.HOLD
+    faults.clear()
     return state
 
 
@@ -52,10 +45,10 @@ def resume(m2pem: CommandLine, *words: str) -> Program:
 
 
 def test_vehicles_that_a_dying_executive_has_held_are_asked_about(
-    m2pem: CommandLine, tmp_path: Path
+    faulty: CommandLine, faults: Faults
 ) -> None:
-    state = held_by_a_dying_executive(m2pem, tmp_path)
-    program = resume(m2pem, "--ocu", "plain")
+    state = held_by_a_dying_executive(faulty, faults)
+    program = resume(faulty, "--ocu", "plain")
     program.until_text("held, and the journal does not say why")
     kinds = [effect.kind for effect in recorded_effects(state)]
     assert EffectKind.RESUME not in kinds
@@ -68,21 +61,21 @@ def test_vehicles_that_a_dying_executive_has_held_are_asked_about(
 
 
 def test_what_an_interrupted_run_has_left_behind_is_said_and_can_be_stopped(
-    m2pem: CommandLine, tmp_path: Path
+    faulty: CommandLine, faults: Faults, tmp_path: Path
 ) -> None:
-    state = held_by_a_dying_executive(m2pem, tmp_path)
+    state = held_by_a_dying_executive(faulty, faults)
     fleet = tmp_path / "fleets" / "vignette1.yaml"
-    status, _, refused = m2pem.run("stop", "r1", "--journal", "journal.db")
-    _, shown, _ = m2pem.run("fleet", fleet, "--journal", "journal.db")
+    status, _, refused = faulty.run("stop", "r1", "--journal", "journal.db")
+    _, shown, _ = faulty.run("fleet", fleet, "--journal", "journal.db")
     for text in (refused, shown):
         assert "r1 (drive.bpmn) was interrupted, and no executive drives it" in text
         assert "it has evsg1 (goto), which may go on or be held" in text
         assert "`m2pem resume r1 --stop` stops it" in text
     assert status == 1
-    assert m2pem.run("resume", "r1", "--stop", "--journal", "journal.db")[0] == 130
+    assert faulty.run("resume", "r1", "--stop", "--journal", "journal.db")[0] == 130
     kinds = [effect.kind for effect in recorded_effects(state)]
     assert (EffectKind.CANCEL in kinds, EffectKind.RESUME in kinds) == (True, False)
-    assert "was interrupted" not in m2pem.run("fleet", fleet, "--journal", "journal.db")[1]
+    assert "was interrupted" not in faulty.run("fleet", fleet, "--journal", "journal.db")[1]
 
 
 def test_what_a_run_left_that_was_deleted_is_ended_before_its_vehicle_is_free(
@@ -105,6 +98,8 @@ def test_what_a_run_left_that_was_deleted_is_ended_before_its_vehicle_is_free(
     kinds = [effect.kind for effect in recorded_effects(state)]
     assert kinds[-3:] == [EffectKind.CANCEL, EffectKind.END, EffectKind.HOLD]
     program.type("start drive.bpmn")
-    program.until_text("r2 completed")
+    program.until_text("evsg1 begins goto")
+    program.type("stop all")
+    program.until_text("r2 stopped")
     program.send(signal.SIGTERM)
     assert program.rest()[0] == 0

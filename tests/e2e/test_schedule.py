@@ -1,6 +1,7 @@
 """The schedule of a real executive: kills, restarts, the queue, and the commands for it."""
 
 import json
+import time
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -14,6 +15,7 @@ from m2pem.control_socket.paths import live_sockets
 from m2pem.testing import scenarios
 from tests.command_line import FLEET, MISSION, CommandLine, Program, install_plugin
 from tests.each_case import failures
+from tests.faults import Faults
 
 JOURNAL = ("--journal", "journal.db")
 SPEED = "20"
@@ -249,18 +251,20 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_scheduled(m2pem: CommandL
     assert runs(m2pem) == []
 
 
-def test_a_time_that_came_while_nothing_served_is_said_at_the_start(m2pem: CommandLine) -> None:
-    server = serving(m2pem)
-    soon = (datetime.now(UTC) + timedelta(seconds=8)).isoformat()
+def test_a_time_that_came_while_nothing_served_is_said_at_the_start(
+    faulty: CommandLine, faults: Faults
+) -> None:
+    server = serving(faulty)
+    soon = (datetime.now(UTC) + timedelta(hours=1)).isoformat()
     scheduled = ("--when", soon, "--starting-deadline", "0 s", "--by", "ada")
-    assert m2pem.run("start", MISSION, *JOURNAL, *scheduled)[:2] == (0, "s1\n")
+    assert faulty.run("start", MISSION, *JOURNAL, *scheduled)[:2] == (0, "s1\n")
     server.kill()
-    while entry(m2pem, "s1")["status"] == "scheduled":
-        pass
-    again = serving(m2pem)
+    assert entry(faulty, "s1")["status"] == "scheduled"
+    faults.set(f"clock {time.CLOCK_REALTIME} {2 * 3600}")
+    again = serving(faulty)
     assert told(again, "missed the start").startswith("m2pem: s1 missed")
-    assert runs(m2pem) == []
-    assert entry(m2pem, "s1")["status"] == "ended"
+    assert runs(faulty) == []
+    assert entry(faulty, "s1")["status"] == "ended"
 
 
 def test_the_commands_of_the_schedule_work_with_an_executive_and_without(

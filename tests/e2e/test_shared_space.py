@@ -20,7 +20,7 @@ def test_who_waited_for_the_bridge_when_the_executive_was_killed_crosses_it_afte
     mission = tmp_path / "mission.bpmn"
     mission.write_bytes(both_ways())
     words = ("--ocu", "none", "--format", "json")
-    program = m2pem.start("run", mission, "--fleet", fleet, "--speed", "5", *words)
+    program = m2pem.start("run", mission, "--fleet", fleet, "--speed", "15", *words)
     waits = program.until_record("AllocationDelayed")
     assert waits["holders"] == {"bridge": "r1.b1"}
     status, running, _ = m2pem.run("fleet", "--running")
