@@ -14,9 +14,9 @@ import pytest
 REPOSITORY = Path(__file__).parents[4]
 MISSION = REPOSITORY / "missions" / "survey_pair.bpmn"
 FLEETS = REPOSITORY / "fleet_configs"
-SPEED = "15"
-LOST_AFTER = "20 s"
-"""More than a second of the wall clock: at this speed a busy computer is soon silent for 10 s."""
+SPEED = "30"
+LOST_AFTER = "40 s"
+"""More than a second of the wall clock: at this speed a busy computer is soon silent for 20 s."""
 
 HALF_A_FIELD = ("38.1093", "38.1086")
 """The northern edge of both fields, in degrees: a survey takes half the time."""

@@ -12,7 +12,7 @@ from mavlink_sitl import free_port
 from tests.command_line import command_line
 from tests.executive.conftest import mission, sequence
 
-SPEED = "15"
+SPEED = "30"
 ROUNDS = 2
 PILOT = (
     "requires=\"vehicle.domain == 'air'\" onLoss='reassign' store='pilot' "
@@ -33,9 +33,9 @@ def test_another_copter_flies_the_rest_and_the_first_one_is_stopped_when_it_retu
     tmp_path: Path,
 ) -> None:
     port = free_port()
-    file, fleet = write(tmp_path, port, MISSION, lost_after="20 s", rounds=ROUNDS, copters=2)
+    file, fleet = write(tmp_path, port, MISSION, lost_after="40 s", rounds=ROUNDS, copters=2)
     with contextmanager(command_line)(tmp_path) as m2pem:
-        m2pem.start(*simulated(port, SPEED, "1: cut link at 80 s for 50 s", copters=2))
+        m2pem.start(*simulated(port, SPEED, "1: cut link at 80 s for 70 s", copters=2))
         words = ("--speed", SPEED, "--ocu", "none", "--format", "json")
         status, output, errors = m2pem.run("run", file, "--fleet", fleet, *words)
     assert status == 0, errors
