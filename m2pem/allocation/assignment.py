@@ -31,11 +31,14 @@ class RoleOptions:
 @dataclass(frozen=True, slots=True)
 class Request:
     """A task that asks for resources: its id and its roles. `waits`: until it can have them; while
-    it waits for several, later ones do not get those of them that are free."""
+    it waits for several, later ones do not get those of them that are free, nor what it `keeps`.
+    `in_turn`: it does not get what those before it keep."""
 
     id: str
     roles: tuple[RoleOptions, ...]
     waits: bool = True
+    keeps: Collection[ResourceId] = ()
+    in_turn: bool = True
 
 
 @dataclass(slots=True)
@@ -121,9 +124,11 @@ def assign(
     served: list[Request] = []
     kept: set[ResourceId] = set()
     for request in requests:
-        if matching.add(list(_slots(request, kept))):
+        if matching.add(list(_slots(request, kept if request.in_turn else ()))):
             served.append(request)
-        elif request.waits:
+            continue
+        kept.update(request.keeps)
+        if request.waits:
             kept.update(_kept_for(request, kept, matching))
     for request in served:
         for role in request.roles:

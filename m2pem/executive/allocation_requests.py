@@ -71,6 +71,14 @@ class ConsideredRequest:
         return asked or self.request.deadline != 0
 
     @property
+    def in_turn(self) -> bool:
+        """Whether it queues for resources: it does not if it names them, and waits for space at
+        most. So what brings a vehicle down by its name need not wait for what another task keeps.
+        """
+        roles = [each.role for each in self.roles]
+        return any(not r.resource or (r.need is not None and r.need.waits) for r in roles)
+
+    @property
     def named_vehicles(self) -> frozenset[ResourceId]:
         """The resources that its roles name, or an operator."""
         return frozenset(one for role in self.roles if role.named for one in role.resources)

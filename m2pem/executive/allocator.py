@@ -11,7 +11,7 @@ together with the resources.
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from heapq import merge
 from types import MappingProxyType
@@ -203,6 +203,7 @@ class Allocator:
                 tuple(role.options for role in each.roles),
                 # One that does not get what it needs now may take the rest from other runs.
                 waits=each.waits or preempts,
+                in_turn=each.in_turn,
             )
             for each in waiting
         }
@@ -239,8 +240,7 @@ class Allocator:
             or any(role.reads_task for role in considered)
         )
         self._named_holders.clear()
-        lacking = [each for each in left if each.request.id not in refusals]
-        for each, no_space in self._preempt(lacking, set(given)):
+        for each, no_space in self._preempt(left, set(refusals), set(given)):
             if no_space is not None and no_space.wait_s is not None:
                 refusals[each.request.id] = no_space
                 self._refuse_space(each, no_space)
@@ -280,7 +280,8 @@ class Allocator:
                 refusal = self._without_space(each, chosen[number])
                 if refusal is not None:
                     refusals.setdefault(number, {})[refusal.vehicle] = refusal
-                    requests[number] = _not_free(requests[number], refusal.vehicle)
+                    keeps = space.kept_with(number)
+                    requests[number] = _not_free(requests[number], refusal.vehicle, keeps)
                     break
             else:
                 for number in chosen:
@@ -367,19 +368,26 @@ class Allocator:
     # --- preemption -------------------------------------------------------------------------------
 
     def _preempt(
-        self, left: Sequence[ConsideredRequest], given: set[ResourceId]
+        self,
+        left: Sequence[ConsideredRequest],
+        without_space: Collection[str],
+        given: Collection[ResourceId],
     ) -> "list[tuple[ConsideredRequest, Refusal | None]]":
         """Take resources from other runs for requests that get none. Returns the requests for which
         that is not possible; with why, if they would have no space then.
 
-        `given`: what others were given at the same moment.
+        `left`: all that waits. `without_space`: those of them that wait for space alone. `given`:
+        what others were given at the same moment.
         """
         if not self._arbiters.fleet.preemption:
-            return [(each, None) for each in left]
+            return [(each, None) for each in left if each.request.id not in without_space]
         without: list[tuple[ConsideredRequest, Refusal | None]] = []
         behaviors = preemptible(self._runners.values(), self._latest)
         kept = set(given)
         for place, each in enumerate(left):
+            if each.request.id in without_space:
+                kept.update(() if self._space is None else self._space.kept_with(each.request.id))
+                continue
             holders = {
                 resource: holder
                 for holder in behaviors
@@ -496,8 +504,8 @@ def _excluding(
     return role.excluding(reasons) if reasons else role
 
 
-def _not_free(request: Request, vehicle: ResourceId) -> Request:
-    """Return a request for which a vehicle is not free."""
+def _not_free(request: Request, vehicle: ResourceId, keeps: Sequence[ResourceId]) -> Request:
+    """Return a request for which a vehicle is not free. `keeps`: what it keeps as it waits."""
     roles = tuple(
         replace(
             role,
@@ -508,4 +516,4 @@ def _not_free(request: Request, vehicle: ResourceId) -> Request:
         else role
         for role in request.roles
     )
-    return replace(request, roles=roles)
+    return replace(request, roles=roles, keeps=keeps)

@@ -1,13 +1,14 @@
 """Reserves space for what the allocator chooses, and finds tasks that wait for each other's space.
 
-A task that waits for space holds none. Later tasks get nothing that it needs as long as behaviors
-that will end are in its way: so it is not overtaken for ever. A vehicle at rest in its way, or
-that is lost, may stay there: what the task needs is then free for others.
+A task that waits for space holds none. Later tasks get nothing that it needs, neither the space nor
+its vehicles, as long as behaviors that will end are in its way: so it is not overtaken for ever. A
+vehicle at rest in its way, or that is lost, may stay there: what the task needs is then free for
+others.
 """
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from m2pem.allocation.circles import Waiting, circles
@@ -92,6 +93,11 @@ class SpaceAllocation:
         kept = self._kept_back.get(request) or self._kept_before.get(request)
         if kept is not None:
             self._ahead.append(kept)
+
+    def kept_with(self, request: str) -> Sequence[ResourceId]:
+        """Return the resources for which a request waits for space; (): it keeps none."""
+        kept = self._kept_back.get(request)
+        return () if kept is None else kept.request.resources
 
     def commit(self, request: str) -> None:
         """Reserve the space of a request that is served."""

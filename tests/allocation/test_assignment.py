@@ -1,6 +1,7 @@
 """The choice for all tasks together, compared with every possible choice on small fleets."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations, product
 
 from hypothesis import given
@@ -51,6 +52,14 @@ def test_a_request_gets_all_of_its_roles_or_nothing() -> None:
 def test_a_request_that_waits_for_several_keeps_what_is_free() -> None:
     waiting = ask("r1.a1", role(least=2, a=1, busy=["b"]))
     assert choose(waiting, ask("r2.a1", role(a=1, c=50))) == {"r2.a1": {"r": ("c",)}}
+
+
+def test_a_request_that_lacks_something_else_keeps_what_it_names_from_those_in_turn() -> None:
+    waiting = Request("r1.a1", (role(busy=["a"]),), keeps=["a"])
+    later = ask("r2.a1", role(a=1))
+    assert choose(waiting, later) == {}
+    assert choose(waiting, replace(later, in_turn=False)) == {"r2.a1": {"r": ("a",)}}
+    assert choose(later, waiting) == {"r2.a1": {"r": ("a",)}}
 
 
 def test_a_request_that_does_not_wait_keeps_nothing() -> None:

@@ -10,7 +10,8 @@ from m2pem.engine.records import BehaviorRequested, ErrorThrown
 from m2pem.fleet.fleet import Domain, OnConflict, SharedSpace
 
 from .conftest import Play, World, task
-from .test_shared_space_run import GEOMETRIES, at, delays, status
+from .sky import area
+from .test_shared_space_run import GEOMETRIES, at, delays, status, waits
 
 HOMES = {"one": (0.0, 0.0), "two": (100.0, 30.0), "three": (30.0, 0.0)}
 """One and three are west of the bridge (40 m to 60 m east), two is east of it."""
@@ -102,6 +103,39 @@ def test_a_task_with_space_takes_the_vehicle_and_nobody_enters_before_it(play: P
         assert any("which does r2." in each.reason for each in delays(world))
 
     sharing(play, story)
+
+
+def test_a_task_that_takes_a_vehicle_gets_no_space_that_an_earlier_one_waits_for(
+    play: Play,
+) -> None:
+    """Two waits for the bridge, and needs the gate behind it as well, which is free."""
+    homes = {"one": (80.0, 40.0), "two": (100.0, 0.0), "three": (30.0, 0.0)}
+    gate = area((75, -5), (85, -5), (85, 5), (75, 5))
+
+    def with_priority(each: tuple[str, str], priority: int) -> tuple[str, str]:
+        return each[0], each[1].replace("<m2pem:role ", f'<m2pem:role priority="{priority}" ')
+
+    async def story(world: World) -> list[str]:
+        for name, where in (("one", at(80, 90)), ("three", at(65, 0))):
+            slowly = task("Slowly", "goto", name, target=where, speed="0.5 m/s")
+            await world.under_way(await world.begin(slowly))
+        both = task("Both", "goto", "two", target=at(0, 0), speed="2 m/s")
+        earlier = await world.begin(with_priority(both, 9))
+        await waits(world, earlier)
+        through = task("Through", "goto", "one", target=at(80, -40), speed="2 m/s")
+        later = await world.begin(with_priority(through, 5))
+        for run in (earlier, later):
+            assert await status(world, run) is RunStatus.COMPLETED
+        return requested(world)
+
+    policy = {
+        "vertical_separation_m": None,
+        "preemption": True,
+        "shared_space": {name: SharedSpace(name, 1) for name in ("bridge", "gate")},
+    }
+    geometries = {**GEOMETRIES, "gate": gate}
+    order = play(story, homes, geometries=geometries, policy=policy, ground=tuple(homes))
+    assert order == ["r1.b1", "r2.b1", "r3.b1", "r4.b1"]
 
 
 def test_of_vehicles_that_can_be_taken_one_with_space_is(play: Play) -> None:

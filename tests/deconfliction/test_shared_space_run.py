@@ -403,6 +403,66 @@ def test_a_later_task_does_not_overtake_one_that_waits_for_space(play: Play) -> 
     assert rovers(play, story, homes=homes) == ["r1.b1", "r3.b1", "r2.b1", "r4.b1"]
 
 
+def for_two(element: str, north: float) -> tuple[str, str]:
+    """A task beside the bridge, for a vehicle that must be two."""
+    _, text = task(element, "goto", "two", target=at(100, north), speed="2 m/s")
+    need = 'requires="vehicle.name == \'two\'" wait="PT1H"'
+    return element, text.replace('vehicle="two"', need)
+
+
+def test_a_task_that_waits_for_space_keeps_its_vehicle_from_later_tasks(play: Play) -> None:
+    """Else later tasks get the vehicle, others the space meanwhile, and so on for ever."""
+    homes = {"one": (0.0, 0.0), "two": (100.0, 30.0), "three": (120.0, 0.0)}
+
+    async def story(world: World) -> list[str]:
+        first = await world.begin(OVER)
+        await world.under_way(first)
+        named = await world.begin(BACK)
+        await waits(world, named)
+        across = [task(f"To{e}", "goto", "three", target=at(e, 0), speed="2 m/s") for e in (0, 120)]
+        later = [
+            await world.begin(for_two("Aside", 90)),
+            await world.begin(*across),
+            await world.begin(for_two("Far", 150)),
+        ]
+        await waits(world, later[0])
+        for run in (first, named, *later):
+            assert await status(world, run) is RunStatus.COMPLETED
+        kept = next(e.reason for e in delays(world) if e.allocation == f"{later[0]}.a1")
+        assert kept == "what is free is kept for tasks that asked before"
+        return [each.behavior for each in world.seen if isinstance(each, BehaviorRequested)]
+
+    order = rovers(play, story, homes=homes, policy=policy(wait_s=3600.0))
+    assert order[:2] == ["r1.b1", "r2.b1"]
+
+
+def test_a_vehicle_may_be_brought_back_by_name_while_a_task_waits_with_it_for_space(
+    play: Play,
+) -> None:
+    async def story(world: World) -> None:
+        first = await world.begin(OVER)
+        await world.under_way(first)
+        second = await world.begin(BACK)
+        await waits(world, second)
+        await world.all_of(task("Aside", "goto", "two", target=at(100, 35)))
+        assert [await status(world, run) for run in (first, second)] == [RunStatus.COMPLETED] * 2
+
+    rovers(play, story)
+
+
+def test_a_task_that_waits_for_who_stands_in_its_way_leaves_its_vehicle_to_others(
+    play: Play,
+) -> None:
+    async def story(world: World) -> None:
+        first = await world.begin(BACK)
+        await waits(world, first)
+        await world.all_of(task("Aside", "goto", "two", target=at(100, 90)))
+        await world.all_of(task("Leave", "goto", "one", target=at(50, -60)))
+        assert await status(world, first) is RunStatus.COMPLETED
+
+    rovers(play, story, homes={**HOMES, "one": (50.0, 0.0)})
+
+
 def test_a_team_crosses_a_bridge_for_one_vehicle_one_by_one(play: Play) -> None:
     homes = {"one": (0.0, 0.0), "two": (-12.0, 0.0)}
 

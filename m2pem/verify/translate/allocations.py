@@ -13,7 +13,7 @@ depends on telemetry: each is a transition.
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from m2pem.fleet.facts import vehicle_of
@@ -103,6 +103,7 @@ def take_named_resources(
     if asks_for_space(context, instance.node):
         kind = Kind.JOIN
         wait_for_space(context, instance)
+        _note_kept_while_it_waits_for_space(context, instance, named)
     context.contended.append(Contender(instance, named, refused, begins, kind))
     begun = instance.begin().then(Effect(produce=(asks,)))
     assert begun is not None
@@ -302,8 +303,22 @@ def _note_approximations(
     others = [other for other in context.candidates if other is not instance.node]
     if waits and wanted > 1 and others:
         bounded("that it keeps what is free, while it waits for the rest, is not followed")
+    if asks_for_space(context, instance.node):
+        able = [resource for each in roles for resource in each.resources]
+        _note_kept_while_it_waits_for_space(context, instance, able)
     if instance.inside.several:
         bounded("of several tokens on it, one has resources at a time")
+
+
+def _note_kept_while_it_waits_for_space(
+    context: TranslationContext, instance: ActivityInstance, resources: Collection[ResourceId]
+) -> None:
+    """`resources`: that it may have. Tasks that name theirs and do not wait get them anyway."""
+    others = (roles for node, roles in context.candidates.items() if node is not instance.node)
+    wanted = (each.resources for roles in others for each in roles)
+    if any(not set(resources).isdisjoint(each) for each in wanted):
+        what = "that later tasks do not get its vehicle, while it waits for space, is not followed"
+        context.net.approximate(instance.node, Exactness.BOUNDED, what)
 
 
 def _least(each: RoleCandidates) -> int:
