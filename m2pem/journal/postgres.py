@@ -127,18 +127,26 @@ class PostgresStorage:
         files: OpenFiles,
     ) -> None:
         self.place = address.shown
-        self.connection = connection
+        self._connection = connection
         self.owners = owners
         self._files = files
         self._in_transaction = False
+        self._begun = False
         self._excludes = False
         self._tries = 0
         self._unknown = False
 
+    @property
+    def connection(self) -> PostgresConnection:
+        """See `Storage.connection`. The server learns of a transaction with its first statement."""
+        if self._in_transaction and not self._begun:
+            self._connection.execute("BEGIN")
+            self._begun = True
+        return self._connection
+
     def begin(self) -> bool:
         """See `Storage.begin`: the positions of runs that are this executive's stay known."""
-        self.connection.execute("BEGIN ISOLATION LEVEL READ COMMITTED")
-        self._in_transaction, self._excludes = True, False
+        self._in_transaction, self._begun, self._excludes = True, False, False
         return True
 
     def exclude_others(self) -> None:
@@ -240,8 +248,14 @@ class PostgresStorage:
         self, entries: Sequence[tuple[Any, ...]], positions: Mapping[int, RunPosition], wrote: bool
     ) -> None:
         """See `Storage.commit`."""
-        raw = self.connection.raw
+        if not self._begun and not positions:
+            self._in_transaction = False
+            return
+        raw = self._connection.raw
         with raw.pipeline():
+            if not self._begun:
+                raw.execute("BEGIN")
+                self._begun = True
             there = raw.execute(
                 "SELECT run, epoch FROM standings WHERE run = ANY(%s) ORDER BY run FOR UPDATE",
                 (list(positions),),
@@ -269,9 +283,9 @@ class PostgresStorage:
     def _commit(self, transaction: str) -> None:
         self._in_transaction = False
         try:
-            self.connection.raw.execute("COMMIT")
+            self._connection.raw.execute("COMMIT")
         except self.errors as error:
-            if not transaction or not self.connection.lost:
+            if not transaction or not self._connection.lost:
                 raise
             if not self._was_committed(transaction, error):
                 raise RetryError from error
@@ -284,7 +298,7 @@ class PostgresStorage:
                 self._unknown = True
                 raise error
             try:
-                row = self.connection.execute(
+                row = self._connection.execute(
                     "SELECT pg_xact_status(CAST(? AS xid8))", (transaction,)
                 ).fetchone()
             except psycopg.errors.InvalidParameterValue:
@@ -302,7 +316,7 @@ class PostgresStorage:
         until_s = lease.until_s if lease.until_s is not None else boot_time_s() + lease.length_s
         while True:
             with suppress(psycopg.Error):
-                self.connection.execute("SELECT 1")
+                self._connection.execute("SELECT 1")
                 return True
             if boot_time_s() + _BETWEEN_TRIES_S > until_s - lease.length_s / 3:
                 return False
@@ -310,9 +324,9 @@ class PostgresStorage:
 
     def rollback(self) -> None:
         """See `Storage.rollback`."""
-        in_transaction, self._in_transaction = self._in_transaction, False
-        if in_transaction and not self.connection.lost:
-            self.connection.execute("ROLLBACK")
+        begun, self._in_transaction = self._in_transaction and self._begun, False
+        if begun and not self._connection.lost:
+            self._connection.execute("ROLLBACK")
 
     def check(self) -> None:
         """See `Storage.check`: of the marks, the only files."""
@@ -339,7 +353,7 @@ class PostgresStorage:
         ):
             again = passed
         else:
-            again = passed and self.connection.lost and self._connected_again()
+            again = passed and self._connection.lost and self._connected_again()
         if not again:
             self._tries = 0
         return again
@@ -356,16 +370,17 @@ def _columns(rows: Sequence[tuple[Any, ...]]) -> list[list[Any]]:
     return [list(column) for column in zip(*rows, strict=True)]
 
 
+# As binary parameters (%b): psycopg writes a text's array with a regular expression, by far slower.
 _INSERT_ENTRIES = (
     "INSERT INTO entries SELECT run, seq, epoch, at_us, t_us, convert_to(body, 'UTF8'), hash FROM"
-    " unnest(%s::bigint[], %s::bigint[], %s::bigint[], %s::bigint[], %s::bigint[], %s::text[],"
-    " %s::bytea[]) AS given (run, seq, epoch, at_us, t_us, body, hash)"
+    " unnest(%b::bigint[], %b::bigint[], %b::bigint[], %b::bigint[], %b::bigint[], %b::text[],"
+    " %b::bytea[]) AS given (run, seq, epoch, at_us, t_us, body, hash)"
 )
 
 _WRITE_STANDINGS = (
-    "INSERT INTO standings SELECT * FROM unnest(%s::bigint[], %s::bigint[], %s::bigint[],"
-    " %s::bigint[], %s::bigint[], %s::int[], %s::text[], %s::text[], %s::bigint[], %s::bytea[],"
-    " %s::bytea[]) ON CONFLICT (run) DO UPDATE SET epoch = excluded.epoch, pid = excluded.pid,"
+    "INSERT INTO standings SELECT * FROM unnest(%b::bigint[], %b::bigint[], %b::bigint[],"
+    " %b::bigint[], %b::bigint[], %b::int[], %b::text[], %b::text[], %b::bigint[], %b::bytea[],"
+    " %b::bytea[]) ON CONFLICT (run) DO UPDATE SET epoch = excluded.epoch, pid = excluded.pid,"
     " started_us = excluded.started_us, last_seq = excluded.last_seq, paused = excluded.paused,"
     " outcome = excluded.outcome, detail = excluded.detail, ended_us = excluded.ended_us,"
     " hash = excluded.hash, seal = excluded.seal"

@@ -56,6 +56,7 @@ def connect(
             connection.execute(f"SET lock_timeout = {round(LOCKED_FOR_S * 1000)}")
             # An executive that is stopped within a transaction must not keep others waiting.
             connection.execute(f"SET idle_in_transaction_session_timeout = {2 * within_ms}")
+            # What BEGIN begins: rows that another executive has changed are waited for, and seen.
             connection.execute("SET default_transaction_isolation = 'read committed'")
             connection.execute("SET default_transaction_read_only = off")
     except BaseException:

@@ -98,22 +98,31 @@ class Wire(threading.Thread):
             here, _ = self._listening.accept()
             there = socket.socket(socket.AF_UNIX)
             there.connect(str(self._server / ".s.PGSQL.5432"))
-            for one, other in ((here, there), (there, here)):
-                threading.Thread(target=self._pass_on, args=(one, other, here), daemon=True).start()
+            asked = threading.Event()
+            for way in (self._ask, self._answer):
+                threading.Thread(target=way, args=(here, there, asked), daemon=True).start()
 
-    def _pass_on(self, one, other, here):
-        while said := self._received(one):
-            if one is here and self.armed.is_set() and b"COMMIT" in said and not self.cut.is_set():
+    def _ask(self, here, there, asked):
+        while said := self._received(here):
+            if self.armed.is_set() and b"COMMIT" in said and not self.cut.is_set():
                 self.cut.set()
-                if self._delivered:
-                    other.sendall(said)
-                    other.recv(1)  # it is committed
-                break
+                if not self._delivered:
+                    break
+                asked.set()
+            there.sendall(said)
+        self._end(here, there)
+
+    def _answer(self, here, there, asked):
+        while (said := self._received(there)) and not asked.is_set():
             try:
-                other.sendall(said)
+                here.sendall(said)
             except OSError:
                 break
-        for each in (one, other):
+        self._end(here, there)
+
+    @staticmethod
+    def _end(here, there):
+        for each in (here, there):
             try:
                 each.shutdown(socket.SHUT_RDWR)
             except OSError:
