@@ -150,6 +150,10 @@ class Dispatcher:
 
     # --- runs that pass from one executive to another --------------------------------------------
 
+    async def confirm_claims(self) -> None:
+        """Return when it is known which runs are driven here: see `Claims.confirmed`."""
+        await self._claims.confirmed()
+
     async def fence(self, run: str, epoch: int) -> None:
         """Have all vehicles refuse what an earlier executive commands for a run, from now on driven
         here."""

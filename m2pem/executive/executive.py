@@ -134,6 +134,8 @@ class Executive:
         )
         self._scheduling: asyncio.Task[None] | None = None
         self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file)
+        if journal.lease_s is not None and self._locks.resources:
+            self._supervisor.served_by_another = self._served_by_another
         self.superseded = asyncio.Event()
         """Set when another executive serves the fleet, after the lease on the journal had ended."""
         self._speed = speed
@@ -229,15 +231,23 @@ class Executive:
         assert self.journal.lease_s is not None
         while not self.superseded.is_set():
             await asyncio.sleep(self.journal.lease_s / 3)
-            try:
-                await self._locks.serve(self.journal, self.fleet)
-            except FleetServedError as error:
-                # Before anyone stops the runs: a STOP would be sent to vehicles of the other one.
-                await self.ownership.ask()
+            await self._served_by_another()
+
+    async def _served_by_another(self) -> str:
+        """Serve the fleet again, if its lease had ended; else return why it is not served here."""
+        try:
+            await self._locks.serve(self.journal, self.fleet)
+        except FleetServedError as error:
+            # Before anyone stops the runs: a STOP would be sent to vehicles of the other one.
+            await self.ownership.ask()
+            if not self.superseded.is_set():
                 log.error("%s; this executive commands no vehicle any more", error)
                 self.superseded.set()
-            except JournalError as error:
-                log.info("who serves %s is not known: %s", self.fleet.name, error)
+            return str(error)
+        except JournalError as error:
+            log.info("who serves %s is not known: %s", self.fleet.name, error)
+            return f"who serves {self.fleet.name} is not known: {error}"
+        return ""
 
     async def load_schedule(self) -> None:
         """Read what the journal has scheduled for this fleet, before runs are taken up.

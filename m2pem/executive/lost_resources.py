@@ -12,7 +12,7 @@ and marks beside the journal which were lost by runs that are over.
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -57,9 +57,10 @@ class LostResources:
     """The resources whose link was lost, until they are free again.
 
     `epoch_of`: with which epoch the run of a behavior is driven here. `out_of_reach`: what a
-    resource does that is being lost, by the runs that are driven here. `show`: to operators, how a
-    resource is. `returned`: is called when a resource has returned and stopped. `marks`: of what is
-    lost, for the next executive.
+    resource does that is being lost, by the runs that are driven here. `not_ours`: "", or why
+    another executive may command the vehicles by now. `show`: to operators, how a resource is.
+    `returned`: is called when a resource has returned and stopped. `marks`: of what is lost, for
+    the next executive.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class LostResources:
         clock: Clock,
         epoch_of: Callable[[BehaviorId], int],
         out_of_reach: Callable[[ResourceId], OutOfReach | None],
+        not_ours: Callable[[], Awaitable[str]],
         show: Callable[[VehicleState | PayloadState], None],
         returned: Callable[[ResourceId, str], None],
         marks: LostMarks,
@@ -80,6 +82,7 @@ class LostResources:
         self._clock = clock
         self._epoch_of = epoch_of
         self._out_of_reach = out_of_reach
+        self._not_ours = not_ours
         self._show = show
         self._returned = returned
         self._marks = marks
@@ -224,6 +227,9 @@ class LostResources:
         arbiter = self._arbiters.of(resource)
         try:
             async with asyncio.timeout(ONCE_WITHIN_S):
+                # A link counts as lost after this process stood still, too.
+                if why := await self._not_ours():
+                    return f"it is not commanded to stop: {why}"
                 lost = self._lost[resource]
                 if lost.is_earlier and self._is_commanded(resource):
                     return ""  # a run that was resumed later has it: it had returned

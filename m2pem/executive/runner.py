@@ -217,6 +217,10 @@ class Runner:
         try:
             while not self._is_over():
                 batch = await self._next_inputs()
+                # What failed is held before it is journaled: not vehicles of another executive.
+                await self._context.dispatcher.confirm_claims()
+                if self._broken is not None:
+                    raise self._broken
                 seen, _ = await self._look_after_outage()
                 if seen or batch:
                     await self._cycle([*seen, *batch])
@@ -233,6 +237,7 @@ class Runner:
             for _, decided in self._submitted:
                 if not decided.done():
                     decided.set_exception(self._why_not())
+                    decided.exception()  # who asked may not wait for it: it is logged already
 
     def _why_not(self) -> M2pemError:
         return self.failure or OperatorError(f"{self.id} has ended")

@@ -8,7 +8,7 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -185,6 +185,8 @@ class Supervisor:
         self.availability.on_change = self._resources_changed
         self.on_change: Callable[[], None] = lambda: None
         """Is called when a run has ended, or when resources may be free."""
+        self.served_by_another: Callable[[], Awaitable[str]] | None = None
+        """Says which other executive may serve the fleet, or ""; None: none can."""
         self.emergency = EmergencyCommands(self.dispatcher, events, self.marks)
         self.handover = Handover(arbiters, self.availability)
         self.losses = JournalLossPrompts(
@@ -204,6 +206,7 @@ class Supervisor:
             clock,
             self.epoch_of,
             self._out_of_reach,
+            self._not_ours,
             bus.publish,
             self._returns.returned,
             LostMarks(journal.file, journal.identity, self.fleet),
@@ -559,7 +562,8 @@ class Supervisor:
             for each in every
             if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
         ]
-        if not self.fleet.simulated and (text := describe_armed_vehicles(free, self._bus)):
+        is_ours = not (runner.replaced or self.fleet.simulated)
+        if is_ours and (text := describe_armed_vehicles(free, self._bus)):
             self.events.publish(Alert(runner.id, LEFT_ARMED, text))
         self.on_change()
         over = [each for each in self.runners.values() if each.done.is_set()]
@@ -653,6 +657,10 @@ class Supervisor:
                 runner.post(fault)
                 if not fault.reachable:
                     self._returns.faulted(fault.resource, runner.id)
+
+    async def _not_ours(self) -> str:
+        await self.ownership.confirmed()
+        return await self.served_by_another() if self.served_by_another is not None else ""
 
     def _lost(self, resource: ResourceId, reason: str) -> None:
         self._lost_resources.lost(resource, reason)

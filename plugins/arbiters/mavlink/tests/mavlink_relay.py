@@ -76,11 +76,17 @@ class Relay:
             self.seen.append(("mode", message.custom_mode))
 
     def _note_sent(self, message: Any) -> None:
-        name = message.get_type()
-        if name in MOVES:
-            self.seen.append(("sent", name))
-        elif name in ("COMMAND_LONG", "COMMAND_INT"):
-            if message.command == dialect.MAV_CMD_DO_SET_MODE:
-                self.seen.append(("sent", f"mode {int(message.param2)}"))
-            elif message.command in STARTS:
-                self.seen.append(("sent", message.command))
+        self.seen += [("sent", what) for what in moves_of(message)]
+
+
+def moves_of(message: Any) -> list[object]:
+    """The mode, motion or mission that a message of a ground station gives a vehicle, if any."""
+    name = message.get_type()
+    if name in MOVES:
+        return [name]
+    if name in ("COMMAND_LONG", "COMMAND_INT"):
+        if message.command == dialect.MAV_CMD_DO_SET_MODE:
+            return [f"mode {int(message.param2)}"]
+        if message.command in STARTS:
+            return [message.command]
+    return []
