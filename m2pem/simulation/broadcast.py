@@ -52,7 +52,7 @@ class Broadcast:
             self.send(body, now_us)
 
     def send(self, body: Body, now_us: int, detections: tuple[Detection, ...] = ()) -> None:
-        """Report a body now, and again after its interval."""
+        """Report a body now, and again after its interval; those that were missed are skipped."""
         if not self._begun:
             return
         if self._audible(body.id):
@@ -69,8 +69,10 @@ class Broadcast:
                 isinstance(body, SimVehicle) and body.pose(now_us).speed > 0
             )
             rate = rate if busy else min(rate, SLOWEST_HZ)
+            interval_us = round(US_PER_S / rate)
+            missed = max(0, self._event_queue.due_us - now_us) // interval_us
             self._next[body.id] = self._event_queue.at(
-                now_us + round(US_PER_S / rate),
+                now_us + (1 + missed) * interval_us,
                 lambda at_us: self.send(body, at_us),
                 background=True,
             )

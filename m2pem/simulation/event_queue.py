@@ -42,7 +42,8 @@ class EventQueue:
     while the queue was not read can be caught up with, and nothing drifts.
 
     `expected` counts the calls to come that may change something by themselves. In the
-    background is what goes on for ever: a pursuit, a battery that drains.
+    background is what goes on for ever: a pursuit, a battery that drains. `due_us`: until when
+    calls were due as they were made last.
     """
 
     def __init__(self, clock: Clock, logger: logging.Logger) -> None:
@@ -54,6 +55,7 @@ class EventQueue:
         self._sleeping_until = 0
         self._awake = False
         self.expected = 0
+        self.due_us = 0
 
     def at(
         self, time_us: int, call: Callable[[int], None], *, background: bool = False
@@ -68,6 +70,7 @@ class EventQueue:
 
     def run_due(self, now_us: int) -> None:
         """Make every call that is due, in order, also those that these schedule."""
+        self.due_us = now_us
         while self._entries and self._entries[0].at_us <= now_us:
             entry = heapq.heappop(self._entries)
             call = entry.take()

@@ -4,7 +4,7 @@ import math
 import pytest
 
 from m2pem.api.arbiter import BehaviorReport, Connection
-from m2pem.api.clock import Clock, run_virtual
+from m2pem.api.clock import Clock, SystemClock, run_virtual
 from m2pem.api.telemetry import VehicleState
 from m2pem.errors import FleetError
 from m2pem.mission.catalogue import BehaviorState, ResourceId
@@ -432,6 +432,18 @@ def test_telemetry_comes_at_its_rate_while_moving_and_once_a_second_while_standi
         assert len(bench.states) == pytest.approx(11 + 50, abs=2)
 
     simulate(UGV, main, telemetry_hz=5.0)
+
+
+async def test_states_that_were_missed_while_the_computer_was_suspended_are_skipped() -> None:
+    now_ns = [0]
+    clock = SystemClock(start_us=START_US, steady_ns=lambda: now_ns[0])
+    arbiter = make(clock, UGV, telemetry_hz=5.0)
+    async with ArbiterHarness(arbiter, clock) as bench:
+        now_ns[0] += 8 * 3_600_000_000_000
+        await arbiter.hold(ResourceId("ugv"))
+        await asyncio.sleep(0)
+        assert len(bench.states) < 5
+        assert bench.states[-1].time_us == clock.now_us()
 
 
 def test_the_same_commands_have_the_same_reports_at_the_same_times() -> None:
