@@ -1,7 +1,7 @@
 """`m2pem attach`: one more operator of a running executive, from another terminal."""
 
 import asyncio
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from m2pem.cli.options import (
     optional_run_argument,
     path_option,
 )
-from m2pem.cli.run_control import explain, journal_file
+from m2pem.cli.run_control import explain, found_elsewhere, journal_file
 
 if TYPE_CHECKING:
     from m2pem.cli.ocus import Operators
@@ -60,7 +60,8 @@ async def _attach(
     plugins = PluginManager()
     units = chosen(ocu_names, plugins)
     try:
-        executive = await asyncio.to_thread(find_executive, path, run)
+        with found_elsewhere(journal_url) if run is None else nullcontext():
+            executive = await asyncio.to_thread(find_executive, path, run)
     except NotDrivenError as error:
         if run is None:
             raise

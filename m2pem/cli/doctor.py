@@ -60,7 +60,7 @@ def _running(journal: str | None) -> "list[HealthCheck]":
     import msgspec
 
     from m2pem.api.health import HealthCheck, HealthStatus
-    from m2pem.cli.run_control import journal_file
+    from m2pem.cli.run_control import elsewhere, journal_file
     from m2pem.control_socket.client import ask
     from m2pem.control_socket.paths import live_sockets
     from m2pem.errors import M2pemError
@@ -79,8 +79,9 @@ def _running(journal: str | None) -> "list[HealthCheck]":
         else:
             checks += [replace(check, name=f"{name}: {check.name}") for check in said]
     if not checks:
-        why = f"none serves {path}"
-        checks.append(HealthCheck("executive", HealthStatus.ERROR, why, "m2pem serve starts one"))
+        why = f"none serves {path} here"
+        remedy = elsewhere(journal) or "m2pem serve starts one"
+        checks.append(HealthCheck("executive", HealthStatus.ERROR, why, remedy))
     return checks
 
 

@@ -222,8 +222,8 @@ def _show_running(journal: str | None, output: str) -> None:
     import msgspec
 
     from m2pem.api.allocation import SharedSpaceState, WaitingTask
-    from m2pem.cli.run_control import journal_file
-    from m2pem.control_socket.client import ask, executives, fleet_name
+    from m2pem.cli.run_control import executives_here
+    from m2pem.control_socket.client import ask, fleet_name
 
     found = [
         Holding(
@@ -235,7 +235,7 @@ def _show_running(journal: str | None, output: str) -> None:
             ask(socket, "unavailable"),
             ask(socket, "holder_labels"),
         )
-        for socket in executives(journal_file(journal))
+        for socket in executives_here(journal)
     ]
     if output == "json":
         click.echo(as_json({"executives": found}))

@@ -12,7 +12,7 @@ from m2pem.cli.options import (
     journal_option,
     run_argument,
 )
-from m2pem.cli.run_control import by_option, journal_file, steer
+from m2pem.cli.run_control import by_option, executives_here, journal_file, steer
 
 if TYPE_CHECKING:
     from m2pem.api.runs import OpenIncident
@@ -33,11 +33,11 @@ def incidents(journal: str | None, output: str) -> None:
     import msgspec
 
     from m2pem.api.runs import OpenIncident
-    from m2pem.control_socket.client import ask, executives
+    from m2pem.control_socket.client import ask
 
     found = [
         each
-        for socket in executives(journal_file(journal))
+        for socket in executives_here(journal)
         for each in msgspec.convert(ask(socket, "incidents"), list[OpenIncident])
     ]
     if output == "json":

@@ -2,8 +2,8 @@
 
 import shutil
 import tempfile
-from collections.abc import AsyncIterator, Mapping
-from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -22,10 +22,12 @@ from m2pem.journal import (
     file_of,
     is_postgres,
     open_journal,
+    postgres_address,
 )
 
 if TYPE_CHECKING:
     from m2pem.journal.database_journal import DatabaseJournal
+    from m2pem.journal.postgres_info import ExecutiveElsewhere
 
 
 def url_of(url: str | None) -> str:
@@ -109,6 +111,17 @@ async def existing_journal(url: str | None) -> AsyncIterator[Journal]:
         raise UnusableError(f"there is no journal {path}")
     else:
         yield MemoryJournal()
+
+
+def executives_elsewhere(url: str | None) -> "Sequence[ExecutiveElsewhere]":
+    """Return the executives of other hosts on a journal in PostgreSQL, as far as it can be read."""
+    if not is_postgres(url_of(url)):
+        return ()
+    from m2pem.journal.postgres_info import executives_elsewhere
+
+    with suppress(JournalError):  # who asks has an error of its own
+        return executives_elsewhere(postgres_address(url_of(url)))
+    return ()
 
 
 async def find_run(journal: Journal, run: str) -> RunInfo:

@@ -1,7 +1,8 @@
 """`m2pem answer`, `signal`, `pause`, `continue` and `stop`: one request to a running executive."""
 
 import asyncio
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,8 +50,8 @@ def steer(
 def explain(
     error: "NotDrivenError", journal_url: str | None, path: Path, method: str, run: str
 ) -> "OperatorError":
-    """Return an error that says what the journal knows of a run that no executive drives: how and
-    when it has ended, or what it has left behind.
+    """Return an error that says what the journal knows of a run that no executive here drives: how
+    and when it has ended, which other host drives it, or what it has left behind.
 
     `path`: the file of the journal.
     """
@@ -58,6 +59,8 @@ def explain(
 
     if ended := _ended(journal_url, path, method, run):
         return OperatorError(ended)
+    if there := elsewhere(journal_url, run):
+        return NotDrivenError(there)
     return NotDrivenError(f"{error}{_left_behind(journal_url, path, run)}")
 
 
@@ -74,7 +77,8 @@ def steer_all(journal_url: str | None, method: str, by: str | None, **params: An
 
     path = journal_file(journal_url)
     try:
-        return ask_all(path, method, by=by or operator_name(), **params)
+        with found_elsewhere(journal_url):
+            return ask_all(path, method, by=by or operator_name(), **params)
     except NotDrivenError as error:
         raise NotDrivenError(f"{error}{_left_behind(journal_url, path)}") from error
 
@@ -107,6 +111,50 @@ def _ended(journal_url: str | None, path: Path, request: str, run: str) -> str:
         with suppress(M2pemError):  # what the executive refused matters more
             return asyncio.run(found())
     return ""
+
+
+def elsewhere(journal_url: str | None, run: str | None = None) -> str:
+    """Return which other host drives a run, or (None) which ones serve on a journal in PostgreSQL,
+    and what to do; "": none."""
+    from m2pem.cli.journals import executives_elsewhere
+
+    said = []
+    for each in executives_elsewhere(journal_url):
+        if run is None:
+            what = ", ".join(each.fleets) or "this journal"
+            said.append(f"{each.host} serves {what} ({each})")
+        elif run in each.runs:
+            said.append(f"{each.host} drives {run} ({each})")
+    return f"{'; '.join(said)}: run the command there" if said else ""
+
+
+@contextmanager
+def found_elsewhere(journal_url: str | None) -> Iterator[None]:
+    """Within the block, the error that no executive is here says which other host has one."""
+    from m2pem.errors import NotDrivenError
+
+    try:
+        yield
+    except NotDrivenError as error:
+        if there := elsewhere(journal_url):
+            raise NotDrivenError(there) from error
+        raise
+
+
+def executives_here(journal_url: str | None) -> list[Path]:
+    """Return the sockets of the executives of this host on the journal; a note names the others.
+
+    Raises:
+        NotDrivenError: there is none here.
+    """
+    from m2pem.cli.notes import note
+    from m2pem.control_socket.client import executives
+
+    with found_elsewhere(journal_url):
+        found = executives(journal_file(journal_url))
+    if there := elsewhere(journal_url):
+        note(f"also {there}")
+    return found
 
 
 def _left_behind(journal_url: str | None, path: Path, run: str | None = None) -> str:
@@ -203,6 +251,8 @@ def stop(run_id: str | None, every: bool, reason: str, journal: str | None, by: 
     """
     if every == (run_id is not None):
         raise click.UsageError("name a run to stop, or --all")
+    from m2pem.errors import OperatorError
+
     if run_id is not None:
         steer(journal, run_id, "stop", by, f"stopped: {run_id}", reason=reason)
         return
@@ -210,3 +260,5 @@ def stop(run_id: str | None, every: bool, reason: str, journal: str | None, by: 
     click.echo(f"stopped: {', '.join(stopped) or 'no run was running'}")
     if any(hold for hold in held_schedules(journal_file(journal))):
         click.echo("the schedule is held; `m2pem schedule release` lets it go on")
+    if there := elsewhere(journal):
+        raise OperatorError(f"what other hosts have is not stopped: {there}")

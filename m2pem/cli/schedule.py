@@ -10,7 +10,7 @@ import click
 
 from m2pem.cli.completers import entries_of_journal
 from m2pem.cli.options import UnusableError, as_json, example, format_option, journal_option
-from m2pem.cli.run_control import by_option, journal_file
+from m2pem.cli.run_control import by_option, elsewhere, journal_file
 
 if TYPE_CHECKING:
     from m2pem.api.schedule import Schedule, ScheduledMission
@@ -61,7 +61,8 @@ def list_(every: bool, journal: str | None, output: str) -> None:
     header = ("ENTRY", "STATUS", "NEXT", "PRIORITY", "LAST RUN", "MISSION", "WHEN", "REASON")
     click.echo(table(header, [_row(entry) for entry in shown]))
     if not all(each.served for each in found):
-        click.echo("no executive serves this schedule now: `m2pem serve` does", err=True)
+        serves = elsewhere(journal) or "no executive serves this schedule now: `m2pem serve` does"
+        click.echo(serves, err=True)
 
 
 def _row(entry: "ScheduledMission") -> tuple[str, ...]:
@@ -138,7 +139,8 @@ def start(entry: str, journal: str | None, by: str | None) -> None:
             params = {"entry": entry, "by": by or operator_name()}
             click.echo(ask(path, "start_scheduled", timeout_s=LONG_TIMEOUT_S, **params))
             return
-    raise UnusableError(f"no executive serves {entry} now: `m2pem serve` does")
+    no_executive = f"no executive serves {entry} now: `m2pem serve` does"
+    raise UnusableError(elsewhere(journal) or no_executive)
 
 
 @schedule.command(epilog=example("m2pem schedule hold s1 --reason 'rain'"))
@@ -148,6 +150,7 @@ def start(entry: str, journal: str | None, by: str | None) -> None:
 @by_option
 def hold(entry: str | None, reason: str, journal: str | None, by: str | None) -> None:
     """Let an entry, or the whole schedule, start nothing until it is released."""
+    from m2pem.cli.journals import executives_elsewhere
 
     async def offline(kept: "Journal", name: str) -> None:
         from m2pem.scheduling.entry import EntryChange, Hold
@@ -157,7 +160,8 @@ def hold(entry: str | None, reason: str, journal: str | None, by: str | None) ->
             state = (await _active(kept, entry)).state
             await kept.change_entry(EntryChange(entry, state.changed(hold=made)))
             return
-        for fleet in {each.plan.fleet for each in await kept.entries() if each.state.active}:
+        fleets = {each.plan.fleet for each in await kept.entries() if each.state.active}
+        for fleet in fleets.union(*(each.fleets for each in executives_elsewhere(journal))):
             await kept.hold_schedule(fleet, made)
 
     what = entry or "the schedule"
@@ -170,6 +174,7 @@ def hold(entry: str | None, reason: str, journal: str | None, by: str | None) ->
 @by_option
 def release(entry: str | None, journal: str | None, by: str | None) -> None:
     """Let an entry, or the whole schedule, start missions again."""
+    from m2pem.cli.journals import executives_elsewhere
 
     async def offline(kept: "Journal", _: str) -> None:
         from m2pem.scheduling.entry import EntryChange
@@ -178,7 +183,8 @@ def release(entry: str | None, journal: str | None, by: str | None) -> None:
             state = (await _active(kept, entry)).state
             await kept.change_entry(EntryChange(entry, state.changed(hold=None)))
             return
-        for fleet in {each.plan.fleet for each in await kept.entries()}:
+        fleets = {each.plan.fleet for each in await kept.entries()}
+        for fleet in fleets.union(*(each.fleets for each in executives_elsewhere(journal))):
             await kept.hold_schedule(fleet, None)
 
     what = entry or "the schedule"

@@ -14,7 +14,7 @@ from m2pem.cli.options import (
     path_option,
     process_option,
 )
-from m2pem.cli.run_control import by_option, journal_file
+from m2pem.cli.run_control import by_option, found_elsewhere, journal_file
 
 if TYPE_CHECKING:
     from m2pem.mission.values import Value
@@ -70,7 +70,8 @@ def start(
         raise click.UsageError(
             "a mission that starts later waits for its vehicles: no --even-if-busy"
         )
-    path = choose_executive(journal_file(journal), run_on)
+    with found_elsewhere(journal):
+        path = choose_executive(journal_file(journal), run_on)
     loaded = load_source(mission, search_path)
     files = mission_files(loaded)
     found = ask(

@@ -1,10 +1,12 @@
 """What the database of a journal in PostgreSQL is now: its format and size, and who writes."""
 
+import socket
 from contextlib import closing
 from dataclasses import dataclass
 
 import psycopg
 
+from m2pem.journal.codec import run_id
 from m2pem.journal.postgres_address import PostgresAddress
 from m2pem.journal.postgres_database import MIGRATIONS, connect, explained_error
 
@@ -22,6 +24,44 @@ class DatabaseInfo:
     size: int
     server: str
     executives: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutiveElsewhere:
+    """An executive of another host whose lease lasts: what it serves, and the runs it drives."""
+
+    host: str
+    pid: int
+    command: str
+    fleets: tuple[str, ...]
+    runs: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"process {self.pid}: {self.command}"
+
+
+def executives_elsewhere(address: PostgresAddress) -> tuple[ExecutiveElsewhere, ...]:
+    """Return the executives of other hosts on a journal that was opened before.
+
+    Raises:
+        JournalError: it cannot be read.
+    """
+    try:
+        with closing(connect(address, _WITHIN_S)) as connection:
+            rows = connection.execute(
+                "SELECT host, pid, command,"
+                " ARRAY(SELECT DISTINCT fleet FROM fleets WHERE executive = id ORDER BY fleet),"
+                " ARRAY(SELECT run FROM owners WHERE executive = id ORDER BY run)"
+                " FROM executives WHERE lease_until > clock_timestamp() AND host <> %s"
+                " ORDER BY host, pid",
+                (socket.gethostname(),),
+            ).fetchall()
+    except psycopg.Error as error:
+        raise explained_error(error, address.shown) from error
+    return tuple(
+        ExecutiveElsewhere(host, pid, command, tuple(fleets), tuple(map(run_id, runs)))
+        for host, pid, command, fleets, runs in rows
+    )
 
 
 def database_info(address: PostgresAddress) -> DatabaseInfo:
