@@ -5,6 +5,7 @@ It opens no connection to a vehicle: a second sender would disturb the executive
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 
 from m2pem.errors import FleetError, FleetServedError, JournalError
 from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks
@@ -26,12 +27,13 @@ async def stand_by(
         FleetError: another fleet of this name is served: its runs could not be taken over.
         JournalError: the journal, a file of this host, cannot be used.
     """
-    said = ""
+    said, changes = "", 0
     while (why := await _try(journal, fleet, locks)) is not None:
         if why != said:
             say(why)
             said = why
-        await asyncio.sleep(ASK_EACH_S)
+        with suppress(TimeoutError):
+            changes = await asyncio.wait_for(journal.changed(changes), ASK_EACH_S)
     if said:
         say(f"taking over {fleet.name}")
 
@@ -57,6 +59,7 @@ async def _try(journal: Journal, fleet: Fleet, locks: VehicleLocks) -> str | Non
         locks.acquire()
     except VehicleInUseError as error:
         await journal.leave_fleet(fleet.name)
+        await asyncio.sleep(ASK_EACH_S)  # other standbys are told of it, and try
         return f"standing by for {fleet.name}: {error}"
     locks.release()
     return None

@@ -309,8 +309,18 @@ class Journal(Protocol):
     async def schedule_revisions(self) -> Mapping[str, int]:
         """Return the revision of each entry of the schedule, by its id.
 
-        It is asked each second for what other executives have added, changed or removed, so it
-        must cost little.
+        It is asked each second, and after each change, for what other executives have added,
+        changed or removed, so it must cost little.
+        """
+        ...
+
+    async def changed(self, seen: int) -> int:
+        """Return when this journal was told of more than `seen` changes, and of how many by then.
+
+        A change is that of a schedule, of its hold, or of who serves a fleet, by another executive.
+        With 0 it returns as soon as changes are told of. None is while the database cannot be
+        reached, so who follows looks from time to time, too. Where nothing tells of changes, it
+        does not return.
         """
         ...
 

@@ -377,6 +377,11 @@ class DatabaseJournal(ABC):
         rows = self._reading.execute("SELECT entry, revision FROM schedule ORDER BY entry")
         return {entry_id(number): revision for number, revision in rows}
 
+    async def changed(self, seen: int) -> int:
+        """See `Journal.changed`: nothing tells of what another process writes."""
+        never: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        return await never
+
     async def remove_entries(self, entries: Sequence[str]) -> None:
         """See `Journal.remove_entries`."""
         self._check_open()

@@ -1,5 +1,6 @@
 """The journal in memory: for simulation, tests and missions that need no resume."""
 
+import asyncio
 import os
 import time
 from bisect import bisect_right
@@ -241,6 +242,11 @@ class MemoryJournal:
         """See `Journal.schedule_revisions`."""
         self._check_open()
         return {entry.id: entry.state.revision for entry in self._entries.values()}
+
+    async def changed(self, seen: int) -> int:
+        """See `Journal.changed`: no other executive has this journal."""
+        never: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        return await never
 
     async def remove_entries(self, entries: Sequence[str]) -> None:
         """See `Journal.remove_entries`."""

@@ -20,6 +20,7 @@ from m2pem.journal.lease import Executive, Lease, end_dead, lease_s, process_spa
 from m2pem.journal.marks import MarkFile, find_losses
 from m2pem.journal.position import RunPosition
 from m2pem.journal.postgres_address import PostgresAddress, write_address
+from m2pem.journal.postgres_changes import ChangeListener
 from m2pem.journal.postgres_database import (
     PostgresConnection,
     check_server,
@@ -424,6 +425,7 @@ class PostgresJournal(DatabaseJournal):
         self._owners = owners
         self._writing = connection
         self._pooled = PostgresConnection(lambda: connect(address, length_s))
+        self._changes = ChangeListener(address, length_s, session)
         storage = PostgresStorage(address, connection, owners, OpenFiles([marks.path]))
         super().__init__(address.file, identity, storage, self._pooled, marks)
 
@@ -472,6 +474,16 @@ class PostgresJournal(DatabaseJournal):
     def lease_s(self) -> float | None:
         """See `Journal.lease_s`."""
         return self._lease.length_s
+
+    async def changed(self, seen: int) -> int:
+        """See `Journal.changed`."""
+        self._check_open()
+        return await self._changes.changed(seen)
+
+    async def close(self) -> None:
+        """See `Journal.close`."""
+        await self._changes.close()
+        await super().close()
 
     async def check_claim(self, run: str, epoch: int) -> None:
         """See `Journal.check_claim`: also whether the lease, under which it was claimed, lasts."""

@@ -23,6 +23,24 @@ _LOCK = 0x6D327065
 """The advisory lock of who makes or changes the tables: "m2pe"."""
 
 
+CHANNEL = "m2pem"
+"""On which executives are told of what others change."""
+
+
+def connection_parameters(within_s: float, session: str = "m2pem") -> dict[str, Any]:
+    """Return libpq's parameters of a connection, beside its URL; see `connect`."""
+    return {
+        "autocommit": True,
+        "application_name": session,
+        "client_encoding": "UTF8",
+        "connect_timeout": max(2, round(within_s)),
+        "tcp_user_timeout": max(1000, round(within_s * 1000)),
+        "keepalives_idle": max(1, round(within_s)),
+        "keepalives_interval": 1,
+        "keepalives_count": 3,
+    }
+
+
 def connect(
     address: PostgresAddress, within_s: float, session: str = "m2pem"
 ) -> psycopg.Connection[Any]:
@@ -35,17 +53,7 @@ def connect(
         psycopg.Error: see `explained_error`.
     """
     within_ms = max(1000, round(within_s * 1000))
-    connection = psycopg.connect(
-        address.url,
-        autocommit=True,
-        application_name=session,
-        client_encoding="UTF8",
-        connect_timeout=max(2, round(within_s)),
-        tcp_user_timeout=within_ms,
-        keepalives_idle=max(1, round(within_s)),
-        keepalives_interval=1,
-        keepalives_count=3,
-    )
+    connection = psycopg.connect(address.url, **connection_parameters(within_s, session))
     try:
         with connection.pipeline():
             # A host that is gone must not keep its locks for hours.
@@ -224,7 +232,25 @@ def fleets(connection: psycopg.Connection[Any]) -> None:
     )
 
 
-MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (first_tables, fleets)
+def notifications(connection: psycopg.Connection[Any]) -> None:
+    """0.3: what tells executives of a change of the schedule, or of who serves a fleet."""
+    connection.execute(
+        "CREATE OR REPLACE FUNCTION m2pem_tell() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
+        f" PERFORM pg_notify('{CHANNEL}', current_setting('application_name'));"
+        " RETURN NULL; END $$"
+    )
+    for table in ("schedule", "schedule_holds", "fleets"):
+        connection.execute(
+            f"CREATE TRIGGER m2pem_tell AFTER INSERT OR UPDATE OR DELETE ON {table}"
+            " FOR EACH STATEMENT EXECUTE FUNCTION m2pem_tell()"
+        )
+
+
+MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
+    first_tables,
+    fleets,
+    notifications,
+)
 """A released step is never changed; a change becomes a new step at the end."""
 
 
@@ -298,7 +324,7 @@ _BY_STATE = {
     "role SELECT, INSERT, UPDATE and DELETE on its tables",
     "53100": "the disk of the server is full; make room",
     "53300": "the server has too many connections: end some, or raise max_connections (an "
-    "executive takes three)",
+    "executive takes four)",
     "25006": "the server can only be read; it may have become a standby",
     "55P03": f"other executives have kept it locked for {LOCKED_FOR_S:g} s",
     "57P01": "the server is shutting down; start it again",

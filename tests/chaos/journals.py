@@ -19,6 +19,7 @@ UNDONE = {
     "schedule": ("DROP TABLE schedule", "DROP TABLE schedule_holds"),
     "origin_of_salvaged_runs": ("DROP TABLE origin",),
     "fleets": ("DROP TABLE fleets",),
+    "notifications": ("DROP FUNCTION m2pem_tell CASCADE",),
 }
 """How the last steps of migration are undone in a journal with no deletion and no schedule,
 which was not salvaged, and whose executives are dead."""

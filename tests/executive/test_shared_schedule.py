@@ -25,10 +25,23 @@ class SharedJournal(MemoryJournal):
     def __init__(self, file: Path) -> None:
         super().__init__()
         self._file = file
+        self._told = 0
+        self._telling = asyncio.Event()
 
     @property
     def file(self) -> Path:
         return self._file
+
+    async def changed(self, seen: int) -> int:
+        while self._told <= seen:
+            await self._telling.wait()
+        return self._told
+
+    def tell(self) -> None:
+        """As a database that was told by an executive."""
+        self._told += 1
+        self._telling.set()
+        self._telling = asyncio.Event()
 
 
 @pytest.fixture
@@ -80,6 +93,17 @@ def test_each_sees_what_the_other_schedules_holds_releases_and_cancels(play):
     assert "held" not in str(seen[2])
     assert "held by bob: smoke" in str(seen[3])
     assert "held" not in str(seen[4])
+
+
+def test_what_the_journal_tells_of_is_known_before_the_next_look(play):
+    async def story(one: Scheduling, two: Scheduling):
+        await one.at(100.25)
+        await one.schedule(ASK, at=at(1000))
+        one.executive.journal.tell()
+        await one.clock.sleep(0.01)
+        return await statuses(two)
+
+    assert play(story) == {"s1": "scheduled"}
 
 
 def test_an_operator_may_cancel_at_once_what_was_scheduled_at_the_other(play):

@@ -9,7 +9,10 @@ from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info
 
 
 class TestMemoryJournal(JournalContract):
-    unsupported = {"durability": "it ends with its process"}  # noqa: RUF012
+    unsupported = {  # noqa: RUF012
+        "durability": "it ends with its process",
+        "notification": "no other executive has it",
+    }
 
     @pytest.fixture
     def open_journal(self):

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import threading
+from functools import partial
 
 import psycopg
 import pytest
@@ -10,7 +11,16 @@ import pytest
 from m2pem.errors import JournalError
 from m2pem.journal import file_of, open_journal
 from m2pem.journal.postgres_database import MIGRATIONS
-from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info, opened, written
+from m2pem.scheduling.entry import EntryState
+from m2pem.testing.contracts.journal import (
+    HEADER,
+    PLAN,
+    JournalContract,
+    entry,
+    info,
+    opened,
+    written,
+)
 
 
 class TestPostgresJournal(JournalContract):
@@ -36,6 +46,22 @@ async def test_executives_that_create_runs_at_the_same_time_give_each_its_own_nu
                 *(journal.create(HEADER) for _ in range(10) for journal in (one, two))
             )
         assert sorted(made, key=lambda run: int(run[1:])) == [f"r{n}" for n in range(1, 21)]
+
+
+async def test_an_executive_is_told_of_what_others_change_also_after_it_could_not_be(
+    postgres, postgres_url
+):
+    opening = partial(open_journal, postgres_url)
+    async with opened(opening) as one, opened(opening) as two:
+        seen = await asyncio.wait_for(one.changed(0), 30)
+        postgres.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE 'LISTEN%'"
+        )
+        again = await asyncio.wait_for(one.changed(seen), 30)
+        assert again == seen + 1
+        await one.schedule(PLAN, EntryState(5))
+        await two.schedule(PLAN, EntryState(5))
+        assert await asyncio.wait_for(one.changed(again), 30) == again + 1  # not of its own
 
 
 # --- a server that ends -----------------------------------------------------------------------

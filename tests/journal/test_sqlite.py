@@ -12,6 +12,8 @@ from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info
 
 
 class TestSqliteJournal(JournalContract):
+    unsupported = {"notification": "followers look each second"}  # noqa: RUF012
+
     @pytest.fixture
     def open_journal(self, tmp_path):
         return lambda: SqliteJournal.open(tmp_path / "journal.db")

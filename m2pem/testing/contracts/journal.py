@@ -83,6 +83,8 @@ PLAN = SchedulePlan(
 
 STARTED = SettledTime(9, 10, Settlement.STARTED)
 
+_TOLD_WITHIN_S = 30.0
+
 ENDED = (RunStarted("PATROL", 5), RunEnded(RunOutcome.COMPLETED, ""))
 """Records of a run that has ended."""
 
@@ -130,7 +132,8 @@ class JournalContract(Contract):
 
     m2pem_contract: ClassVar[str] = "JournalContract"
     subjects: ClassVar[Mapping[str, str]] = {
-        "durability": "a journal that is opened again, or twice, has what was written"
+        "durability": "a journal that is opened again, or twice, has what was written",
+        "notification": "a journal is told of what other executives change",
     }
 
     @pytest.fixture
@@ -287,6 +290,28 @@ class JournalContract(Contract):
             assert await journal.schedule_revisions() == {"s1": 1, "s2": 1}
             await journal.remove_entries(["s2"])
             assert await journal.schedule_revisions() == {"s1": 1}
+
+    @needs("durability", "notification")
+    async def test_a_change_by_another_executive_is_told_of(
+        self, open_journal: OpenJournal
+    ) -> None:
+        """Of the schedule, of its hold, and of who serves a fleet. What runs do is not."""
+        async with opened(open_journal) as one, opened(open_journal) as two:
+            seen = await asyncio.wait_for(one.changed(0), _TOLD_WITHIN_S)
+            cancelled = EntryState(5, status=EntryStatus.CANCELLED, revision=1)
+            for change in (
+                lambda: two.schedule(PLAN, EntryState(5)),
+                lambda: two.change_entry(EntryChange("s1", cancelled)),
+                lambda: two.remove_entries(["s1"]),
+                lambda: two.hold_schedule("north", Hold("anna", "rain", 8)),
+                lambda: two.hold_schedule("north", None),
+                lambda: two.serve_fleet("north", ["ugv1"]),
+                lambda: two.leave_fleet("north"),
+            ):
+                waiting = asyncio.ensure_future(one.changed(seen))
+                await change()
+                before, seen = seen, await asyncio.wait_for(waiting, _TOLD_WITHIN_S)
+                assert seen > before
 
     async def test_a_schedule_is_held_for_each_fleet(self, open_journal: OpenJournal) -> None:
         """Until it is released."""
