@@ -35,10 +35,17 @@ class Step:
     commands: Sequence[Command]
 
 
+STEPS_AT_ONCE = 1_000
+"""Steps after which a run that does not wait lets others run: STOP waits no longer. What is decided
+again must be with as many: where a run yielded is in its records."""
+
+
 class MissionRun:
     """A run: its state, and how inputs are decided."""
 
-    def __init__(self, mission: Mission, fleet: Fleet | None, run: str, batch: int = 10_000):
+    def __init__(
+        self, mission: Mission, fleet: Fleet | None, run: str, batch: int = STEPS_AT_ONCE
+    ) -> None:
         """`batch`: steps that one input may cause before the run yields (`Continue`)."""
         self.state = RunState(run, mission)
         self._x = Steps(self.state, fleet, batch)

@@ -25,7 +25,7 @@ from m2pem.api.telemetry import TeamState, Telemetry
 from m2pem.engine.commands import Command
 from m2pem.engine.inputs import GeometrySet, Input, ResourceFault, StartRun, StopRun
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
-from m2pem.engine.run import MissionRun
+from m2pem.engine.run import STEPS_AT_ONCE, MissionRun
 from m2pem.engine.state import OutOfReach, RunStatus
 from m2pem.errors import (
     JournalError,
@@ -87,10 +87,6 @@ log = logging.getLogger("m2pem.executive")
 
 REMEMBERED_RUNS = 100
 """Ended runs whose last state is kept in memory; the journal has them all."""
-
-STEPS_AT_ONCE = 1_000
-"""Engine steps after which a run that does not wait lets others run: STOP waits no longer."""
-
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:

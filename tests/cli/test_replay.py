@@ -7,6 +7,7 @@ import pytest
 
 from tests.cli.conftest import Invoke
 from tests.command_line import ANSWERS, MISSION, CommandLine
+from tests.executive.conftest import flow, mission
 
 
 @pytest.fixture
@@ -158,6 +159,31 @@ def test_an_unknown_run_is_told_with_those_there_are(
     assert (status, err) == (2, "m2pem: the journal has no run 'r2'; it has r1\n")
     status, _, err = invoke("replay", "nonsense")
     assert (status, err) == (2, "m2pem: the journal has no run 'nonsense'; it has none yet\n")
+
+
+COUNTS = mission(
+    '<process id="P" isExecutable="true"><startEvent id="S"/>'
+    '<scriptTask id="Zero"><script>n = 0</script></scriptTask><exclusiveGateway id="Again"/>'
+    '<scriptTask id="Add"><script>n = n + 1</script></scriptTask>'
+    '<exclusiveGateway id="Leave" default="Leave_Again"/><endEvent id="E"/>'
+    f"{flow('S', 'Zero')}{flow('Zero', 'Again')}{flow('Again', 'Add')}{flow('Add', 'Leave')}"
+    f"{flow('Leave', 'Again')}"
+    '<sequenceFlow id="Out" sourceRef="Leave" targetRef="E">'
+    "<conditionExpression>n &gt; 1000</conditionExpression></sequenceFlow></process>"
+)
+
+
+def test_a_run_that_did_not_wait_for_thousands_of_steps_is_verified(
+    invoke: Invoke, journal: Path
+) -> None:
+    file = journal.with_name("counts.bpmn")
+    file.write_bytes(COUNTS)
+    words = ("--fleet", "sim", "--ocu", "none", "--format", "json", "--journal", journal)
+    status, out, errors = invoke("run", file, *words)
+    assert status == 0, errors
+    assert "RunYielded" in out
+    status, out, _ = invoke("replay", "r1", "--verify", "--journal", journal)
+    assert (status, "all the same" in out) == (0, True), out
 
 
 def test_verify_and_state_exclude_each_other(invoke: Invoke) -> None:
