@@ -58,6 +58,13 @@ def test_a_script_throws_an_error_and_what_follows_is_not_run() -> None:
     assert play.data == {"a": 1}
 
 
+def test_the_lines_of_a_script_share_what_they_may_look_at() -> None:
+    play = one_task('<scriptTask id="task">a = max(l); b = max(l); a = max(l)</scriptTask>')
+    play.start({"l": [0] * 40_000})
+    assert play.entered() == "start task error caught"
+    assert "it looks at more than 100,000 values, in 'max(l)'" in thrown(play)
+
+
 def test_a_script_that_divides_by_zero_throws_expression_with_the_line() -> None:
     play = one_task('<scriptTask id="task">a = 1; b = a / 0</scriptTask>').start()
     assert play.entered() == "start task error caught"

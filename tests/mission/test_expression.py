@@ -288,6 +288,30 @@ def test_distance_is_that_of_the_great_circle():
     assert value("distance([90, 0], [-90, 0])") == pytest.approx(6_371_008.8 * math.pi)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "= some a in l satisfies some b in l satisfies some c in l satisfies a + b + c < 0",
+        "= every a in l satisfies a in l",
+        "= some a in l satisfies l = l and a < 0",
+        "= some a in l satisfies sum(l) < 0",
+        "= some a in l satisfies upper(t) = \"b\"",
+    ],
+)
+def test_an_evaluation_that_would_take_long_is_refused(text):
+    data = {"l": list(range(1000)), "t": "a" * 100_000}
+    with pytest.raises(ExpressionError, match="it looks at more than 100,000 values"):
+        parse(text).evaluate(data.get)
+
+
+def test_what_may_be_looked_at_is_counted_anew_for_each_evaluation():
+    found = parse("max(l)")
+    data = {"l": list(range(70_000))}
+    assert [found.evaluate(data.get) for _ in range(2)] == [69_999] * 2
+    with pytest.raises(ExpressionError, match="it looks at more"):
+        found.evaluate(data.get, anew=False)
+
+
 def test_lists_that_double_with_every_assignment_are_refused_before_they_are_large():
     grown = [1]
     double = parse("[x, x]")

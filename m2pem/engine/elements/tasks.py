@@ -81,10 +81,10 @@ def script_task(x: Execution, token: Token) -> None:
 
 
 def _run_script(x: Execution, token: Token, node: ScriptTask) -> None:
-    for statement in node.script.statements if node.script is not None else ():
+    for number, statement in enumerate(node.script.statements if node.script is not None else ()):
         if isinstance(statement, Assignment):
             try:
-                value = statement.expression.evaluate(reader(token))
+                value = statement.expression.evaluate(reader(token), anew=number == 0)
             except ExpressionError as error:
                 throw_error(x, token, "EXPRESSION", f"line {statement.line}: {error}")
                 return

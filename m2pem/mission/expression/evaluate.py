@@ -17,6 +17,7 @@ from m2pem.mission.expression.operators import (
     contains,
     index,
     join,
+    look_at,
     negate,
     truth,
 )
@@ -39,6 +40,7 @@ from m2pem.mission.expression.tree import (
     Or,
     Some,
     binds,
+    walk,
 )
 from m2pem.mission.values import ReadValue, Value
 
@@ -140,9 +142,12 @@ def _some(node: Some, read: ReadValue) -> Value:
         return False
     if not isinstance(items, list):
         raise ExpressionError(f"'some' and 'every' take a list, not {describe(items)}")
-    return any(
-        _holds(node.condition, bind(node.variable, item, read), "a condition") for item in items
-    )
+    size = sum(1 for _ in walk(node.condition))
+    for item in items:
+        look_at(size)
+        if _holds(node.condition, bind(node.variable, item, read), "a condition"):
+            return True
+    return False
 
 
 def _list(node: ListOf, read: ReadValue) -> Value:

@@ -10,7 +10,7 @@ from m2pem.mission.expression.dialect import Dialect, Span, locate, split
 from m2pem.mission.expression.evaluate import evaluate
 from m2pem.mission.expression.feel import FeelParser
 from m2pem.mission.expression.literals import shorten, show_scalar
-from m2pem.mission.expression.operators import truth
+from m2pem.mission.expression.operators import begin_work, truth
 from m2pem.mission.expression.parser import Parser
 from m2pem.mission.expression.tree import Join, Literal, Node, names
 from m2pem.mission.values import ReadValue, Value
@@ -39,12 +39,15 @@ class Expression:
         """Whether it reads nothing, so that its value is always the same."""
         return not self.names
 
-    def evaluate(self, read: ReadValue) -> Value:
-        """Its value over the data store.
+    def evaluate(self, read: ReadValue, *, anew: bool = True) -> Value:
+        """Its value over the data store. `anew`: the limit of what it looks at is its own; else it
+        shares that with what was evaluated before.
 
         Raises:
-            ExpressionError: a wrong type, a division by zero, or a result beyond the limits.
+            ExpressionError: a wrong type, a division by zero, or something beyond the limits.
         """
+        if anew:
+            begin_work()
         try:
             return evaluate(self.tree, read)
         except ExpressionError as error:
@@ -56,6 +59,7 @@ class Expression:
         Raises:
             ExpressionError: as `evaluate`, and when the value is neither a boolean nor null.
         """
+        begin_work()
         try:
             value = evaluate(self.tree, read)
             return value if value is True or value is False else truth(value, "a condition")

@@ -10,10 +10,12 @@ import m2pem.mission.timers as times  # imports this package too: only its name 
 from m2pem.errors import ExpressionError, ExpressionSyntaxError
 from m2pem.mission.expression.literals import NUMBER, describe, read_number
 from m2pem.mission.expression.operators import (
+    TEXT_AS_VALUE,
     bounded,
     bounded_text,
     equal,
     kind,
+    look_at,
     text_of,
 )
 from m2pem.mission.values import Value
@@ -60,6 +62,10 @@ class Function:
             elif kind(argument) not in kinds:
                 wanted = " or ".join(kinds)
                 raise ExpressionError(f"{self.name}() takes a {wanted}, not {describe(argument)}")
+            elif isinstance(argument, list):
+                look_at(len(argument))
+            elif isinstance(argument, str):
+                look_at(len(argument) // TEXT_AS_VALUE)
         return None if null else self.compute(*arguments)
 
 

@@ -2,6 +2,7 @@
 
 import math
 import operator
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,34 @@ MAX_SIZE = 100_000
 
 MAX_VALUE_DEPTH = 100
 """How deep lists and maps may nest in each other."""
+
+MAX_WORK = 100_000
+"""How many values one evaluation may look at. Nothing else happens in an executive meanwhile, STOP
+included, so it must not take long; and a replay must come to the same end on any computer."""
+
+TEXT_AS_VALUE = 1_000
+"""So many characters of a text count as one value."""
+
+
+class _Work(threading.local):
+    """What the evaluation of this thread may still look at."""
+
+    left = MAX_WORK
+
+
+_work = _Work()
+
+
+def begin_work() -> None:
+    """Count anew what is looked at."""
+    _work.left = MAX_WORK
+
+
+def look_at(values: int) -> None:
+    """Count values; raises ExpressionError when they are too many."""
+    _work.left -= values
+    if _work.left < 0:
+        raise ExpressionError(f"it looks at more than {MAX_WORK:,} values")
 
 Binary = Callable[[Value, Value], Value]
 Test = Callable[[Value, Value], bool]
@@ -63,12 +92,14 @@ def _equal(left: Value, right: Value, depth: int) -> bool:
     if isinstance(left, list) and isinstance(right, list):
         if depth == 0:
             raise ExpressionError(f"'==' compares lists nested deeper than {MAX_VALUE_DEPTH}")
+        look_at(len(left))
         return len(left) == len(right) and all(
             _equal(a, b, depth - 1) for a, b in zip(left, right, strict=True)
         )
     if isinstance(left, dict) and isinstance(right, dict):
         if depth == 0:
             raise ExpressionError(f"'==' compares maps nested deeper than {MAX_VALUE_DEPTH}")
+        look_at(len(left))
         return left.keys() == right.keys() and all(
             _equal(value, right[key], depth - 1) for key, value in left.items()
         )
@@ -80,6 +111,7 @@ def _equal(left: Value, right: Value, depth: int) -> bool:
 def contains(container: Value, item: Value) -> bool:
     """`item in container`; nothing is in null."""
     if isinstance(container, list):
+        look_at(len(container))
         return any(equal(each, item) for each in container)
     if container is None:
         return False
@@ -135,6 +167,7 @@ def bounded_text(value: str, what: str) -> str:
     """The text that an operation made, when it is not too long."""
     if len(value) > MAX_SIZE:
         raise ExpressionError(f"the result of {what} is longer than {MAX_SIZE} characters")
+    look_at(len(value) // TEXT_AS_VALUE)
     return value
 
 
@@ -156,6 +189,7 @@ def bounded_list(items: list[Value]) -> list[Value]:
             raise ExpressionError(f"the list is larger than {MAX_SIZE} values and characters")
         if depth > MAX_VALUE_DEPTH:
             raise ExpressionError(f"the list is nested deeper than {MAX_VALUE_DEPTH}")
+    look_at(size)
     return items
 
 

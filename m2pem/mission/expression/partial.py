@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from m2pem.mission.expression.evaluate import evaluate
 from m2pem.mission.expression.expression import Expression
-from m2pem.mission.expression.operators import truth
+from m2pem.mission.expression.operators import begin_work, truth
 from m2pem.mission.expression.tree import And, If, Node, Not, Or, names
 from m2pem.mission.values import ReadValue
 
@@ -21,11 +21,13 @@ def possible_truth(expression: Expression, known: IsKnown, read: ReadValue) -> b
     Raises:
         ExpressionError: a part that is known has a wrong type.
     """
+    begin_work()
     return _truth(expression.tree, known, read)
 
 
 def first_false(expression: Expression, known: IsKnown, read: ReadValue) -> frozenset[str]:
     """Return the names of the first part of a false conjunction that makes it false."""
+    begin_work()
     tree = expression.tree
     for part in tree.operands if isinstance(tree, And) else (tree,):
         if _truth(part, known, read) is False:
