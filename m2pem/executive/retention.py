@@ -1,9 +1,15 @@
-"""How long runs are kept: deleting runs, with what is kept of them beside the journal."""
+"""How long runs are kept: deleting runs, with what is kept of them beside the journal.
+
+A computer's clock that is years ahead, as after a start without network, must not delete what is
+young. So the age of a run does not follow the clock alone: a time in which no run began or ended,
+and this executive did not run, counts as half of what is kept at most.
+"""
 
 import asyncio
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from datetime import UTC, datetime
 from pathlib import Path
 from uuid import UUID
 
@@ -72,26 +78,57 @@ def _files(journal: Path, identity: UUID, run: str) -> Iterator[Path]:
         yield runtime_directory() / f"{identity}-stopped-{run}"
 
 
-async def delete_old_runs(journal: Journal, keep_s: float, now_us: int, *, by: str) -> list[str]:
+async def delete_old_runs(
+    journal: Journal, keep_s: float, since_us: int, now_us: int, *, by: str
+) -> list[str]:
     """Delete the runs that ended more than `keep_s` before `now_us`, and return their ids.
 
-    A run that has not ended, that an executive still has, or of which entries are lost, is kept.
+    A run that has not ended, that an executive still has, or of which entries are lost, is kept;
+    also one that is older by the clock alone, which is logged. `since_us`: when this executive was
+    started, by the same clock.
 
     Raises:
         JournalError: the journal cannot be read or written.
     """
-    before_us = now_us - round(keep_s * US_PER_S)
-    old = [
-        line.run
-        for line in await journal.runs()
-        if line.ended_us is not None
-        and line.ended_us < before_us
-        and not line.driven
-        and line.loss is None
-    ]
+    keep_us = round(keep_s * US_PER_S)
+    lines = await journal.runs()
+    times_us = {at_us for each in lines for at_us in (each.started_us, each.ended_us or 0)}
+    ages_us = _ages_us(times_us, since_us, now_us, keep_us // 2)
+    old: list[str] = []
+    doubtful: list[str] = []
+    for line in lines:
+        ended_us = line.ended_us
+        if ended_us is None or now_us - ended_us <= keep_us or line.driven or line.loss is not None:
+            continue
+        (old if ages_us[ended_us] > keep_us else doubtful).append(line.run)
+    if doubtful:
+        log.warning(
+            "kept: %s. By the clock, which shows %s UTC, they ended longer ago than is kept; but "
+            "the journal has no run in most of that time, so the clock may be wrong. They are "
+            "deleted when this executive has run for half of the time that is kept, or now with "
+            "`m2pem runs --delete %s`",
+            ", ".join(doubtful),
+            datetime.fromtimestamp(now_us / US_PER_S, UTC).strftime("%Y-%m-%d %H:%M"),
+            " ".join(doubtful),
+        )
     if old:
         await delete_runs(journal, old, by=by)
     return old
+
+
+def _ages_us(
+    times_us: Iterable[int], since_us: int, now_us: int, longest_us: int
+) -> dict[int, int]:
+    """Return how long ago each time of a journal was. Each gap between them counts as `longest_us`
+    at most, but not those since `since_us`, when this executive was started."""
+    ages_us = {}
+    age_us, later_us = now_us - since_us, since_us
+    for at_us in sorted(times_us, reverse=True):
+        if at_us < since_us:
+            age_us += min(later_us - at_us, longest_us)
+            later_us = at_us
+        ages_us[at_us] = age_us if at_us < since_us else now_us - at_us
+    return ages_us
 
 
 async def keep_runs(journal: Journal, keep_s: float, clock: Clock, *, by: str) -> None:
@@ -99,10 +136,10 @@ async def keep_runs(journal: Journal, keep_s: float, clock: Clock, *, by: str) -
 
     A journal that cannot be read or written now is tried again the next day.
     """
+    since_us = clock.now_us()
     while True:
-        now_us = clock.now_us()
         try:
-            deleted = await delete_old_runs(journal, keep_s, now_us, by=by)
+            deleted = await delete_old_runs(journal, keep_s, since_us, clock.now_us(), by=by)
         except JournalError as error:
             log.warning("old runs are not deleted: %s", error)
         else:

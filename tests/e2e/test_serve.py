@@ -2,11 +2,14 @@
 
 import asyncio
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.testing.contracts.journal import ENDED, HEADER, entry, opened
 from tests.command_line import FLEET, MISSION, CommandLine, Program
+
+DAY_US = 86_400_000_000
 
 
 def serving(m2pem: CommandLine, *words: str) -> Program:
@@ -111,13 +114,16 @@ def test_a_run_waits_for_what_operators_started_beside_it(m2pem: CommandLine) ->
 def test_runs_that_ended_long_ago_are_deleted_and_named(m2pem: CommandLine, tmp_path: Path) -> None:
     path = tmp_path / "journal.db"
 
-    async def old_run() -> None:
+    async def old_runs() -> None:
         async with opened(lambda: SqliteJournal.open(path)) as journal:
-            run = await journal.create(HEADER)
-            await journal.append([entry(run, 1, *ENDED)])
+            for day in range(2):
+                run = await journal.create(HEADER)
+                first = entry(run, 1, *ENDED)
+                await journal.append([replace(first, at_us=first.at_us + day * DAY_US)])
 
-    asyncio.run(old_run())
+    asyncio.run(old_runs())
     program = serving(m2pem, "--journal", str(path), "--keep", "12h")
+    assert "kept: r2. By the clock" in program.stderr.readline()
     assert "deleted what ended longer ago than is kept: r1" in program.stderr.readline()
     program.type(f"start {MISSION}")
     program.until_text("UserSendRoute")

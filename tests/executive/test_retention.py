@@ -1,6 +1,7 @@
 """Deleting runs that ended long ago, and what is kept of them beside the journal."""
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -16,9 +17,9 @@ START_US = HEADER.created_us
 DAY_US = round(DAY_S * 1_000_000)
 
 
-async def with_run(journal, *records, driven=False):
+async def with_run(journal, *records, driven=False, at_us=START_US + 1):
     run = await journal.create(HEADER)
-    await journal.append([entry(run, 1, *records)])
+    await journal.append([replace(entry(run, 1, *records), at_us=at_us)])
     if not driven:
         await journal.release(run)
     return run
@@ -56,8 +57,8 @@ async def test_only_runs_that_ended_before_are_deleted():
     await with_run(journal, *ENDED)
     await with_run(journal, RunStarted("PATROL", 5))
     await with_run(journal, *ENDED, driven=True)
-    assert await delete_old_runs(journal, 10.0, START_US + 10_000_001, by="ann") == []
-    assert await delete_old_runs(journal, 10.0, START_US + 10_000_002, by="ann") == ["r1"]
+    assert await delete_old_runs(journal, 10.0, START_US, START_US + 10_000_001, by="ann") == []
+    assert await delete_old_runs(journal, 10.0, START_US, START_US + 10_000_002, by="ann") == ["r1"]
     assert await ids(journal) == ["r2", "r3"]
     assert [(each.run, each.by) for each in await journal.deletions()] == [("r1", "ann")]
 
@@ -84,4 +85,31 @@ def test_old_runs_are_deleted_at_the_start_and_each_day(caplog):
 async def test_runs_of_every_outcome_are_deleted(outcome):
     journal = MemoryJournal()
     await with_run(journal, RunStarted("PATROL", 5), RunEnded(outcome, ""))
-    assert await delete_old_runs(journal, 1.0, START_US + DAY_US, by="ann") == ["r1"]
+    assert await delete_old_runs(journal, 1.0, START_US, START_US + DAY_US, by="ann") == ["r1"]
+
+
+async def test_a_clock_that_is_years_ahead_deletes_nothing_young(caplog):
+    journal = MemoryJournal()
+    await with_run(journal, *ENDED)
+    ahead_us = START_US + 14 * 365 * DAY_US
+
+    async def deleted(days):
+        now_us = ahead_us + days * DAY_US
+        return await delete_old_runs(journal, 30 * DAY_S, ahead_us, now_us, by="ann")
+
+    assert await deleted(0) == []
+    assert caplog.messages[-1].startswith(
+        "kept: r1. By the clock, which shows 2039-12-29 00:00 UTC, they ended longer ago than is"
+    )
+    await with_run(journal, *ENDED, at_us=ahead_us + 1)
+    assert await deleted(14) == []
+    assert await deleted(16) == ["r1"]
+    assert await deleted(31) == ["r2"]
+
+
+async def test_runs_of_a_journal_that_is_seldom_used_are_deleted_in_the_end():
+    journal = MemoryJournal()
+    for days in (0, 90, 180, 270):
+        await with_run(journal, *ENDED, at_us=START_US + days * DAY_US)
+    now_us = START_US + 271 * DAY_US
+    assert await delete_old_runs(journal, 30 * DAY_S, now_us, now_us, by="ann") == ["r1", "r2"]
