@@ -56,6 +56,7 @@ from m2pem.executive.incidents import Foresee, IncidentChoices, open_incidents
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
 from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
+from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.run_summary import summary
 from m2pem.executive.runner import Runner
 from m2pem.executive.schedule_admission import planned
@@ -92,6 +93,7 @@ class Control:
     def __init__(
         self,
         supervisor: Supervisor,
+        starter: RunStarter,
         bus: Bus,
         health: ExecutiveHealth,
         schedule: ScheduleEntries,
@@ -100,6 +102,7 @@ class Control:
         foresee: Foresee | None = None,
     ) -> None:
         self._supervisor = supervisor
+        self._starter = starter
         self._schedule = schedule
         self._scheduler = scheduler
         self._bus = bus
@@ -119,7 +122,7 @@ class Control:
         even_if_busy: bool = False,
     ) -> RunId:
         """Start a mission, also one that was loaded; returns when the journal has its beginning."""
-        return await self._supervisor.start(
+        return await self._starter.start(
             mission, process, _bounded(data), by, even_if_busy=even_if_busy
         )
 
@@ -144,7 +147,7 @@ class Control:
         roles = {(each.name, each.resource): each for each in roles_of_mission(loaded)}
         fleet, busy = supervisor.fleet, ""
         try:
-            supervisor.refuse_busy(loaded)
+            self._starter.refuse_busy(loaded)
         except BusyError as error:
             busy = str(error)
         return StartPreview(
@@ -198,7 +201,15 @@ class Control:
             )
         holds, known = self._schedule.holds, self._schedule.by_id
         plan, resources = await planned(
-            self._supervisor, known, mission, when, process, _bounded(data), priority, by
+            self._supervisor,
+            self._starter,
+            known,
+            mission,
+            when,
+            process,
+            _bounded(data),
+            priority,
+            by,
         )
         return await self._schedule.schedule(plan, resources, holds)
 

@@ -27,6 +27,8 @@ from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee
 from m2pem.executive.outages import Outages
 from m2pem.executive.process_monitors import watch_space
+from m2pem.executive.run_starter import RunStarter
+from m2pem.executive.run_takeover import RunTakeover
 from m2pem.executive.runner import OnRecords, RunLimit, Runner
 from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduled_runs import ScheduledRuns
@@ -114,17 +116,20 @@ class Executive:
         self.stalls = self._supervisor.stalls
         self.ownership = self._supervisor.ownership
         self.health = ExecutiveHealth(journal)
-        starter = ScheduledRuns(self._supervisor, self.bus)
+        self._starter = RunStarter(self._supervisor)
+        self._takeover = RunTakeover(self._supervisor)
+        scheduled = ScheduledRuns(self._supervisor, self._starter, self.bus)
         self._schedule = ScheduleEntries(
-            starter,
+            scheduled,
             self.events.publish,
             self._supervisor.marks,
             real=not self.arbiters.nothing_is_real,
         )
-        self._scheduler = Scheduler(starter, self._schedule)
+        self._scheduler = Scheduler(scheduled, self._schedule)
         self._supervisor.on_change = self._schedule.changed.set
         self.control = Control(
             self._supervisor,
+            self._starter,
             self.bus,
             self.health,
             self._schedule,
@@ -322,13 +327,13 @@ class Executive:
         Raises:
             MissionError: with every finding.
         """
-        return self._supervisor.admit(loaded, process, data)
+        return self._starter.admit(loaded, process, data)
 
     async def begin(
         self, loaded: Mission, process_id: str, data: Mapping[str, Value] | None, by: str
     ) -> RunId:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable."""
-        return await self._supervisor.begin(loaded, process_id, data, by)
+        return await self._starter.begin(loaded, process_id, data, by)
 
     def expect_interrupted(self, runs: Sequence[RunId]) -> None:
         """Say, before it connects, which runs are taken up first: none begins before that."""
@@ -336,7 +341,7 @@ class Executive:
 
     async def resume_all(self, runs: Sequence[RunId]) -> Mapping[RunId, M2pemError]:
         """Take up runs that their executive left without ending them; returns why some are not."""
-        return await self._supervisor.resume(runs)
+        return await self._takeover.resume(runs)
 
     async def resume(self, run: RunId) -> None:
         """Take up one run.

@@ -6,6 +6,7 @@ from collections.abc import Container, Sequence
 from m2pem.api.authoring import MissionSource
 from m2pem.api.schedule import EntryId, When, host_time_zone
 from m2pem.errors import ExpressionError, ScheduleError
+from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.scheduled_start import vehicles_of
 from m2pem.executive.supervisor import Supervisor
 from m2pem.fleet.allocation import resources_of_mission
@@ -23,6 +24,7 @@ from m2pem.suggestions import did_you_mean
 
 async def planned(
     supervisor: Supervisor,
+    starter: RunStarter,
     known: Container[EntryId],
     mission: MissionSource,
     when: When,
@@ -42,7 +44,7 @@ async def planned(
     refuse_unattended(supervisor.fleet)
     now_us = supervisor.clock.now_us()
     when = resolved(when, now_us, host_time_zone())
-    loaded, process_id = await asyncio.to_thread(supervisor.load, mission, process, data)
+    loaded, process_id = await asyncio.to_thread(starter.load, mission, process, data)
     named = resources_of_mission(loaded, supervisor.fleet)
     await _refuse_unknown(supervisor, known, when, named)
     plan = SchedulePlan(

@@ -8,6 +8,7 @@ from m2pem.api.clock import Clock
 from m2pem.api.runs import RunId
 from m2pem.api.telemetry import LinkState
 from m2pem.executive.loading import load_source
+from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.schedule_admission import refuse_unattended
 from m2pem.executive.supervisor import Supervisor
 from m2pem.fleet.allocation import resources_of_mission
@@ -22,8 +23,9 @@ from m2pem.telemetry.bus import Bus
 class ScheduledRuns:
     """Starts missions on an executive: `m2pem.executive.scheduled_start.Starter`."""
 
-    def __init__(self, supervisor: Supervisor, bus: Bus) -> None:
+    def __init__(self, supervisor: Supervisor, starter: RunStarter, bus: Bus) -> None:
         self._supervisor = supervisor
+        self._starter = starter
         self._bus = bus
 
     @property
@@ -51,7 +53,7 @@ class ScheduledRuns:
         refuse_unattended(self.fleet)
         files = MissionFiles(plan.mission_name, plan.mission, plan.library)
         loaded = load_source(files)
-        process, _ = self._supervisor.admit(loaded, plan.process, plan.data)
+        process, _ = self._starter.admit(loaded, plan.process, plan.data)
         return loaded, process
 
     def has_others(self) -> bool:
@@ -68,7 +70,7 @@ class ScheduledRuns:
         still: Callable[[], bool],
     ) -> RunId:
         """Begin the run of an entry of the schedule; see `Starter`."""
-        return await self._supervisor.begin_if_free(
+        return await self._starter.begin_if_free(
             loaded, process, plan.data, by, started=started, still=still
         )
 

@@ -1,4 +1,4 @@
-"""The supervisor: starts, resumes and drives every run of one executive, and routes what happens.
+"""The supervisor: drives every run of one executive, and routes what happens.
 
 Reports of arbiters, faults of vehicles and geometries of operators become inputs of the runs that
 they concern.
@@ -6,29 +6,22 @@ they concern.
 
 import asyncio
 import logging
-import math
-import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
-from m2pem.allocation.assignment import load_solver
 from m2pem.api.allocation import SharedSpaceState
 from m2pem.api.arbiter import BehaviorId, BehaviorReport
-from m2pem.api.authoring import MissionSource
-from m2pem.api.clock import Clock, SystemClock
+from m2pem.api.clock import Clock
 from m2pem.api.epoch_fence import run_of
 from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
-from m2pem.engine.commands import Command
-from m2pem.engine.inputs import GeometrySet, Input, ResourceFault, StartRun, StopRun
+from m2pem.engine.inputs import GeometrySet, Input, ResourceFault
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import STEPS_AT_ONCE, MissionRun
 from m2pem.engine.state import OutOfReach, RunStatus
 from m2pem.errors import (
-    JournalError,
     M2pemError,
     NotDrivenError,
     OperatorError,
@@ -49,39 +42,32 @@ from m2pem.executive.control_events import ControlEvents, RecordObservers
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.emergency import EmergencyCommands, StopMarks
 from m2pem.executive.fleet_connections import FleetArbiters
-from m2pem.executive.handover import Handover, refuse_busy_resources
+from m2pem.executive.handover import Handover
 from m2pem.executive.interrupted_runs import InterruptedRuns
 from m2pem.executive.journal_loss import JournalLossPrompts
-from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
 from m2pem.executive.lost_marks import LostMarks
 from m2pem.executive.lost_resources import LostResources
 from m2pem.executive.outages import OUTAGE_S, Outages, StallMonitor
 from m2pem.executive.ownership import Ownership
-from m2pem.executive.recovery import claim, look_again, replaced_by, replay, take_over
+from m2pem.executive.recovery import look_again, replaced_by
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
-from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
 from m2pem.executive.waiting_tasks import waiting_tasks
-from m2pem.findings import Finding, Severity
 from m2pem.fleet.allocation import Availability
-from m2pem.fleet.fleet import Fleet, dump
+from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
 from m2pem.geo.geojson import GeometryError, parse_geojson
 from m2pem.geo.positions import NO_ORIGIN, geometry_out_of_reach
-from m2pem.journal.base import Journal, RunHeader
-from m2pem.journal.mission import mission_of
+from m2pem.journal.base import Journal
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.geometry import Geometry
 from m2pem.mission.losses import LINK_LOST
-from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
-from m2pem.scheduling.entry import EntryChange
 from m2pem.telemetry.bus import Bus
-from m2pem.units import US_PER_S
 
 log = logging.getLogger("m2pem.executive")
 
@@ -110,14 +96,11 @@ class RunSettings:
         return STEPS_AT_ONCE if self.limit is None else min(STEPS_AT_ONCE, self.limit.steps_at_once)
 
 
-CLOCK_BACK_US = 2 * US_PER_S
-"""A wall clock that is behind the journal by more has gone back: no leap second, and no slew."""
-
-
 class Supervisor:
     """Every run of one executive. `runners`: the runs that it drives, and the last that ended.
 
-    `observers`: the plugins that observe records; None: none is called.
+    `RunStarter` and `RunTakeover` add runs. `observers`: the plugins that observe records; None:
+    none is called.
     """
 
     def __init__(
@@ -153,8 +136,6 @@ class Supervisor:
         self.interrupted = InterruptedRuns(self.marks)
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
-        # Of two starts at once the second must see what the first one takes.
-        self._starting = asyncio.Lock()
         self.ownership = Ownership(
             journal, self.stalls, self.runners, self.replaced, self._claim_unknown
         )
@@ -236,7 +217,7 @@ class Supervisor:
         self._group = group
         self._lost_resources.take_up(self.arbiters.resources)
 
-    def _refuse_unconnected(self) -> None:
+    def refuse_unconnected(self) -> None:
         """Check that runs can be driven.
 
         Raises:
@@ -269,7 +250,7 @@ class Supervisor:
         """Let the marks of stopped runs be written."""
         await self.marks.close()
 
-    # --- starting and resuming ------------------------------------------------------------------
+    # --- starting and driving -------------------------------------------------------------------
 
     @property
     def fleet_now(self) -> Fleet:
@@ -277,243 +258,13 @@ class Supervisor:
         given = {name: parse_geojson(each.geometry) for name, each in self.handed_over.items()}
         return replace(self.fleet, geometries={**self.fleet.geometries, **given})
 
-    def admit(
-        self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None
-    ) -> tuple[str, list[Finding]]:
-        """Check a mission; returns the id of the process to begin with, and the warnings.
-
-        Raises:
-            MissionError: with every finding.
-        """
-        findings = findings_for(
-            loaded,
-            self.arbiters,
-            self.plugins,
-            known_data(data),
-            process,
-            handed_over=self.handed_over,
-        )
-        refuse_errors(f"{loaded.file} cannot run with fleet {self.fleet.file}", findings)
-        if loaded.chooses_resources or waits_for_space(self.fleet):
-            load_solver()
-        return loaded.process(process).id, findings
-
-    def load(
-        self,
-        mission: MissionSource | Mission,
-        process: str | None,
-        data: Mapping[str, Value] | None,
-    ) -> tuple[Mission, str]:
-        """Read and check a mission that is to start; returns it with its process. It blocks.
-
-        Raises:
-            MissionError: with every finding.
-        """
-        loaded = (
-            mission
-            if isinstance(mission, Mission)
-            else load_source(mission, self.settings.search_path)
-        )
-        process_id, _ = self.admit(loaded, process, data)
-        return loaded, process_id
-
-    async def start(
-        self,
-        mission: MissionSource | Mission,
-        process: str | None,
-        data: Mapping[str, Value] | None,
-        by: str,
-        *,
-        even_if_busy: bool = False,
-    ) -> RunId:
-        """Begin a run. Returns when its first records are durable.
-
-        Raises:
-            MissionError: with every finding.
-            BusyError: other runs or operators have what it names, unless `even_if_busy`.
-        """
-        # Reading and checking take a while, and a URL may take longer: not in the event loop.
-        loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
-        if even_if_busy:
-            return await self.begin(loaded, process_id, data, by)
-        return await self.begin_if_free(loaded, process_id, data, by)
-
-    async def begin_if_free(
-        self,
-        loaded: Mission,
-        process_id: str,
-        data: Mapping[str, Value] | None,
-        by: str,
-        *,
-        started: EntryChange | None = None,
-        still: Callable[[], bool] = lambda: True,
-    ) -> RunId:
-        """Begin a run if all that its mission names is free; the rest as for `begin`.
-
-        Raises:
-            BusyError: other runs or operators have some of it.
-        """
-        async with self._starting:
-            self.refuse_busy(loaded)
-            return await self.begin(loaded, process_id, data, by, started=started, still=still)
-
-    def refuse_busy(self, loaded: Mission) -> None:
-        """Check that everything that a mission names is free now.
-
-        Raises:
-            BusyError: other runs or operators have some of it.
-        """
-        ended = RunStatus.ENDED
-        over = {run for run, one in self.runners.items() if one.run.state.status is ended}
-        taken, holder = self.handover.taken, self.availability.holder
-        refuse_busy_resources(loaded, self.fleet, taken, holder, over)
-
-    async def begin(
-        self,
-        loaded: Mission,
-        process_id: str,
-        data: Mapping[str, Value] | None,
-        by: str,
-        *,
-        started: EntryChange | None = None,
-        still: Callable[[], bool] = lambda: True,
-    ) -> RunId:
-        """Begin a run of a mission that was admitted. Returns when its beginning is durable.
-
-        `started`: the new state of the entry of the schedule that starts it. `still`: whether it
-        may begin, asked when the journal has created it.
-
-        Raises:
-            OperatorError: the arbiters are not connected yet, or interrupted runs do not have their
-                vehicles yet.
-            NotBegunError: a run that the schedule starts was created, and has not begun.
-        """
-        self._refuse_unconnected()
-        self.interrupted.refuse_start()
-        header = RunHeader(
-            loaded.file,
-            loaded.source,
-            process_id,
-            dump(self.fleet),
-            self.fleet.simulated,
-            self.settings.speed,
-            self.clock.now_us() if self.settings.speed == 1.0 else time.time_ns() // 1000,
-            loaded.library,
-        )
-        number = await self.journal.create(header, started)
-        # From here to `_drive` nothing is awaited: STOP of all finds the run, or was before it.
-        if not still():
-            await self.journal.release(number)
-            raise NotBegunError(number, "it was held as it was to begin")
-        run = MissionRun(loaded, self.fleet, number, self.settings.steps_at_once)
-        runner = self._runner(run, 1)
-        begun = runner.submit(StartRun(process_id, dict(data or {}), by, self.handover.by_name()))
-        for geometry in self._geometries_given():
-            runner.post(geometry)
-        self._drive(runner)
-        try:
-            await begun
-        except M2pemError as error:
-            if started is None:
-                raise
-            await asyncio.wait([self._tasks[number]] if number in self._tasks else [])
-            self.runners.pop(number, None)
-            raise NotBegunError(number, str(error)) from error
-        return number
-
-    async def resume(self, runs: Sequence[RunId]) -> dict[RunId, M2pemError]:
-        """Take up runs that their executive left without ending them.
-
-        Each is given what it commanded before any of them commands anything new.
-
-        Returns why some are not taken up: a JournalError if there is no such run, or an executive
-        that is alive drives it; an OperatorError if it has ended.
-
-        Raises:
-            OperatorError: the arbiters are not connected yet.
-        """
-        self._refuse_unconnected()
-        self.interrupted.expect(runs)
-        refused: dict[RunId, M2pemError] = {}
-        taken_over: list[tuple[Runner, list[Command]]] = []
-        try:
-            for run in runs:
-                try:
-                    taken_over.append(await self._take_over(run))
-                except M2pemError as error:
-                    refused[run] = error
-        finally:
-            self.interrupted.expect(())
-            for runner, commands in taken_over:
-                runner.take_up(commands)
-                self._drive(runner)
-        return refused
-
-    async def _take_over(self, number: RunId) -> tuple[Runner, list[Command]]:
-        """Give an interrupted run what it commanded; returns what it still has to command."""
-        lines = {line.run: line for line in await self.journal.runs()}
-        line = lines.get(number)
-        if line is None:
-            known = ", ".join(lines) or "none"
-            raise JournalError(f"there is no run {number}; the journal has: {known}")
-        if line.loss is not None and not line.loss.resumable:
-            raise OperatorError(f"{number}: {line.loss}. {line.loss.remedy(number)}")
-        if line.outcome is not None:
-            raise OperatorError(f"{number} has ended: {line.outcome.value}")
-        if line.last_seq == 0:
-            raise OperatorError(f"{number} never began: start its mission again")
-        epoch = await self.journal.claim(number)
-        mission = mission_of(line.header)
-        for finding in mission.warnings:
-            if finding.severity is Severity.ERROR:
-                log.warning(
-                    "%s goes on as it was begun, but would not begin now: %s", number, finding
-                )
-        if mission.chooses_resources or waits_for_space(self.fleet):
-            await asyncio.to_thread(load_solver)
-        run = MissionRun(mission, self.fleet, number, self.settings.steps_at_once)
-        last_us = await replay(self.journal, run, self.settings.on_records)
-        runner = self._runner(run, epoch)
-        await self.dispatcher.fence(number, epoch)
-        self.handover.take_up(run.state.taken)
-        outage_s = self._outage_s(number, last_us)
-        claim(runner, line.loss, self.handover.taken, self._geometries_given())
-        mark = self.marks.get(number)
-        if mark is not None:
-            log.warning("%s was stopped before its executive ended; it stays stopped", number)
-            runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
-        commands = await take_over(
-            runner, self.arbiters, self.dispatcher, outage_s, self._lost, line.loss
-        )
-        self._returns.take_up(runner)
-        for name, was in still_lost(run.state).items():
-            self._lost_resources.lost_before(ResourceId(name), was.behavior, was.native_ref)
-        if line.loss is not None:
-            await self.losses.ask(runner, line.loss)
-        return runner, commands
-
-    def _outage_s(self, number: RunId, last_us: int) -> float:
-        """Return for how long no executive drove a run whose last input was decided at `last_us`.
-
-        Infinite: that is not known, as the computer's clock went back since.
-        """
-        by_wall = isinstance(self.clock, SystemClock) and self.settings.speed == 1.0
-        if by_wall and time.time_ns() // 1000 < last_us - CLOCK_BACK_US:
-            log.warning(
-                "%s: the computer's clock is before the run's last record (%s UTC): for how long "
-                "no executive drove it is not known",
-                number,
-                datetime.fromtimestamp(last_us / US_PER_S, UTC).strftime("%Y-%m-%d %H:%M:%S"),
-            )
-            return math.inf
-        return max(0.0, (self.clock.now_us() - last_us) / US_PER_S)
-
-    def _geometries_given(self) -> list[GeometrySet]:
+    def geometries_given(self) -> list[GeometrySet]:
         """Return the inputs that hand over what operators have handed over for all runs."""
         given = self.handed_over.items()
         return [GeometrySet(name, dict(each.geometry), each.by) for name, each in given]
 
-    def _runner(self, run: MissionRun, epoch: int) -> Runner:
+    def add(self, run: MissionRun, epoch: int) -> Runner:
+        """Return the runner of a run that is to be driven. `epoch`: that of its claim."""
         context = RunContext(
             self.journal,
             self.clock,
@@ -532,6 +283,12 @@ class Supervisor:
         self.runners[runner.id] = runner
         return runner
 
+    def take_up(self, runner: Runner) -> None:
+        """Know which vehicles of a run that is taken up were lost before."""
+        self._returns.take_up(runner)
+        for name, was in still_lost(runner.run.state).items():
+            self._lost_resources.lost_before(ResourceId(name), was.behavior, was.native_ref)
+
     def _look_at_all(self) -> None:
         for runner in self.runners.values():
             runner.wake()
@@ -541,9 +298,15 @@ class Supervisor:
     ) -> tuple[list[Input], frozenset[str]]:
         return await look_again(runner, self.arbiters, self.dispatcher, outage_s)
 
-    def _drive(self, runner: Runner) -> None:
+    def drive(self, runner: Runner) -> None:
+        """Have a run decide its inputs from now on."""
         assert self._group is not None
         self._tasks[runner.id] = self._group.create_task(self._drive_and_release(runner))
+
+    async def forget(self, run: RunId) -> None:
+        """Wait until the task of a run that failed to begin has ended; it is no run then."""
+        await asyncio.wait([self._tasks[run]] if run in self._tasks else [])
+        self.runners.pop(run, None)
 
     async def _drive_and_release(self, runner: Runner) -> None:
         await runner.drive()
@@ -583,7 +346,7 @@ class Supervisor:
             if isinstance(record, WorkReassigned) and record.code == LINK_LOST:
                 for resource in map(ResourceId, record.excluded):
                     if not self.availability.reason(resource):
-                        self._lost(resource, record.reason)  # its arbiter noticed it first
+                        self.lost(resource, record.reason)  # its arbiter noticed it first
         if self.settings.on_records is not None:
             self.settings.on_records(run, records)
         if self._observers is not None:
@@ -646,7 +409,7 @@ class Supervisor:
         log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
         resource = ResourceId(fault.resource)
         if not fault.reachable:
-            self._lost(resource, fault.reason)
+            self.lost(resource, fault.reason)
         with_team = self.arbiters.teams.fault(resource, fault.code, fault.reason)
         for runner in self.runners.values():
             if not with_team and fault.resource in runner.run.state.held:
@@ -658,7 +421,8 @@ class Supervisor:
         await self.ownership.confirmed()
         return await self.served_by_another() if self.served_by_another is not None else ""
 
-    def _lost(self, resource: ResourceId, reason: str) -> None:
+    def lost(self, resource: ResourceId, reason: str) -> None:
+        """Keep a vehicle or payload from all runs until it returns and does nothing any more."""
         self._lost_resources.lost(resource, reason)
         if self._separation:
             self._separation.reservations.lost(resource)

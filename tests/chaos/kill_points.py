@@ -123,7 +123,7 @@ POSTGRES = JournalKind(
 JOURNALS: Mapping[str, JournalKind] = {each.name: each for each in (SQLITE, POSTGRES)}
 
 _DISPATCHER = "m2pem.executive.dispatcher:Dispatcher"
-_SUPERVISOR = "m2pem.executive.supervisor"
+_TAKEOVER = "m2pem.executive.run_takeover"
 
 
 def executive_points(journal: JournalKind, arbiter: str) -> tuple[KillPoint, ...]:
@@ -141,11 +141,11 @@ def executive_points(journal: JournalKind, arbiter: str) -> tuple[KillPoint, ...
         KillPoint("ended, not released", f"{_DISPATCHER}.ended"),
         KillPoint("created, not begun", f"{journal.type}.create", When.AFTER),
         KillPoint("resume: claimed", f"{journal.type}.claim", When.AFTER, resuming=True),
-        KillPoint("resume: replayed", f"{_SUPERVISOR}:claim", resuming=True),
+        KillPoint("resume: replayed", f"{_TAKEOVER}:claim", resuming=True),
         KillPoint("resume: before a query", f"{arbiter}.query", resuming=True),
         KillPoint("resume: after a query", f"{arbiter}.query", When.AFTER, resuming=True),
         KillPoint("resume: before posting", f"{_DISPATCHER}.adopt", resuming=True),
-        KillPoint("resume: posted", f"{_SUPERVISOR}:take_over", When.AFTER, resuming=True),
+        KillPoint("resume: posted", f"{_TAKEOVER}:take_over", When.AFTER, resuming=True),
         KillPoint(
             "resume: taken up", "m2pem.executive.runner:Runner.take_up", When.AFTER, resuming=True
         ),

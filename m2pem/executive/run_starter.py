@@ -1,0 +1,184 @@
+"""Starting missions on an executive: each is checked, and begins if what it names is free."""
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+
+from m2pem.allocation.assignment import load_solver
+from m2pem.api.authoring import MissionSource
+from m2pem.api.runs import RunId
+from m2pem.engine.inputs import StartRun
+from m2pem.engine.run import MissionRun
+from m2pem.engine.state import RunStatus
+from m2pem.errors import M2pemError
+from m2pem.executive.handover import refuse_busy_resources
+from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
+from m2pem.executive.scheduled_start import NotBegunError
+from m2pem.executive.supervisor import Supervisor
+from m2pem.findings import Finding
+from m2pem.fleet.fleet import dump
+from m2pem.fleet.space import waits_for_space
+from m2pem.journal.base import RunHeader
+from m2pem.mission.mission import Mission
+from m2pem.mission.values import Value
+from m2pem.scheduling.entry import EntryChange
+
+
+class RunStarter:
+    """Checks missions and begins their runs, which the supervisor drives then."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+        # Of two starts at once the second must see what the first one takes.
+        self._starting = asyncio.Lock()
+
+    def admit(
+        self, loaded: Mission, process: str | None, data: Mapping[str, Value] | None
+    ) -> tuple[str, list[Finding]]:
+        """Check a mission; returns the id of the process to begin with, and the warnings.
+
+        Raises:
+            MissionError: with every finding.
+        """
+        supervisor = self._supervisor
+        findings = findings_for(
+            loaded,
+            supervisor.arbiters,
+            supervisor.plugins,
+            known_data(data),
+            process,
+            handed_over=supervisor.handed_over,
+        )
+        refuse_errors(f"{loaded.file} cannot run with fleet {supervisor.fleet.file}", findings)
+        if loaded.chooses_resources or waits_for_space(supervisor.fleet):
+            load_solver()
+        return loaded.process(process).id, findings
+
+    def load(
+        self,
+        mission: MissionSource | Mission,
+        process: str | None,
+        data: Mapping[str, Value] | None,
+    ) -> tuple[Mission, str]:
+        """Read and check a mission that is to start; returns it with its process. It blocks.
+
+        Raises:
+            MissionError: with every finding.
+        """
+        supervisor = self._supervisor
+        loaded = (
+            mission
+            if isinstance(mission, Mission)
+            else load_source(mission, supervisor.settings.search_path)
+        )
+        process_id, _ = self.admit(loaded, process, data)
+        return loaded, process_id
+
+    async def start(
+        self,
+        mission: MissionSource | Mission,
+        process: str | None,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        even_if_busy: bool = False,
+    ) -> RunId:
+        """Begin a run. Returns when its first records are durable.
+
+        Raises:
+            MissionError: with every finding.
+            BusyError: other runs or operators have what it names, unless `even_if_busy`.
+        """
+        # Reading and checking take a while, and a URL may take longer: not in the event loop.
+        loaded, process_id = await asyncio.to_thread(self.load, mission, process, data)
+        if even_if_busy:
+            return await self.begin(loaded, process_id, data, by)
+        return await self.begin_if_free(loaded, process_id, data, by)
+
+    async def begin_if_free(
+        self,
+        loaded: Mission,
+        process_id: str,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        started: EntryChange | None = None,
+        still: Callable[[], bool] = lambda: True,
+    ) -> RunId:
+        """Begin a run if all that its mission names is free; the rest as for `begin`.
+
+        Raises:
+            BusyError: other runs or operators have some of it.
+        """
+        async with self._starting:
+            self.refuse_busy(loaded)
+            return await self.begin(loaded, process_id, data, by, started=started, still=still)
+
+    def refuse_busy(self, loaded: Mission) -> None:
+        """Check that everything that a mission names is free now.
+
+        Raises:
+            BusyError: other runs or operators have some of it.
+        """
+        supervisor = self._supervisor
+        ended = RunStatus.ENDED
+        over = {run for run, one in supervisor.runners.items() if one.run.state.status is ended}
+        taken, holder = supervisor.handover.taken, supervisor.availability.holder
+        refuse_busy_resources(loaded, supervisor.fleet, taken, holder, over)
+
+    async def begin(
+        self,
+        loaded: Mission,
+        process_id: str,
+        data: Mapping[str, Value] | None,
+        by: str,
+        *,
+        started: EntryChange | None = None,
+        still: Callable[[], bool] = lambda: True,
+    ) -> RunId:
+        """Begin a run of a mission that was admitted. Returns when its beginning is durable.
+
+        `started`: the new state of the entry of the schedule that starts it. `still`: whether it
+        may begin, asked when the journal has created it.
+
+        Raises:
+            OperatorError: the arbiters are not connected yet, or interrupted runs do not have their
+                vehicles yet.
+            NotBegunError: a run that the schedule starts was created, and has not begun.
+        """
+        supervisor = self._supervisor
+        supervisor.refuse_unconnected()
+        supervisor.interrupted.refuse_start()
+        header = RunHeader(
+            loaded.file,
+            loaded.source,
+            process_id,
+            dump(supervisor.fleet),
+            supervisor.fleet.simulated,
+            supervisor.settings.speed,
+            supervisor.clock.now_us()
+            if supervisor.settings.speed == 1.0
+            else time.time_ns() // 1000,
+            loaded.library,
+        )
+        number = await supervisor.journal.create(header, started)
+        # From here to `drive` nothing is awaited: STOP of all finds the run, or was before it.
+        if not still():
+            await supervisor.journal.release(number)
+            raise NotBegunError(number, "it was held as it was to begin")
+        run = MissionRun(loaded, supervisor.fleet, number, supervisor.settings.steps_at_once)
+        runner = supervisor.add(run, 1)
+        begun = runner.submit(
+            StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name())
+        )
+        for geometry in supervisor.geometries_given():
+            runner.post(geometry)
+        supervisor.drive(runner)
+        try:
+            await begun
+        except M2pemError as error:
+            if started is None:
+                raise
+            await supervisor.forget(number)
+            raise NotBegunError(number, str(error)) from error
+        return number

@@ -1,0 +1,123 @@
+"""Taking up the runs that another executive has left without ending them."""
+
+import asyncio
+import logging
+import math
+import time
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from m2pem.allocation.assignment import load_solver
+from m2pem.api.clock import SystemClock
+from m2pem.api.runs import RunId
+from m2pem.engine.commands import Command
+from m2pem.engine.inputs import StopRun
+from m2pem.engine.run import MissionRun
+from m2pem.errors import JournalError, M2pemError, OperatorError
+from m2pem.executive.recovery import claim, replay, take_over
+from m2pem.executive.runner import Runner
+from m2pem.executive.supervisor import Supervisor
+from m2pem.findings import Severity
+from m2pem.fleet.space import waits_for_space
+from m2pem.journal.mission import mission_of
+from m2pem.units import US_PER_S
+
+log = logging.getLogger("m2pem.executive")
+
+CLOCK_BACK_US = 2 * US_PER_S
+"""A wall clock that is behind the journal by more has gone back: no leap second, and no slew."""
+
+
+class RunTakeover:
+    """Takes up interrupted runs of the journal, which the supervisor drives then."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+
+    async def resume(self, runs: Sequence[RunId]) -> dict[RunId, M2pemError]:
+        """Take up runs that their executive left without ending them.
+
+        Each is given what it commanded before any of them commands anything new.
+
+        Returns why some are not taken up: a JournalError if there is no such run, or an executive
+        that is alive drives it; an OperatorError if it has ended.
+
+        Raises:
+            OperatorError: the arbiters are not connected yet.
+        """
+        supervisor = self._supervisor
+        supervisor.refuse_unconnected()
+        supervisor.interrupted.expect(runs)
+        refused: dict[RunId, M2pemError] = {}
+        taken_over: list[tuple[Runner, list[Command]]] = []
+        try:
+            for run in runs:
+                try:
+                    taken_over.append(await self._take_over(run))
+                except M2pemError as error:
+                    refused[run] = error
+        finally:
+            supervisor.interrupted.expect(())
+            for runner, commands in taken_over:
+                runner.take_up(commands)
+                supervisor.drive(runner)
+        return refused
+
+    async def _take_over(self, number: RunId) -> tuple[Runner, list[Command]]:
+        """Give an interrupted run what it commanded; returns what it still has to command."""
+        supervisor = self._supervisor
+        lines = {line.run: line for line in await supervisor.journal.runs()}
+        line = lines.get(number)
+        if line is None:
+            known = ", ".join(lines) or "none"
+            raise JournalError(f"there is no run {number}; the journal has: {known}")
+        if line.loss is not None and not line.loss.resumable:
+            raise OperatorError(f"{number}: {line.loss}. {line.loss.remedy(number)}")
+        if line.outcome is not None:
+            raise OperatorError(f"{number} has ended: {line.outcome.value}")
+        if line.last_seq == 0:
+            raise OperatorError(f"{number} never began: start its mission again")
+        epoch = await supervisor.journal.claim(number)
+        mission = mission_of(line.header)
+        for finding in mission.warnings:
+            if finding.severity is Severity.ERROR:
+                log.warning(
+                    "%s goes on as it was begun, but would not begin now: %s", number, finding
+                )
+        if mission.chooses_resources or waits_for_space(supervisor.fleet):
+            await asyncio.to_thread(load_solver)
+        run = MissionRun(mission, supervisor.fleet, number, supervisor.settings.steps_at_once)
+        last_us = await replay(supervisor.journal, run, supervisor.settings.on_records)
+        runner = supervisor.add(run, epoch)
+        await supervisor.dispatcher.fence(number, epoch)
+        supervisor.handover.take_up(run.state.taken)
+        outage_s = self._outage_s(number, last_us)
+        claim(runner, line.loss, supervisor.handover.taken, supervisor.geometries_given())
+        mark = supervisor.marks.get(number)
+        if mark is not None:
+            log.warning("%s was stopped before its executive ended; it stays stopped", number)
+            runner.submit_stop(StopRun(mark.by, mark.reason), frozenset())
+        commands = await take_over(
+            runner, supervisor.arbiters, supervisor.dispatcher, outage_s, supervisor.lost, line.loss
+        )
+        supervisor.take_up(runner)
+        if line.loss is not None:
+            await supervisor.losses.ask(runner, line.loss)
+        return runner, commands
+
+    def _outage_s(self, number: RunId, last_us: int) -> float:
+        """Return for how long no executive drove a run whose last input was decided at `last_us`.
+
+        Infinite: that is not known, as the computer's clock went back since.
+        """
+        supervisor = self._supervisor
+        by_wall = isinstance(supervisor.clock, SystemClock) and supervisor.settings.speed == 1.0
+        if by_wall and time.time_ns() // 1000 < last_us - CLOCK_BACK_US:
+            log.warning(
+                "%s: the computer's clock is before the run's last record (%s UTC): for how long "
+                "no executive drove it is not known",
+                number,
+                datetime.fromtimestamp(last_us / US_PER_S, UTC).strftime("%Y-%m-%d %H:%M:%S"),
+            )
+            return math.inf
+        return max(0.0, (supervisor.clock.now_us() - last_us) / US_PER_S)
