@@ -6,7 +6,7 @@ vehicle: what comes of a command arrives as a report.
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
@@ -327,6 +327,11 @@ class Dispatcher:
         spec = self.spec(ids, command.name, kind)
         if spec is not None:
             self._clearance.reservations.adopt(self.request(command, spec), kind)
+
+    def resources_of(self, behavior: str) -> Sequence[ResourceId]:
+        """Return the resources of a behavior that has not ended."""
+        active = self._active.get(behavior)
+        return () if active is None else active.resources
 
     def view(self, behavior: str) -> DispatcherView:
         """Return what is commanded of a behavior that has not ended."""

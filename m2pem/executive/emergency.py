@@ -14,19 +14,24 @@ from m2pem.api.runs import Alert, RunId
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
-from m2pem.engine.state import RunStatus
+from m2pem.engine.state import RunOutcome, RunStatus
 from m2pem.errors import M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
 from m2pem.executive.ended_runs import in_words
 from m2pem.executive.mark_files import MarkFiles
 from m2pem.executive.runner import Runner
+from m2pem.mission.catalogue import BehaviorState
 
 ACKNOWLEDGED_WITHIN_S = 1.0
 """An arbiter that has not taken a STOP or hold by then: operators are alerted."""
 
 WRITTEN_WITHIN_S = 1.5
 """How long an operator's STOP or pause waits for the journal, before it says how things are."""
+
+
+_NOT_STOPPED = (BehaviorState.LOST, BehaviorState.FAILED)
+"""How a behavior ends whose cancel its vehicle may not have received."""
 
 
 class EmergencyCommands:
@@ -104,6 +109,20 @@ class EmergencyCommands:
         if problems:
             raise OperatorError("; ".join(problems))
 
+    def on_records(self, runner: Runner, records: Iterable[r.Record]) -> None:
+        """Say which vehicles of a stopped run were lost, or failed, before they had stopped."""
+        if runner.run.state.outcome is not RunOutcome.STOPPED:
+            return
+        for record in records:
+            if isinstance(record, r.BehaviorEnded) and record.state in _NOT_STOPPED:
+                resources = self._dispatcher.resources_of(record.behavior)
+                self._alert("STOP", runner.id, resources, record.reason or record.code)
+
+    def _alert(self, what: str, run: RunId, resources: Iterable[str], why: str) -> None:
+        names = ", ".join(resources)
+        text = f"{names} may not have received the {what} of {run}: {why}. Use its own stop"
+        self._events.publish(Alert(run, "NOT_RECEIVED", text))
+
     def _watch(self, what: str, run: RunId, orders: Mapping[str, Order]) -> None:
         if orders:
             task = asyncio.create_task(self._alert_if_late(what, run, orders))
@@ -120,9 +139,7 @@ class EmergencyCommands:
             if order.wrong or not (order.task is None or order.task.done())
         ]
         for order, why in late:
-            names = ", ".join(order.resources)
-            text = f"{names} may not have received the {what} of {run}: {why}. Use its own stop"
-            self._events.publish(Alert(run, "NOT_RECEIVED", text))
+            self._alert(what, run, order.resources, why)
 
 
 def _waited(order: Order) -> str:

@@ -342,6 +342,8 @@ class Supervisor:
         self.losses.on_records(run, records)
         self.allocator.on_records(run, records)
         self._returns.on_records(run, records)
+        if (runner := self.runners.get(run)) is not None:
+            self.emergency.on_records(runner, records)
         for record in records:
             if isinstance(record, WorkReassigned) and record.code == LINK_LOST:
                 for resource in map(ResourceId, record.excluded):

@@ -233,6 +233,19 @@ def test_an_arbiter_that_does_not_take_a_stop_is_named_and_delays_no_other_vehic
     assert "has not taken it within 1 s" in play(story, "ugv1", "ugv2")
 
 
+def test_a_vehicle_that_does_not_end_what_it_did_after_a_stop_is_named(play):
+    async def story(world: World):
+        control = world.executive.control
+        alert = asyncio.ensure_future(alerts(world, "NOT_RECEIVED"))
+        run = await control.start(DRIVE)
+        await world.fake.until_called("start")
+        await control.stop(run)
+        return (await alert).text
+
+    text = play(story, "ugv1")
+    assert text.startswith("ugv1 may not have received the STOP of r1: did not end within ")
+
+
 def test_a_mission_that_never_waits_is_paused_and_says_why_and_can_be_stopped(play):
     async def story(world: World):
         control = world.executive.control
