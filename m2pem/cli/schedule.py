@@ -150,7 +150,7 @@ def start(entry: str, journal: str | None, by: str | None) -> None:
 @by_option
 def hold(entry: str | None, reason: str, journal: str | None, by: str | None) -> None:
     """Let an entry, or the whole schedule, start nothing until it is released."""
-    from m2pem.cli.journals import executives_elsewhere
+    from m2pem.errors import OperatorError
 
     async def offline(kept: "Journal", name: str) -> None:
         from m2pem.scheduling.entry import EntryChange, Hold
@@ -161,7 +161,9 @@ def hold(entry: str | None, reason: str, journal: str | None, by: str | None) ->
             await kept.change_entry(EntryChange(entry, state.changed(hold=made)))
             return
         fleets = {each.plan.fleet for each in await kept.entries() if each.state.active}
-        for fleet in fleets.union(*(each.fleets for each in executives_elsewhere(journal))):
+        if not fleets:
+            raise OperatorError("nothing is scheduled")
+        for fleet in fleets:
             await kept.hold_schedule(fleet, made)
 
     what = entry or "the schedule"
@@ -174,17 +176,22 @@ def hold(entry: str | None, reason: str, journal: str | None, by: str | None) ->
 @by_option
 def release(entry: str | None, journal: str | None, by: str | None) -> None:
     """Let an entry, or the whole schedule, start missions again."""
-    from m2pem.cli.journals import executives_elsewhere
+    from m2pem.errors import OperatorError
 
     async def offline(kept: "Journal", _: str) -> None:
         from m2pem.scheduling.entry import EntryChange
 
         if entry is not None:
             state = (await _active(kept, entry)).state
+            if state.hold is None:
+                raise OperatorError(f"{entry} is not held")
             await kept.change_entry(EntryChange(entry, state.changed(hold=None)))
             return
         fleets = {each.plan.fleet for each in await kept.entries()}
-        for fleet in fleets.union(*(each.fleets for each in executives_elsewhere(journal))):
+        held = [fleet for fleet in fleets if await kept.schedule_hold(fleet) is not None]
+        if not held:
+            raise OperatorError("the schedule is not held")
+        for fleet in held:
             await kept.hold_schedule(fleet, None)
 
     what = entry or "the schedule"
@@ -291,6 +298,5 @@ async def _active(journal: "Journal", entry: str) -> "ScheduleEntry":
         if found.id == entry:
             if found.state.active:
                 return found
-            detail = found.state.detail or f"it has started {found.state.run}"
-            raise OperatorError(f"{entry} is {found.state.status.value}: {detail}")
+            raise OperatorError(f"{entry} is {found.state.end}")
     raise UnusableError(f"the schedule has no entry {entry!r}")

@@ -179,8 +179,7 @@ class ScheduleEntries:
             known = ", ".join(each.id for each in self.active()) or "none"
             raise OperatorError(f"there is no entry {number!r} in the schedule; it has {known}")
         if not entry.state.active:
-            detail = entry.state.detail or f"it has started {entry.state.run}"
-            raise OperatorError(f"{number} is {entry.state.status.value}: {detail}")
+            raise OperatorError(f"{number} is {entry.state.end}")
         return entry
 
     async def find(self, number: EntryId) -> ScheduleEntry:
@@ -380,9 +379,10 @@ class ScheduleEntries:
                 if entry.state.hold is None:
                     raise OperatorError(f"{number} is not held")
                 await self.change(entry, hold=None)
+        for each in self.looks if number is None else (number,):
+            look = self.looks[each]
+            look.reason, look.warned_due_us, look.starts_us = "", None, None
         self.say(f"{number or 'the schedule'} is released by {by or 'an operator'}")
-        for look in self.looks.values():
-            look.warned_due_us = look.starts_us = None
         self.changed.set()
 
     async def _release_all(self) -> None:

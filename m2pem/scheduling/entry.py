@@ -150,6 +150,12 @@ class EntryState(msgspec.Struct, frozen=True, omit_defaults=True):
         """Whether it may still start something."""
         return self.status is EntryStatus.ACTIVE
 
+    @property
+    def end(self) -> str:
+        """How it is over, in words: "ended: it has started r1"."""
+        detail = self.detail or f"it has started {self.run}"
+        return detail if detail.startswith(self.status.value) else f"{self.status.value}: {detail}"
+
     def changed(self, **fields: Any) -> "EntryState":
         """Return the next state, with other values of some fields."""
         return msgspec.structs.replace(self, **fields, revision=self.revision + 1)

@@ -60,9 +60,14 @@ def test_a_command_says_which_host_has_what_it_asks_for(
 def test_the_schedule_that_another_host_serves_is_held_and_released_in_the_journal(
     invoke: Invoke, served: Journal, postgres_url: str
 ) -> None:
+    assert invoke("schedule", "hold", "--journal", postgres_url)[2].endswith(
+        "nothing is scheduled\n"
+    )
+    asyncio.run(served.schedule(PLAN, EntryState(0)))
     for word, held in (("hold", True), ("release", False)):
         assert invoke("schedule", word, "--journal", postgres_url)[0] == 0
         assert (asyncio.run(served.schedule_hold("north")) is not None) is held
+    assert invoke("schedule", "release", "--journal", postgres_url)[2].endswith("is not held\n")
 
 
 def test_a_stop_of_all_says_what_it_has_not_stopped(

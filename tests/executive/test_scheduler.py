@@ -424,6 +424,24 @@ def test_a_held_entry_starts_nothing_until_it_is_released():
     assert begun == {"r1": pytest.approx(120, abs=0.01)}
 
 
+def test_a_release_of_one_entry_does_not_delay_the_start_of_another():
+    async def story(world):
+        await world.schedule(drive("ugv1"), at=at(60))
+        await world.schedule(drive("ugv2"), at=at(100))
+        await world.executive.control.hold_schedule("s1", by="bob", reason="rain")
+        await world.at(95)
+        assert (await world.entry("s2")).status is ScheduledStatus.STARTING
+        await world.executive.control.release_schedule("s1", by="bob")
+        released = await world.entry("s1")
+        await world.end("r1")
+        await world.end("r2")
+        return released, await world.begun()
+
+    released, begun = play(story, fleet=unattended_fleet("ugv1", "ugv2", warning_s=10))
+    assert (released.status, released.reason) == (ScheduledStatus.WAITING, "")
+    assert list(begun.values()) == [pytest.approx(100, abs=0.01), pytest.approx(105, abs=0.01)]
+
+
 def test_stop_of_all_holds_the_schedule_also_after_a_restart():
     journal = MemoryJournal()
 

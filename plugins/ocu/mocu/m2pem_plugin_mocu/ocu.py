@@ -5,6 +5,7 @@ import logging
 import os
 from collections.abc import Mapping
 from contextlib import suppress
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from m2pem_plugin_ros import keep_on_loopback, require_interfaces
@@ -25,6 +26,12 @@ SETTLE_TURNS = 5
 SETTLE_S = 0.5
 
 log = logging.getLogger("m2pem.ocu.mocu")
+
+
+def _load_rclpy() -> None:
+    """Load what takes a second, in a thread: STOP reaches the vehicles meanwhile."""
+    for module in ("m2pem_plugin_ros.runtime", "m2pem_plugin_mocu.services"):
+        import_module(module)
 
 
 class MocuOcu:
@@ -57,6 +64,7 @@ class MocuOcu:
 
         Ends when the executive does.
         """
+        await asyncio.to_thread(_load_rclpy)
         from m2pem_plugin_ros import RosRuntime  # noqa: PLC0415  # rclpy
 
         from m2pem_plugin_mocu.diagnostics import DiagnosticsPublisher  # noqa: PLC0415

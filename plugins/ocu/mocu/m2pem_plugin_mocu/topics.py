@@ -26,6 +26,7 @@ from m2pem.api import (
     StampedRecord,
 )
 from m2pem.api import records as r
+from m2pem.api.runs import SCHEDULE, STARTS_SOON
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import incidents, messages
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
@@ -197,7 +198,13 @@ class Topics(Listener):
 
     def alerted(self, alert: Alert) -> None:
         """Log it in ROS, whose topic `/rosout` operators read."""
-        self._ros_log.error(f"{alert.run}: {alert.text}" if alert.run else alert.text)
+        text = f"{alert.run}: {alert.text}" if alert.run else alert.text
+        if alert.code == SCHEDULE:
+            self._ros_log.info(text)
+        elif alert.code == STARTS_SOON:
+            self._ros_log.warning(text)
+        else:
+            self._ros_log.error(text)
 
     # --- publishing -----------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from m2pem.testing import scenarios
 HOLD, RELEASE, CANCEL, START = 1, 2, 3, 4
 ADDED, CHANGED, HELD, RELEASED = 1, 2, 4, 5
 IS_HELD, CANCELLED = 4, 6
+INFO = 20
 QUESTION = scenarios.question("Go on?")
 
 
@@ -26,6 +27,8 @@ async def test_a_client_lists_holds_starts_and_cancels_what_is_scheduled(client:
             fields = {"verb": verb, "entry": entry, "by": "anna", **more}
             return await client.call("control_schedule", **fields)
 
+        news = await client.hears("rosout", lambda e: "s1 is scheduled by ada" in e["msg"])
+        assert news["level"] == INFO
         assert (await asks(HOLD, reason="rain"))["success"]
         held = await client.hears(
             "schedule_events",
@@ -45,7 +48,7 @@ async def test_a_client_lists_holds_starts_and_cancels_what_is_scheduled(client:
         assert (await asks(RELEASE, ""))["success"]
         await client.hears("schedule_events", lambda e: e["kind"] == RELEASED)
         assert (await asks(CANCEL))["success"]
-        assert not (await asks(CANCEL))["success"]
+        assert (await asks(CANCEL))["message"] == "s1 is cancelled by anna"
         listed = await client.call("list_schedule")
         (entry,) = listed["schedule"]["entries"]
         assert (entry["status"], entry["reason"]) == (CANCELLED, "cancelled by anna")
