@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from m2pem.api.epoch_fence import EpochFence
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
-    from m2pem.api.health import HealthCheck, HealthStatus, listening_check
+    from m2pem.api.health import ExecutiveAddress, HealthCheck, HealthStatus, listening_check
     from m2pem.api.hosting import CutOffPolicy, Host, HostedArbiter, HostLink, WhenCutOff
     from m2pem.api.latest_task import LatestTask
     from m2pem.api.ocu import Ocu
@@ -162,7 +162,7 @@ _MODULES = {
     "m2pem.api.epoch_fence": "EpochFence",
     "m2pem.api.follower": "Follower Listener follow",
     "m2pem.api.goals": "GoalArbiter",
-    "m2pem.api.health": "HealthCheck HealthStatus listening_check",
+    "m2pem.api.health": "ExecutiveAddress HealthCheck HealthStatus listening_check",
     "m2pem.api.hosting": "CutOffPolicy Host HostLink HostedArbiter WhenCutOff",
     "m2pem.api.behavior_parameters": "BehaviorParameters decode_parameters encode_parameters",
     "m2pem.api.behavior_tracker": "BehaviorTracker",
@@ -262,6 +262,7 @@ __all__ = [
     "Editable",
     "EpochFence",
     "Fence",
+    "ExecutiveAddress",
     "FencingArbiter",
     "Finding",
     "Fleet",

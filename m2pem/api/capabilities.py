@@ -50,11 +50,12 @@ class OcuCapabilities:
     `takes_terminal`: it draws on the whole terminal. Then the command line prints nothing while it
     serves, and uses `plain` instead where there is no terminal. `imports`: names of modules that
     take long to import. They are imported before an executive exists, as an import in its event
-    loop would delay STOP.
+    loop would delay STOP. `stands_by`: it has what `m2pem.api.ocu.StandbyOcu` describes.
     """
 
     takes_terminal: bool = False
     imports: tuple[str, ...] = ()
+    stands_by: bool = False
 
 
 def arbiter_capabilities(arbiter: object) -> ArbiterCapabilities:
@@ -90,7 +91,12 @@ def arbiter_problem(arbiter: object) -> str:
 
 def ocu_problem(factory: object) -> str:
     """Return what is wrong in the declaration of an operator control unit; "" if nothing is."""
-    return _problem(factory, OcuCapabilities, REPLACED_OF_OCU)
+    if problem := _problem(factory, OcuCapabilities, REPLACED_OF_OCU):
+        return problem
+    for member in ("page", "stand_by"):
+        if ocu_capabilities(factory).stands_by and not hasattr(factory, member):
+            return f"its `capabilities` say stands_by=True, but it has no `{member}`"
+    return ""
 
 
 def _problem(declaring: object, kind: type, replaced: Mapping[str, str]) -> str:

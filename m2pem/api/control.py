@@ -20,7 +20,7 @@ from m2pem.api.authoring import (
     SearchLimits,
     SearchProgress,
 )
-from m2pem.api.health import HealthCheck
+from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.runs import (
     Alert,
     HandedOver,
@@ -367,6 +367,14 @@ class MissionControl(Protocol):
 
         It answers within two seconds, whatever hangs. Vehicles do not count: their links are in
         the telemetry.
+        """
+        ...
+
+    async def standbys(self) -> Sequence[ExecutiveAddress]:
+        """The executives that stand by for the fleet of this one.
+
+        Raises:
+            JournalError: the journal cannot say it.
         """
         ...
 

@@ -15,6 +15,22 @@ class HealthStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class ExecutiveAddress:
+    """Where an executive is. `page`: the address of its web page; "": it has none.
+
+    `pid` 0: it has just begun, and is not known yet.
+    """
+
+    host: str
+    pid: int
+    page: str = ""
+
+    def __str__(self) -> str:
+        at = f" ({self.page})" if self.page else ""
+        return f"process {self.pid} on {self.host}{at}"
+
+
+@dataclass(frozen=True, slots=True)
 class HealthCheck:
     """What was found about one thing. `remedy`: what to do about it; "" if it is right.
 

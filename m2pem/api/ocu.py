@@ -1,9 +1,11 @@
 """An operator control unit: how operators see and steer missions (paper, section 4.3)."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from m2pem.api.control import MissionControl
+    from m2pem.api.health import ExecutiveAddress
 
 
 class Ocu(Protocol):
@@ -17,4 +19,21 @@ class Ocu(Protocol):
 
     async def serve(self) -> None:
         """Show and ask until cancelled, or until the operator leaves."""
+        ...
+
+
+class StandbyOcu(Protocol):
+    """A unit that answers also while its executive stands by (`OcuCapabilities.stands_by`)."""
+
+    @classmethod
+    def page(cls) -> str:
+        """Return the address at which browsers will find it; "": it has none, or does not know."""
+        ...
+
+    @classmethod
+    async def stand_by(cls, fleet: str, served_by: "Callable[[], ExecutiveAddress | None]") -> None:
+        """Tell who comes that the executive stands by, until cancelled.
+
+        `served_by`: who serves the fleet now; None: that is not known.
+        """
         ...

@@ -24,7 +24,7 @@ from m2pem.api.allocation import (
 )
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.control import MissionControl
-from m2pem.api.health import HealthCheck
+from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.runs import (
     Alert,
     IncidentPreview,
@@ -305,6 +305,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("simulated", Nothing, bool, kept=True),
         Operation("speed", Nothing, float, kept=True),
         Operation("health", Nothing, list[HealthCheck], alone=True),
+        Operation("standbys", Nothing, list[ExecutiveAddress], alone=True),
         Operation(
             "journal_file",
             Nothing,

@@ -9,6 +9,9 @@ import click
 from m2pem.cli.options import as_json, example, fleet_option, format_option, journal_option
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
     from m2pem.api.health import HealthCheck
 
 ANSWERED_WITHIN_S = 5.0
@@ -78,11 +81,30 @@ def _running(journal: str | None) -> "list[HealthCheck]":
             checks.append(HealthCheck(name, HealthStatus.ERROR, str(error), remedy))
         else:
             checks += [replace(check, name=f"{name}: {check.name}") for check in said]
+            checks += _standbys_at(socket, name)
     if not checks:
         why = f"none serves {path} here"
         remedy = elsewhere(journal) or "m2pem serve starts one"
         checks.append(HealthCheck("executive", HealthStatus.ERROR, why, remedy))
     return checks
+
+
+def _standbys_at(socket: "Path", name: str) -> "Iterator[HealthCheck]":
+    """Say who stands by for an executive."""
+    import msgspec
+
+    from m2pem.api.health import ExecutiveAddress, HealthCheck, HealthStatus
+    from m2pem.control_socket.client import ask
+    from m2pem.errors import M2pemError
+
+    try:
+        said = ask(socket, "standbys", timeout_s=ANSWERED_WITHIN_S)
+        found = msgspec.convert(said, list[ExecutiveAddress])
+    except (M2pemError, msgspec.ValidationError):
+        return  # the check of its journal says it
+    who = "; ".join(map(str, found))
+    text = f"{who} stands by" if who else "no standby (m2pem serve --standby)"
+    yield HealthCheck(f"{name}: standby", HealthStatus.OK, text)
 
 
 def _show(checks: "Sequence[HealthCheck]", output: str) -> int:

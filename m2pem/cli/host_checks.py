@@ -28,6 +28,7 @@ from m2pem.journal.storage_checks import (
 
 if TYPE_CHECKING:
     from m2pem.fleet.fleet import Fleet, Payload, Vehicle
+    from m2pem.journal.fleet_server import FleetServer
     from m2pem.plugins import PluginManager
 
 OK, WARNING, ERROR = HealthStatus.OK, HealthStatus.WARNING, HealthStatus.ERROR
@@ -282,6 +283,7 @@ def check_fleet(
     except VehicleInUseError as error:
         remedy = "start missions there (m2pem start), or end that process first"
         checks.append(HealthCheck("vehicles", WARNING, str(error), remedy))
+        checks += [each for each in _served(fleet, journal_url) if each.name == "standby"]
     except M2pemError:
         pass  # the check of the journal says it
     else:
@@ -290,23 +292,29 @@ def check_fleet(
 
 
 def _served(fleet: "Fleet", journal_url: str | None) -> Iterator[HealthCheck]:
-    """Say which executive serves the fleet on the journal, on any host."""
+    """Say which executives serve the fleet on the journal, and stand by for it, on any host."""
     from m2pem.cli.journals import journal_to_read
+    from m2pem.journal.standbys import standbys_of
 
-    async def ask() -> str:
+    async def ask() -> "tuple[FleetServer | None, list[FleetServer], float | None]":
         async with journal_to_read(journal_url) as journal:
             server = await journal.fleet_server(fleet.name, [*fleet.vehicles, *fleet.payloads])
-        return str(server) if server is not None else ""
+            return server, await standbys_of(journal, fleet.name), journal.lease_s
 
     try:
-        server = asyncio.run(ask())
+        server, standbys, lease_s = asyncio.run(ask())
     except M2pemError:
         return  # the check of the journal says it
-    if server:
+    if server is not None:
+        text = f"{server} serves {fleet.name}"
+        if server.left_s is not None:
+            text += f"; its lease lasts {server.left_s:.1f} s more ({lease_s:g} s are set here)"
         remedy = "start missions there (m2pem start), or let another one stand by: serve --standby"
-        yield HealthCheck("vehicles", WARNING, f"{server} serves {fleet.name}", remedy)
+        yield HealthCheck("vehicles", WARNING, text, remedy)
     else:
         yield HealthCheck("vehicles", OK, "no executive of this user commands them")
+    who = "; ".join(map(str, standbys))
+    yield HealthCheck("standby", OK, f"{who} stands by" if who else "no executive stands by")
 
 
 def _findings(error: FleetError, file: str) -> list[HealthCheck]:

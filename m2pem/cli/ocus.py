@@ -6,11 +6,14 @@ import logging
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
+from typing import cast
 
 import click
 
 from m2pem.api.capabilities import ocu_capabilities
 from m2pem.api.control import MissionControl
+from m2pem.api.health import ExecutiveAddress
+from m2pem.api.ocu import StandbyOcu
 from m2pem.cli.notes import note
 from m2pem.errors import PluginError
 from m2pem.plugins import PluginManager
@@ -68,6 +71,24 @@ class Operators:
     def take_terminal(self) -> bool:
         """Whether one of them draws on the whole terminal."""
         return any(ocu_capabilities(each).takes_terminal for each in self._factories.values())
+
+    @property
+    def page(self) -> str:
+        """The address of the web page that one of them will serve; "": none does."""
+        return next((page for each in self._standing_by() if (page := each.page())), "")
+
+    async def stand_by(self, fleet: str, served_by: Callable[[], ExecutiveAddress | None]) -> None:
+        """Let those that can answer while the executive stands by, until cancelled."""
+        units = [
+            self._serve("standby", each.stand_by(fleet, served_by)) for each in self._standing_by()
+        ]
+        await asyncio.gather(*units)
+
+    def _standing_by(self) -> list[type[StandbyOcu]]:
+        units = self._factories.values()
+        return [
+            cast("type[StandbyOcu]", each) for each in units if ocu_capabilities(each).stands_by
+        ]
 
     def begin(self, control: MissionControl, left: Callable[[], None]) -> None:
         """Let them serve. `left` is called when the operator of one has left, and when one that

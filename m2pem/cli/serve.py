@@ -21,9 +21,11 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from m2pem.cli.ocus import Operators
     from m2pem.executive.executive import Executive
     from m2pem.fleet.fleet import Fleet
     from m2pem.journal.base import Journal, RunHeader, RunInfo
+    from m2pem.journal.fleet_server import FleetServer
     from m2pem.plugins import PluginManager
 
 
@@ -134,11 +136,13 @@ async def _serve(
     refuse_speed(fleet, speed)
     _refuse_memory(url, standby=standby)
     async with journal_at(url) as journal:
-        if standby and not await standing_by(journal, fleet, plugins, speed):
+        if standby and not await standing_by(journal, fleet, plugins, speed, operators):
             return 0
         mine, _ = await interrupted_runs(journal, fleet, speed)
         clock = SystemClock(speed, await _start_us(journal, mine, speed))
-        executive = make_executive(fleet, journal, plugins, clock, search_path=search_path)
+        executive = make_executive(
+            fleet, journal, plugins, clock, search_path=search_path, page=operators.page
+        )
         executive.expect_interrupted([line.run for line in mine])
         with output_of(output) as out:
             async with driving(executive, out, operators, file_of(url), one=False) as interruption:
@@ -179,14 +183,21 @@ def _refuse_memory(url: str, *, standby: bool) -> None:
 
 
 async def standing_by(
-    journal: "Journal", fleet: "Fleet", plugins: "PluginManager", speed: float
+    journal: "Journal",
+    fleet: "Fleet",
+    plugins: "PluginManager",
+    speed: float,
+    operators: "Operators",
 ) -> bool:
     """Wait until this executive serves the fleet; False: SIGINT or SIGTERM ended it before.
+
+    Operators are told meanwhile who serves it.
 
     Raises:
         FleetError: another fleet of that name is served.
     """
     from m2pem.api.clock import SystemClock
+    from m2pem.api.health import ExecutiveAddress
     from m2pem.cli.notes import note
     from m2pem.cli.session import SIGNALS, make_executive
     from m2pem.executive.standby import stand_by
@@ -195,12 +206,21 @@ async def standing_by(
 
     # What is wrong with the fleet, an arbiter or a mission is found before it is needed.
     make_executive(fleet, journal, plugins, SystemClock(speed))
-    locks = VehicleLocks(addresses_of(arbiters_of(fleet, plugins)), journal.file)
+    page = operators.page
+    locks = VehicleLocks(addresses_of(arbiters_of(fleet, plugins)), journal.file, page)
+    served_by: ExecutiveAddress | None = None
+
+    def say(text: str, server: "FleetServer | None") -> None:
+        nonlocal served_by
+        served_by = None
+        if server is not None:
+            served_by = ExecutiveAddress(server.host, server.pid, server.page)
+        note(f"m2pem: {text}")
+
     for text in await unreadable(journal, fleet, speed):
         note(f"m2pem: {text}")
-    waiting = asyncio.create_task(
-        stand_by(journal, fleet, locks, lambda text: note(f"m2pem: {text}"))
-    )
+    waiting = asyncio.create_task(stand_by(journal, fleet, locks, say, page))
+    telling = asyncio.create_task(operators.stand_by(fleet.name, lambda: served_by))
     loop = asyncio.get_running_loop()
     for number in SIGNALS:
         loop.add_signal_handler(number, waiting.cancel)
@@ -211,6 +231,8 @@ async def standing_by(
     finally:
         for number in SIGNALS:
             loop.remove_signal_handler(number)
+        telling.cancel()
+        await asyncio.gather(telling, return_exceptions=True)
     return True
 
 

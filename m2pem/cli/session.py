@@ -267,8 +267,9 @@ def make_executive(
     *,
     answers: "Answers | None" = None,
     search_path: Sequence[Path] = (),
+    page: str = "",
 ) -> Executive:
-    """An executive that has not connected yet.
+    """An executive that has not connected yet. `page`: the address of its web page.
 
     Raises:
         UnusableError: the fleet names an arbiter that no plugin provides.
@@ -285,6 +286,7 @@ def make_executive(
             rehearse=_rehearse,
             foresee=outlook_in_subprocess,
             has_others=partial(_others_on, journal.file),
+            page=page,
         )
     except PluginError as error:
         raise UnusableError(f"{fleet.file}: {error}") from error

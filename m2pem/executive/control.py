@@ -24,7 +24,7 @@ from m2pem.api.authoring import (
     file_of,
 )
 from m2pem.api.control import ControlEvent
-from m2pem.api.health import HealthCheck
+from m2pem.api.health import ExecutiveAddress, HealthCheck
 from m2pem.api.runs import (
     HandedOver,
     IncidentPreview,
@@ -70,6 +70,7 @@ from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.operator_roles import why_not_allowed
 from m2pem.journal.mission import mission_of
+from m2pem.journal.standbys import standbys_of
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 from m2pem.mission.events import Signal
 from m2pem.mission.mission import Mission
@@ -554,6 +555,11 @@ class Control:
     async def health(self) -> Sequence[HealthCheck]:
         """Whether this executive can do its work now."""
         return await self._health.checks()
+
+    async def standbys(self) -> Sequence[ExecutiveAddress]:
+        """The executives that stand by for the fleet of this one."""
+        found = await standbys_of(self._supervisor.journal, self._supervisor.fleet.name)
+        return [ExecutiveAddress(each.host, each.pid, each.page) for each in found]
 
     def check(
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()

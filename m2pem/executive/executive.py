@@ -58,7 +58,8 @@ class Executive:
     whether silence of a vehicle ends its behaviors. `observed`: whether plugins observe records.
     `search_path`, `limit`, `on_records`, `has_others`: as in `RunSettings`. `rehearse`: what
     `MissionControl.simulate` awaits; None: it is refused. `foresee`: what explores the choices
-    about incidents; None: what follows them is not known.
+    about incidents; None: what follows them is not known. `page`: the address of its web page, of
+    which operators of other executives are told.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class Executive:
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
         has_others: Callable[[], bool] = lambda: False,
+        page: str = "",
     ) -> None:
         self.fleet = fleet
         self.journal = journal
@@ -138,7 +140,7 @@ class Executive:
             foresee,
         )
         self._scheduling: asyncio.Task[None] | None = None
-        self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file)
+        self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file, page)
         if journal.lease_s is not None and self._locks.resources:
             self._supervisor.served_by_another = self._served_by_another
         self.superseded = asyncio.Event()

@@ -74,6 +74,7 @@ log = logging.getLogger("m2pem.executive")
 REMEMBERED_RUNS = 100
 """Ended runs whose last state is kept in memory; the journal has them all."""
 
+
 @dataclass(frozen=True, slots=True)
 class RunSettings:
     """How an executive drives its runs.

@@ -32,14 +32,19 @@ class VehicleInUseError(M2pemError):
 class VehicleLocks:
     """The locks of one executive. `addresses`: of each vehicle or payload; see `addresses_of`.
 
-    `journal`: its file, beside which the executive is found; None: it is in memory.
+    `journal`: its file, beside which the executive is found; None: it is in memory. `page`: the
+    address of its web page, or "".
     """
 
     def __init__(
-        self, addresses: Mapping[ResourceId, Iterable[str]], journal: Path | None = None
+        self,
+        addresses: Mapping[ResourceId, Iterable[str]],
+        journal: Path | None = None,
+        page: str = "",
     ) -> None:
         self._addresses = addresses
         self._journal = journal
+        self._page = page
         self._held: dict[Path, int] = {}
 
     @property
@@ -54,7 +59,7 @@ class VehicleLocks:
             FleetServedError: another one does.
             JournalError: the journal cannot say or note it.
         """
-        await journal.serve_fleet(fleet.name, self.resources, digest_of(fleet))
+        await journal.serve_fleet(fleet.name, self.resources, digest_of(fleet), self._page)
 
     def acquire(self) -> None:
         """Take the locks of all, or none.

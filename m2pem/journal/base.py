@@ -180,11 +180,13 @@ class Journal(Protocol):
         """
         ...
 
-    async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
+    async def serve_fleet(
+        self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
+    ) -> None:
         """Let no other executive on this journal serve these vehicles and payloads in a fleet of
         this name, until `leave_fleet` or `close`, the end of its process or of its lease. Again:
         check that it is so still; what no executive serves is taken again. `digest`: of the fleet's
-        content, for `fleet_server`.
+        content, and `page`: the address of this executive's web page, for `fleet_server`.
 
         Raises:
             FleetServedError: another executive serves one of them, and this one none; host, process

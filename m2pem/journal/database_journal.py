@@ -126,11 +126,13 @@ class DatabaseJournal(ABC):
         """How many transactions have been written since it was opened."""
         return self._writer.commits
 
-    async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
+    async def serve_fleet(
+        self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
+    ) -> None:
         """See `Journal.serve_fleet`."""
         self._check_open()
         await self._writer.submit(
-            lambda transaction: transaction.serve_fleet(fleet, resources, digest)
+            lambda transaction: transaction.serve_fleet(fleet, resources, digest, page)
         )
 
     async def leave_fleet(self, fleet: str) -> None:

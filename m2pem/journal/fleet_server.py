@@ -17,13 +17,17 @@ from m2pem.journal.postgres_address import without_password
 class FleetServer:
     """An executive that serves a fleet. `pid` 0: it has just begun, and is not known yet.
 
-    `digest`: of the fleet's content, see `digest_of`; "": not known.
+    `digest`: of the fleet's content, see `digest_of`; "": not known. `page`: the address of its web
+    page; "": it has none. `left_s`: for how long its lease lasts if it is not renewed, in seconds;
+    None: it has none.
     """
 
     host: str = ""
     pid: int = 0
     command: str = ""
     digest: str = ""
+    page: str = ""
+    left_s: float | None = None
 
     @property
     def is_here(self) -> bool:
@@ -42,9 +46,9 @@ class FleetServer:
         )
 
 
-def this_process(digest: str) -> FleetServer:
+def this_process(digest: str, page: str) -> FleetServer:
     """How others are told of this executive."""
-    return FleetServer(socket.gethostname(), os.getpid(), command_line(), digest)
+    return FleetServer(socket.gethostname(), os.getpid(), command_line(), digest, page)
 
 
 def command_line() -> str:

@@ -75,10 +75,13 @@ class MemoryJournal:
         """See `Journal.owned_until_s`."""
         return None
 
-    async def serve_fleet(self, fleet: str, resources: Collection[str], digest: str = "") -> None:
+    async def serve_fleet(
+        self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
+    ) -> None:
         """See `Journal.serve_fleet`: no other executive has this journal."""
         self._check_open()
-        self._fleets.setdefault(fleet, {}).update(dict.fromkeys(resources, this_process(digest)))
+        me = this_process(digest, page)
+        self._fleets.setdefault(fleet, {}).update(dict.fromkeys(resources, me))
 
     async def leave_fleet(self, fleet: str) -> None:
         """See `Journal.leave_fleet`."""

@@ -42,8 +42,10 @@ _TRIES = 10
 _BETWEEN_TRIES_S = 0.1
 
 _SERVER = (
-    "SELECT host, pid, command, digest FROM fleets JOIN executives ON id = executive"
-    " AND lease_until > clock_timestamp() WHERE fleet = ? AND resource = ANY(?)"
+    "SELECT host, pid, command, digest, page,"
+    " CAST(EXTRACT(EPOCH FROM lease_until - clock_timestamp()) AS double precision)"
+    " FROM fleets JOIN executives ON id = executive AND lease_until > clock_timestamp()"
+    " WHERE fleet = ? AND resource = ANY(?)"
 )
 
 _LIVE = "owners JOIN executives ON id = executive AND lease_until > clock_timestamp()"
@@ -200,7 +202,7 @@ class PostgresStorage:
         return True
 
     def serve_fleet(
-        self, fleet: str, resources: Collection[str], digest: str
+        self, fleet: str, resources: Collection[str], digest: str, page: str
     ) -> FleetServer | None:
         """See `Storage.serve_fleet`: for as long as the lease lasts."""
         lease = self.owners.lease
@@ -219,11 +221,11 @@ class PostgresStorage:
             lease.end()
             lease.begin()  # says so
         self.connection.execute(
-            "INSERT INTO fleets SELECT ?, resource, ?, ? FROM unnest(CAST(? AS text[])) AS resource"
-            " ON CONFLICT (fleet, resource)"
-            " DO UPDATE SET executive = excluded.executive, digest = excluded.digest"
-            " WHERE fleets.executive <> excluded.executive",
-            (fleet, lease.id, digest, names),
+            "INSERT INTO fleets SELECT ?, resource, ?, ?, ?"
+            " FROM unnest(CAST(? AS text[])) AS resource ON CONFLICT (fleet, resource)"
+            " DO UPDATE SET executive = excluded.executive, digest = excluded.digest,"
+            " page = excluded.page WHERE fleets.executive <> excluded.executive",
+            (fleet, lease.id, digest, page, names),
         )
         self.owners.fleets.setdefault(fleet, set()).update(names)
         return None

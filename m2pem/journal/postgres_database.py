@@ -62,8 +62,9 @@ def connect(
             connection.execute("SET tcp_keepalives_interval = 1")
             connection.execute("SET tcp_keepalives_count = 3")
             connection.execute(f"SET lock_timeout = {round(LOCKED_FOR_S * 1000)}")
-            # An executive that is stopped within a transaction must not keep others waiting.
-            connection.execute(f"SET idle_in_transaction_session_timeout = {2 * within_ms}")
+            # An executive that is stopped or cut off within a transaction keeps others waiting no
+            # longer than its lease, after which it could not commit.
+            connection.execute(f"SET idle_in_transaction_session_timeout = {within_ms}")
             # What BEGIN begins: rows that another executive has changed are waited for, and seen.
             connection.execute("SET default_transaction_isolation = 'read committed'")
             connection.execute("SET default_transaction_read_only = off")
@@ -246,10 +247,16 @@ def notifications(connection: psycopg.Connection[Any]) -> None:
         )
 
 
+def pages(connection: psycopg.Connection[Any]) -> None:
+    """0.3: where the web page of an executive is that serves a fleet, or stands by for it."""
+    connection.execute("ALTER TABLE fleets ADD COLUMN page TEXT NOT NULL DEFAULT ''")
+
+
 MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     first_tables,
     fleets,
     notifications,
+    pages,
 )
 """A released step is never changed; a change becomes a new step at the end."""
 

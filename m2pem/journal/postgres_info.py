@@ -9,6 +9,7 @@ import psycopg
 from m2pem.journal.codec import run_id
 from m2pem.journal.postgres_address import PostgresAddress
 from m2pem.journal.postgres_database import MIGRATIONS, connect, explained_error
+from m2pem.journal.standbys import STANDBY_OF
 
 LATEST_FORMAT = len(MIGRATIONS)
 """The version of the tables that this m2pem writes."""
@@ -41,7 +42,7 @@ class ExecutiveElsewhere:
 
 
 def executives_elsewhere(address: PostgresAddress) -> tuple[ExecutiveElsewhere, ...]:
-    """Return the executives of other hosts on a journal that was opened before.
+    """Return the executives of other hosts on a journal that was opened before, but standbys.
 
     Raises:
         JournalError: it cannot be read.
@@ -58,10 +59,12 @@ def executives_elsewhere(address: PostgresAddress) -> tuple[ExecutiveElsewhere, 
             ).fetchall()
     except psycopg.Error as error:
         raise explained_error(error, address.shown) from error
-    return tuple(
-        ExecutiveElsewhere(host, pid, command, tuple(fleets), tuple(map(run_id, runs)))
-        for host, pid, command, fleets, runs in rows
-    )
+    found = []
+    for host, pid, command, served, runs in rows:
+        fleets = tuple(each for each in served if not each.startswith(STANDBY_OF))
+        if fleets or runs or not served:  # not one that only stands by
+            found.append(ExecutiveElsewhere(host, pid, command, fleets, tuple(map(run_id, runs))))
+    return tuple(found)
 
 
 def database_info(address: PostgresAddress) -> DatabaseInfo:

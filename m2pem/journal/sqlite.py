@@ -77,7 +77,7 @@ class SqliteStorage:
         return False
 
     def serve_fleet(
-        self, fleet: str, resources: Collection[str], digest: str
+        self, fleet: str, resources: Collection[str], digest: str, page: str
     ) -> FleetServer | None:
         """See `Storage.serve_fleet`: by locks of the kernel; files beside them say whose they are.
 
@@ -92,7 +92,7 @@ class SqliteStorage:
             if not self.owners.mine(lock):
                 self.owners.acquire(lock)
                 self._fleets.setdefault(fleet, set()).add(resource)
-                _write_note(_fleet_note(self._path, lock), this_process(digest))
+                _write_note(_fleet_note(self._path, lock), this_process(digest, page))
         return None
 
     def leave_fleet(self, fleet: str) -> None:

@@ -123,7 +123,7 @@ class Storage(Protocol):
         ...
 
     def serve_fleet(
-        self, fleet: str, resources: Collection[str], digest: str
+        self, fleet: str, resources: Collection[str], digest: str, page: str
     ) -> FleetServer | None:
         """Serve these of a fleet, within a transaction that excludes others; returns who else
         serves one of them, and None when all are served here.

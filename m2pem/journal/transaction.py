@@ -149,11 +149,11 @@ class WriteTransaction:
                 f"{loss.remedy(run)}"
             )
 
-    def serve_fleet(self, fleet: str, resources: Collection[str], digest: str) -> None:
+    def serve_fleet(self, fleet: str, resources: Collection[str], digest: str, page: str) -> None:
         """Serve a fleet, unless another executive does."""
         self._storage.exclude_others()
         try:
-            other = self._storage.serve_fleet(fleet, resources, digest)
+            other = self._storage.serve_fleet(fleet, resources, digest, page)
         except OSError as error:
             raise JournalError(
                 f"{error.filename or self._storage.place}: {disk_fault(error)}; which executive "

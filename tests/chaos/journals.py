@@ -20,6 +20,7 @@ UNDONE = {
     "origin_of_salvaged_runs": ("DROP TABLE origin",),
     "fleets": ("DROP TABLE fleets",),
     "notifications": ("DROP FUNCTION m2pem_tell CASCADE",),
+    "pages": ("ALTER TABLE fleets DROP COLUMN page",),
 }
 """How the last steps of migration are undone in a journal with no deletion and no schedule,
 which was not salvaged, and whose executives are dead."""

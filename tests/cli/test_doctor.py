@@ -18,6 +18,7 @@ from m2pem.executive.runtime_directory import VARIABLE
 from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
 from m2pem.fleet.fleet_file import load_fleet
 from m2pem.journal import open_journal
+from m2pem.journal.standbys import StandbyNote, standbys_of
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 from m2pem.plugins import PluginManager
 from m2pem.scripting.sources import arbiters_of
@@ -217,6 +218,19 @@ async def test_who_serves_the_fleet_on_the_journal_is_said(invoke: Invoke, tmp_p
         status, checks = await asyncio.to_thread(doctor, invoke, *words)
     assert (status, checks["vehicles"]["status"]) == (0, "warning")
     assert f"process {os.getpid()} on" in checks["vehicles"]["message"]
+    assert checks["standby"]["message"] == "no executive stands by"
+
+
+async def test_who_stands_by_is_said(invoke: Invoke, tmp_path: Path) -> None:
+    fleet = load_fleet(str(FLEET))
+    async with opened(lambda: open_journal(str(tmp_path / "journal.db"))) as journal:
+        await StandbyNote(journal, fleet, "https://gcs2:8700/").renew()
+        assert [each.page for each in await standbys_of(journal, fleet.name)] == [
+            "https://gcs2:8700/"
+        ]
+        words = ("--fleet", FLEET, "--journal", tmp_path / "journal.db")
+        _, checks = await asyncio.to_thread(doctor, invoke, *words)
+    assert f"process {os.getpid()} on" in checks["standby"]["message"]
 
 
 def test_a_fleet_that_is_made_up_is_refused(invoke: Invoke) -> None:
@@ -289,7 +303,9 @@ def test_an_executive_that_runs_says_how_it_is(m2pem: CommandLine, tmp_path: Pat
     said = {check["name"]: check["status"] for check in json.loads(out)["checks"]}
     name = f"executive {serving.process.pid}"
     assert status == 0
-    assert said == {f"{name}: {each}": "ok" for each in ("journal", "arbiters", "event loop")}
+    assert said == {
+        f"{name}: {each}": "ok" for each in ("journal", "arbiters", "event loop", "standby")
+    }
     status, out, _ = m2pem.run(*words, M2PEM_MIN_FREE_MB="1e15")  # it counts where it serves
     assert status == 0
     serving.process.send_signal(signal.SIGSTOP)

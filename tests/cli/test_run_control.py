@@ -61,6 +61,7 @@ OTHERWISE = {
     "telemetry": "the terminal unit in m2pem attach shows it",
     "journal_file": "--journal names it",
     "health": "m2pem doctor --running",
+    "standbys": "m2pem doctor --running",
 }
 NO_COMMAND = {
     "message": "programs send messages: over the control socket, REST or ROS",

@@ -78,6 +78,8 @@ def test_a_standby_takes_over_from_a_killed_executive(
     start_mission(m2pem, journal)
     answer(m2pem, journal, prompted(owner), "continue")
     owner.until_record("BehaviorProgressed", state="RUNNING")
+    _, out, _ = m2pem.run("doctor", "--running", "--journal", journal)
+    assert all(f"process {each.process.pid} on" in out for each in standbys), out
     owner.kill()
     again, other = who_took_over(standbys, owner)
     again.until_record("RunClaimed", epoch=2)

@@ -295,7 +295,7 @@ def test_distance_is_that_of_the_great_circle():
         "= every a in l satisfies a in l",
         "= some a in l satisfies l = l and a < 0",
         "= some a in l satisfies sum(l) < 0",
-        "= some a in l satisfies upper(t) = \"b\"",
+        '= some a in l satisfies upper(t) = "b"',
     ],
 )
 def test_an_evaluation_that_would_take_long_is_refused(text):

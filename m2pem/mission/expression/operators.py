@@ -50,6 +50,7 @@ def look_at(values: int) -> None:
     if _work.left < 0:
         raise ExpressionError(f"it looks at more than {MAX_WORK:,} values")
 
+
 Binary = Callable[[Value, Value], Value]
 Test = Callable[[Value, Value], bool]
 

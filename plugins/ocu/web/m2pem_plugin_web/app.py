@@ -14,6 +14,7 @@ from m2pem_plugin_web.access.requests import BoundedBodies, SafeHeaders
 from m2pem_plugin_web.access.sign_in import Entry
 from m2pem_plugin_web.live import socket
 from m2pem_plugin_web.live.hub import Hub
+from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.pages import Pages
 from m2pem_plugin_web.problems import ProblemModel, handle_problems
 from m2pem_plugin_web.rest import (
@@ -26,6 +27,7 @@ from m2pem_plugin_web.rest import (
     runs,
     schedule,
     session,
+    standbys,
     steering,
     tracks,
     verifications,
@@ -60,6 +62,7 @@ def routers_of(
         rehearsals.router(control, folder, services.rehearsals),
         catalogue.router(control),
         geometries.router(control),
+        standbys.router(hub.standbys),
         map_tiles.router(tiles),
         socket.router(hub, entry),
         probes.router(control),
@@ -68,9 +71,10 @@ def routers_of(
 
 
 def create_app(
-    routers: Iterable[APIRouter], entry: Entry, settings: Settings, slots: Slots
+    routers: Iterable[APIRouter], entry: Entry, settings: Settings, slots: Slots, known: Standbys
 ) -> ASGIApp:
-    """Create the app. `entry` signs users in; `slots` are the server's connections."""
+    """Create the app. `entry` signs users in; `slots` are the server's connections; the page may
+    ask the pages of `known` whether they serve."""
     # FastAPI makes the routes of a router that is included a second time, which takes longer than
     # all else at the start: the app has them as they are.
     routes = [route for router in routers for route in router.routes]
@@ -85,7 +89,7 @@ def create_app(
         scheme=settings.scheme,
         slots=slots,
     )
-    return SafeHeaders(guard)
+    return SafeHeaders(guard, lambda: known.pages)
 
 
 def _described(app: FastAPI) -> dict[str, Any]:

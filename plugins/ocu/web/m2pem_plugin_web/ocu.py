@@ -1,7 +1,7 @@
 """The operator control unit in a browser."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from m2pem_plugin_web.settings import Settings, read_settings
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
-    from m2pem.api import MissionControl
+    from m2pem.api import ExecutiveAddress, MissionControl
     from m2pem_plugin_web.access.sign_in import Entry
 
 
@@ -25,7 +25,20 @@ class WebOcu:
             is not private.
     """
 
-    capabilities = OcuCapabilities(imports=("m2pem_plugin_web.app",))
+    capabilities = OcuCapabilities(imports=("m2pem_plugin_web.app",), stands_by=True)
+
+    @classmethod
+    def page(cls) -> str:
+        """Return the address of the page; "": it has any free port."""
+        settings = read_settings()
+        return settings.address(settings.port) if settings.port else ""
+
+    @classmethod
+    async def stand_by(cls, fleet: str, served_by: "Callable[[], ExecutiveAddress | None]") -> None:
+        """See `StandbyOcu.stand_by`."""
+        from m2pem_plugin_web import standby  # noqa: PLC0415
+
+        await standby.serve(fleet, served_by, os.environ)
 
     def __init__(
         self, control: "MissionControl", *, environment: Mapping[str, str] = os.environ
@@ -52,7 +65,7 @@ class WebOcu:
 
             def app() -> "ASGIApp":
                 routers = routers_of(self._services, settings, self.hub, entry, self._recorder)
-                return create_app(routers, entry, settings, self._server.slots)
+                return create_app(routers, entry, settings, self._server.slots, self.hub.standbys)
 
             self._make_app = app
         except BaseException:

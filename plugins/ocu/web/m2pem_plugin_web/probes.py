@@ -18,7 +18,8 @@ READY = "/readyz"
 ANSWERED_WITHIN_S = 3.0
 """For an executive in another process, whose answer may not come."""
 
-NO_STORE = {"cache-control": "no-store"}
+PROBE_HEADERS = {"cache-control": "no-store", "access-control-allow-origin": "*"}
+"""The page of another executive of the fleet may ask: they say nothing secret."""
 
 
 def router(control: MissionControl) -> APIRouter:
@@ -28,7 +29,7 @@ def router(control: MissionControl) -> APIRouter:
     @routes.api_route(LIVE, methods=["GET", "HEAD"])
     async def live() -> JSONResponse:
         """The event loop runs: it has answered."""
-        return JSONResponse({"status": "live"}, headers=NO_STORE)
+        return JSONResponse({"status": "live"}, headers=PROBE_HEADERS)
 
     @routes.api_route(READY, methods=["GET", "HEAD"])
     async def ready() -> JSONResponse:
@@ -42,7 +43,7 @@ def router(control: MissionControl) -> APIRouter:
         return JSONResponse(
             {"status": "ready" if is_ready else "not ready", "checks": checks},
             status_code=200 if is_ready else 503,
-            headers=NO_STORE,
+            headers=PROBE_HEADERS,
         )
 
     return routes

@@ -88,6 +88,7 @@ QUERIES = {
     "shared_space": "/api/resources",
     "fleet": "/api/fleet",
     "catalogue": "/api/behaviors",
+    "standbys": "/api/standbys",
 }
 NOT_SERVED = {
     "preview_incident": "POST .../incidents/{incident}/preview",

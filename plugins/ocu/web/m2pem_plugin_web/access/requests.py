@@ -6,7 +6,7 @@ The order: `SafeHeaders` outside, then `Guard`, then `BoundedBodies`.
 import asyncio
 import math
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
@@ -180,7 +180,8 @@ class BoundedBodies:
         return f"the body is larger than {self._largest / 1_000_000:g} MB"
 
 
-# Styles: bpmn-js sets some on elements. `self` covers a WebSocket of the same origin.
+# Styles: bpmn-js sets some on elements. `self` covers a WebSocket of the same origin. `others` are
+# the pages of executives that stand by.
 POLICY = "; ".join(
     (
         "default-src 'self'",
@@ -188,7 +189,7 @@ POLICY = "; ".join(
         "style-src 'self' 'unsafe-inline'",
         "img-src 'self' data: blob:",
         "font-src 'self' data:",
-        "connect-src 'self'",
+        "connect-src 'self'{others}",
         "object-src 'none'",
         "base-uri 'none'",
         "form-action 'self'",
@@ -198,7 +199,6 @@ POLICY = "; ".join(
 
 # A stricter Referrer-Policy would take the origin from requests of forms.
 HEADERS = {
-    "content-security-policy": POLICY,
     "x-content-type-options": "nosniff",
     "x-frame-options": "DENY",
     "referrer-policy": "same-origin",
@@ -209,10 +209,12 @@ HEADERS = {
 
 
 class SafeHeaders:
-    """Adds security headers to every response; responses of /api are not cached."""
+    """Adds security headers to every response; responses of /api are not cached. `others`: other
+    pages, which a page from here may ask whether they serve."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, others: Callable[[], Iterable[str]] = tuple) -> None:
         self._app = app
+        self._others = others
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on."""
@@ -224,6 +226,8 @@ class SafeHeaders:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 headers.update(HEADERS)
+                others = "".join(f" {page}" for page in self._others())
+                headers["content-security-policy"] = POLICY.format(others=others)
                 if scope["path"].startswith("/api"):
                     headers["cache-control"] = "no-store"
             await send(message)

@@ -36,6 +36,7 @@ from m2pem_plugin_web.access.requests import now_s
 from m2pem_plugin_web.live import messages
 from m2pem_plugin_web.live.latest_states import FleetStates, LatestStates
 from m2pem_plugin_web.live.live_run import LiveRun, command
+from m2pem_plugin_web.live.standbys import Standbys
 from m2pem_plugin_web.live.viewer import Unsent, Viewer
 
 FRAME_S = 0.04
@@ -62,6 +63,7 @@ class Hub(Listener):
         self.runs: dict[RunId, LiveRun] = {}
         self.follower = follow(control, self)
         self.fleet = FleetStates(control, self._lost)
+        self.standbys = Standbys(control)
         self._control = control
         self._holders: dict[str, str] = {}
         self._holders_at = 0.0
@@ -76,6 +78,7 @@ class Hub(Listener):
             tasks.create_task(self._follow(), name="web: records")
             tasks.create_task(self.fleet.follow(), name="web: telemetry")
             tasks.create_task(self._pace(), name="web: frames")
+            tasks.create_task(self.standbys.run(), name="web: standbys")
 
     async def _follow(self) -> None:
         while True:

@@ -6,6 +6,7 @@ import { connect } from "./shared/executive";
 import { Header } from "./shared/Header";
 import { route } from "./shared/router";
 import { loadSession, redeem, session, takeToken, toSignIn } from "./shared/session";
+import { followStandbys } from "./shared/standbys";
 import { Toasts } from "./shared/Toasts";
 import { strings } from "./strings";
 import "./theme.css";
@@ -56,4 +57,5 @@ function App() {
   );
 }
 
+followStandbys();
 render(<App />, document.getElementById("page")!);

@@ -1,9 +1,10 @@
 // On every page: which fleet, who looks, whether what moves is real, and how to stop it.
 import { effect } from "@preact/signals";
-import { strings } from "../strings";
+import { fill, strings } from "../strings";
 import { connect, connection, prompts } from "./executive";
 import { go, route } from "./router";
 import { may, session, signOut } from "./session";
+import { standbys } from "./standbys";
 import { StopAlert } from "./StopAlert";
 import { StopButton } from "./StopButton";
 import { ALL, stop } from "./stopping";
@@ -89,6 +90,12 @@ export function Header() {
       {who && connection.value === "lost" && (
         <div class="offline" role="alert">
           {text.offline}
+          {standbys.value.map(({ host, pid, page }) => (
+            <span key={page}>
+              {" "}
+              {text.standby} <a href={page}>{named(pid, host)}</a>
+            </span>
+          ))}
           <button type="button" onClick={connect}>
             {text.retry}
           </button>
@@ -110,11 +117,15 @@ function Reality({ simulated }: { simulated: boolean }) {
   );
 }
 
+const named = (pid: number, host: string) => fill(text.process, { pid: String(pid), host });
+
 function Link() {
   const state = connection.value;
   const said = { open: text.connected, connecting: text.connecting }[state as "open"];
+  const names = standbys.value.map(({ pid, host }) => named(pid, host)).join(", ");
+  const standby = names ? `${text.standby} ${names}` : text.noStandby;
   return (
-    <span class={`link link-${state}`} title={said ?? text.offline}>
+    <span class={`link link-${state}`} title={`${said ?? text.offline} ${standby}`}>
       <i aria-hidden="true" />
       <span class={said ? "for-readers" : ""}>{said ?? text.offlineShort}</span>
     </span>

@@ -14,6 +14,13 @@ export interface Session {
   tiles: { max_zoom: number; attribution: string } | null;
 }
 
+/** An executive that stands by. `page`: the address of its page; "": it has none. */
+export interface Standby {
+  host: string;
+  pid: number;
+  page: string;
+}
+
 /** A session that has just begun; `key` is the header M2pem-Key of every request. */
 export interface BegunSession extends Session {
   key: string;
