@@ -14,7 +14,7 @@ from m2pem.api.runs import Alert, RunId
 from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.run import Step
-from m2pem.engine.state import RunOutcome, RunStatus
+from m2pem.engine.state import RunStatus
 from m2pem.errors import M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.dispatcher import Dispatcher, Order
@@ -111,7 +111,7 @@ class EmergencyCommands:
 
     def on_records(self, runner: Runner, records: Iterable[r.Record]) -> None:
         """Say which vehicles of a stopped run were lost, or failed, before they had stopped."""
-        if runner.run.state.outcome is not RunOutcome.STOPPED:
+        if runner.run.state.outcome is not r.RunOutcome.STOPPED:
             return
         for record in records:
             if isinstance(record, r.BehaviorEnded) and record.state in _NOT_STOPPED:

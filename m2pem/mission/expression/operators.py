@@ -2,8 +2,8 @@
 
 import math
 import operator
-import threading
 from collections.abc import Callable
+from contextvars import ContextVar
 from typing import Any
 
 from m2pem.errors import ExpressionError
@@ -30,24 +30,19 @@ TEXT_AS_VALUE = 1_000
 """So many characters of a text count as one value."""
 
 
-class _Work(threading.local):
-    """What the evaluation of this thread may still look at."""
-
-    left = MAX_WORK
-
-
-_work = _Work()
+_left = ContextVar("_left", default=MAX_WORK)
 
 
 def begin_work() -> None:
     """Count anew what is looked at."""
-    _work.left = MAX_WORK
+    _left.set(MAX_WORK)
 
 
 def look_at(values: int) -> None:
     """Count values; raises ExpressionError when they are too many."""
-    _work.left -= values
-    if _work.left < 0:
+    left = _left.get() - values
+    _left.set(left)
+    if left < 0:
         raise ExpressionError(f"it looks at more than {MAX_WORK:,} values")
 
 
