@@ -78,7 +78,7 @@ def test_after_a_kill_between_the_loss_and_the_new_choice_the_rest_is_done(
     fault = ", faults: ['single_vehicle_routing: cut link at 60 s']}, cruise"
     fleet.write_text(alone.replace("}, cruise", fault))
     mission.write_text(MISSION.replace("onLoss", 'wait="unlimited" onLoss'))
-    words = ("--speed", "20", "--ocu", "none", "--format", "json")
+    words = ("--speed", "50", "--ocu", "none", "--format", "json")
     program = m2pem.start("run", mission, "--fleet", fleet, *words)
     program.until_record("AllocationDelayed")
     program.kill()

@@ -94,7 +94,7 @@ def results(tmp_path: Path) -> str:
 def test_a_long_search_counts_up_on_a_terminal_and_wipes_its_line(
     tmp_path: Path, mission: Path
 ) -> None:
-    with at_terminal(tmp_path, mission, "--max-seconds", "4") as terminal:
+    with at_terminal(tmp_path, mission, "--max-seconds", "3") as terminal:
         first = terminal.until(r"searching for \d+ s, ([\d,]+) states found, [\d,]+ of them to be")
         terminal.until(r"searching for [2-9] s, ")
         assert terminal.rest() == 3
