@@ -4,12 +4,13 @@
 It answers on a Unix socket alone. The server refuses to run as root: root runs it as `postgres`.
 """
 
+import atexit
 import os
 import pwd
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from functools import cache
 from itertools import count
 from pathlib import Path
 
@@ -100,12 +101,18 @@ def start_server() -> PostgresServer:
     return PostgresServer(programs)
 
 
-@pytest.fixture(scope="session")
-def postgres() -> Iterator[PostgresServer]:
-    """A server; fails where PostgreSQL is not installed."""
+@cache
+def shared_server() -> PostgresServer:
+    """The server of this process, which ends with it: to start one takes two seconds."""
     server = start_server()
-    yield server
-    server.remove()
+    atexit.register(server.remove)
+    return server
+
+
+@pytest.fixture(scope="session")
+def postgres() -> PostgresServer:
+    """A server; fails where PostgreSQL is not installed."""
+    return shared_server()
 
 
 @pytest.fixture

@@ -1,10 +1,8 @@
 """The journals of rounds: an SQLite file, or a database of a PostgreSQL server of this process."""
 
-import atexit
 import sqlite3
 from collections.abc import Sequence
 from contextlib import closing
-from functools import cache
 from pathlib import Path
 
 import psycopg
@@ -12,7 +10,7 @@ import psycopg
 from m2pem.journal import migrations, postgres_database
 from m2pem.journal.postgres_address import PostgresAddress, read_address, write_address
 from tests.chaos.kill_points import POSTGRES, JournalKind
-from tests.postgres_server import PostgresServer, start_server
+from tests.postgres_server import shared_server
 
 UNDONE = {
     "deletions": ("DROP TABLE deletions",),
@@ -26,18 +24,11 @@ UNDONE = {
 which was not salvaged, and whose executives are dead."""
 
 
-@cache
-def _server() -> PostgresServer:
-    server = start_server()
-    atexit.register(server.remove)
-    return server
-
-
 def make(kind: JournalKind, folder: Path) -> Path:
     """Return the file that names a new journal, in the folder of a round. The journal is empty."""
     file = folder / kind.file
     if kind is POSTGRES:
-        url = _server().new_database()
+        url = shared_server().new_database()
         write_address(PostgresAddress(url, url, file))
     return file
 
