@@ -6,10 +6,13 @@ import socket
 import subprocess
 import sys
 from collections import Counter
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.command_line import command_line
 
 REPOSITORY = Path(__file__).parents[4]
 MISSION = REPOSITORY / "missions" / "survey_pair.bpmn"
@@ -52,32 +55,19 @@ def m2pem(*words: object) -> list[str]:
 def test_the_second_copter_takes_over_what_the_first_one_leaves(
     fleet: Path, port: int, tmp_path: Path
 ) -> None:
-    autopilots = subprocess.Popen(
-        m2pem(
-            *("sim", "mavlink", "--copters", 2, "--rovers", 1, "--speed", SPEED, "--ekf", "6s"),
+    with contextmanager(command_line)(tmp_path) as forked:
+        forked.start(
+            *("sim", "mavlink", "--copters", "2", "--rovers", "1", "--speed", SPEED, "--ekf", "6s"),
             *("--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{port}"),
             *("--set", "FS_GCS_ENABLE=1", "--set", "FS_GCS_TIMEOUT=20"),
             *("--fault", "1: cut link at 60 s for 900 s"),
-        ),
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        done = subprocess.run(
-            m2pem(
-                *("run", MISSION, "--fleet", fleet, "--speed", SPEED, "--ocu", "none"),
-                *("--journal", tmp_path / "journal.db", "--format", "json"),
-            ),
-            capture_output=True,
-            text=True,
-            timeout=ENDED_WITHIN_S,
-            check=False,
         )
-    finally:
-        autopilots.terminate()
-        autopilots.communicate()
-    assert done.returncode == 0, done.stderr
-    records = [json.loads(line) for line in done.stdout.splitlines()]
+        status, output, errors = forked.run(
+            *("run", MISSION, "--fleet", fleet, "--speed", SPEED, "--ocu", "none"),
+            *("--journal", tmp_path / "journal.db", "--format", "json"),
+        )
+    assert status == 0, errors
+    records = [json.loads(line) for line in output.splitlines()]
     assert records[-1]["record"] == "RunEnded"
     assert records[-1]["outcome"] == "completed"
     assert ends(records) == Counter(
