@@ -8,6 +8,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from m2pem.verify.net.petri_net import Action
 from m2pem.verify.search.explore import Progress
 from tests.cli.conftest import Invoke
 from tests.cli.test_verify import wide
@@ -65,6 +66,19 @@ def required(out: str) -> dict[str, dict[str, Any]]:
 
 def verdicts(out: str) -> dict[str, str]:
     return {name: each["verdict"] for name, each in required(out).items()}
+
+
+def test_the_schema_of_reports_has_every_action() -> None:
+    found: list[list[str]] = []
+    waiting: list[Any] = [SCHEMA]
+    for each in waiting:
+        if isinstance(each, dict):
+            found += [each["action"]["enum"]] if "enum" in each.get("action", {}) else []
+            waiting += each.values()
+        elif isinstance(each, list):
+            waiting += each
+    assert found
+    assert all(sorted(each) == sorted(Action) for each in found)
 
 
 def test_each_requirement_has_a_line_in_plain_english(invoke: Invoke, spec: Path) -> None:
