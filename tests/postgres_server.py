@@ -8,8 +8,12 @@ import atexit
 import os
 import pwd
 import shutil
+import signal
 import subprocess
 import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -29,10 +33,13 @@ def _programs() -> Path | None:
 
 
 class PostgresServer:
-    """A server that runs until `remove`. The role `m2pem` may log in, and owns each database."""
+    """A server that runs until `remove`. The role `m2pem` may log in, and owns each database.
 
-    def __init__(self, programs: Path) -> None:
-        self._programs = programs
+    `primary`: whose standby it is, until it is promoted.
+    """
+
+    def __init__(self, programs: Path, primary: "PostgresServer | None" = None) -> None:
+        self.programs = programs
         self._numbers = count(1)
         self.folder = Path(tempfile.mkdtemp(prefix="m2pem-pg-"))
         if os.geteuid() == 0:
@@ -40,6 +47,11 @@ class PostgresServer:
             os.chown(self.folder, user.pw_uid, user.pw_gid)
         self.folder.chmod(0o755)
         self._data = self.folder / "data"
+        if primary is not None:
+            self._run("pg_basebackup", "-D", self._data, "-h", primary.folder, "-U", "postgres",
+                      "--write-recovery-conf", "--checkpoint=fast", "--no-sync")  # fmt: skip
+            self.start()
+            return
         self._run("initdb", "-D", self._data, "-U", "postgres", "-A", "trust", "--no-sync",
                   "-E", "UTF8", "--locale=C")  # fmt: skip
         self.start()
@@ -55,9 +67,24 @@ class PostgresServer:
         """End it, as a crash does, or in another of pg_ctl's modes."""
         self._run("pg_ctl", "-D", self._data, "-m", mode, "-w", "stop")
 
+    def promote(self) -> None:
+        """Let a standby take over; returns when it can be written to."""
+        self._run("pg_ctl", "-D", self._data, "-w", "promote")
+
+    def kill(self) -> None:
+        """Kill all of its processes (SIGKILL)."""
+        file = self._data / "postmaster.pid"
+        process = int(file.read_text().split()[0])
+        children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+        for each in (process, *map(int, children)):
+            with suppress(ProcessLookupError):
+                os.kill(each, signal.SIGKILL)
+        file.unlink()
+
     def remove(self) -> None:
         """End it, and remove its files."""
-        self.stop()
+        if (self._data / "postmaster.pid").exists():
+            self.stop()
         shutil.rmtree(self.folder)
 
     def new_database(self) -> str:
@@ -77,7 +104,7 @@ class PostgresServer:
             return found.fetchall() if found.description else []
 
     def _run(self, program: str, *arguments: object) -> None:
-        words = [str(self._programs / program), *map(str, arguments)]
+        words = [str(self.programs / program), *map(str, arguments)]
         user = pwd.getpwnam("postgres") if os.geteuid() == 0 else None
         with (self.folder / "output").open("ab") as output:
             code = subprocess.run(
@@ -113,6 +140,35 @@ def shared_server() -> PostgresServer:
 def postgres() -> PostgresServer:
     """A server; fails where PostgreSQL is not installed."""
     return shared_server()
+
+
+@dataclass
+class Replicated:
+    """A server with a standby that has all that it commits. `url` names both."""
+
+    primary: PostgresServer
+    standby: PostgresServer
+    url: str
+
+    def fail_over(self) -> None:
+        """Kill the server, and let the standby take over."""
+        self.primary.kill()
+        self.standby.promote()
+
+
+@pytest.fixture
+def replicated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Replicated]:
+    """A database without tables, on two servers."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    primary = start_server()
+    url = primary.new_database()
+    standby = PostgresServer(primary.programs, primary)
+    primary.execute("ALTER SYSTEM SET synchronous_standby_names = '*'")
+    primary.execute("ALTER SYSTEM SET synchronous_commit = 'remote_apply'")
+    primary.execute("SELECT pg_reload_conf()")
+    yield Replicated(primary, standby, f"{url},{standby.folder}")
+    standby.remove()
+    primary.remove()
 
 
 @pytest.fixture

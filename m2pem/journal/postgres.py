@@ -138,6 +138,8 @@ class PostgresStorage:
         self._excludes = False
         self._tries = 0
         self._unknown = False
+        self._written: dict[int, tuple[int, bytes | None]] = {}
+        """Epoch and hash of the runs of this executive, as they were written last."""
 
     @property
     def connection(self) -> PostgresConnection:
@@ -199,6 +201,7 @@ class PostgresStorage:
         self.connection.execute(
             "DELETE FROM owners WHERE run = ? AND executive = ?", (number, self.owners.lease.id)
         )
+        self._written.pop(number, None)
         return True
 
     def serve_fleet(
@@ -259,15 +262,12 @@ class PostgresStorage:
             if not self._begun:
                 raw.execute("BEGIN")
                 self._begun = True
-            there = raw.execute(
-                "SELECT run, epoch FROM standings WHERE run = ANY(%s) ORDER BY run FOR UPDATE",
-                (list(positions),),
-            )
+            standings = raw.execute(f"{_STANDINGS} ORDER BY run FOR UPDATE", (list(positions),))
             state = raw.execute(
-                "SELECT pg_current_xact_id()::text, (SELECT lease_until > clock_timestamp()"
-                " FROM executives WHERE id = %s)"
+                "SELECT pg_current_xact_id()::text, pg_postmaster_start_time()::text,"
+                " (SELECT lease_until > clock_timestamp() FROM executives WHERE id = %s)"
                 if wrote
-                else "SELECT '', false",
+                else "SELECT '', '', false",
                 (self.owners.lease.id,) if wrote else None,
             )
             if entries:
@@ -275,43 +275,66 @@ class PostgresStorage:
             if positions:
                 rows = [position_columns(*each) for each in positions.items()]
                 raw.execute(_WRITE_STANDINGS, _columns(rows))
-        if any(epoch > positions[number].epoch for number, epoch in there):
+        there = {number: (epoch, hash_) for number, epoch, hash_ in standings}
+        if any(epoch > positions[number].epoch for number, (epoch, _) in there.items()):
             raise RetryError  # another has claimed it: read again, its position says so
-        transaction, leased = state.fetchone() or ("", False)
+        transaction, server, leased = state.fetchone() or ("", "", False)
         if positions and not leased:
             self.owners.lease.end()
             raise RetryError
-        self._commit(transaction)
+        for number in positions.keys() & self._written.keys():
+            if there.get(number) != self._written.pop(number):
+                raise RetryError  # a server without it has taken over: read again, the mark says so
+        self._commit(transaction, server, positions)
+        self._written.update(_standings_of(positions))
 
-    def _commit(self, transaction: str) -> None:
+    def _commit(self, transaction: str, server: str, positions: Mapping[int, RunPosition]) -> None:
         self._in_transaction = False
         try:
             self._connection.raw.execute("COMMIT")
         except self.errors as error:
             if not transaction or not self._connection.lost:
                 raise
-            if not self._was_committed(transaction, error):
+            if not self._was_committed(transaction, server, positions, error):
                 raise RetryError from error
         self._tries = 0
 
-    def _was_committed(self, transaction: str, error: Exception) -> bool:
-        """Ask the server what has become of a transaction whose connection was lost."""
+    def _was_committed(
+        self,
+        transaction: str,
+        server: str,
+        positions: Mapping[int, RunPosition],
+        error: Exception,
+    ) -> bool:
+        """Ask the server what has become of a transaction whose connection was lost.
+
+        One that starts again, or takes over, may give the number of the transaction to another
+        one: what was to be written says more than the number.
+        """
         while True:
             if not self._connected_again():
                 self._unknown = True
                 raise error
             try:
-                row = self._connection.execute(
-                    "SELECT pg_xact_status(CAST(? AS xid8))", (transaction,)
-                ).fetchone()
+                status, now = self._connection.execute(
+                    "SELECT pg_xact_status(CAST(? AS xid8)), pg_postmaster_start_time()::text",
+                    (transaction,),
+                ).fetchone()  # type: ignore[misc]
+                rows = self._connection.raw.execute(_STANDINGS, (list(positions),)).fetchall()
             except psycopg.errors.InvalidParameterValue:
                 return False  # the server has taken over from another one, and never had it
             except psycopg.OperationalError:
                 continue
-            if row is not None and row[0] == "in progress":
+            if status == "in progress":
                 time.sleep(_BETWEEN_TRIES_S)
-                continue
-            return row is not None and row[0] == "committed"
+            elif positions:
+                there = {number: (epoch, hash_) for number, epoch, hash_ in rows}
+                return there == _standings_of(positions)
+            elif now == server:
+                return bool(status == "committed")
+            else:
+                self._unknown = True
+                raise error
 
     def _connected_again(self) -> bool:
         """Connect again, as long as this executive surely has its runs."""
@@ -369,9 +392,15 @@ def _lost(number: int) -> StaleEpochError:
     )
 
 
+def _standings_of(positions: Mapping[int, RunPosition]) -> dict[int, tuple[int, bytes | None]]:
+    return {number: (each.epoch, each.hash) for number, each in positions.items()}
+
+
 def _columns(rows: Sequence[tuple[Any, ...]]) -> list[list[Any]]:
     return [list(column) for column in zip(*rows, strict=True)]
 
+
+_STANDINGS = "SELECT run, epoch, hash FROM standings WHERE run = ANY(%s)"
 
 # As binary parameters (%b): psycopg writes a text's array with a regular expression, by far slower.
 _INSERT_ENTRIES = (

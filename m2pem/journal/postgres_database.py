@@ -33,7 +33,9 @@ def connection_parameters(within_s: float, session: str = "m2pem") -> dict[str, 
         "autocommit": True,
         "application_name": session,
         "client_encoding": "UTF8",
-        "connect_timeout": max(2, round(within_s)),
+        # One of several hosts may be gone: the next one must be reached before a lease ends.
+        "connect_timeout": max(2, round(within_s / 3)),
+        "target_session_attrs": "primary",
         "tcp_user_timeout": max(1000, round(within_s * 1000)),
         "keepalives_idle": max(1, round(within_s)),
         "keepalives_interval": 1,
@@ -113,7 +115,7 @@ def check_server(connection: psycopg.Connection[Any], shown: str) -> None:
     """Check what a journal needs of a server, and warn of what may lose entries.
 
     Raises:
-        JournalError: it is too old, a standby, or the database has another encoding.
+        JournalError: it is too old, or the database has another encoding.
     """
     version = connection.info.server_version // 10_000
     if version < OLDEST_VERSION:
@@ -121,20 +123,15 @@ def check_server(connection: psycopg.Connection[Any], shown: str) -> None:
             f"{shown}: the server is PostgreSQL {version}; a journal needs {OLDEST_VERSION} or "
             "newer"
         )
-    encoding, standby, fsync, replies = _one(
+    encoding, fsync, replies = _one(
         connection,
-        "SELECT current_setting('server_encoding'), pg_is_in_recovery(),"
-        " current_setting('fsync'), current_setting('synchronous_commit')",
+        "SELECT current_setting('server_encoding'), current_setting('fsync'),"
+        " current_setting('synchronous_commit')",
     )
     if encoding != "UTF8":
         raise JournalError(
             f"{shown}: the encoding of the database is {encoding}: make one with "
             "`CREATE DATABASE ... ENCODING 'UTF8' TEMPLATE template0`"
-        )
-    if standby:
-        raise JournalError(
-            f"{shown}: the server is a standby, which cannot be written to: name the primary, or "
-            "both, with ?target_session_attrs=read-write"
         )
     if replies == "off":
         # As SQLite's `synchronous`: an executive acts on what a commit says.
@@ -353,6 +350,8 @@ _BY_TEXT = {
     "starting up": _BY_STATE["57P03"],
     "shutting down": _BY_STATE["57P03"],
     "translate host name": "no host has that name: correct the URL",
+    "hot standby": "the server is a standby, which cannot be written to: name the primary, or all "
+    "servers (postgresql://host1,host2/database)",
     "service": "libpq does not know that service: see pg_service.conf",
 }
 

@@ -420,10 +420,16 @@ class WriteTransaction:
         if position is None:
             query = f"SELECT * FROM standings WHERE run = ?{self._storage.locking}"
             row = self._connection.execute(query, (number,)).fetchone()
+            mine = self._owners.mine(number)
+            if mine and number not in self._lossy:
+                # A server may have taken over meanwhile that does not have all that another had.
+                loss = find_loss(self._connection, number, self._marks.of(number))
+                if loss is not None:
+                    raise JournalError(f"{run_id(number)}: {loss}")
             if row is None:
                 raise no_run(self._connection, number)
             position = position_from(row)
-            if self._owners.mine(number):
+            if mine:
                 self._known[number] = position
         return position
 

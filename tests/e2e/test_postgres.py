@@ -8,9 +8,15 @@ import pytest
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
 from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine, Program, fleet_with_state
-from tests.postgres_server import PostgresServer, postgres, postgres_url
+from tests.postgres_server import (
+    PostgresServer,
+    Replicated,
+    postgres,
+    postgres_url,
+    replicated,
+)
 
-__all__ = ["postgres", "postgres_url"]
+__all__ = ["postgres", "postgres_url", "replicated"]
 
 SCRIPT = ("--answers", ANSWERS / "vignette1_detection.yaml")
 SECRET = "s3cret"
@@ -141,3 +147,32 @@ def test_a_run_is_held_before_its_lease_ends_and_resumed_when_the_server_is_back
     assert recorded_effects(state)[-1].kind is EffectKind.HOLD
     status, out, _ = m2pem.run("resume", "r1", "--stop", "--ocu", "none", "--journal", url)
     assert "stopped" in out
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lease_s", ["60", "1"])
+def test_a_mission_goes_on_when_a_standby_of_the_server_takes_over(
+    m2pem: CommandLine, tmp_path: Path, replicated: Replicated, lease_s: str
+) -> None:
+    """By itself within the lease of its executive; afterwards by `m2pem resume`."""
+    fleet, _ = fleet_with_state(tmp_path)
+    journal = ("--journal", replicated.url)
+    program = driving(m2pem, fleet, replicated.url, M2PEM_LEASE_S=lease_s)
+    programs = [program]
+    replicated.primary.kill()
+    if lease_s == "1":
+        status, errors = program.rest()
+        assert (status, "go on with `m2pem resume r1`" in errors) == (1, True), errors
+    replicated.standby.promote()
+    if lease_s == "1":
+        program = m2pem.start("resume", "r1", "--ocu", "none", "--format", "json", *journal)
+        program.until_record("RunClaimed", epoch=2)
+        programs.append(program)
+    status, _, errors = m2pem.run("stop", "r1", *journal)
+    assert status == 0, errors
+    program.until_record("RunEnded", outcome="stopped")
+    program.rest()
+    status, out, _ = m2pem.run("replay", "r1", "--format", "json", *journal)
+    printed = [line for each in programs for line in each.lines]
+    assert set(printed) <= set(out.splitlines())
+    assert m2pem.run("replay", "r1", "--verify", *journal)[0] == 0
