@@ -21,6 +21,9 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Coroutine, Iterator
+
+    from m2pem.api.clock import SystemClock
     from m2pem.cli.ocus import Operators
     from m2pem.executive.executive import Executive
     from m2pem.fleet.fleet import Fleet
@@ -64,6 +67,22 @@ class DaysOption(click.ParamType):  # type: ignore[type-arg]  # older clicks hav
     help="Delete runs that ended longer ago than this, such as 30d or 12h, at the start and each "
     "day  [default: keep all]",
 )
+@click.option(
+    "--backup-to",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Copy the journal there, at the start and then each --backup-every; the last 24 copies "
+    "stay.",
+)
+@click.option(
+    "--backup-every",
+    "backup_every_s",
+    type=DaysOption(),
+    default="1h",
+    show_default=True,
+    metavar="HOURS",
+    help="How often --backup-to copies the journal, such as 12h or 1d.",
+)
 @format_option
 def serve(
     fleet_file: str,
@@ -74,6 +93,8 @@ def serve(
     speed: float,
     standby: bool,
     keep_s: float | None,
+    backup_to: Path | None,
+    backup_every_s: float,
     output: str,
 ) -> int:
     """Serve operators, who start missions, until stopped.
@@ -92,6 +113,8 @@ def serve(
             keep_s,
             output,
             standby=standby,
+            backup_to=backup_to,
+            backup_every_s=backup_every_s,
         )
     )
 
@@ -107,15 +130,15 @@ async def _serve(
     output: str,
     *,
     standby: bool,
+    backup_to: Path | None,
+    backup_every_s: float,
 ) -> int:
     from m2pem.api.clock import SystemClock
-    from m2pem.api.operator import operator_name
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.notes import note
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
     from m2pem.cli.session import driving, make_executive, refuse_speed
-    from m2pem.executive.retention import keep_runs
     from m2pem.executive.simulated_state import tidy_up, with_shared_state
     from m2pem.fleet.fleet import simulated_fleet
     from m2pem.fleet.fleet_file import load_fleet
@@ -135,6 +158,8 @@ async def _serve(
     fleet = with_shared_state(fleet, file_of(url), written)
     refuse_speed(fleet, speed)
     _refuse_memory(url, standby=standby)
+    if backup_to is not None:
+        _refuse_other_than_file(url)
     async with journal_at(url) as journal:
         if standby and not await standing_by(journal, fleet, plugins, speed, operators):
             return 0
@@ -161,13 +186,13 @@ async def _serve(
                 executive.serve_schedule()
                 for each in (await executive.control.scheduled()).lines():
                     note(f"m2pem: schedule: {each}")
-                retention: asyncio.Task[None] | None = None
-                if keep_s is not None:
-                    kept = keep_runs(journal, keep_s, clock, by=operator_name())
-                    retention = asyncio.create_task(kept, name="retention of runs")
+                keeping = [
+                    asyncio.create_task(work)
+                    for work in _housekeeping(journal, clock, keep_s, backup_to, backup_every_s)
+                ]
                 await interruption.asked.wait()
-                if retention is not None:
-                    retention.cancel()
+                for task in keeping:
+                    task.cancel()
         tidy_up(executive, file_of(url))
         return 1 if executive.superseded.is_set() else 0
 
@@ -179,6 +204,34 @@ def _refuse_memory(url: str, *, standby: bool) -> None:
         raise click.UsageError(
             "--standby: a journal in memory ends with its executive; name the file or database of "
             "the executive whose runs are to be taken over with --journal"
+        )
+
+
+def _housekeeping(
+    journal: "Journal",
+    clock: "SystemClock",
+    keep_s: float | None,
+    backup_to: Path | None,
+    backup_every_s: float,
+) -> "Iterator[Coroutine[None, None, None]]":
+    """Yield what is done with the journal from time to time."""
+    from m2pem.api.operator import operator_name
+    from m2pem.executive.backups import keep_backups
+    from m2pem.executive.retention import keep_runs
+
+    if keep_s is not None:
+        yield keep_runs(journal, keep_s, clock, by=operator_name())
+    if backup_to is not None and journal.file is not None:
+        yield keep_backups(journal.file, backup_to, backup_every_s, clock)
+
+
+def _refuse_other_than_file(url: str) -> None:
+    from m2pem.journal import file_of, is_postgres
+
+    if file_of(url) is None or is_postgres(url):
+        raise click.UsageError(
+            "--backup-to copies a journal in a file; one in memory has no copy, and one in "
+            "PostgreSQL is copied with `pg_dump` or `pg_basebackup` (docs/journal.md#backup)"
         )
 
 

@@ -111,8 +111,11 @@ def test_a_run_waits_for_what_operators_started_beside_it(m2pem: CommandLine) ->
     assert program.rest()[0] == 0
 
 
-def test_runs_that_ended_long_ago_are_deleted_and_named(m2pem: CommandLine, tmp_path: Path) -> None:
-    path = tmp_path / "journal.db"
+def test_runs_that_ended_long_ago_are_deleted_and_named_and_the_journal_is_copied(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    path, copies = tmp_path / "journal.db", tmp_path / "copies"
+    copies.mkdir()
 
     async def old_runs() -> None:
         async with opened(lambda: SqliteJournal.open(path)) as journal:
@@ -122,7 +125,10 @@ def test_runs_that_ended_long_ago_are_deleted_and_named(m2pem: CommandLine, tmp_
                 await journal.append([replace(first, at_us=first.at_us + day * DAY_US)])
 
     asyncio.run(old_runs())
-    program = serving(m2pem, "--journal", str(path), "--keep", "12h")
+    program = serving(
+        m2pem, "--journal", str(path), "--keep", "12h", "--backup-to", str(copies),
+        "--backup-every", "1d",
+    )  # fmt: skip
     assert "kept: r2. By the clock" in program.stderr.readline()
     assert "deleted what ended longer ago than is kept: r1" in program.stderr.readline()
     program.type(f"start {MISSION}")
@@ -130,6 +136,15 @@ def test_runs_that_ended_long_ago_are_deleted_and_named(m2pem: CommandLine, tmp_
     program.send(signal.SIGTERM)
     assert program.rest()[0] == 0
     assert m2pem.run("runs", "--journal", path)[1].splitlines()[1].startswith("r2")
+    (copy,) = copies.glob("journal-*.db")
+    assert m2pem.run("journal", "check", copy)[0] == 0
+
+
+def test_a_journal_that_is_no_file_is_not_copied(m2pem: CommandLine, tmp_path: Path) -> None:
+    for url in ("memory:", "postgresql://nobody@127.0.0.1:1/x"):
+        words = ("--journal", url, "--backup-to", tmp_path)
+        status, _, err = m2pem.run("serve", "--fleet", FLEET, *words)
+        assert (status, "--backup-to copies a journal in a file" in err) == (2, True), err
 
 
 def test_a_time_to_keep_runs_that_is_none_is_refused(m2pem: CommandLine) -> None:
