@@ -114,6 +114,15 @@ class CommandLine:
         self._started.append(Program(process, *pipes))
         return self._started[-1]
 
+    def start_other(self, *command: str | Path) -> Program:
+        """Start another program as this one, with pipes for everything."""
+        pipe = subprocess.PIPE
+        pipes = {"stdin": pipe, "stdout": pipe, "stderr": pipe}
+        words = [*map(str, command)]
+        process = subprocess.Popen(words, cwd=self.folder, env=self.environment, text=True, **pipes)
+        self._started.append(Program(process, process.stdin, process.stdout, process.stderr))
+        return self._started[-1]
+
     def run(self, *words: str | Path, **environment: str) -> tuple[int, str, str]:
         """Run it to its end with no input: exit status, standard output, standard error."""
         with (

@@ -273,15 +273,16 @@ class FleetConnections:
             yield f"telemetry of {name}", partial(self._read_telemetry, arbiter)
 
     def lost_after_s(self, stretch: float) -> dict[ResourceId, float]:
-        """After which silence the link of each vehicle is lost, `stretch` times as long."""
-        return {
-            vehicle.id: stretch
-            * (
-                vehicle.lost_after_s
-                or self._arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
-            )
-            for vehicle in self._arbiters.fleet.vehicles.values()
-        }
+        """After which silence the link of each vehicle is lost, `stretch` times as long.
+
+        The fleet's bound counts, and on another host the way to it, which its arbiter adds.
+        """
+        bounds_s = {}
+        for vehicle in self._arbiters.fleet.vehicles.values():
+            own_s = self._arbiters.of(vehicle.id).limits(vehicle.id).lost_after_s
+            stated_s = None if vehicle.host else vehicle.lost_after_s
+            bounds_s[vehicle.id] = stretch * (stated_s or own_s)
+        return bounds_s
 
     async def close(self) -> None:
         """Close all arbiters."""

@@ -35,6 +35,9 @@ from m2pem_plugin_zenoh.store import HostStore, Kept, run_of
 LOST_AFTER_S = 3.0
 """Of a vehicle for which neither the fleet nor its arbiter states one."""
 
+AT_FIRST = 4
+"""States are sent so many times less often than the fleet says, until the round trip is known."""
+
 ITEMS_AT_ONCE = 100
 ANSWERS_KEPT = 1_000
 AGAIN_S = 0.3
@@ -55,8 +58,8 @@ class Outlet(Protocol):
         """
         ...
 
-    def publish(self, executive: str, state: bytes) -> None:
-        """Send a state; it may get lost."""
+    def publish(self, executive: str, states: bytes) -> None:
+        """Send states; they may get lost."""
         ...
 
 
@@ -83,7 +86,8 @@ class ArbiterHost:
         self._answers: OrderedDict[str, asyncio.Task[m.Answer]] = OrderedDict()
         self._received_s = 0.0
         self._received_us = 0
-        self._round_trip_s = 0.0
+        # Until it is measured: at first, states must not fill a thin link.
+        self._round_trip_s = AT_FIRST / hosted.host.telemetry_hz
         self._held_for_executive: set[ResourceId] = set()
         self._ending: set[str] = set()
         self._greeting = asyncio.Lock()
@@ -250,7 +254,8 @@ class ArbiterHost:
         if refused := self._out_of_contact(request):
             return refused
         self._note_contact()
-        self._round_trip_s = ping.round_trip_s
+        if ping.round_trip_s is not None:
+            self._round_trip_s = ping.round_trip_s
         return m.Done(self._now_us)
 
     def _out_of_contact(self, request: m.Request) -> m.Refused | None:
@@ -383,7 +388,7 @@ class ArbiterHost:
         if isinstance(state, TeamState):
             return
         if isinstance(state, PayloadState) and state.detections:
-            self._store.state(m.encode_state(state))
+            self._store.state(m.encode_states([state]))
             self._news.set()
             return
         self._pending[state.resource] = state
@@ -409,8 +414,7 @@ class ArbiterHost:
             self._states.clear()
             if self._contact:
                 pending, self._pending = self._pending, {}
-                for state in pending.values():
-                    self._outlet.publish(self._executive, m.encode_state(state))
+                self._outlet.publish(self._executive, m.encode_states([*pending.values()]))
             await asyncio.sleep(self.state_interval_s)
 
     @property
@@ -418,7 +422,7 @@ class ArbiterHost:
         """How long the host waits from one state of a resource to the next: as the fleet says, or
         a round trip on a slow link, but so that the executive does not believe it lost."""
         slow_s = max(1.0 / self._hosted.host.telemetry_hz, self._round_trip_s)
-        return min(slow_s, self._silence_s / 3)
+        return min(slow_s, self._bound_s / 2)
 
     # --- without contact ------------------------------------------------------------------------
 

@@ -23,8 +23,15 @@ from m2pem_plugin_zenoh.arbiter_host import LinkError
 if TYPE_CHECKING:
     import zenoh
 
-LEASE_MS = 5_000
-"""A connection over which nothing has arrived for so long is closed, and made again."""
+LEASE_S = 5.0
+"""And two round trips: a connection over which nothing has arrived for so long is closed, and made
+again. That takes several round trips, so that waiting is better where the way is long."""
+
+OPENED_WITHIN_S = 10.0
+"""And four round trips: what the handshakes of TCP, TLS and Zenoh may take."""
+
+ANSWERED_WITHIN_S = 60.0
+"""What comes later is dropped."""
 
 RETRY_MS = 500
 OPEN_AGAIN_S = 0.5
@@ -44,6 +51,7 @@ def settings(host: Host, endpoints: Endpoints) -> dict[str, Any]:
     Raises:
         PluginError: a file of keys or passwords is missing, or others may read it.
     """
+    opened_within_ms = round(1000 * (OPENED_WITHIN_S + 4 * host.round_trip_s))
     found: dict[str, Any] = {
         # One that connects is a client, which a router serves, too.
         "mode": "peer" if endpoints.listen else "client",
@@ -56,7 +64,9 @@ def settings(host: Host, endpoints: Endpoints) -> dict[str, Any]:
         },
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
-        "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/lease": round(1000 * (LEASE_S + 2 * host.round_trip_s)),
+        "transport/unicast/open_timeout": opened_within_ms,
+        "transport/unicast/accept_timeout": opened_within_ms,
     }
     if host.ca:
         tls: dict[str, Any] = {"root_ca_certificate": _readable(host.ca)}
@@ -144,38 +154,43 @@ class Link:
     # --- requests -------------------------------------------------------------------------------
 
     async def request(
-        self, key: str, content: bytes, timeout_s: float, *, urgent: bool = False
+        self,
+        key: str,
+        content: bytes,
+        timeout_s: float,
+        *,
+        urgent: bool = False,
+        answered: "asyncio.Future[bytes] | None" = None,
     ) -> bytes:
         """Send a request to what answers at a key; returns the answer.
 
-        `urgent`: it goes before everything else, and is never dropped.
+        `urgent`: it goes before everything else, and is never dropped. `answered`: the answer to
+        the same request that was sent before, which may come first.
 
         Raises:
             LinkError: there is no answer within `timeout_s`.
         """
-        answer: asyncio.Future[bytes] = self._loop.create_future()
+        answer: asyncio.Future[bytes] = answered or self._loop.create_future()
+        over: asyncio.Future[bytes] = self._loop.create_future()
 
         def replied(reply: Any) -> None:
             if reply.ok is not None:
                 self._soon(_resolve, answer, reply.ok.payload.to_bytes())
 
         def ended() -> None:
-            self._soon(_fail, answer)
+            self._soon(_resolve, over, b"")
 
-        await self._run(
-            partial(self._get, key, content, timeout_s, urgent, replied, ended), urgent=urgent
-        )
-        try:
-            async with asyncio.timeout(timeout_s):
-                return await answer
-        except TimeoutError:
-            raise LinkError(f"no answer within {timeout_s:g} s") from None
+        await self._run(partial(self._get, key, content, urgent, replied, ended), urgent=urgent)
+        ends = {answer, over}
+        await asyncio.wait(ends, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
+        if answer.done():
+            return answer.result()
+        raise LinkError("nobody answers" if over.done() else f"no answer within {timeout_s:g} s")
 
     def _get(
         self,
         key: str,
         content: bytes,
-        timeout_s: float,
         urgent: bool,
         replied: Callable[[Any], None],
         ended: Callable[[], None],
@@ -187,7 +202,7 @@ class Link:
             key,
             zenoh.handlers.Callback(replied, ended, indirect=False),
             payload=content,
-            timeout=timeout_s,
+            timeout=ANSWERED_WITHIN_S,
             priority=priority,
             congestion_control=zenoh.CongestionControl.BLOCK,
             express=True,
@@ -316,11 +331,6 @@ def _open(configured: dict[str, Any]) -> "zenoh.Session":
 def _resolve(answer: "asyncio.Future[bytes]", content: bytes) -> None:
     if not answer.done():
         answer.set_result(content)
-
-
-def _fail(answer: "asyncio.Future[bytes]") -> None:
-    if not answer.done():
-        answer.set_exception(LinkError("nobody answers"))
 
 
 def _joined(pools: Sequence[ThreadPoolExecutor]) -> None:

@@ -4,7 +4,8 @@ A request has the same `id` when it is sent again; the host does it once. Times 
 the sender's clock, since the Unix epoch.
 """
 
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import msgspec
@@ -22,7 +23,7 @@ from m2pem.api import (
     VehicleState,
 )
 
-VERSION = 1
+VERSION = 2
 """Of these messages. Both ends must have the same."""
 
 
@@ -30,10 +31,14 @@ class MessageError(ValueError):
     """What arrived is no message of this version."""
 
 
+class _Message(msgspec.Struct, frozen=True, array_like=True):
+    """Without the names of its fields on the link."""
+
+
 # --- what the executive asks --------------------------------------------------------------------
 
 
-class Hello(msgspec.Struct, frozen=True, tag=True):
+class Hello(_Message, frozen=True, tag=True):
     """The executive wants contact. `fresh`: its first one since it began. `going`: the behaviors
     that go on as it knows; the host holds what does something else. `who`: for people."""
 
@@ -43,46 +48,46 @@ class Hello(msgspec.Struct, frozen=True, tag=True):
     going: tuple[str, ...] = ()
 
 
-class Ping(msgspec.Struct, frozen=True, tag=True):
-    """It is still there. `round_trip_s`: as it measured it last."""
+class Ping(_Message, frozen=True, tag=True):
+    """It is still there. `round_trip_s`: as it measured it last; None: not yet."""
 
-    round_trip_s: float
+    round_trip_s: float | None
 
 
-class Start(msgspec.Struct, frozen=True, tag=True):
+class Start(_Message, frozen=True, tag=True):
     request: dict[str, Any]
 
 
-class Cancel(msgspec.Struct, frozen=True, tag=True):
+class Cancel(_Message, frozen=True, tag=True):
     behavior: str
     epoch: int
 
 
-class Adjust(msgspec.Struct, frozen=True, tag=True):
+class Adjust(_Message, frozen=True, tag=True):
     behavior: str
     epoch: int
     parameters: dict[str, Any]
 
 
-class Query(msgspec.Struct, frozen=True, tag=True):
+class Query(_Message, frozen=True, tag=True):
     behavior: str
     native_ref: str | None
     epoch: int
 
 
-class Hold(msgspec.Struct, frozen=True, tag=True):
+class Hold(_Message, frozen=True, tag=True):
     resource: str
 
 
-class Resume(msgspec.Struct, frozen=True, tag=True):
+class Resume(_Message, frozen=True, tag=True):
     resource: str
 
 
-class Reclaim(msgspec.Struct, frozen=True, tag=True):
+class Reclaim(_Message, frozen=True, tag=True):
     resource: str
 
 
-class Fence(msgspec.Struct, frozen=True, tag=True):
+class Fence(_Message, frozen=True, tag=True):
     run: str
     epoch: int
 
@@ -90,9 +95,9 @@ class Fence(msgspec.Struct, frozen=True, tag=True):
 Body: TypeAlias = Hello | Ping | Start | Cancel | Adjust | Query | Hold | Resume | Reclaim | Fence
 
 
-class Request(msgspec.Struct, frozen=True):
+class Request(_Message, frozen=True):
     """`executive`: a process. `journal`: of that executive. `contact`: as the host has named it in
-    `Welcome`; "" before."""
+    `Welcome`; "" before. A `Ping` has neither `id` nor `journal`."""
 
     id: str
     executive: str
@@ -104,7 +109,7 @@ class Request(msgspec.Struct, frozen=True):
 # --- what the host answers ----------------------------------------------------------------------
 
 
-class Welcome(msgspec.Struct, frozen=True, tag=True):
+class Welcome(_Message, frozen=True, tag=True):
     """There is contact. `store`: which numbers of items belong together."""
 
     contact: str
@@ -112,21 +117,21 @@ class Welcome(msgspec.Struct, frozen=True, tag=True):
     time_us: int
 
 
-class Done(msgspec.Struct, frozen=True, tag=True):
+class Done(_Message, frozen=True, tag=True):
     """`text`: what `reclaim` returned, else "". `time_us`: of the host's clock."""
 
     time_us: int
     text: str = ""
 
 
-class Found(msgspec.Struct, frozen=True, tag=True):
+class Found(_Message, frozen=True, tag=True):
     """The answer to `Query`. `resources`: of the behavior, if the host knows them."""
 
     report: bytes
     resources: tuple[str, ...]
 
 
-class Refused(msgspec.Struct, frozen=True, tag=True):
+class Refused(_Message, frozen=True, tag=True):
     """`code`: why, for programs: NO_CONTACT, SUPERSEDED, IN_USE, STALE_EPOCH, VERSION, FAILED.
     `newest`: with STALE_EPOCH, the epoch that was seen."""
 
@@ -140,7 +145,7 @@ Answer: TypeAlias = Welcome | Done | Found | Refused
 # --- what the host reports ----------------------------------------------------------------------
 
 
-class Item(msgspec.Struct, frozen=True):
+class Item(_Message, frozen=True):
     """A report, a state with detections, or a note. `number` rises in the order of their coming."""
 
     number: int
@@ -148,14 +153,14 @@ class Item(msgspec.Struct, frozen=True):
     content: bytes
 
 
-class Items(msgspec.Struct, frozen=True):
+class Items(_Message, frozen=True):
     """Delivered until the executive has said up to which number it has them."""
 
     store: str
     items: tuple[Item, ...]
 
 
-class Received(msgspec.Struct, frozen=True):
+class Received(_Message, frozen=True):
     number: int
 
 
@@ -163,6 +168,24 @@ REPORT, STATE, NOTE = "report", "state", "note"
 """Kinds of items; a note is a text for operators."""
 
 _encoder = msgspec.msgpack.Encoder()
+
+LARGEST_STATES = 10_000_000
+"""Bytes of a message of states, which is compressed: the most that is read."""
+
+_OFTEN = _encoder.encode(
+    {
+        "resource": "",
+        "time_us": 1_800_000_000_000_000,
+        "position": {"latitude_deg": 0.0, "longitude_deg": 0.0, "altitude_m": 0.0},
+        "altitude_above_home_m": None,
+        "velocity_enu_m_s": [0.0, 0.0, 0.0],
+        **{"roll_rad": 0.0, "pitch_rad": 0.0, "yaw_rad": 0.0, "battery_fraction": 0.0},
+        **{"mode": "", "armed": True, "ready": True, "not_ready_reasons": []},
+        **{"link": "CONNECTED", "behavior": ""},
+    }
+)
+"""What a state is alike in, so that compression leaves of one little but its numbers. With another
+one, an end does not understand what the other has compressed: it belongs to `VERSION`."""
 
 
 def encode(message: msgspec.Struct) -> bytes:
@@ -274,14 +297,21 @@ def decode_report(content: bytes) -> BehaviorReport:
     return report
 
 
-def encode_state(state: VehicleState | PayloadState) -> bytes:
-    """Return a state as bytes."""
-    return _encoder.encode((isinstance(state, PayloadState), state))
+def encode_states(states: Sequence[VehicleState | PayloadState]) -> bytes:
+    """Return states as bytes."""
+    compressor = zlib.compressobj(zlib.Z_BEST_COMPRESSION, zdict=_OFTEN)
+    plain = _encoder.encode([(isinstance(each, PayloadState), each) for each in states])
+    return compressor.compress(plain) + compressor.flush()
 
 
-def decode_state(content: bytes) -> VehicleState | PayloadState:
-    """Return what `encode_state` was given; raises MessageError."""
-    payload, plain = decode(content, tuple[bool, msgspec.Raw])
-    state = decode(bytes(plain), PayloadState if payload else VehicleState)
-    assert isinstance(state, VehicleState | PayloadState)
-    return state
+def decode_states(content: bytes) -> list[VehicleState | PayloadState]:
+    """Return what `encode_states` was given; raises MessageError."""
+    decompressor = zlib.decompressobj(zdict=_OFTEN)
+    try:
+        plain = decompressor.decompress(content, LARGEST_STATES)
+    except zlib.error as error:
+        raise MessageError(f"not a message of this version: {error}") from error
+    return [
+        decode(bytes(each), PayloadState if is_of_payload else VehicleState)
+        for is_of_payload, each in decode(plain, list[tuple[bool, msgspec.Raw]])
+    ]

@@ -97,5 +97,5 @@ class _Outlet:
             raise LinkError(str(error)) from error
         return received.number
 
-    def publish(self, executive: str, state: bytes) -> None:
-        self._link.publish(f"{self._key}/{executive}/state", state)
+    def publish(self, executive: str, states: bytes) -> None:
+        self._link.publish(f"{self._key}/{executive}/state", states)

@@ -32,6 +32,9 @@ from m2pem_plugin_zenoh.arbiter_host import LinkError, lost_after_s
 from m2pem_plugin_zenoh.link import Endpoints, Link, settings
 
 APPEARS_WITHIN_S = 3.0
+ROUND_TRIPS = 3
+"""How many of them a host has to appear, where they take longer: connections are made meanwhile."""
+
 CONNECTS_WITHIN_S = 20.0
 """How long a host that is there may take to connect its arbiter to the vehicles."""
 
@@ -44,9 +47,11 @@ START_WITHIN_S = 5.0
 """After so long a start returns, though the host has not confirmed it: it is sent on."""
 
 CONFIRMED_WITHIN_S = 8.0
-"""How long what stops a vehicle is sent again until the host confirms it."""
+"""And two round trips: how long what stops a vehicle is sent again until the host confirms it."""
 
 AGAIN_S = 1.0
+LATE_ANSWERS = 4
+"""One after the other, until operators are told that the link is slow."""
 
 
 def _stale(what: str, behavior: BehaviorId, epoch: int, newest: int) -> StaleCommandError:
@@ -94,9 +99,11 @@ class RemoteArbiter:
         self._contact = self._store = ""
         self._received = 0
         self._fresh = True
-        self._refusal = ""
+        self._refusal = self._greeting = ""
+        self._hello: m.Hello | None = None
         self._answered_s = 0.0
         self._round_trip_s = 0.0
+        self._late_answers = 0
         self._clock_ahead_us: int | None = None
         self._behaviors: dict[BehaviorId, _Behavior] = {}
         self._lost: set[ResourceId] = set()
@@ -143,7 +150,8 @@ class RemoteArbiter:
         self._create(self._keep_contact(self._link), "contact")
         self._create(self._watch(), "watch the contact")
         try:
-            async with asyncio.timeout(APPEARS_WITHIN_S):
+            appears_within_s = max(APPEARS_WITHIN_S, ROUND_TRIPS * self._host.round_trip_s)
+            async with asyncio.timeout(appears_within_s):
                 await self._is_there.wait()
             async with asyncio.timeout(CONNECTS_WITHIN_S):
                 await self._greeted.wait()
@@ -197,7 +205,7 @@ class RemoteArbiter:
     async def _send_start(
         self, request: BehaviorRequest, stale: "asyncio.Future[StaleCommandError]"
     ) -> None:
-        body, id_ = m.Start(m.plain_request(request)), uuid4().hex
+        body, id_, answered = m.Start(m.plain_request(request)), uuid4().hex, self._answered()
         behavior = self._behaviors[request.id]
         is_first = True
         while not behavior.ended:
@@ -207,12 +215,13 @@ class RemoteArbiter:
                 continue
             is_first = False
             try:
-                answer = await self._request(id_, body, self._resend_after_s)
+                answer = await self._request(id_, body, self._resend_after_s, answered=answered)
             except LinkError:
                 await self._again()
                 continue
             match answer:
                 case m.Refused("NO_CONTACT"):
+                    answered = self._answered()
                     await self._again()
                     continue
                 case m.Refused("STALE_EPOCH"):
@@ -305,12 +314,15 @@ class RemoteArbiter:
 
     async def _confirmed(self, body: m.Body, *, urgent: bool = False) -> m.Answer:
         """Send a request until it is answered; raises HostError."""
-        id_ = uuid4().hex
+        id_, answered = uuid4().hex, self._answered()
+        within_s = CONFIRMED_WITHIN_S + 2 * self._host.round_trip_s
         try:
-            async with asyncio.timeout(CONFIRMED_WITHIN_S):
+            async with asyncio.timeout(within_s):
                 while self._contact:
                     try:
-                        answer = await self._request(id_, body, self._resend_after_s, urgent=urgent)
+                        answer = await self._request(
+                            id_, body, self._resend_after_s, urgent=urgent, answered=answered
+                        )
                     except LinkError:
                         await self._again()
                         continue
@@ -322,25 +334,42 @@ class RemoteArbiter:
                     return answer
         except TimeoutError:
             raise HostError(
-                f"host {self._host.name} has not confirmed it within {CONFIRMED_WITHIN_S:g} s"
+                f"host {self._host.name} has not confirmed it within {within_s:g} s"
             ) from None
         raise HostError(self._unreached)
 
     async def _request(
-        self, id_: str, body: m.Body, timeout_s: float, *, urgent: bool = False
+        self,
+        id_: str,
+        body: m.Body,
+        timeout_s: float,
+        *,
+        urgent: bool = False,
+        answered: "asyncio.Future[bytes] | None" = None,
     ) -> m.Answer:
+        """Send a request; returns the answer. `answered`: by the answer to what was sent before
+        with the same id, too.
+
+        Raises:
+            LinkError: there is none within `timeout_s`.
+        """
         link = self._link
         if link is None:
             raise LinkError("the link is closed")
-        journal = str(self._context.journal)
+        journal = "" if isinstance(body, m.Ping) else str(self._context.journal)
         request = m.Request(id_, self._id, journal, self._contact, body)
         key = f"{self._key}/request"
-        content = await link.request(key, m.encode(request), timeout_s, urgent=urgent)
+        content = await link.request(
+            key, m.encode(request), timeout_s, urgent=urgent, answered=answered
+        )
         try:
             answer: m.Answer = m.decode(content, m.Answer)
         except m.MessageError as error:
             raise LinkError(str(error)) from error
         return answer
+
+    def _answered(self) -> "asyncio.Future[bytes]":
+        return asyncio.get_running_loop().create_future()
 
     async def _again(self) -> None:
         await asyncio.sleep(min(AGAIN_S, max(0.1, self._round_trip_s)))
@@ -355,7 +384,7 @@ class RemoteArbiter:
     async def _keep_contact(self, link: Link) -> None:
         await link.open()
         await link.answer(f"{self._key}/{self._id}/items", self._take_items)
-        await link.subscribe(f"{self._key}/{self._id}/state", self._take_state)
+        await link.subscribe(f"{self._key}/{self._id}/state", self._take_states)
         await link.watch(f"{self._key}/alive", self._appears)
         pings: set[asyncio.Task[None]] = set()
         while True:
@@ -366,12 +395,12 @@ class RemoteArbiter:
                 ping.add_done_callback(pings.discard)
                 await asyncio.sleep(self._shortest_silence_s / PINGS_IN_SILENCE)
                 continue
-            await self._greet()
-            if not self._contact:
-                self._appeared.clear()
-                waiting = self._create(self._wait_for_host(), "wait for the host")
-                await asyncio.wait({waiting}, timeout=AGAIN_S)
-                waiting.cancel()
+            # On a slow link several greetings are on the way, too.
+            self._appeared.clear()
+            self._create(self._greet(), "greet")
+            waiting = self._create(self._wait_for_host(), "wait for the host")
+            await asyncio.wait({waiting}, timeout=AGAIN_S)
+            waiting.cancel()
 
     def _appears(self) -> None:
         self._is_there.set()
@@ -383,12 +412,19 @@ class RemoteArbiter:
     async def _greet(self) -> None:
         going = tuple(id_ for id_, each in self._behaviors.items() if not each.ended)
         who = f"the executive {os.getpid()} of {socket.gethostname()}"
-        body = m.Hello(m.VERSION, who, self._fresh, going)
+        hello = m.Hello(m.VERSION, who, self._fresh, going)
+        if hello != self._hello:
+            # An answer to the former one is too late: the host would let go on what has ended here.
+            self._hello, self._greeting = hello, uuid4().hex
+        id_ = self._greeting
         try:
-            answer = await self._request(uuid4().hex, body, max(2.0, 4 * self._round_trip_s))
+            answer = await self._request(id_, hello, PING_TIMEOUT_S)
         except LinkError as error:
             self._log.debug("host %s: %s", self._host.name, error)
             return
+        if self._contact or id_ != self._greeting:
+            return  # the same one was answered before
+        self._hello = None
         if isinstance(answer, m.Welcome | m.Refused):
             self._greeted.set()
         if isinstance(answer, m.Refused):
@@ -402,28 +438,43 @@ class RemoteArbiter:
             self._store, self._received = answer.store, 0
         self._contact, self._fresh, self._refusal = answer.contact, False, ""
         self._answered_s = self._now_s
+        self._appeared.set()
         self._clock_ahead_us = None
         self._lost.clear()
         self._log.info("contact with host %s", self._host.name)
 
     async def _ping(self) -> None:
         contact, sent_s, sent_us = self._contact, self._now_s, self._now_us
-        body = m.Ping(self._round_trip_s)
+        body = m.Ping(self._round_trip_s or None)
         try:
-            answer = await self._request(uuid4().hex, body, PING_TIMEOUT_S)
+            answer = await self._request("", body, PING_TIMEOUT_S)
         except LinkError:
             return
+        before_s, self._round_trip_s = self._round_trip_s, self._now_s - sent_s
+        self._judge_round_trip()
         if contact != self._contact:
             return
         if isinstance(answer, m.Refused):
             self._lose_contact(answer.reason)
         elif isinstance(answer, m.Done):
             self._answered_s = self._now_s
-            took_s = self._now_s - sent_s
             # The shortest way tells most of the other clock.
-            if self._clock_ahead_us is None or took_s <= self._round_trip_s:
+            if self._clock_ahead_us is None or self._round_trip_s <= before_s:
                 self._clock_ahead_us = answer.time_us - (sent_us + self._now_us) // 2
-            self._round_trip_s = took_s
+
+    def _judge_round_trip(self) -> None:
+        """Tell operators, once, that the link is slower than the fleet says."""
+        if self._late_answers == LATE_ANSWERS:
+            return
+        self._late_answers += 1
+        if self._round_trip_s <= self._host.round_trip_s:
+            self._late_answers = 0
+        elif self._late_answers == LATE_ANSWERS:
+            self._log.warning(
+                "host %s answers after %.1f s; contact is lost too early where the fleet file has "
+                "a shorter round_trip (%g s): write a longer one for this host",
+                *(self._host.name, self._round_trip_s, self._host.round_trip_s),
+            )
 
     async def _watch(self) -> None:
         """Notice that the host does not answer; each resource has its own bound."""
@@ -470,7 +521,7 @@ class RemoteArbiter:
                 if item.kind == m.REPORT:
                     self._report(m.decode_report(item.content))
                 elif item.kind == m.STATE:
-                    self._take_state(item.content)
+                    self._take_states(item.content)
                 elif item.kind == m.NOTE:
                     text = item.content.decode(errors="replace")
                     self._log.warning("host %s: %s", self._host.name, text)
@@ -494,16 +545,15 @@ class RemoteArbiter:
             known.number += 1
             self._reports.put(BehaviorReport(id_, known.number, state, code, reason))
 
-    def _take_state(self, content: bytes) -> None:
+    def _take_states(self, content: bytes) -> None:
         # What was on its way while the contact was lost does not mean that the vehicle is there.
         if not self._contact:
             return
-        state = m.decode_state(content)
-        if state.resource not in self._hosted.connections:
-            return
-        state = self._in_our_time(state)
-        self._latest[state.resource] = state
-        self._states.put(state)
+        for each in m.decode_states(content):
+            if each.resource in self._hosted.connections:
+                state = self._in_our_time(each)
+                self._latest[state.resource] = state
+                self._states.put(state)
 
     def _in_our_time(self, state: VehicleState | PayloadState) -> VehicleState | PayloadState:
         """Return a state with its time by the clock of this host; it does not go back."""

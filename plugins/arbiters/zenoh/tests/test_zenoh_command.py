@@ -9,8 +9,13 @@ import pytest
 from m2pem_plugin_zenoh.plugin import ZenohHosts
 from zenoh_world import free_port
 
+from m2pem import load_fleet
+from m2pem.api import SystemClock
 from m2pem.errors import PluginError
+from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
+from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
+from m2pem.testing.contracts.arbiter_harness import context
 from tests.command_line import CommandLine, Program, command_line
 
 PAGE = Path(__file__).parents[4] / "docs" / "arbiter-host.md"
@@ -87,6 +92,19 @@ def test_bad_words_are_refused_with_a_remedy(
 def test_no_vehicle_has_the_link_as_its_arbiter() -> None:
     with pytest.raises(PluginError, match="keep the vehicle's own arbiter"):
         ZenohHosts()({}, None)  # type: ignore[arg-type]  # it is refused before
+
+
+async def test_the_way_to_its_host_adds_to_the_bound_of_a_vehicle(tmp_path: Path) -> None:
+    text = FLEET.replace("arbiter: sim,", "arbiter: sim, lost_after: 5 s,")
+    text = text.replace("arbiter: sim}", "arbiter: sim, lost_after: 5 s}")
+    (tmp_path / "fleet.yaml").write_text(text.replace('7447"]', '7447"], round_trip: 3 s'))
+    fleet = load_fleet(tmp_path / "fleet.yaml")
+    arbiters = FleetArbiters(fleet, PluginManager(), context(SystemClock()))
+    connections = FleetConnections(arbiters, lambda _: None, lambda _: None)
+    try:
+        assert connections.lost_after_s(1.0) == {"rover1": 8.0, "rover2": 5.0}
+    finally:
+        await connections.close()
 
 
 def begun(m2pem: CommandLine) -> Program:

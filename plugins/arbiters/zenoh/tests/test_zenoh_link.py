@@ -2,8 +2,8 @@
 
 import asyncio
 import shutil
-import subprocess
 from contextlib import AsyncExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,36 +11,24 @@ from m2pem_plugin_zenoh import m2pem_check_host
 from m2pem_plugin_zenoh.arbiter_host import LinkError
 from m2pem_plugin_zenoh.host_checks import check_hosts
 from m2pem_plugin_zenoh.link import Endpoints, Link, settings
-from zenoh_world import free_port
+from m2pem_plugin_zenoh.plugin import ZenohHosts
+from zenoh_world import free_port, hosted_simulation
 
+from bench.network import make_keys
 from m2pem import load_fleet
-from m2pem.api import Host
+from m2pem.api import Host, SystemClock
 from m2pem.errors import PluginError
+from m2pem.testing.contracts.arbiter_harness import context
 
 
 @pytest.fixture(scope="session")
 def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a CA, a certificate for 127.0.0.1 and its key, and one of another CA."""
-    if not shutil.which("openssl"):
-        pytest.fail("needs openssl: install it")
-    folder = tmp_path_factory.mktemp("keys")
-    (folder / "names").write_text("subjectAltName=IP:127.0.0.1")
-    new = "openssl req -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes"
-    for ca in ("ca", "other"):
-        run(folder, f"{new} -x509 -days 2 -keyout {ca}.key -out {ca}.pem -subj /CN={ca}")
-    for name, ca in (("link", "ca"), ("stranger", "other")):
-        run(folder, f"{new} -keyout {name}.key -out {name}.csr -subj /CN={name}")
-        signed = f"-CA {ca}.pem -CAkey {ca}.key -CAcreateserial -days 2 -extfile names"
-        run(folder, f"openssl x509 -req -in {name}.csr {signed} -out {name}.pem")
-    (folder / "users").write_text("anna:secret\n")
-    (folder / "wrong").write_text("anna:guessed\n")
-    for file in folder.iterdir():
-        file.chmod(0o600)
+    """A folder with keys for 127.0.0.1, and files of passwords."""
+    folder = make_keys(tmp_path_factory.mktemp("keys"), "127.0.0.1")
+    for name, password in (("users", "secret"), ("wrong", "guessed")):
+        (folder / name).write_text(f"anna:{password}\n")
+        (folder / name).chmod(0o600)
     return folder
-
-
-def run(folder: Path, command: str) -> None:
-    subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
 
 
 def host(keys: Path, certificate: str = "link", credentials: str = "") -> Host:
@@ -125,6 +113,32 @@ def test_a_secret_that_others_may_read_is_refused(keys: Path, tmp_path: Path, fi
     (copy / file).chmod(0o640)
     with pytest.raises(PluginError, match=rf"{file}: others may read it .*chmod 600 .*{file}"):
         settings(host(copy, credentials="users"), Endpoints(listen=("tls/127.0.0.1:1",)))
+
+
+async def test_with_a_secret_that_others_may_read_neither_end_starts(
+    keys: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "keys"
+    shutil.copytree(keys, copy)
+    (copy / "link.key").chmod(0o644)
+    hosted = hosted_simulation(1, tmp_path)
+    hosted = replace(hosted, host=replace(host(copy), connect=("tls/127.0.0.1:1",)))
+    made = context(SystemClock())
+    executive = ZenohHosts()(hosted.connections, made, hosted)
+    with pytest.raises(PluginError, match=r"chmod 600 .*link\.key"):
+        await executive.connect()
+    await executive.close()
+    with pytest.raises(PluginError, match=r"chmod 600 .*link\.key"):
+        await ZenohHosts().serve([hosted], made, tmp_path / "state")
+
+
+@pytest.mark.long
+async def test_an_end_whose_certificate_names_another_address_is_not_spoken_to(
+    tmp_path: Path,
+) -> None:
+    elsewhere = make_keys(tmp_path, "10.0.0.7")
+    with pytest.raises(LinkError):
+        await answer_of(host(elsewhere), host(elsewhere))
 
 
 def test_the_doctor_names_files_that_cannot_be_used(keys: Path) -> None:

@@ -1,6 +1,6 @@
 """A host with two simulated MAVLink rovers, over UDP.
 
-    python zenoh_mavlink_host_process.py PORT FOLDER SPEED ACTION:AFTER_S LOST_AFTER_S
+    python zenoh_mavlink_host_process.py PORT FOLDER SPEED ACTION:AFTER_S LOST_AFTER_S ...
 
 FOLDER/ports has the UDP port of the first rover; the second one has the next. It obeys lines at its
 standard input: "cut VEHICLE", "effects VEHICLE".

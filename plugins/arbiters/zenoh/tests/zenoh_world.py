@@ -3,6 +3,8 @@
 import asyncio
 import os
 import socket
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from m2pem.api import (
@@ -32,14 +34,19 @@ def hosted_simulation(
     policy: CutOffPolicy = CutOffPolicy(),  # noqa: B008  # it is frozen
     lost_after_s: float | None = None,
     round_trip_s: float = 1.0,
+    connect: str = "",
 ) -> HostedArbiter:
-    """Two simulated vehicles at a host, which listens at the port, or at one that leads to it."""
+    """Two simulated vehicles at a host, which listens at the port, or at one that leads to it.
+
+    `connect`: the endpoint of a router, to which the executive connects instead.
+    """
     settings = {"state": str(folder / "vehicles.sqlite"), "telemetry_hz": 10}
     connections = {
         vehicle: Connection(vehicle, "ground", settings, lost_after_s=lost_after_s)
         for vehicle in (UGV1, UGV2)
     }
-    host = Host("pi", (f"tcp/127.0.0.1:{port}",), telemetry_hz=50.0, round_trip_s=round_trip_s)
+    endpoint = connect or f"tcp/127.0.0.1:{port}"
+    host = Host("pi", (endpoint,), telemetry_hz=50.0, round_trip_s=round_trip_s)
 
     def make(context: ArbiterContext) -> SimArbiter:
         return SimArbiter(connections, context)
@@ -53,7 +60,8 @@ class HostProcess:
     """A host in a process of its own. It obeys lines at its standard input: cut, mend, effects.
 
     `speed`: of its clock. `policy`: what it does alone, and after how long. `lost_after_s`: of its
-    vehicles.
+    vehicles. `connect`: to the endpoint of a router; it listens at the port if there is none.
+    `inside`: the words before its command, if it does not run here.
     """
 
     program = "zenoh_host_process.py"
@@ -65,21 +73,32 @@ class HostProcess:
         speed: float = 1.0,
         policy: str = "hold:10",
         lost_after_s: float = 3.0,
+        round_trip_s: float = 1.0,
+        connect: str = "",
+        inside: Sequence[str] = (),
     ) -> None:
         self.port = port
         words = [self.program, str(port), str(folder), str(speed), policy, str(lost_after_s)]
+        words += [str(round_trip_s), connect]
+        self._inside = inside
         self._code = (
             f"import runpy, sys; sys.argv[:] = {words!r}; "
             f"runpy.run_path({str(HERE / self.program)!r}, run_name='__main__')"
         )
-        modules = os.pathsep.join(map(str, (HERE, REPOSITORY)))
+        more = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        modules = os.pathsep.join(map(str, (HERE, REPOSITORY, *filter(None, more))))
         self._command_line = CommandLine(folder, {"PYTHONPATH": modules})
         self._process = self._start()
 
     def _start(self) -> Program:
-        process = self._command_line.start("-c", self._code)
-        process.until_text("listens")
+        process = self._started()
+        process.until(lambda line: "listens" in line or "connects" in line)
         return process
+
+    def _started(self) -> Program:
+        if not self._inside:
+            return self._command_line.start("-c", self._code)
+        return self._command_line.start_other(*self._inside, sys.executable, "-c", self._code)
 
     def say(self, words: str) -> str:
         """Have it do something; returns what it answers."""
