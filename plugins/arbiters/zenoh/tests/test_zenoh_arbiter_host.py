@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import zlib
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, cast
@@ -443,6 +444,15 @@ def test_a_slow_link_gets_fewer_states_but_is_not_believed_lost(
         assert world.host.state_interval_s == 2.0
 
     play(main)
+
+
+def test_states_of_another_version_are_refused() -> None:
+    states: list[VehicleState | PayloadState] = [VehicleState(UGV1, 1), PayloadState(CAMERA, 2)]
+    content = m.encode_states(states)
+    assert m.decode_states(content) == states
+    for other in (b"junk", m.encode(m.Ping(None)), content[:-8], zlib.compress(b"\x80")):
+        with pytest.raises(m.MessageError):
+            m.decode_states(other)
 
 
 def test_detections_are_not_lost(play: Callable[..., None]) -> None:

@@ -144,6 +144,19 @@ async def test_a_hold_overtakes_what_a_slow_link_carries(
             assert end.state is BehaviorState.CANCELLED, end
 
 
+@pytest.mark.long
+async def test_operators_are_told_of_a_link_that_is_slower_than_the_fleet_says(
+    start_host: StartHost, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    host = start_host(lost_after_s=4.0)
+    async with Wire(free_port(), host.port) as wire:
+        wire.delay_s = 0.4
+        async with connected(wire.port, tmp_path, 4.0, round_trip_s=0.5) as harness:
+            told = "host pi answers after"
+            assert await harness.until(lambda: told in caplog.text, 100)
+            assert "write a longer one" in caplog.text
+
+
 async def test_a_killed_host_takes_its_vehicles_up_again(
     start_host: StartHost, tmp_path: Path
 ) -> None:

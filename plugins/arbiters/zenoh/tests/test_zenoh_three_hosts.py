@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from zenoh_world import free_port
 
 from bench.network import Network, make_keys, missing
 from m2pem.simulation.state_file import recorded_effects
@@ -45,7 +46,7 @@ hosts:
   rover-pi: {{connect: ["tls/{ground}:7447"], tls: {tls}}}
 vehicles:
   uav1: {{domain: air, arbiter: mavlink, host: copter-pi, lost_after: {lost_after} s, sitl: true,
-    connection: {{url: "udpout://127.0.0.1:14600", system_id: 1}},
+    connection: {{url: "udpout://127.0.0.1:{port}", system_id: 1}},
     when_cut_off: {{action: hold, after: 30 s}}}}
   ugv1: {{domain: ground, arbiter: sim, host: rover-pi, lost_after: {lost_after} s,
     when_cut_off: {{action: continue}}}}
@@ -102,10 +103,12 @@ class World:
         make_keys(folder, *map(network.address, (STATION, AIR, GROUND)))
         tls = "{ca: ca.pem, certificate: link.pem, key: link.key}"
         addresses = {"air": network.address(AIR), "ground": network.address(GROUND)}
-        fleet = FLEET.format(**addresses, tls=tls, lost_after=LOST_AFTER_S)
+        # The vehicles of a computer are locked by their addresses, also those in other namespaces.
+        port = free_port()
+        fleet = FLEET.format(**addresses, tls=tls, lost_after=LOST_AFTER_S, port=port)
         (folder / "fleet.yaml").write_text(fleet)
         (folder / "m.bpmn").write_bytes(MISSION)
-        self.copter = self._start(AIR, sys.executable, COPTER, "14600")
+        self.copter = self._start(AIR, sys.executable, COPTER, port)
         self._line(self.copter)
         self.hosts = {name: self.host(name) for name in (AIR, GROUND)}
 
