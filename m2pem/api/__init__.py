@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from m2pem.api.health import ExecutiveAddress, HealthCheck, HealthStatus, listening_check
     from m2pem.api.hosting import CutOffPolicy, Host, HostedArbiter, HostLink, WhenCutOff
     from m2pem.api.latest_task import LatestTask
-    from m2pem.api.ocu import Ocu
+    from m2pem.api.ocu import Ocu, StandbyOcu
     from m2pem.api.operations import (
         MAX_DATA_VALUES,
         MAX_NAME_CHARACTERS,
@@ -168,7 +168,7 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
-    "m2pem.api.ocu": "Ocu",
+    "m2pem.api.ocu": "Ocu StandbyOcu",
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
     ),
@@ -332,6 +332,7 @@ __all__ = [
     "Severity",
     "SightedArbiter",
     "SimulationResult",
+    "StandbyOcu",
     "StampedRecord",
     "SurveyTracks",
     "SystemClock",

@@ -57,7 +57,7 @@ class LostResources:
     """The resources whose link was lost, until they are free again.
 
     `epoch_of`: with which epoch the run of a behavior is driven here. `out_of_reach`: what a
-    resource does that is being lost, by the runs that are driven here. `not_ours`: "", or why
+    resource does that is being lost, by the runs that are driven here. `why_not_served`: "", or why
     another executive may command the vehicles by now. `show`: to operators, how a resource is.
     `returned`: is called when a resource has returned and stopped. `marks`: of what is lost, for
     the next executive.
@@ -71,7 +71,7 @@ class LostResources:
         clock: Clock,
         epoch_of: Callable[[BehaviorId], int],
         out_of_reach: Callable[[ResourceId], OutOfReach | None],
-        not_ours: Callable[[], Awaitable[str]],
+        why_not_served: Callable[[], Awaitable[str]],
         show: Callable[[VehicleState | PayloadState], None],
         returned: Callable[[ResourceId, str], None],
         marks: LostMarks,
@@ -82,7 +82,7 @@ class LostResources:
         self._clock = clock
         self._epoch_of = epoch_of
         self._out_of_reach = out_of_reach
-        self._not_ours = not_ours
+        self._why_not_served = why_not_served
         self._show = show
         self._returned = returned
         self._marks = marks
@@ -228,7 +228,7 @@ class LostResources:
         try:
             async with asyncio.timeout(ONCE_WITHIN_S):
                 # A link counts as lost after this process stood still, too.
-                if why := await self._not_ours():
+                if why := await self._why_not_served():
                     return f"it is not commanded to stop: {why}"
                 lost = self._lost[resource]
                 if lost.is_earlier and self._is_commanded(resource):

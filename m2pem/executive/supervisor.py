@@ -184,7 +184,7 @@ class Supervisor:
             clock,
             self.epoch_of,
             self._out_of_reach,
-            self._not_ours,
+            self._why_not_served,
             bus.publish,
             self._returns.returned,
             LostMarks(journal.file, journal.identity, self.fleet),
@@ -322,8 +322,8 @@ class Supervisor:
             for each in every
             if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
         ]
-        is_ours = not (runner.replaced or self.fleet.simulated)
-        if is_ours and (text := describe_armed_vehicles(free, self._bus)):
+        may_be_armed = not (runner.replaced or self.fleet.simulated)
+        if may_be_armed and (text := describe_armed_vehicles(free, self._bus)):
             self.events.publish(Alert(runner.id, LEFT_ARMED, text))
         self.on_change()
         over = [each for each in self.runners.values() if each.done.is_set()]
@@ -420,7 +420,7 @@ class Supervisor:
                 if not fault.reachable:
                     self._returns.faulted(fault.resource, runner.id)
 
-    async def _not_ours(self) -> str:
+    async def _why_not_served(self) -> str:
         await self.ownership.confirmed()
         return await self.served_by_another() if self.served_by_another is not None else ""
 

@@ -7,7 +7,8 @@ from unittest.mock import AsyncMock, Mock
 import httpx
 import pytest
 from fastapi import FastAPI
-from m2pem_plugin_web.rest import incidents, schedule, steering
+from m2pem_plugin_web.live.standbys import Standbys
+from m2pem_plugin_web.rest import incidents, schedule, standbys, steering
 from rest_world import As, app_of
 
 from m2pem.api import (
@@ -131,6 +132,7 @@ def app(control: Mock) -> FastAPI:
         steering.resource_router(control),
         schedule.router(control, Mock()),
         incidents.router(control),
+        standbys.router(Standbys(control)),
     )
 
 
