@@ -73,6 +73,10 @@ SMALL = Limits(states=3_000, tokens=3)
 FEW = 12
 LONG_S = 600.0
 MOST_TRANSITIONS = 2_000
+MOST_RESETS = 100_000
+"""Spin takes half a minute to write the checker of a larger net, for each question: the time grows
+with the square of the statements, of which each place that a transition resets is one."""
+
 ODD_MISSIONS, ODD_TRANSITIONS = (
     (18, 27, 234, 251, 356),
     (1, 19, 176, 203, 540, 728866273, 983159541),
@@ -168,6 +172,11 @@ def seeds(odd: tuple[int, ...]) -> list[object]:
     ]
 
 
+def too_large_for_spin(net: PetriNet) -> bool:
+    resets = sum(len(each.reset) for each in net.transitions)
+    return len(net.transitions) > MOST_TRANSITIONS or resets > MOST_RESETS
+
+
 def _random_mission(seed: int) -> PetriNet:
     text = (structured if seed % 2 else graph)(Random(seed))
     return (simplify if seed % 3 else lambda net: net)(translate(notation(text)))
@@ -201,16 +210,25 @@ def test_random_transitions_have_the_same_states(seed: int) -> None:
 @pytest.mark.timeout(3_600)
 @pytest.mark.parametrize("made", [_random_mission, lambda seed: random_net(Random(seed))])
 def test_many_random_ones_have_the_same_states(made) -> None:  # type: ignore[no-untyped-def]
+    """All but a few: about one mission of a hundred is too large for Spin, one of thirteen has too
+    many states."""
+    tried, compared = 0, 0
     for seed in seeds_for(LONG_S):
+        tried += 1
         net = made(seed)
-        if len(net.transitions) > MOST_TRANSITIONS:
-            continue  # Spin takes half a minute for each question
-        if len(explore(net, SMALL).states) <= SMALL.states:
-            try:
-                same(net)
-            except Exception as error:
-                error.add_note(f"seed {seed}")
-                raise
+        if too_large_for_spin(net) or len(explore(net, SMALL).states) > SMALL.states:
+            continue
+        try:
+            same(net)
+        except Exception as error:
+            error.add_note(f"seed {seed}")
+            raise
+        compared += 1
+    assert compared >= tried // 2, f"{tried - compared} of {tried} were left out"
+
+
+def test_a_mission_for_which_spin_takes_minutes_is_left_out() -> None:
+    assert too_large_for_spin(_random_mission(666362223))
 
 
 def test_no_more_is_asked_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -319,6 +337,7 @@ def test_random_formulas_have_one_answer(formula: Formula, seed: int) -> None:
     dice = Random(seed)
     mission = notation(structured(dice))
     net = simplify(translate(mission))
+    assume(not too_large_for_spin(net))
     found = explore(net, SMALL)
     assume(found.complete)
     elements = sorted(net.elements)
