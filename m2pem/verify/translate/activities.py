@@ -38,7 +38,6 @@ from m2pem.verify.translate.allocations import (
     asking_place,
     choose_resources,
     lose_resources,
-    pools_among,
     take_named_resources,
 )
 from m2pem.verify.translate.catching import boundaries, caught_before_work
@@ -66,6 +65,7 @@ from m2pem.verify.translate.moving import (
 )
 from m2pem.verify.translate.net_builder import Effect, ScopeDraft, entry_place, product
 from m2pem.verify.translate.pools import goes_on
+from m2pem.verify.translate.role_choices import pools_among
 from m2pem.verify.translate.sequence_flows import leave
 from m2pem.verify.translate.throwing import (
     catchable,

@@ -16,8 +16,6 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from m2pem.fleet.facts import vehicle_of
-from m2pem.fleet.fleet import Fleet
 from m2pem.mission.behavior import Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.losses import REJECTED, UNAVAILABLE
@@ -41,7 +39,7 @@ from m2pem.verify.translate.context import (
     Source,
     TranslationContext,
 )
-from m2pem.verify.translate.data import boxes, constant
+from m2pem.verify.translate.data import constant
 from m2pem.verify.translate.keeping import (
     goes_to,
     holds_place,
@@ -58,11 +56,16 @@ from m2pem.verify.translate.moving import (
 )
 from m2pem.verify.translate.net_builder import Effect, product
 from m2pem.verify.translate.pools import Pool, RoleCandidates
+from m2pem.verify.translate.role_choices import (
+    RoleChoices,
+    RoleFilling,
+    least_of,
+    pools_among,
+    role_cases,
+    role_choices,
+)
 from m2pem.verify.translate.throwing import failing
 from m2pem.verify.translate.timers import due_us, runs, written
-
-Amounts = Mapping[Pool, int]
-"""How many resources of each pool."""
 
 
 def asking_place(context: TranslationContext, instance: ActivityInstance) -> int:
@@ -110,12 +113,6 @@ def take_named_resources(
     return [begun]
 
 
-def pools_among(context: TranslationContext, resources: Iterable[ResourceId]) -> tuple[Pool, ...]:
-    """Return the pools of some resources."""
-    pools = (context.pool_of.get(each) for each in resources)
-    return tuple(dict.fromkeys(pool for pool in pools if pool is not None))
-
-
 def _holds_named(
     context: TranslationContext,
     instance: ActivityInstance,
@@ -130,38 +127,6 @@ def _holds_named(
 # --- tasks whose resources are chosen -------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class _Filled:
-    """A role, how many of which pool fill it, and what could."""
-
-    role: RoleCandidates
-    amounts: Amounts
-    offered: Sequence[Pool]
-
-    @property
-    def count(self) -> int:
-        return sum(self.amounts.values())
-
-
-@dataclass(frozen=True, slots=True)
-class _Choice:
-    """A choice for all roles of a task."""
-
-    filled: tuple[_Filled, ...]
-
-    @property
-    def total(self) -> Counter[Pool]:
-        total: Counter[Pool] = Counter()
-        for each in self.filled:
-            total.update(each.amounts)
-        return total
-
-    @property
-    def possible(self) -> bool:
-        """Whether the pools have so many."""
-        return all(count <= len(pool) for pool, count in self.total.items())
-
-
 def choose_resources(
     context: TranslationContext, instance: ActivityInstance, behavior: Behavior
 ) -> list[Effect]:
@@ -170,7 +135,7 @@ def choose_resources(
     asks = asking_place(context, instance)
     waits = any(each.role.need is not None and each.role.need.waits for each in roles)
     _note_approximations(context, instance, roles, waits=waits)
-    cases = list(_cases(context, instance, roles))
+    cases = list(role_cases(context, instance, roles))
     certain = len(cases) == 1 and not instance.inside.several
     translate_keeping(context, instance, roles)
     context.asking.append(_asking(context, instance, roles, certain=certain))
@@ -198,7 +163,7 @@ def choose_resources(
                     refused = product(given, product(no_room, [rejected])) if no_room else []
                 context.transitions(refused, Kind.JOIN)
             if not waits:
-                fewest = _choices(context, instance, roles, offered, fewest=True)
+                fewest = role_choices(context, instance, roles, offered, fewest=True)
                 for limits in _refusals([each.total for each in fewest]):
                     refused = product([when], _refused(context, instance, limits))
                     fails = failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT)
@@ -247,7 +212,7 @@ def _asking(
     """Return who asks. Only of a task that needs one resource, whatever telemetry and data are, it
     is known that it gets one as soon as one is free.
     """
-    urgent = certain and len(roles) == 1 and _least(roles[0]) == 1 and not roles[0].unknown
+    urgent = certain and len(roles) == 1 and least_of(roles[0]) == 1 and not roles[0].unknown
     urgent = urgent and not asks_for_space(context, instance.node)  # what it needs may have no room
     pools = pools_among(context, (resource for each in roles for resource in each.resources))
     asks = asking_place(context, instance)
@@ -299,7 +264,7 @@ def _note_approximations(
         same = each.role.need.same if each.role.need is not None else ""
         if same and context.data.values_of(same, instance.outer, instance.node) is None:
             bounded(f"role '{each.role.name}': '{same}' is not followed, so it may be any resource")
-    wanted = sum(_least(each) for each in roles)
+    wanted = sum(least_of(each) for each in roles)
     others = [other for other in context.candidates if other is not instance.node]
     if waits and wanted > 1 and others:
         bounded("that it keeps what is free, while it waits for the rest, is not followed")
@@ -321,104 +286,7 @@ def _note_kept_while_it_waits_for_space(
         context.net.approximate(instance.node, Exactness.BOUNDED, what)
 
 
-def _least(each: RoleCandidates) -> int:
-    if each.named:
-        return max(1, len(each.resources)) if not each.role.optional else len(each.resources)
-    need = each.role.need
-    return 0 if each.role.optional or need is None else need.least
-
-
-# --- what a task may be given ---------------------------------------------------------------------
-
-
-def _cases(
-    context: TranslationContext, instance: ActivityInstance, roles: Sequence[RoleCandidates]
-) -> Iterator[tuple[dict[int, frozenset[int]], tuple[tuple[ResourceId, ...], ...]]]:
-    """Yield, by the values of data that roles read with `same`, what may fill each role."""
-    followed = {}
-    for each in roles:
-        name = each.role.need.same if each.role.need is not None else ""
-        known = context.data.values_of(name, instance.outer, instance.node) if name else None
-        if known is not None:
-            followed[name] = known
-    ranges = [range(len(values)) for _, values in followed.values()]
-    alike: dict[tuple[tuple[ResourceId, ...], ...], list[tuple[int, ...]]] = {}
-    for combination in itertools.product(*ranges):
-        context.net.size_limit.count_case(instance.node.id)
-        values = {
-            name: known[number]
-            for (name, (_, known)), number in zip(followed.items(), combination, strict=True)
-        }
-        offered = tuple(_same(context.fleet, each, values) for each in roles)
-        alike.setdefault(offered, []).append(combination)
-    variables = [variable for variable, _ in followed.values()]
-    for offered, combinations in alike.items():
-        for box in boxes(combinations, [len(each) for each in ranges]):
-            yield dict(zip(variables, box, strict=True)), offered
-
-
-def _same(
-    fleet: Fleet, each: RoleCandidates, values: Mapping[str, tuple[Value, bool]]
-) -> tuple[ResourceId, ...]:
-    """What may fill a role beside the values of data, of which each is exact or stands for many."""
-    name = each.role.need.same if each.role.need is not None else ""
-    value, exact = values.get(name, (None, False))
-    if not exact:
-        return each.resources
-    chosen = value if isinstance(value, list) else [value]
-    return tuple(r for r in each.resources if r in chosen or vehicle_of(fleet, r).id in chosen)
-
-
-def _choices(
-    context: TranslationContext,
-    instance: ActivityInstance,
-    roles: Sequence[RoleCandidates],
-    offered: Sequence[tuple[ResourceId, ...]],
-    *,
-    fewest: bool,
-) -> Iterator[_Choice]:
-    """Yield all choices for the roles of a task. `fewest`: with no more resources than it needs."""
-    ways = [
-        list(_fillings(context, role, resources, fewest=fewest))
-        for role, resources in zip(roles, offered, strict=True)
-    ]
-    for filled in itertools.product(*ways):
-        context.net.size_limit.count_case(instance.node.id)
-        choice = _Choice(filled)
-        if choice.possible:
-            yield choice
-
-
-def _fillings(
-    context: TranslationContext,
-    each: RoleCandidates,
-    resources: Sequence[ResourceId],
-    *,
-    fewest: bool,
-) -> Iterator[_Filled]:
-    least = _least(each)
-    pools = pools_among(context, resources)
-    if each.named:
-        if len(resources) == least:
-            yield _Filled(each, dict.fromkeys(pools, 1), pools)
-        return
-    need = each.role.need
-    most = least if fewest or need is None else need.most
-    for count in range(least, min(most, sum(map(len, pools))) + 1):
-        for amounts in _spread(pools, count):
-            yield _Filled(each, amounts, pools)
-
-
-def _spread(pools: Sequence[Pool], count: int) -> Iterator[dict[Pool, int]]:
-    """Yield every way to take a number of resources from pools."""
-    if not pools:
-        if not count:
-            yield {}
-        return
-    first, *others = pools
-    for taken in range(min(count, len(first)), -1, -1):
-        for rest in _spread(others, count - taken):
-            yield {first: taken, **rest} if taken else rest
+# --- what a task is given -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -438,9 +306,9 @@ def _takings(
     behavior: Behavior,
     roles: Sequence[RoleCandidates],
     offered: Sequence[tuple[ResourceId, ...]],
-) -> Iterator[tuple[_Choice, Sequence[_Taken]]]:
+) -> Iterator[tuple[RoleChoices, Sequence[_Taken]]]:
     """Yield all choices for the roles of a task, with where each resource is taken from."""
-    for choice in _choices(context, instance, roles, offered, fewest=False):
+    for choice in role_choices(context, instance, roles, offered, fewest=False):
         ways = [
             itertools.combinations_with_replacement(
                 [
@@ -466,7 +334,7 @@ def _given(
     context: TranslationContext,
     instance: ActivityInstance,
     behavior: Behavior,
-    choice: _Choice,
+    choice: RoleChoices,
     taken: Sequence[_Taken],
 ) -> list[Effect]:
     """A task is given resources, and begins its behavior."""
@@ -515,7 +383,7 @@ def _given(
 def _no_more(
     context: TranslationContext,
     instance: ActivityInstance,
-    choice: _Choice,
+    choice: RoleChoices,
     taken: Sequence[_Taken],
 ) -> list[Effect]:
     """Return when a choice may leave a role with fewer than it can have: no more are free, or
@@ -540,7 +408,7 @@ def _no_more(
     return [rest, *(Effect(read=frozenset({place})) for place in others)]
 
 
-def _stored_value(context: TranslationContext, each: _Filled, *, one: bool) -> Value | None:
+def _stored_value(context: TranslationContext, each: RoleFilling, *, one: bool) -> Value | None:
     """What a role stores; None: which of a pool is not known."""
     if any(len(pool) > 1 for pool in each.amounts):
         return None
