@@ -52,6 +52,7 @@ def test_a_command_says_which_host_has_what_it_asks_for(
         assert said.startswith(f"m2pem: {found}"), words
         assert said.endswith(": run the command there")
         assert "no executive" not in err
+    assert SERVES in invoke("doctor", "--running", "--journal", postgres_url)[1]
     _, out, err = invoke("schedule", "--journal", postgres_url)
     assert "s1" in out
     assert err.splitlines()[-1].startswith(SERVES)
