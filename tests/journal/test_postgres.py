@@ -178,6 +178,22 @@ async def test_a_commit_whose_answer_is_lost_is_written_once(
         assert [each.seq for each in await written(journal, run)] == [1, 2, 3]
 
 
+async def test_a_commit_that_was_not_made_is_made_though_its_number_was_given_to_another(
+    postgres, postgres_url, tmp_path
+):
+    """As by a server that has crashed, or has taken over: the number says that it was."""
+    name = postgres_url.partition("@/")[2].partition("?")[0]
+    postgres.execute(f"ALTER DATABASE {name} SET search_path = public, pg_catalog")
+    postgres.execute(
+        "CREATE FUNCTION public.pg_xact_status(xid8) RETURNS text LANGUAGE sql"
+        " AS $$ SELECT 'committed' $$",
+        postgres.url(name, "postgres"),
+    )
+    await test_a_commit_whose_answer_is_lost_is_written_once(
+        postgres, postgres_url, tmp_path, delivered=False
+    )
+
+
 # --- losses -----------------------------------------------------------------------------------
 
 
