@@ -147,13 +147,19 @@ class JournalContract(Contract):
         self, open_journal: OpenJournal
     ) -> None:
         """It is named by its process; to ask again changes nothing, and to leave twice neither."""
+        page = "https://gcs1:8700/"
         async with opened(open_journal) as journal:
             assert await journal.fleet_server("north", ["ugv2"]) is None
             for _ in range(2):
-                await journal.serve_fleet("north", ["ugv1", "ugv2"])
+                await journal.serve_fleet("north", ["ugv1", "ugv2"], page=page)
                 server = await journal.fleet_server("north", ["ugv2"])
                 assert server is not None
-                assert server.pid == os.getpid()
+                assert (server.pid, server.page) == (os.getpid(), page)
+                if journal.lease_s is None:
+                    assert server.left_s is None
+                else:
+                    assert server.left_s is not None
+                    assert 0 < server.left_s <= journal.lease_s
             assert await journal.fleet_server("north 2", ["ugv2"]) is None
             for _ in range(2):
                 await journal.leave_fleet("north")
