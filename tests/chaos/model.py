@@ -40,6 +40,7 @@ class JournalInThread:
         self._loop = asyncio.new_event_loop()
         self._journal = SqliteJournal.open(path)
         self.identity, self.file = self._journal.identity, self._journal.file
+        self.lease_s, self.owned_until_s = self._journal.lease_s, self._journal.owned_until_s
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
         self._calls = ThreadPoolExecutor(thread_name_prefix="calls of a journal")
