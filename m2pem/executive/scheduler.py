@@ -61,7 +61,7 @@ CLOCKS_APART_S = 5.0
 
 FOLLOW_S = 1.0
 """Between two looks at what other executives on the journal have done with the schedule, if it
-tells of no change."""
+notifies of no change."""
 
 
 def _first(times_us: Iterable[int | None]) -> int | None:
@@ -77,7 +77,7 @@ class Scheduler:
         self._conditions = StartConditions(starter, entries.by_id)
         self._clocks_apart = False
         self._changes = 0
-        """Of other executives on the journal, of which it has told."""
+        """Of other executives on the journal, as the journal counts them."""
 
     async def serve(self) -> None:
         """Start what is due, for ever. The entries are loaded before."""
@@ -119,13 +119,13 @@ class Scheduler:
         latest_us = clock.now_us() + round(LONGEST_SLEEP_S * US_PER_S)
         sleeping = asyncio.ensure_future(clock.sleep_until(min(next_us, latest_us)))
         waking = asyncio.ensure_future(self._entries.changed.wait())
-        told = asyncio.ensure_future(self._starter.journal.changed(self._changes))
+        notified = asyncio.ensure_future(self._starter.journal.changed(self._changes))
         try:
-            await asyncio.wait((sleeping, waking, told), return_when=asyncio.FIRST_COMPLETED)
-            if told.done():
-                self._changes = told.result()
+            await asyncio.wait((sleeping, waking, notified), return_when=asyncio.FIRST_COMPLETED)
+            if notified.done():
+                self._changes = notified.result()
         finally:
-            for each in (sleeping, waking, told):
+            for each in (sleeping, waking, notified):
                 each.cancel()
 
     # --- what is due ----------------------------------------------------------------------------

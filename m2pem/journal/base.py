@@ -317,11 +317,11 @@ class Journal(Protocol):
         ...
 
     async def changed(self, seen: int) -> int:
-        """Return when this journal was told of more than `seen` changes, and of how many by then.
+        """Return the number of changes of which this journal was notified, once it exceeds `seen`.
 
         A change is that of a schedule, of its hold, or of who serves a fleet, by another executive.
-        With 0 it returns as soon as changes are told of. None is while the database cannot be
-        reached, so who follows looks from time to time, too. Where nothing tells of changes, it
+        With 0 it returns as soon as notifications arrive. None does while the database cannot be
+        reached, so a follower looks from time to time, too. Where nothing notifies of changes, it
         does not return.
         """
         ...

@@ -380,7 +380,7 @@ class DatabaseJournal(ABC):
         return {entry_id(number): revision for number, revision in rows}
 
     async def changed(self, seen: int) -> int:
-        """See `Journal.changed`: nothing tells of what another process writes."""
+        """See `Journal.changed`: nothing notifies of what another process writes."""
         never: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         return await never
 

@@ -47,7 +47,7 @@ class FleetServer:
 
 
 def this_process(digest: str, page: str) -> FleetServer:
-    """How others are told of this executive."""
+    """How others name this executive."""
     return FleetServer(socket.gethostname(), os.getpid(), command_line(), digest, page)
 
 

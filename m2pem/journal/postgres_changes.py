@@ -1,4 +1,4 @@
-"""What executives on a journal in PostgreSQL tell each other, by NOTIFY and LISTEN.
+"""How executives on a journal in PostgreSQL notify each other of changes, by NOTIFY and LISTEN.
 
 Triggers notify in the transaction of the change (`postgres_database.notifications`), and name the
 session that made it.
@@ -26,17 +26,17 @@ class ChangeListener:
         self._address = address
         self._within_s = within_s
         self._session = session
-        self._told = 0
-        self._telling = asyncio.Condition()
+        self._changes = 0
+        self._condition = asyncio.Condition()
         self._listening: asyncio.Task[None] | None = None
 
     async def changed(self, seen: int) -> int:
         """See `Journal.changed`."""
         if self._listening is None:
             self._listening = asyncio.create_task(self._listen(), name="changes of the journal")
-        async with self._telling:
-            await self._telling.wait_for(lambda: self._told > seen)
-        return self._told
+        async with self._condition:
+            await self._condition.wait_for(lambda: self._changes > seen)
+        return self._changes
 
     async def _listen(self) -> None:
         while True:
@@ -45,18 +45,18 @@ class ChangeListener:
                     self._address.url, **connection_parameters(self._within_s)
                 ) as connection:
                     await connection.execute(f"LISTEN {CHANNEL}")
-                    await self._tell()  # of what was changed while nobody listened
+                    await self._notify()  # of what was changed before it listened
                     async for notification in connection.notifies():
                         if notification.payload != self._session:
-                            await self._tell()
+                            await self._notify()
             except psycopg.Error as error:
-                log.info("changes by other executives are not told of: %s", error)
+                log.info("no notification of what other executives change: %s", error)
             await asyncio.sleep(_AGAIN_S)
 
-    async def _tell(self) -> None:
-        async with self._telling:
-            self._told += 1
-            self._telling.notify_all()
+    async def _notify(self) -> None:
+        async with self._condition:
+            self._changes += 1
+            self._condition.notify_all()
 
     async def close(self) -> None:
         """Listen no more."""

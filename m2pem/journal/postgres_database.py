@@ -24,7 +24,7 @@ _LOCK = 0x6D327065
 
 
 CHANNEL = "m2pem"
-"""On which executives are told of what others change."""
+"""On which executives are notified of what others change."""
 
 
 def connection_parameters(within_s: float, session: str = "m2pem") -> dict[str, Any]:

@@ -133,7 +133,7 @@ class JournalContract(Contract):
     m2pem_contract: ClassVar[str] = "JournalContract"
     subjects: ClassVar[Mapping[str, str]] = {
         "durability": "a journal that is opened again, or twice, has what was written",
-        "notification": "a journal is told of what other executives change",
+        "notification": "a journal is notified of what other executives change",
     }
 
     @pytest.fixture
@@ -298,7 +298,7 @@ class JournalContract(Contract):
             assert await journal.schedule_revisions() == {"s1": 1}
 
     @needs("durability", "notification")
-    async def test_a_change_by_another_executive_is_told_of(
+    async def test_a_change_by_another_executive_is_notified(
         self, open_journal: OpenJournal
     ) -> None:
         """Of the schedule, of its hold, and of who serves a fleet. What runs do is not."""
