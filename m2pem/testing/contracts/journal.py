@@ -83,7 +83,7 @@ PLAN = SchedulePlan(
 
 STARTED = SettledTime(9, 10, Settlement.STARTED)
 
-_TOLD_WITHIN_S = 30.0
+_NOTIFIED_WITHIN_S = 30.0
 
 ENDED = (RunStarted("PATROL", 5), RunEnded(RunOutcome.COMPLETED, ""))
 """Records of a run that has ended."""
@@ -303,7 +303,7 @@ class JournalContract(Contract):
     ) -> None:
         """Of the schedule, of its hold, and of who serves a fleet. What runs do is not."""
         async with opened(open_journal) as one, opened(open_journal) as two:
-            seen = await asyncio.wait_for(one.changed(0), _TOLD_WITHIN_S)
+            seen = await asyncio.wait_for(one.changed(0), _NOTIFIED_WITHIN_S)
             cancelled = EntryState(5, status=EntryStatus.CANCELLED, revision=1)
             for change in (
                 lambda: two.schedule(PLAN, EntryState(5)),
@@ -316,7 +316,7 @@ class JournalContract(Contract):
             ):
                 waiting = asyncio.ensure_future(one.changed(seen))
                 await change()
-                before, seen = seen, await asyncio.wait_for(waiting, _TOLD_WITHIN_S)
+                before, seen = seen, await asyncio.wait_for(waiting, _NOTIFIED_WITHIN_S)
                 assert seen > before
 
     async def test_a_schedule_is_held_for_each_fleet(self, open_journal: OpenJournal) -> None:
