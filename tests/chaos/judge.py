@@ -60,6 +60,8 @@ async def judge(evidence: "Evidence", expected: Mapping[str, End] | None) -> Ver
     for run in begun:
         by_mission[run.info.header.mission_name].append(run)
     for name, some in by_mission.items():
+        if evidence.stopped and not some:
+            continue
         if len(some) != 1:
             verdict.faults.append(
                 f"{name} has {len(some)} runs: {[each.info.run for each in some]}"
@@ -98,7 +100,7 @@ def _run_faults(run: _Run, evidence: "Evidence") -> list[str]:
         faults.append(run.difference)
     left = [each.element for each in run.records if isinstance(each, r.TokenLeft)]
     mission = next(e for e in evidence.world.missions if e.name == run.info.header.mission_name)
-    for order in mission.orders:
+    for order in () if evidence.stopped else mission.orders:
         places = [left.index(each) for each in order if each in left]
         if len(places) != len(order) or any(a > b for a, b in pairwise(places)):
             faults.append(f"{run.info.run}: not in the order {' '.join(order)}: {' '.join(left)}")

@@ -25,6 +25,10 @@ RANDOM = "at a random moment"
 """The name of no point: the process is killed from outside."""
 
 
+REPLACED = "stopped beyond its lease"
+"""The name of no point: the process is stopped (SIGSTOP), and goes on when a standby has taken
+over. Only where claims hold for a lease: on one computer, a stopped process keeps its locks."""
+
 WAIT_FOR_ANSWER = 1
 """`psycopg.waiting.Wait.R`, which most executives need not import."""
 

@@ -25,10 +25,10 @@ from m2pem.errors import M2pemError, OperatorError
 from m2pem.journal.lease import LEASE_VARIABLE
 from tests.chaos import journals
 from tests.chaos.judge import Verdict, judge
-from tests.chaos.kill_points import JOURNALS, RANDOM, points_of
+from tests.chaos.kill_points import JOURNALS, RANDOM, REPLACED, points_of
 from tests.chaos.worlds import WORLDS, ChaosMission, World
 from tests.command_line import CommandLine
-from tests.preloaded import Process, preloaded
+from tests.preloaded import Preloaded, Process, preloaded
 
 LOOK_EVERY_S = 0.01
 ROUND_WITHIN_S = 120.0
@@ -57,7 +57,7 @@ class Kill:
     after_s: float = 0.0
 
     def __str__(self) -> str:
-        if self.point == RANDOM:
+        if self.point in (RANDOM, REPLACED):
             return f"{self.point}, after {self.after_s:.2f} s"
         return f"{self.point}, passage {self.passage}"
 
@@ -67,7 +67,8 @@ class Plan:
     """What happens in a round: executives are killed, one after the other; the next one is not.
 
     `pauses`: whether an operator pauses all runs in each life, and resumes them. `spoil`: Python
-    code that makes the executives that are killed worse, to see that the judge finds it.
+    code that makes the executives that are killed worse, to see that the judge finds it. `speed`:
+    0: that of its vehicles.
     """
 
     number: int
@@ -76,6 +77,7 @@ class Plan:
     kills: tuple[Kill, ...]
     pauses: bool = False
     spoil: str = ""
+    speed: float = 0.0
 
     def __str__(self) -> str:
         kills = "; ".join(map(str, self.kills)) or "no kill"
@@ -98,14 +100,14 @@ def plan_round(seed: int, number: int, world: str, journal: str, point: str = ""
     kind = JOURNALS[journal]
     passages = undisturbed(world, journal).passages
     points = points_of(kind, WORLDS[world].arbiter)
-    names = [RANDOM, *points]
+    names = [RANDOM, *points, *([REPLACED] if kind.lease_s else [])]
     first = point or names[number % len(names)]
     kills: list[Kill] = []
-    older = first != RANDOM and points[first].opening
-    if first != RANDOM and (points[first].resuming or (older and chance.random() < 0.7)):
+    older = first in points and points[first].opening
+    if first in points and (points[first].resuming or (older and chance.random() < 0.7)):
         early = [RANDOM, *(each for each in points if passages.get(each, 0) > 1)]
         kills.append(_kill(chance, chance.choice(early), passages))
-    upgrades = kills and points[first].opening
+    upgrades = kills and older
     kills.append(_kill(chance, first, {first: STATEMENTS_OF_AN_UPGRADE} if upgrades else passages))
     while len(kills) < MOST_KILLS and chance.random() < 0.3:
         kills.append(_kill(chance, chance.choice(names), passages))
@@ -117,7 +119,9 @@ def _kill(chance: random.Random, point: str, passages: Mapping[str, int]) -> Kil
     # A point that is passed only in a resume is passed once for each run or behavior.
     most = passages.get(point) or 2
     # A computer with other work has fewer commits, each of more calls.
-    return Kill(point, chance.randint(1, -(-most * 2 // 3)), chance.uniform(0.0, 1.5))
+    passage = chance.randint(1, -(-most * 2 // 3))
+    # Where another is to take over, all missions have begun, and must not have ended.
+    return Kill(point, passage, chance.uniform(0.0, 0.5 if point == REPLACED else 1.5))
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +158,8 @@ class Evidence:
     acknowledged: Mapping[str, Sequence[RunId]] = field(default_factory=dict)
     answered: Sequence[tuple[RunId, str]] = ()
     errors: str = ""
+    stopped: bool = False
+    """An operator stopped all runs: not each mission has begun, and none needs have come far."""
 
 
 _GONE = (ControlSocketError, OSError)
@@ -163,16 +169,24 @@ _GONE = (ControlSocketError, OSError)
 class Play:
     """One round while it is played."""
 
-    def __init__(self, plan: Plan, folder: Path) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        folder: Path,
+        environment: Mapping[str, str] | None = None,
+        forked_from: Preloaded | None = None,
+    ) -> None:
         self.plan = plan
         self.reached = 0
-        self._world: World = WORLDS[plan.world](folder)
+        kind = WORLDS[plan.world]
+        self._world: World = kind(folder, plan.speed or kind.speed)
         self._folder = folder
         self._kind = JOURNALS[plan.journal]
         self._file = journals.make(self._kind, folder)
         lease = {LEASE_VARIABLE: self._kind.lease_s} if self._kind.lease_s else {}
-        self._environment = CommandLine(folder, lease).environment
-        self._process: Process | None = None
+        self._environment = CommandLine(folder, {**lease, **(environment or {})}).environment
+        self._forked_from = forked_from or preloaded()
+        self._processes: list[Process] = []
         self._chance = random.Random(f"{plan.number}")
         self._lives = 0
         self._runs: dict[str, list[RunId]] = {each.name: [] for each in self._world.missions}
@@ -180,9 +194,9 @@ class Play:
 
     def close(self) -> None:
         """Leave nothing running."""
-        if self._process is not None and self._process.poll() is None:
-            self._process.kill()
-            self._process.wait()
+        for process in self._processes:
+            process.kill()
+            process.wait()
         self._world.close()
 
     def evidence(self) -> Evidence:
@@ -199,7 +213,8 @@ class Play:
         for kill in self.plan.kills:
             if kill.point == "migration" and self._lives:
                 journals.downgrade(self._kind, self._file)
-            if await self._life(kill):
+            life = self._replaced if kill.point == REPLACED else self._life
+            if await life(kill):
                 self.reached += 1
             elif self._over:
                 break
@@ -241,11 +256,59 @@ class Play:
             raise AssertionError(f"it ended by itself ({process.returncode}): {self._said()}")
         return killed
 
-    def _start(self, arm: str, spoil: str) -> Process:
+    async def _replaced(self, kill: Kill) -> bool:
+        """Run an executive that is stopped until a standby has taken over, and goes on then.
+
+        Returns whether that happened; all missions have ended in any case.
+        """
+        owner = self._start("", self.plan.spoil)
+        operator = asyncio.create_task(self._operate(owner))
+        try:
+            async with asyncio.timeout(ROUND_WITHIN_S):
+                await self._control(owner)
+                # Another computer's: on this one the owner's vehicles would stay locked.
+                elsewhere = {"M2PEM_RUNTIME_DIR": str(self._folder / "elsewhere")}
+                standby = self._start("", "", ("--standby",), elsewhere)
+                while not (operator.done() or all(self._runs.values())):  # noqa: ASYNC110
+                    await asyncio.sleep(LOOK_EVERY_S)
+                await asyncio.sleep(kill.after_s)
+                reached = not operator.done()
+                if reached:
+                    owner.send_signal(signal.SIGSTOP)
+                    operator.cancel()
+                    await asyncio.gather(operator, return_exceptions=True)
+                    operator = asyncio.create_task(self._operate(standby))
+                    await self._control(standby)
+                    await asyncio.sleep(self._chance.uniform(0.0, 1.0))
+                    owner.send_signal(signal.SIGCONT)
+                await operator
+                self._over = True
+                for process in (standby,) if reached else (standby, owner):
+                    process.terminate()
+                while None in (owner.poll(), standby.poll()):  # noqa: ASYNC110  # a pipe tells
+                    await asyncio.sleep(LOOK_EVERY_S)
+        except TimeoutError as error:
+            said = [self._errors(life).read_text()[-2000:] for life in (1, 2)]
+            raise AssertionError(f"no end within {ROUND_WITHIN_S:g} s: {said}") from error
+        finally:
+            operator.cancel()
+        if (owner.returncode, standby.returncode) != (int(reached), 0):
+            ends = f"{owner.returncode} and {standby.returncode}"
+            raise AssertionError(f"the owner and the standby ended with {ends}: {self._said()}")
+        return reached
+
+    def _start(
+        self,
+        arm: str,
+        spoil: str,
+        more: Sequence[str] = (),
+        environment: Mapping[str, str] | None = None,
+    ) -> Process:
         self._lives += 1
         words = [
             *("serve", "--fleet", str(self._world.fleet), "--journal", str(self._file)),
             *("--speed", f"{self._world.speed:g}", "--ocu", "none", "--format", "json"),
+            *more,
         ]
         code = _STARTER.format(arm=arm, spoil=spoil, words=words)
         nothing = os.open(os.devnull, os.O_RDONLY)
@@ -254,13 +317,17 @@ class Play:
             for path in (self._output(self._lives), self._errors(self._lives))
         )
         try:
-            self._process = preloaded().start(
-                ["-c", code], self._folder, self._environment, (nothing, output, errors)
+            process = self._forked_from.start(
+                ["-c", code],
+                self._folder,
+                {**self._environment, **(environment or {})},
+                (nothing, output, errors),
             )
         finally:
             for each in (nothing, output, errors):
                 os.close(each)
-        return self._process
+        self._processes.append(process)
+        return process
 
     def _arm(self, kill: Kill | None, count_into: Path | None) -> str:
         names = f"kill_points.points_of(kill_points.JOURNALS[{self._kind.name!r}], "

@@ -23,8 +23,13 @@ def as_table(played: "Sequence[Round]") -> str:
     for each in played:
         for point in dict.fromkeys(kill.point for kill in each.plan.kills):
             found.setdefault((point, each.plan.world, each.plan.journal), []).append(each)
-    rows = [COLUMNS, *(_row(key, some) for key, some in sorted(found.items()))]
-    widths = [max(len(str(row[column])) for row in rows) for column in range(len(COLUMNS))]
+    return text_table(COLUMNS, [_row(key, some) for key, some in sorted(found.items())])
+
+
+def text_table(columns: Sequence[str], body: Sequence[Sequence[object]]) -> str:
+    """Return a table in columns; the first three are names, the others numbers."""
+    rows = [columns, *body]
+    widths = [max(len(str(row[column])) for row in rows) for column in range(len(columns))]
     return "\n".join(
         "  ".join(
             str(cell).ljust(width) if column < 3 else str(cell).rjust(width)

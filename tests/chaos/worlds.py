@@ -33,6 +33,18 @@ class Begun:
 
 
 @dataclass(frozen=True, slots=True)
+class Sign:
+    """What a vehicle was told, as it noted itself. `begun`: to move, and for which behavior, as in
+    `Begun`; None: to stop, or it `arrived`. `at_s`: of `time.monotonic`; the state file of
+    simulated vehicles has no time of the wall clock: 0."""
+
+    vehicle: str
+    begun: Begun | None
+    at_s: float = 0.0
+    arrived: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class ChaosMission:
     """A mission that ends alone, but for its user tasks, which are answered `yes`.
 
@@ -58,6 +70,14 @@ class World(Protocol):
 
     def begun(self) -> Sequence[Begun]:
         """Return what the vehicles have begun, in order, by what they noted themselves."""
+        ...
+
+    def signs(self) -> Sequence[Sign]:
+        """Return what the vehicles were told, in order."""
+        ...
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal to the process of the vehicles, where they have one of their own."""
         ...
 
     def close(self) -> None:
@@ -158,7 +178,8 @@ class SimulatedVehicles:
     pauses = True
     missions = (two_ways("ugv1", "uav1"), in_turn("ugv2", "ugv1"))
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, speed: float = speed) -> None:
+        self.speed = speed
         self.fleet = folder / "fleet.yaml"
         self._state = folder / "vehicles.state"
         self.fleet.write_text(_SIMULATED.format(state=self._state), encoding="utf-8")
@@ -176,6 +197,23 @@ class SimulatedVehicles:
             elif effect.kind is EffectKind.END and doing.get(effect.resource) == effect.behavior:
                 del doing[effect.resource]
         return found
+
+    def signs(self) -> list[Sign]:
+        """See `World.signs`. A vehicle that goes on after a hold is told to move again."""
+        found: list[Sign] = []
+        doing: dict[str, Begun] = {}
+        for effect in recorded_effects(self._state) if self._state.exists() else ():
+            vehicle, kind = effect.resource, effect.kind
+            if kind is EffectKind.START:
+                doing[vehicle] = Begun(vehicle, effect.behavior)
+            moves = kind in (EffectKind.START, EffectKind.RESUME)
+            begun = doing.get(vehicle) if moves else None
+            found.append(Sign(vehicle, begun, arrived=kind is EffectKind.END))
+        return found
+
+    def send_signal(self, number: int) -> None:
+        """See `World.send_signal`: they have none."""
+        raise NotImplementedError
 
     def close(self) -> None:
         """They end with the executive."""
@@ -196,14 +234,14 @@ _MAVLINK_VEHICLE = """  {name}:
 _BY_SYSTEM = {1: "uav1", 2: "ugv1", 3: "ugv2"}
 
 _AUTOPILOTS = """
-import json, runpy, sys
+import json, runpy, sys, time
 from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
 
 notes = open({notes!r}, "a", buffering=1)
 log_event = Autopilot.log_event
 
 def noted(self, kind, detail=""):
-    notes.write(json.dumps([self.spec.system, kind, detail]) + "\\n")
+    notes.write(json.dumps([self.spec.system, kind, detail, time.monotonic()]) + "\\n")
     log_event(self, kind, detail)
 
 Autopilot.log_event = noted
@@ -222,7 +260,8 @@ class MavlinkVehicles:
     pauses = False
     missions = SimulatedVehicles.missions
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, speed: float = speed) -> None:
+        self.speed = speed
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
             address = f"127.0.0.1:{free.getsockname()[1]}"
@@ -258,9 +297,17 @@ class MavlinkVehicles:
 
     def begun(self) -> list[Begun]:
         """See `World.begun`. Each place to which missions send a vehicle is another one."""
-        lines = self._notes.read_text(encoding="utf-8").splitlines()
-        found = (_begun(*json.loads(line)) for line in lines)
+        return [sign.begun for sign in self.signs() if sign.begun is not None]
+
+    def signs(self) -> list[Sign]:
+        """See `World.signs`. No autopilot notes that it has arrived."""
+        lines = self._notes.read_text(encoding="utf-8").splitlines(keepends=True)
+        found = (_sign(*json.loads(line)) for line in lines if line.endswith("\n"))
         return [each for each in found if each is not None]
+
+    def send_signal(self, number: int) -> None:
+        """See `World.send_signal`."""
+        self._process.send_signal(number)
 
     def close(self) -> None:
         """See `World.close`."""
@@ -268,8 +315,18 @@ class MavlinkVehicles:
         self._process.wait()
 
 
-def _begun(system: int, kind: str, detail: str) -> Begun | None:
-    vehicle = _BY_SYSTEM[system]
+STOPPED = ("BRAKE", "HOLD", "LOITER")
+"""Modes in which an autopilot stays where it is."""
+
+
+def _sign(system: int, kind: str, detail: str, at_s: float) -> Sign | None:
+    begun = _begun(_BY_SYSTEM[system], kind, detail)
+    if begun is None and (kind, detail in STOPPED) != ("mode", True):
+        return None
+    return Sign(_BY_SYSTEM[system], begun, at_s)
+
+
+def _begun(vehicle: str, kind: str, detail: str) -> Begun | None:
     if kind == "takeoff":
         return Begun(vehicle, "", element="Up")
     if (kind, detail) == ("mode", "LAND"):

@@ -36,6 +36,10 @@ class Faults:
         assert error in errno.errorcode
         self.set(*(f"{call} {error} {name}" for call in calls))
 
+    def hang(self, *calls: str, name: str) -> None:
+        """Have calls on files that have `name` in their path hang until there is another fault."""
+        self.set(*(f"{call} -1 {name}" for call in calls))
+
     def clear(self) -> None:
         """Have no faults any more."""
         self.set()

@@ -2,7 +2,8 @@
 
    M2PEM_FAULTS names a file of 4096 bytes, which is mapped, so that a change takes effect at once.
    Each line is one fault: "CALL ERRNO NAME": a call (write, sync, read, open) on a file whose path
-   contains NAME fails with ERRNO; "clock ID SECONDS": this clock is ahead by so much. */
+   contains NAME fails with ERRNO, or hangs as long as the fault is there if that is -1;
+   "clock ID SECONDS": this clock is ahead by so much. */
 
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -42,7 +43,7 @@ static const char *current(void) {
   return rules;
 }
 
-static int fault_of(const char *call, const char *path) {
+static int found(const char *call, const char *path) {
   const char *line = current();
   if (!line) return 0;
   for (const char *end; *line && (end = strchr(line, '\n')); line = end + 1) {
@@ -53,6 +54,12 @@ static int fault_of(const char *call, const char *path) {
       return number;
   }
   return 0;
+}
+
+static int fault_of(const char *call, const char *path) {
+  int number;
+  while ((number = found(call, path)) < 0) usleep(1000);
+  return number;
 }
 
 static int fault(const char *call, int file) {

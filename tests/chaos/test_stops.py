@@ -1,0 +1,83 @@
+"""STOP while something is wrong: it reaches the vehicles before that is mended.
+
+How soon it does is measured by `make chaos CHAOS=--stop`: here a busy computer may take its time.
+"""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.chaos import stops
+from tests.chaos.kill_points import POSTGRES, SQLITE
+from tests.chaos.stops import StopPlan, plan_stop, play_stop
+from tests.chaos.troubles import TROUBLES
+from tests.chaos.worlds import MavlinkVehicles, SimulatedVehicles
+
+PATIENCE_S = 60.0
+SHORT = "the disk hangs"
+CASES = [
+    (world, journal, each.name)
+    for each in TROUBLES.values()
+    for world in each.worlds
+    for journal in each.journals
+]
+
+
+def plan(trouble: str, world: str = SimulatedVehicles.name, journal: str = SQLITE.name) -> StopPlan:
+    """A stop soon after the vehicles have begun, as quickly as can be."""
+    return StopPlan(1, world, journal, trouble, after_s=0.2, lead_s=0.0, speed=4.0)
+
+
+@pytest.mark.parametrize(
+    ("world", "journal", "trouble"),
+    [
+        each
+        if each == (SimulatedVehicles.name, SQLITE.name, SHORT)
+        else pytest.param(*each, marks=pytest.mark.long)
+        for each in CASES
+    ],
+)
+def test_stop_reaches_each_vehicle_while_something_is_wrong(
+    world: str, journal: str, trouble: str
+) -> None:
+    played = play_stop(replace(plan(trouble, world, journal), within_s=PATIENCE_S))
+    assert not played.verdict.faults
+    assert played.told_s
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("world", "journal"),
+    [
+        (SimulatedVehicles.name, SQLITE.name),
+        (SimulatedVehicles.name, POSTGRES.name),
+        (MavlinkVehicles.name, SQLITE.name),
+    ],
+)
+@pytest.mark.parametrize("number", range(10))
+def test_stop_reaches_each_vehicle_at_a_random_moment(
+    world: str, journal: str, number: int
+) -> None:
+    played = play_stop(replace(plan_stop(3, number, world, journal), within_s=PATIENCE_S))
+    assert not played.verdict.faults, played.plan
+
+
+@pytest.mark.long
+def test_a_vehicle_that_is_not_told_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "cancel never returns"
+    monkeypatch.setitem(TROUBLES, name, replace(TROUBLES[name], deaf=None))
+    played = play_stop(plan(name))
+    assert any("was told never" in each for each in played.verdict.faults)
+
+
+@pytest.mark.long
+def test_that_nothing_was_said_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stops.Stop, "names", lambda *_: False)
+    played = play_stop(replace(plan("cancel never returns"), speed=2.0))
+    assert any("nobody read it" in each for each in played.verdict.faults)
+
+
+def test_a_stop_can_be_played_again_by_its_number() -> None:
+    first, second = (plan_stop(7, 12, SimulatedVehicles.name, SQLITE.name) for _ in range(2))
+    assert first == second
+    assert first != plan_stop(8, 12, SimulatedVehicles.name, SQLITE.name)
