@@ -9,6 +9,7 @@ import math
 import os
 import socket
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -229,7 +230,7 @@ _MAVLINK_VEHICLE = """  {name}:
     arbiter: mavlink
     sitl: true
     lost_after: 120 s
-    connection: {{url: "udpin://{address}", system_id: {system}}}
+    connection: {{url: "udpout://127.0.0.1:{port}", system_id: {system}}}
 """
 _BY_SYSTEM = {1: "uav1", 2: "ugv1", 3: "ugv2"}
 
@@ -250,6 +251,22 @@ runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
 """
 
 
+def _free_ports(count: int) -> int:
+    """Return the first of some UDP ports, one after the other, that nothing listens at."""
+    while True:
+        with ExitStack() as stack:
+            some = [
+                stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                for _ in range(count)
+            ]
+            some[0].bind(("127.0.0.1", 0))
+            first: int = some[0].getsockname()[1]
+            with suppress(OSError):
+                for place, each in enumerate(some[1:], 1):
+                    each.bind(("127.0.0.1", first + place))
+                return first
+
+
 class MavlinkVehicles:
     """Simulated autopilots in a process of their own, over UDP, which note what they begin: a
     takeoff, a landing, a motion to another place."""
@@ -262,15 +279,14 @@ class MavlinkVehicles:
 
     def __init__(self, folder: Path, speed: float = speed) -> None:
         self.speed = speed
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-            free.bind(("127.0.0.1", 0))
-            address = f"127.0.0.1:{free.getsockname()[1]}"
+        # Each autopilot listens, so that two executives may be heard at a time.
+        first = _free_ports(len(_BY_SYSTEM))
         self.fleet = folder / "fleet.yaml"
         vehicles = (
             _MAVLINK_VEHICLE.format(
                 name=name,
                 domain="air" if name.startswith("uav") else "ground",
-                address=address,
+                port=first + system - 1,
                 system=system,
             )
             for system, name in _BY_SYSTEM.items()
@@ -280,8 +296,8 @@ class MavlinkVehicles:
         words = [
             *("sim", "mavlink", "--copters", "1", "--rovers", "2", "--speed", f"{self.speed:g}"),
             *(
-                "--to",
-                f"udp://{address}",
+                "--listen",
+                f"udp://127.0.0.1:{first}",
                 "--ekf",
                 "1s",
                 "--home",
