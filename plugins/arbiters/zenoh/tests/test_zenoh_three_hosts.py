@@ -42,8 +42,8 @@ version: 1
 name: mixed
 origin: {{lat: 38.1075, lon: -77.3192, alt: 60.0}}
 hosts:
-  copter-pi: {{connect: ["tls/{air}:7447"], tls: {tls}}}
-  rover-pi: {{connect: ["tls/{ground}:7447"], tls: {tls}}}
+  copter-pi: {{connect: ["tls/{air}:{port}"], tls: {tls}}}
+  rover-pi: {{connect: ["tls/{ground}:{port}"], tls: {tls}}}
 vehicles:
   uav1: {{domain: air, arbiter: mavlink, host: copter-pi, lost_after: {lost_after} s, sitl: true,
     connection: {{url: "udpout://127.0.0.1:{port}", system_id: 1}},
@@ -103,7 +103,7 @@ class World:
         make_keys(folder, *map(network.address, (STATION, AIR, GROUND)))
         tls = "{ca: ca.pem, certificate: link.pem, key: link.key}"
         addresses = {"air": network.address(AIR), "ground": network.address(GROUND)}
-        # The vehicles of a computer are locked by their addresses, also those in other namespaces.
+        # Vehicles are locked on a computer by their addresses, also for tests beside this one.
         port = free_port()
         fleet = FLEET.format(**addresses, tls=tls, lost_after=LOST_AFTER_S, port=port)
         (folder / "fleet.yaml").write_text(fleet)
