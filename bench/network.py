@@ -102,9 +102,15 @@ class Link:
 
 
 class Network:
-    """Hosts, each of which reaches each other one. `seed`: of what gets lost."""
+    """Hosts, each of which reaches each other one. `seed`: of what gets lost.
+
+    Raises:
+        RuntimeError: there can be no such networks here.
+    """
 
     def __init__(self, *hosts: str, seed: int = 1) -> None:
+        if why := missing():
+            raise RuntimeError(why)
         self._names = hosts
         self._links = {
             frozenset((one, other)): Link()

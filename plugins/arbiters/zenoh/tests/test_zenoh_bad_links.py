@@ -16,7 +16,7 @@ import pytest
 from m2pem_plugin_zenoh.plugin import ZenohHosts
 from zenoh_world import UGV1, UGV2, HostProcess, hosted_simulation, warm_up
 
-from bench.network import Link, Network, missing
+from bench.network import Link, Network
 from m2pem.api import (
     Arbiter,
     ArbiterContext,
@@ -38,11 +38,7 @@ from m2pem.testing.contracts.arbiter_harness import (
     speed,
 )
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.timeout(900),
-    pytest.mark.skipif(bool(missing()), reason=missing()),
-]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 LONG = Route(((38.108, -77.3192, None), (38.130, -77.3180, None)))
 ROUTER = str(Path(__file__).with_name("zenoh_router_process.py"))
 

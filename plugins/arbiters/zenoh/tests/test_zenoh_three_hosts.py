@@ -21,15 +21,11 @@ from typing import Any
 import pytest
 from zenoh_world import free_port
 
-from bench.network import Network, make_keys, missing
+from bench.network import Network, make_keys
 from m2pem.simulation.state_file import recorded_effects
 from tests.executive.conftest import flow, mission, task
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.timeout(900),
-    pytest.mark.skipif(bool(missing()), reason=missing()),
-]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 M2PEM = (sys.executable, "-m", "m2pem")
 COPTER = str(Path(__file__).with_name("zenoh_copter_process.py"))
 STATION, AIR, GROUND = "station", "copter-pi", "rover-pi"
