@@ -237,7 +237,7 @@ def test_rounds_without_end_leave_nothing_in_the_state() -> None:
         <boundaryEvent id="b" attachedToRef="sub">signal S</boundaryEvent>
         s -> sub
     """),
-        5,
+        50,
     )
     root = run.state.root
     assert root is not None
