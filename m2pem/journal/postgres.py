@@ -474,7 +474,9 @@ class PostgresJournal(DatabaseJournal):
         length_s = lease_s()
         shown = address.shown
         session = f"m2pem {uuid4()}"
-        connection = PostgresConnection(lambda: connect(address, length_s, session))
+        # An executive that is stopped or cut off within a transaction keeps others waiting no
+        # longer than its lease, after which it could not commit. One that reads has no locks.
+        connection = PostgresConnection(lambda: connect(address, length_s, session, length_s))
         with ExitStack() as undo:
             undo.callback(connection.close)
             try:

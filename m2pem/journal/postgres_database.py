@@ -44,12 +44,16 @@ def connection_parameters(within_s: float, session: str = "m2pem") -> dict[str, 
 
 
 def connect(
-    address: PostgresAddress, within_s: float, session: str = "m2pem"
+    address: PostgresAddress,
+    within_s: float,
+    session: str = "m2pem",
+    idle_within_s: float = 60.0,
 ) -> psycopg.Connection[Any]:
     """Connect to the server; statements are committed one by one. The checks are those of `open`.
 
     `within_s`: what the other side does not acknowledge by then is given up, on both sides.
-    `session`: what the server calls it.
+    `session`: what the server calls it. `idle_within_s`: after so long without a statement the
+    server gives up a transaction.
 
     Raises:
         psycopg.Error: see `explained_error`.
@@ -64,9 +68,8 @@ def connect(
             connection.execute("SET tcp_keepalives_interval = 1")
             connection.execute("SET tcp_keepalives_count = 3")
             connection.execute(f"SET lock_timeout = {round(LOCKED_FOR_S * 1000)}")
-            # An executive that is stopped or cut off within a transaction keeps others waiting no
-            # longer than its lease, after which it could not commit.
-            connection.execute(f"SET idle_in_transaction_session_timeout = {within_ms}")
+            idle_ms = max(1000, round(idle_within_s * 1000))
+            connection.execute(f"SET idle_in_transaction_session_timeout = {idle_ms}")
             # What BEGIN begins: rows that another executive has changed are waited for, and seen.
             connection.execute("SET default_transaction_isolation = 'read committed'")
             connection.execute("SET default_transaction_read_only = off")

@@ -122,7 +122,7 @@ POSTGRES = JournalKind(
         ),
         KillPoint("release: not committed", f"{_STORAGE}.give_up", When.AFTER),
     ),
-    lease_s="2",
+    lease_s="5",
 )
 JOURNALS: Mapping[str, JournalKind] = {each.name: each for each in (SQLITE, POSTGRES)}
 

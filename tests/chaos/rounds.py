@@ -120,8 +120,9 @@ def _kill(chance: random.Random, point: str, passages: Mapping[str, int]) -> Kil
     most = passages.get(point) or 2
     # A computer with other work has fewer commits, each of more calls.
     passage = chance.randint(1, -(-most * 2 // 3))
-    # Where another is to take over, all missions have begun, and must not have ended.
-    return Kill(point, passage, chance.uniform(0.0, 0.5 if point == REPLACED else 1.5))
+    # The missions take a second on a quiet computer. Where another executive is to take over, all
+    # have begun, and must not have ended.
+    return Kill(point, passage, chance.uniform(0.0, 0.5 if point == REPLACED else 0.8))
 
 
 @dataclass(frozen=True, slots=True)
