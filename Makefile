@@ -45,9 +45,14 @@ PIP_FAILED = { echo "pip could not install what is needed (its own message is ab
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 12
 
-setup: python-packages npm-packages page ## install all that the tests need, into .venv
+setup: python-packages npm-packages page $(VENV)/collected ## install all that the tests need, into .venv
 
 python-packages: $(INSTALLED)
+
+# One process compiles the tests, once: otherwise each worker of the first run would. Mistakes in them are that run's.
+$(VENV)/collected: $(INSTALLED) | python-packages
+	@$(BIN)/pytest --collect-only -q -m "not long" >/dev/null 2>&1 || true
+	@touch $@
 
 $(CREATED):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
@@ -159,7 +164,6 @@ ROS_WORKERS := 4
 
 test-ros: ros ## check the plugins that need ROS, over DDS on 127.0.0.1
 	@$(ROS_PYTHON) -m pytest -n $(ROS_WORKERS) --dist worksteal -m "not long" $(ROS_TESTS)
-	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
 
 demo: $(call packages_for,demo) ## run the paper's mission on simulated vehicles, in two ways
 	@$(BIN)/m2pem demo
@@ -200,21 +204,17 @@ check: lint ## check style, types, layers and the core's unit tests: two minutes
 	@$(BIN)/pytest -n 2 -m "not long" $(UNITS)
 
 test: setup ## check all but the long tests
-	@$(MAKE) --silent --jobs 3 --output-sync=target lint bench-quick page-test collected
+	@$(MAKE) --silent --jobs 3 --output-sync=target lint bench-quick page-test
 	@$(MAKE) --silent --jobs 2 test-core test-ros-aside
 
-.PHONY: test-core test-ros-aside collected
+.PHONY: test-core test-ros-aside
 
 test-core:
 	@$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not long"
 
 # The tests of ROS wait more than they compute: they run beside the others, and are told of when they are through.
 test-ros-aside:
-	@status=0; told=$$($(MAKE) --silent test-ros 2>&1) || status=$$?; echo "$$told"; exit $$status
-
-# One process compiles the tests, which in a fresh clone each worker would do.
-collected: setup
-	@$(BIN)/pytest --collect-only -q -m "not long" >/dev/null || { $(BIN)/pytest --collect-only -qq; exit 1; }
+	@status=0; printed=$$($(MAKE) --silent test-ros 2>&1) || status=$$?; echo "$$printed"; exit $$status
 
 # The unit tests of the page's own code.
 page-test: setup
@@ -223,6 +223,7 @@ page-test: setup
 test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800 --hypothesis-profile random
 	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 --hypothesis-profile random $(ROS_TESTS)
+	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
 
 FUZZ_S := 600
 
