@@ -30,7 +30,7 @@ POINTS = [
 ]
 SHORT = [(SQLITE.name, point) for point in (RANDOM, *points_of(SQLITE, SimulatedVehicles.arbiter))]
 SHORT += [(POSTGRES.name, each.name) for each in POSTGRES.points]
-SHORT = SHORT[::4]  # a round takes more than a second of a processor
+SHORT = SHORT[::6]  # a round takes more than a second of a processor
 
 
 @pytest.mark.parametrize(
