@@ -7,6 +7,7 @@ with the journal.
 import json
 import math
 import os
+import signal
 import socket
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
@@ -17,8 +18,9 @@ from typing import Protocol
 
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
-from tests.command_line import CommandLine
+from tests.command_line import CommandLine, Program
 from tests.executive.conftest import flow, mission, question, task
+from tests.faults.tcp_proxy import TcpProxy
 from tests.preloaded import preloaded
 
 
@@ -97,13 +99,13 @@ def place(east_m: float, north_m: float) -> str:
 
 PLACES = {
     "Out": (12.0, 0.0),
-    "Back": (0.0, 0.0),
+    "Back": (-2.0, 0.0),
     "Fly": (0.0, 25.0),
     "Last": (6.0, 8.0),
     "Near": (5.0, -10.0),
     "Shared": (10.0, 5.0),
 }
-"""Where tasks move vehicles; metres east and north."""
+"""Where tasks move vehicles; metres east and north. None is the aircraft's home."""
 
 
 def goto(element: str, role: str) -> str:
@@ -331,6 +333,52 @@ class MavlinkVehicles:
         self._process.wait()
 
 
+class HostedVehicles(SimulatedVehicles):
+    """Simulated vehicles of an arbiter host, a process of its own that has no other speed than 1.
+    Between it and executives there is a `proxy`."""
+
+    name = "zenoh"
+    arbiter = "m2pem_plugin_zenoh.remote_arbiter:RemoteArbiter"
+    speed = 1.0
+    pauses = False
+
+    def __init__(self, folder: Path, speed: float = speed) -> None:
+        super().__init__(folder, speed)
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port: int = probe.getsockname()[1]
+        self.proxy = TcpProxy(port)
+        host = f'hosts: {{pi: {{connect: ["tcp/127.0.0.1:{self.proxy.port}"]}}}}\nvehicles:'
+        text = self.fleet.read_text(encoding="utf-8").replace("vehicles:", host)
+        text = text.replace("arbiter: sim,", "arbiter: sim, host: pi, lost_after: 10 s,")
+        self.fleet.write_text(text, encoding="utf-8")
+        self._m2pem = CommandLine(folder)
+        self._words = (
+            *("arbiter-host", "--fleet", self.fleet, "--state", folder / "host"),
+            *("--listen", f"tcp/127.0.0.1:{port}"),
+        )
+        self._host = self._start()
+
+    def _start(self) -> Program:
+        host = self._m2pem.start(*self._words)
+        for line in host.stderr:
+            if "listens" in line:
+                return host
+        raise AssertionError(f"the host has ended: {host.rest()}")
+
+    def send_signal(self, number: int) -> None:
+        """See `World.send_signal`. A host that was killed is started again, as systemd would."""
+        self._host.send(signal.Signals(number))
+        if number == signal.SIGKILL:
+            self._host.rest()
+            self._host = self._start()
+
+    def close(self) -> None:
+        """See `World.close`."""
+        self._m2pem.end()
+        self.proxy.close()
+
+
 STOPPED = ("BRAKE", "HOLD", "LOITER")
 """Modes in which an autopilot stays where it is."""
 
@@ -352,9 +400,11 @@ def _begun(vehicle: str, kind: str, detail: str) -> Begun | None:
     latitude, longitude = map(float, detail.split(","))
     east_m, north_m = (longitude - _HOME[1]) * 87_500, (latitude - _HOME[0]) * 111_000
     near = [name for name, at in PLACES.items() if math.dist(at, (east_m, north_m)) < 0.5]
-    return Begun(vehicle, "", element=near[0] if near else "Reverse")
+    # A takeoff that begins again in the air climbs where it is.
+    other = "Up" if vehicle.startswith("uav") else "Reverse"
+    return Begun(vehicle, "", element=near[0] if near else other)
 
 
 WORLDS: Mapping[str, type[SimulatedVehicles] | type[MavlinkVehicles]] = {
-    each.name: each for each in (SimulatedVehicles, MavlinkVehicles)
+    each.name: each for each in (SimulatedVehicles, MavlinkVehicles, HostedVehicles)
 }

@@ -1,4 +1,4 @@
-"""A proxy in front of a PostgreSQL server: the network between one executive and its database.
+"""A proxy in front of a server: the network between an executive and its database, or a host.
 
 While it is `partitioned`, it carries nothing and ends no connection, as a network that loses all
 packets does; what was sent meanwhile arrives when that is over.
@@ -11,9 +11,10 @@ from pathlib import Path
 
 
 class TcpProxy:
-    """It listens at `port` of 127.0.0.1, and connects to the socket of a server of this host."""
+    """It listens at `port` of 127.0.0.1, and connects to the socket, or the port, of a server of
+    this host."""
 
-    def __init__(self, server: Path) -> None:
+    def __init__(self, server: Path | int) -> None:
         self.partitioned = False
         self._server = server
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -46,9 +47,19 @@ class TcpProxy:
 
     def _accept(self) -> None:
         client, _ = self._listener.accept()
+        try:
+            server = self._connected()
+        except OSError:  # it is killed
+            client.close()
+            return
+        self._other[client], self._other[server] = server, client
+
+    def _connected(self) -> socket.socket:
+        if isinstance(self._server, int):
+            return socket.create_connection(("127.0.0.1", self._server))
         server = socket.socket(socket.AF_UNIX)
         server.connect(str(self._server))
-        self._other[client], self._other[server] = server, client
+        return server
 
     def _carry(self, sender: socket.socket) -> None:
         receiver = self._other[sender]
