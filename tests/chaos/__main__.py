@@ -18,7 +18,7 @@ from tests.chaos.rounds import Plan, Round, plan_round, play_round
 from tests.chaos.stops import StopRound, plan_stop, play_stop
 from tests.chaos.stops import as_table as stops_as_table
 from tests.chaos.table import as_table
-from tests.chaos.troubles import TROUBLES
+from tests.chaos.troubles import NONE, TROUBLES
 from tests.chaos.worlds import WORLDS, SimulatedVehicles
 
 
@@ -74,7 +74,10 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--stop", action="store_true", help="stop all, while something is wrong")
     parser.add_argument("--trouble", choices=list(TROUBLES), default="", help="what is wrong then")
-    return parser.parse_args()
+    given = parser.parse_args()
+    if given.stop and given.vehicles not in NONE.worlds:
+        parser.error(f"--stop: --vehicles is one of {', '.join(NONE.worlds)}")
+    return given
 
 
 def _plan(given: argparse.Namespace, number: int) -> Plan:

@@ -1,0 +1,435 @@
+"""The table of faults x journals x arbiters: how missions end, what operators read, what is lost.
+
+`python -m tests.chaos.fault_table` prints it as Markdown; docs/journal.md has it. Each row is
+played, by `play` or by another test.
+"""
+
+import asyncio
+import errno
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+
+from m2pem.api import MissionControl
+from m2pem.api.runs import Alert
+from m2pem.control_socket.remote import RemoteControl
+from m2pem.errors import M2pemError
+from m2pem.journal.postgres_address import PostgresAddress, read_address, write_address
+from tests.chaos import troubles
+from tests.chaos.judge import Verdict, judge
+from tests.chaos.kill_points import POSTGRES, RANDOM, REPLACED, SQLITE
+from tests.chaos.rounds import LOOK_EVERY_S, ROUND_WITHIN_S, Evidence, Kill, Plan, Play
+from tests.chaos.worlds import HostedVehicles, MavlinkVehicles, SimulatedVehicles
+from tests.faults import Faults, with_faults
+from tests.faults.tcp_proxy import TcpProxy
+from tests.postgres_server import shared_server
+
+SIMULATED, MAVLINK, ZENOH = SimulatedVehicles.name, MavlinkVehicles.name, HostedVehicles.name
+JOURNALS = {SQLITE.name: "SQLite", POSTGRES.name: "PostgreSQL"}
+ARBITERS = {SIMULATED: "simulated", MAVLINK: "MAVLink", ZENOH: "on a host (Zenoh)"}
+SPEEDS = {SIMULATED: 4.0, MAVLINK: 8.0, ZENOH: 1.0}
+"""So vehicles move for some seconds."""
+
+
+class Fault(StrEnum):
+    """What goes wrong."""
+
+    KILLED = "executive killed (`kill -9`)"
+    STOPPED = "executive stopped beyond its lease, with a standby"
+    FULL = "disk full"
+    IO_ERROR = "I/O error of the disk"
+    READ_ONLY = "file system read-only"
+    DATABASE_KILLED = "database server killed"
+    CUT_OFF = "database cut off"
+    LINK = "link to the vehicle lost, and back"
+    HOST = "host of the arbiter killed"
+
+
+DISK = {
+    Fault.FULL: (errno.ENOSPC, "write"),
+    Fault.IO_ERROR: (errno.EIO, "write"),
+    Fault.READ_ONLY: (errno.EROFS, "write", "open"),
+}
+STORAGE = (*DISK, Fault.DATABASE_KILLED, Fault.CUT_OFF)
+"""After these an executive has held its vehicles, and the next one takes its runs up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What comes of a fault. `mission`, `operator`: as the page says it. `reads`: what operators
+    read of it, each; `later`: and when it is over. `failed`: whether a mission of the vehicle
+    fails."""
+
+    mission: str
+    operator: str
+    reads: tuple[str, ...] = ()
+    later: tuple[str, ...] = ()
+    failed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """`outcome`: text says why there is no such case. `test`: the node id of the test that plays
+    it; "": `play` does."""
+
+    fault: Fault
+    journal: str
+    arbiter: str
+    outcome: Outcome | str
+    test: str = ""
+
+
+_HELD = "`r1: held`, why (REASON), `Commanded to hold: uav1, ugv1`, `Mend the cause`"
+_HELD_READS = ("r1: held: ", "r2: held: ", "Commanded to hold: ")
+_LATER = "is held; once that is mended, the next executive resumes and completes it"
+
+
+def _held(reason: str, *reads: str) -> Outcome:
+    return Outcome(_LATER, _HELD.replace("REASON", reason), (*_HELD_READS, *reads))
+
+
+OUTCOMES = {
+    Fault.KILLED: Outcome(
+        "completed by the next executive",
+        "the executive is gone; the next one asks, if it cannot know what became of a behavior",
+    ),
+    Fault.STOPPED: Outcome(
+        "completed by the standby; the former executive moves nothing",
+        "`taking over` at the standby",
+        ("taking over",),
+    ),
+    Fault.FULL: _held("`the disk is full; make room`", "the disk is full; make room"),
+    Fault.IO_ERROR: _held(
+        "`the disk failed to read or write; look at it`",
+        "the disk failed to read or write; look at it",
+    ),
+    Fault.READ_ONLY: _held("`the disk failed to read or write` or `can only be read`"),
+    Fault.DATABASE_KILLED: _held(
+        "`no PostgreSQL server answers there` or `the journal has not confirmed`"
+    ),
+    Fault.CUT_OFF: _held("`the journal has not confirmed`"),
+    Fault.LINK: Outcome(
+        "the behavior ends as `LINK_LOST`: an event catches that, an incident opens, or the mission"
+        " fails. The vehicle is stopped when the link is back",
+        "`ugv1: LINK_LOST`, then `its link is restored`",
+        ("ugv1: LINK_LOST: ",),
+        ("ugv1: its link is restored",),
+        failed=True,
+    ),
+    Fault.HOST: Outcome(
+        "completed: the host is started again and takes its behaviors up",
+        "`no contact with host pi`",
+        ("no contact with host pi",),
+    ),
+}
+
+_OF_A_STANDBY = Outcome(
+    "its vehicles are held before the standby takes it over", "`taking over` at the standby"
+)
+
+ONE_HOST = "no such case: claims hold as long as the process has its files, stopped or not"
+SERVER_DISK = "no such case: the disk is the server's, which ends or refuses commits"
+NO_SERVER = "no such case: there is no server"
+NO_HOST = "no such case: the arbiter is in the executive"
+
+
+def _none(fault: Fault, journal: str, arbiter: str) -> str:
+    """Why there is no such case; "" if there is."""
+    if journal == SQLITE.name and fault is Fault.STOPPED:
+        return ONE_HOST
+    if journal == SQLITE.name and fault in (Fault.DATABASE_KILLED, Fault.CUT_OFF):
+        return NO_SERVER
+    if journal == POSTGRES.name and fault in DISK:
+        return SERVER_DISK
+    return NO_HOST if fault is Fault.HOST and arbiter != ZENOH else ""
+
+
+_ROUNDS = "tests/chaos/test_rounds.py"
+_STANDBY = Outcome(
+    "its vehicles are held before the standby takes it over", "`taking over` at the standby"
+)
+
+ONE_HOST = "no such case: claims hold as long as the process has its files, stopped or not"
+SERVER_DISK = "no such case: the disk is the server's, which ends or refuses commits"
+NO_SERVER = "no such case: there is no server"
+NO_HOST = "no such case: the arbiter is in the executive"
+
+
+def _none(fault: Fault, journal: str, arbiter: str) -> str:
+    """Why there is no such case; "" if there is."""
+    if journal == SQLITE.name and fault is Fault.STOPPED:
+        return ONE_HOST
+    if journal == SQLITE.name and fault in (Fault.DATABASE_KILLED, Fault.CUT_OFF):
+        return NO_SERVER
+    if journal == POSTGRES.name and fault in DISK:
+        return SERVER_DISK
+    return NO_HOST if fault is Fault.HOST and arbiter != ZENOH else ""
+
+
+_ROUNDS = "tests/chaos/test_rounds.py"
+_STORAGE = (
+    "tests/e2e/test_storage_faults.py"
+    "::test_a_fault_during_a_run_holds_its_vehicles_and_stop_reaches_them"
+)
+_STANDBY = "plugins/arbiters/mavlink/tests/test_mavlink_standby.py"
+_HOSTS = "plugins/arbiters/zenoh/tests/test_zenoh_three_hosts.py"
+_REPLACED = (
+    f"{_ROUNDS}::test_an_executive_that_goes_on_after_a_standby_has_taken_over_moves_nothing"
+)
+TESTS = {
+    **{
+        (Fault.KILLED, journal, SIMULATED): (
+            f"{_ROUNDS}::test_nothing_is_lost_when_the_executive_dies[{journal}-{RANDOM}]"
+        )
+        for journal in JOURNALS
+    },
+    **{
+        (Fault.KILLED, journal, MAVLINK): (
+            f"{_ROUNDS}::test_autopilots_begin_nothing_twice[started, not reported-{journal}]"
+        )
+        for journal in JOURNALS
+    },
+    (Fault.KILLED, SQLITE.name, ZENOH): (
+        f"{_HOSTS}::test_a_killed_executive_is_resumed_and_finds_its_behaviors_going_on"
+    ),
+    **{(Fault.STOPPED, POSTGRES.name, world): f"{_REPLACED}[{world}]" for world in ARBITERS},
+    (Fault.CUT_OFF, POSTGRES.name, SIMULATED): (
+        "tests/chaos/test_takeovers.py::test_a_standby_takes_over_in_time[cut_off]"
+    ),
+    (Fault.CUT_OFF, POSTGRES.name, MAVLINK): (
+        f"{_STANDBY}::test_an_executive_cut_off_from_its_database_holds_its_copter_before"
+        "_another_one_has_it"
+    ),
+    (Fault.LINK, SQLITE.name, MAVLINK): (
+        f"{_STANDBY}::test_a_standby_leaves_an_executive_alone_that_has_lost_its_copter"
+    ),
+    (Fault.LINK, SQLITE.name, ZENOH): (
+        f"{_HOSTS}::test_a_partition_ends_the_work_of_who_is_lost_and_of_nobody_else[rover-pi]"
+    ),
+}
+"""Rows that other tests play."""
+
+
+def _outcome(fault: Fault, journal: str, arbiter: str) -> Outcome | str:
+    if fault is Fault.CUT_OFF and arbiter != ZENOH:
+        return _none(fault, journal, arbiter) or _OF_A_STANDBY
+    return _none(fault, journal, arbiter) or OUTCOMES[fault]
+
+
+ROWS = tuple(
+    Row(
+        fault,
+        journal,
+        arbiter,
+        _outcome(fault, journal, arbiter),
+        TESTS.get((fault, journal, arbiter), ""),
+    )
+    for fault in Fault
+    for journal in JOURNALS
+    for arbiter in ARBITERS
+)
+PLAYED = [row for row in ROWS if isinstance(row.outcome, Outcome) and not row.test]
+
+
+class FaultPlay(Play):
+    """One row while it is played."""
+
+    def __init__(self, row: Row, folder: Path) -> None:
+        self._faults = Faults(folder)
+        kills = {
+            Fault.KILLED: (Kill(RANDOM, after_s=1.5),),
+            Fault.STOPPED: (Kill(REPLACED, after_s=0.05),),
+        }
+        self._row = row
+        speed = SPEEDS[row.arbiter]
+        super().__init__(
+            Plan(1, row.arbiter, row.journal, kills.get(row.fault, ()), speed=speed),
+            folder,
+            self._faults.variables,
+            with_faults(),
+        )
+        self._flag = folder / "fault"
+        self._alerts: list[Alert] = []
+        if row.fault is Fault.LINK:  # before a vehicle counts as one that does not move
+            fleet = self._world.fleet.read_text(encoding="utf-8")
+            fleet = fleet.replace("lost_after: 120 s", "lost_after: 20 s")
+            self._world.fleet.write_text(fleet, encoding="utf-8")
+        self._database: TcpProxy | None = None
+        if row.fault is Fault.CUT_OFF:
+            direct = read_address(self._file).url
+            self._database = TcpProxy(shared_server().folder / ".s.PGSQL.5432")
+            name = direct.partition("?")[0].rpartition("/")[2]
+            url = f"postgresql://m2pem@127.0.0.1:{self._database.port}/{name}"
+            write_address(PostgresAddress(url, url, self._file))
+
+    def close(self) -> None:
+        """See `Play.close`."""
+        super().close()
+        if self._database is not None:
+            self._database.close()
+
+    def said(self) -> str:
+        """Return all that operators have read."""
+        lives = range(1, self._lives + 1)
+        errors = [self._errors(life).read_text() for life in lives]
+        return "\n".join([*errors, *(each.text for each in self._alerts)])
+
+    def evidence(self) -> Evidence:
+        """See `Play.evidence`."""
+        return replace(super().evidence(), stopped=self._outcome.failed)
+
+    @property
+    def _outcome(self) -> Outcome:
+        assert isinstance(self._row.outcome, Outcome)
+        return self._row.outcome
+
+    async def whole(self) -> None:
+        """See `Play.whole`."""
+        if self.plan.kills:
+            await super().whole()
+            assert self.reached, "no executive was killed"
+            return
+        link = f"troubles.install('link cut', {self._world.arbiter!r}, Path({str(self._flag)!r}))"
+        cut = self._row.fault is Fault.LINK and self._row.arbiter == SIMULATED
+        process = self._start(f"from tests.chaos import troubles\n{link}" if cut else "", "")
+        async with asyncio.timeout(ROUND_WITHIN_S):
+            path = await self._control(process)
+        async with RemoteControl(path) as control:
+            await self._connected(control)
+            listening = asyncio.create_task(self._listen(control))
+            operator = asyncio.create_task(self._operate(process))
+            try:
+                await self._until(self._move, operator)
+                with self._fault():
+                    await self._until(self._read)
+                await self._until(self._read_later)
+                if self._row.fault not in STORAGE:
+                    async with asyncio.timeout(ROUND_WITHIN_S):
+                        await operator
+            finally:
+                for task in (operator, listening):
+                    task.cancel()
+                await asyncio.gather(operator, listening, return_exceptions=True)
+        process.terminate()
+        await self._until(lambda: process.poll() is not None)
+        if self._row.fault in STORAGE:
+            await self.to_the_end()
+
+    async def _listen(self, control: MissionControl) -> None:
+        with suppress(M2pemError, OSError):
+            async for event in control.subscribe():
+                if isinstance(event, Alert):
+                    self._alerts.append(event)
+
+    async def _until(
+        self, true: Callable[[], bool], operator: "asyncio.Task[None] | None" = None
+    ) -> None:
+        try:
+            async with asyncio.timeout(ROUND_WITHIN_S):
+                while not true():
+                    await asyncio.sleep(LOOK_EVERY_S)
+                    if operator is not None and operator.done():
+                        await operator
+                        raise AssertionError(f"all had ended before the fault: {self.said()}")
+        except TimeoutError as error:
+            raise AssertionError(f"{true.__name__}: never; {self.said()}") from error
+
+    def _move(self) -> bool:
+        """Whether a vehicle of each mission does something."""
+        moving = {each.vehicle for each in self._world.begun()}
+        return all(self._runs.values()) and {"ugv1", "ugv2"} <= moving
+
+    def _read(self) -> bool:
+        """Whether operators have read what they must."""
+        said = self.said()
+        return all(each in said for each in self._outcome.reads)
+
+    def _read_later(self) -> bool:
+        said = self.said()
+        return all(each in said for each in self._outcome.later)
+
+    @contextmanager
+    def _fault(self) -> Iterator[None]:
+        """Have the fault within the block."""
+        fault = self._row.fault
+        if fault in DISK:
+            name = f"{self._file.parent.name}/{self._file.name}"
+            self._faults.fail(*DISK[fault], name=name)
+            try:
+                yield
+            finally:
+                self._faults.clear()
+        elif fault is Fault.DATABASE_KILLED:
+            with troubles.database_of(self._file, silent=False):
+                yield
+        elif fault is Fault.HOST:
+            self._world.send_signal(signal.SIGKILL)
+            yield
+        elif self._database is not None:
+            with _partitioned(self._database):
+                yield
+        elif isinstance(self._world, HostedVehicles):
+            with _partitioned(self._world.proxy):
+                yield
+        elif isinstance(self._world, MavlinkVehicles):
+            self._world.send_signal(signal.SIGSTOP)
+            try:
+                yield
+            finally:
+                self._world.send_signal(signal.SIGCONT)
+        else:
+            self._flag.touch()
+            try:
+                yield
+            finally:
+                self._flag.unlink()
+
+
+@contextmanager
+def _partitioned(proxy: TcpProxy) -> Iterator[None]:
+    proxy.partitioned = True
+    try:
+        yield
+    finally:
+        proxy.partitioned = False
+
+
+def play(row: Row, folder: Path) -> tuple[Verdict, str]:
+    """Play a row: what the judge found, and all that operators read."""
+    played = FaultPlay(row, folder)
+    try:
+        asyncio.run(played.whole())
+        verdict = asyncio.run(judge(played.evidence(), None))
+    finally:
+        played.close()
+    return verdict, played.said()
+
+
+def as_markdown(rows: Sequence[Row] = ROWS) -> str:
+    """Return the table; rows of a fault that come to the same are one of its lines."""
+    found: dict[tuple[Fault, Outcome | str], dict[str, list[str]]] = {}
+    for row in rows:
+        of = found.setdefault((row.fault, row.outcome), {})
+        of.setdefault(JOURNALS[row.journal], []).append(ARBITERS[row.arbiter])
+    lines = ["| fault | journal | vehicles | the mission | operators read | lost |"]
+    lines.append("|---|---|---|---|---|---|")
+    for (fault, outcome), of in found.items():
+        by_vehicles: dict[str, list[str]] = {}
+        for journal, some in of.items():
+            by_vehicles.setdefault(", ".join(some), []).append(journal)
+        for arbiters, journals in by_vehicles.items():
+            cells = (
+                (outcome.mission, outcome.operator, "nothing")
+                if isinstance(outcome, Outcome)
+                else (outcome, "", "")
+            )
+            every = arbiters if arbiters != ", ".join(ARBITERS.values()) else "all"
+            lines.append(f"| {' | '.join((fault, ', '.join(journals), every, *cells))} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(as_markdown())
