@@ -32,7 +32,7 @@ class StandbyOcu(Protocol):
 
     @classmethod
     async def stand_by(cls, fleet: str, served_by: "Callable[[], ExecutiveAddress | None]") -> None:
-        """Tell who comes that the executive stands by, until cancelled.
+        """Show operators that the executive stands by, until cancelled.
 
         `served_by`: who serves the fleet now; None: that is not known.
         """

@@ -244,7 +244,7 @@ async def standing_by(
 ) -> bool:
     """Wait until this executive serves the fleet; False: SIGINT or SIGTERM ended it before.
 
-    Operators are told meanwhile who serves it.
+    Meanwhile it prints which executive serves it, and units that can say so to operators do.
 
     Raises:
         FleetError: another fleet of that name is served.

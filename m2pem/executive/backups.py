@@ -21,7 +21,7 @@ log = logging.getLogger("m2pem.executive")
 async def keep_backups(journal: Path, folder: Path, every_s: float, clock: Clock) -> None:
     """Copy a journal to a folder now and after each `every_s` of the executive's clock, for ever.
 
-    What fails is told to operators, and tried again the next time.
+    What fails gives operators a warning, and is tried again the next time.
     """
     while True:
         try:

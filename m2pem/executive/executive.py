@@ -58,8 +58,8 @@ class Executive:
     whether silence of a vehicle ends its behaviors. `observed`: whether plugins observe records.
     `search_path`, `limit`, `on_records`, `has_others`: as in `RunSettings`. `rehearse`: what
     `MissionControl.simulate` awaits; None: it is refused. `foresee`: what explores the choices
-    about incidents; None: what follows them is not known. `page`: the address of its web page, of
-    which operators of other executives are told.
+    about incidents; None: what follows them is not known. `page`: the address of its web page, for
+    operators of other executives.
     """
 
     def __init__(

@@ -26,7 +26,7 @@ async def stand_by(
 ) -> None:
     """Return when this executive serves the fleet, and no other one commands its vehicles.
 
-    `locks`: of its vehicles. `say` is told what it waits for, and for which executive if that is
+    `locks`: of its vehicles. `say` gets what it waits for, and for which executive if that is
     known, each time that this changes. `page`: the address of its web page, or "". The journal
     has a note meanwhile that it stands by.
 
@@ -76,7 +76,7 @@ async def _try(
         locks.acquire()
     except VehicleInUseError as error:
         await journal.leave_fleet(fleet.name)
-        await asyncio.sleep(ASK_EACH_S)  # other standbys are told of it, and try
+        await asyncio.sleep(ASK_EACH_S)  # other standbys are notified of it, and try
         return f"standing by for {fleet.name}: {error}", None
     locks.release()
     return None

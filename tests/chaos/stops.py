@@ -1,7 +1,7 @@
 """Rounds in which an operator stops all at a random moment, while something is wrong.
 
-Whatever it is, each vehicle that can be reached is told to stop, and operators read what could not
-be done. A round is over when they were told: what is wrong lasts until then.
+Each vehicle that can be reached is commanded to stop, whatever is wrong, and operators read what
+could not be done. What is wrong lasts until then.
 """
 
 import asyncio
@@ -49,8 +49,8 @@ WAYS = ("stop_all", "stop", "signal")
 @dataclass(frozen=True, slots=True)
 class StopPlan:
     """`after_s`: when all missions have begun. `lead_s`: how long before the stop something goes
-    wrong. `dies`: whether the executive is killed when all were told, before that is mended.
-    `within_s`: how soon vehicles must be told; what is wrong lasts as long, if they are not."""
+    wrong. `dies`: whether the executive is killed when all were commanded, before that is mended.
+    `within_s`: how soon vehicles must be commanded; what is wrong lasts as long if they are not."""
 
     number: int
     world: str
@@ -85,13 +85,13 @@ class Stop:
     errors: str = ""
 
     def names(self, vehicle: str) -> bool:
-        """Whether operators read that the vehicle may not have been told."""
+        """Whether operators read that the vehicle may not have received the stop."""
         return any(
             vehicle in names
-            for names, not_told, _ in (
+            for names, not_commanded, _ in (
                 line.partition(" may not have received ") for line in self.said.splitlines()
             )
-            if not_told
+            if not_commanded
         )
 
     @property
@@ -101,11 +101,11 @@ class Stop:
 
 @dataclass
 class StopRound:
-    """A round that was played. `told_s`: by vehicle that moved, how long the stop took to it."""
+    """A round that was played. `commanded_s`: how long the stop took to each vehicle that moved."""
 
     plan: StopPlan
     verdict: Verdict
-    told_s: Mapping[str, float] = field(default_factory=dict)
+    commanded_s: Mapping[str, float] = field(default_factory=dict)
     answered_after_s: float = 0.0
     said: str = ""
 
@@ -133,7 +133,7 @@ def plan_stop(seed: int, number: int, world: str, journal: str, trouble: str = "
 
 
 class Watcher:
-    """Notes when a vehicle was told what. `signs`: so far."""
+    """Notes which command came to a vehicle, and when. `signs`: so far."""
 
     def __init__(self, world: World) -> None:
         self.signs: list[Sign] = []
@@ -158,7 +158,7 @@ class Watcher:
             self.signs += [each if each.at_s else replace(each, at_s=now_s) for each in new]
 
     def moving(self) -> dict[str, Sign]:
-        """Return what was told last to each vehicle that was told to move."""
+        """Return the last command of each vehicle that was commanded to move."""
         last = {each.vehicle: each for each in self.signs}
         return {vehicle: each for vehicle, each in last.items() if each.begun is not None}
 
@@ -206,7 +206,7 @@ class StopPlay(Play):
         finally:
             await journal.close()
 
-    # --- the executive that is told to stop -----------------------------------------------------
+    # --- the executive that commands the stop ---------------------------------------------------
 
     async def _stop_once(self) -> None:
         arm = (
@@ -338,7 +338,7 @@ class StopPlay(Play):
         return ""
 
     async def _look_at_vehicles(self, control: MissionControl, process: Process) -> None:
-        """Wait until all that can be told have been, and operators of the others; not for ever."""
+        """Wait until all that can be reached are commanded, and operators read of the others."""
         deaf = self.trouble.deaf is not None
         until_s = self.stop.at_s + max(
             ALERTED_WITHIN_S if deaf else 0.0, 2 * self.stop_plan.within_s
@@ -349,12 +349,12 @@ class StopPlay(Play):
                     return  # all that it was to do has ended
             moving = self.watcher.moving()
             # An autopilot does not note that it has arrived.
-            untold = [
+            unreached = [
                 vehicle
                 for vehicle, sign in moving.items()
                 if vehicle in self._held or sign.at_s > self._held_s
             ]
-            if not any(not self.stop.names(each) for each in untold) and not self.unsaid():
+            if not any(not self.stop.names(each) for each in unreached) and not self.unsaid():
                 return
             await asyncio.sleep(LOOK_EVERY_S)
 
@@ -389,36 +389,36 @@ async def judge_stop(play: StopPlay) -> tuple[Verdict, dict[str, float]]:
                         requested[record.element] = record.behavior
     finally:
         await journal.close()
-    told_s: dict[str, float] = {}
+    commanded_s: dict[str, float] = {}
     for vehicle in dict.fromkeys(each.vehicle for each in play.watcher.signs):
-        fault = _untold(vehicle, play, ends, requested, told_s)
+        fault = _unreached(vehicle, play, ends, requested, commanded_s)
         if fault:
             verdict.faults.append(fault)
     for run in play.unsaid():
         verdict.faults.append(f"nothing said that the stop of {run} was not recorded: {stop.said}")
-    return verdict, told_s
+    return verdict, commanded_s
 
 
-def _untold(
+def _unreached(
     vehicle: str,
     play: StopPlay,
     ends: Mapping[str, r.BehaviorEnded],
     requested: Mapping[str, str],
-    told_s: dict[str, float],
+    commanded_s: dict[str, float],
 ) -> str:
-    """Why a vehicle was not told as it must be; "" if it was."""
+    """Why a vehicle was not commanded as it must be; "" if it was."""
     stop = play.stop
     until_s = stop.at_s + play.stop_plan.within_s
     signs = [each for each in play.watcher.signs if each.vehicle == vehicle]
     before = [each for each in signs if each.at_s <= until_s]
     after = [each for each in signs if each.at_s > until_s]
-    told = [each for each in signs if each.begun is None and not each.arrived]
-    since = [each for each in told if each.at_s >= stop.at_s]
+    commanded = [each for each in signs if each.begun is None and not each.arrived]
+    since = [each for each in commanded if each.at_s >= stop.at_s]
     last = before[-1] if before else None
     moved = [each for each in before if each.at_s < stop.at_s]
     if moved and moved[-1].begun is not None and since:
-        told_s[vehicle] = since[0].at_s - stop.at_s
-    late = next((each.at_s - stop.at_s for each in told if each.at_s > until_s), None)
+        commanded_s[vehicle] = since[0].at_s - stop.at_s
+    late = next((each.at_s - stop.at_s for each in commanded if each.at_s > until_s), None)
     if last is not None and last.begun is not None:
         behavior = last.begun.behavior or requested.get(last.begun.element, "")
         end = ends.get(behavior)
@@ -427,9 +427,11 @@ def _untold(
             deaf = play.trouble.deaf in ("", vehicle)
             if not deaf:
                 when = "never" if late is None else f"after {late:.2f} s"
-                return f"{vehicle}, which did {behavior}, was told {when}: {stop.said}"
+                return f"{vehicle}, which did {behavior}, was commanded {when}: {stop.said}"
             if not stop.names(vehicle):
-                return f"{vehicle} did {behavior}, was not told, and nobody read it: {stop.said}"
+                return (
+                    f"{vehicle} did {behavior}, had no stop, and no operator read it: {stop.said}"
+                )
     again = [each for each in after if each.begun is not None]
     if again and play.trouble.deaf not in ("", vehicle):
         return f"{vehicle} began {again[0].begun} {again[0].at_s - stop.at_s:.2f} s after the stop"
@@ -442,15 +444,17 @@ def play_stop(plan: StopPlan, folder: Path | None = None) -> StopRound:
         with TemporaryDirectory(prefix="m2pem-chaos-") as made:
             return play_stop(plan, Path(made))
     play = StopPlay(plan, folder)
-    told_s: dict[str, float] = {}
+    commanded_s: dict[str, float] = {}
     try:
         asyncio.run(play.whole())
-        verdict, told_s = asyncio.run(judge_stop(play))
+        verdict, commanded_s = asyncio.run(judge_stop(play))
     except (AssertionError, M2pemError, TimeoutError, OSError) as error:
         verdict = Verdict(faults=[f"{type(error).__name__}: {error}; {play.stop.said}"])
     finally:
         play.close()
-    return StopRound(plan, verdict, told_s, play.stop.answered_s - play.stop.at_s, play.stop.said)
+    return StopRound(
+        plan, verdict, commanded_s, play.stop.answered_s - play.stop.at_s, play.stop.said
+    )
 
 
 COLUMNS = (
@@ -458,7 +462,7 @@ COLUMNS = (
     "vehicles",
     "journal",
     "rounds",
-    "told",
+    "commanded",
     "median s",
     "longest s",
     "faults",
@@ -466,16 +470,18 @@ COLUMNS = (
 
 
 def as_table(played: Sequence[StopRound]) -> str:
-    """Return the table of rounds by what was wrong. `told`: vehicles that moved when they were told
-    to stop; `median s`, `longest s`: how long after the request."""
+    """Return the table of rounds by what was wrong. `commanded`: vehicles that moved until the stop
+    came to them; `median s`, `longest s`: how long that took after the request."""
     found: dict[tuple[str, str, str], list[StopRound]] = {}
     for each in played:
         key = (each.plan.trouble, each.plan.world, each.plan.journal)
         found.setdefault(key, []).append(each)
     rows: list[Sequence[object]] = []
     for key, some in sorted(found.items()):
-        told_s = sorted(s for each in some for s in each.told_s.values())
-        middle, last = (f"{told_s[n]:.2f}" if told_s else "" for n in (len(told_s) // 2, -1))
+        commanded_s = sorted(s for each in some for s in each.commanded_s.values())
+        middle, last = (
+            f"{commanded_s[n]:.2f}" if commanded_s else "" for n in (len(commanded_s) // 2, -1)
+        )
         faults = sum(bool(each.verdict.faults) for each in some)
-        rows.append((*key, len(some), len(told_s), middle, last, faults))
+        rows.append((*key, len(some), len(commanded_s), middle, last, faults))
     return text_table(COLUMNS, rows)

@@ -43,7 +43,7 @@ def test_stop_reaches_each_vehicle_while_something_is_wrong(
 ) -> None:
     played = play_stop(replace(plan(trouble, world, journal), within_s=PATIENCE_S))
     assert not played.verdict.faults
-    assert played.told_s or trouble == "paused"  # then they are held already
+    assert played.commanded_s or trouble == "paused"  # then they are held already
 
 
 @pytest.mark.long
@@ -64,18 +64,18 @@ def test_stop_reaches_each_vehicle_at_a_random_moment(
 
 
 @pytest.mark.long
-def test_a_vehicle_that_is_not_told_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_vehicle_that_is_not_commanded_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "cancel never returns"
     monkeypatch.setitem(TROUBLES, name, replace(TROUBLES[name], deaf=None))
     played = play_stop(replace(plan(name), speed=1.0))
-    assert any("was told" in each for each in played.verdict.faults), played
+    assert any("was commanded" in each for each in played.verdict.faults), played
 
 
 @pytest.mark.long
 def test_that_nothing_was_said_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stops.Stop, "names", lambda *_: False)
     played = play_stop(replace(plan("cancel never returns"), speed=1.0))
-    assert any("nobody read it" in each for each in played.verdict.faults), played
+    assert any("no operator read it" in each for each in played.verdict.faults), played
 
 
 def test_a_stop_can_be_played_again_by_its_number() -> None:

@@ -37,7 +37,7 @@ class Begun:
 
 @dataclass(frozen=True, slots=True)
 class Sign:
-    """What a vehicle was told, as it noted itself. `begun`: to move, and for which behavior, as in
+    """What a vehicle was commanded, as it noted it. `begun`: to move, and for which behavior, as in
     `Begun`; None: to stop, or it `arrived`. `at_s`: of `time.monotonic`; the state file of
     simulated vehicles has no time of the wall clock: 0."""
 
@@ -76,7 +76,7 @@ class World(Protocol):
         ...
 
     def signs(self) -> Sequence[Sign]:
-        """Return what the vehicles were told, in order."""
+        """Return what the vehicles were commanded, in order."""
         ...
 
     def send_signal(self, number: int) -> None:
@@ -202,7 +202,7 @@ class SimulatedVehicles:
         return found
 
     def signs(self) -> list[Sign]:
-        """See `World.signs`. A vehicle that goes on after a hold is told to move again."""
+        """See `World.signs`. A vehicle that goes on after a hold is commanded to move again."""
         found: list[Sign] = []
         doing: dict[str, Begun] = {}
         for effect in recorded_effects(self._state) if self._state.exists() else ():
@@ -281,7 +281,7 @@ class MavlinkVehicles:
 
     def __init__(self, folder: Path, speed: float = speed) -> None:
         self.speed = speed
-        # Each autopilot listens, so that two executives may be heard at a time.
+        # Each autopilot listens, so that it receives from two executives at a time.
         first = _free_ports(len(_BY_SYSTEM))
         self.fleet = folder / "fleet.yaml"
         vehicles = (

@@ -309,7 +309,7 @@ def test_what_may_be_looked_at_is_counted_anew_for_each_evaluation():
     data = {"l": list(range(70_000))}
     assert [found.evaluate(data.get) for _ in range(2)] == [69_999] * 2
     with pytest.raises(ExpressionError, match="it looks at more"):
-        found.evaluate(data.get, anew=False)
+        found.evaluate(data.get, new_limit=False)
 
 
 def test_lists_that_double_with_every_assignment_are_refused_before_they_are_large():

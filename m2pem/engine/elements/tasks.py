@@ -84,7 +84,7 @@ def _run_script(x: Execution, token: Token, node: ScriptTask) -> None:
     for number, statement in enumerate(node.script.statements if node.script is not None else ()):
         if isinstance(statement, Assignment):
             try:
-                value = statement.expression.evaluate(reader(token), anew=number == 0)
+                value = statement.expression.evaluate(reader(token), new_limit=number == 0)
             except ExpressionError as error:
                 throw_error(x, token, "EXPRESSION", f"line {statement.line}: {error}")
                 return

@@ -39,14 +39,14 @@ class Expression:
         """Whether it reads nothing, so that its value is always the same."""
         return not self.names
 
-    def evaluate(self, read: ReadValue, *, anew: bool = True) -> Value:
-        """Its value over the data store. `anew`: the limit of what it looks at is its own; else it
+    def evaluate(self, read: ReadValue, *, new_limit: bool = True) -> Value:
+        """Its value over the data store. `new_limit`: what it looks at is counted from 0; else it
         shares that with what was evaluated before.
 
         Raises:
             ExpressionError: a wrong type, a division by zero, or something beyond the limits.
         """
-        if anew:
+        if new_limit:
             begin_work()
         try:
             return evaluate(self.tree, read)

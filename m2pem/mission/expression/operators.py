@@ -34,7 +34,7 @@ _left = ContextVar("_left", default=MAX_WORK)
 
 
 def begin_work() -> None:
-    """Count anew what is looked at."""
+    """Count from 0 what is looked at."""
     _left.set(MAX_WORK)
 
 

@@ -1,5 +1,6 @@
 """A router between simulated autopilots and executives, over UDP, as a telemetry radio and a
-mavlink-router are: each executive is heard and hears all, also one that has not ended yet.
+mavlink-router are: what each executive sends arrives, and each receives all, also one that has not
+ended yet.
 """
 
 import select

@@ -17,7 +17,7 @@ __all__ = ["postgres", "postgres_url"]
 SPEED = 4.0
 LENGTH_M = 250.0
 END_M = 15.0
-"""Nearer to its end, whoever brakes too late on a busy computer may come back to it."""
+"""Nearer to its end, a vehicle that brakes too late on a busy computer may come back to it."""
 
 WATCHED: Mapping[str, Mapping[str, Any]] = {
     name: way for name, way in ALL_WAYS.items() if name != "base"

@@ -185,7 +185,9 @@ class Link:
         await asyncio.wait(ends, timeout=timeout_s, return_when=asyncio.FIRST_COMPLETED)
         if answer.done():
             return answer.result()
-        raise LinkError("nobody answers" if over.done() else f"no answer within {timeout_s:g} s")
+        raise LinkError(
+            "the other end is not there" if over.done() else f"no answer within {timeout_s:g} s"
+        )
 
     def _get(
         self,

@@ -51,7 +51,7 @@ CONFIRMED_WITHIN_S = 8.0
 
 AGAIN_S = 1.0
 LATE_ANSWERS = 4
-"""One after the other, until operators are told that the link is slow."""
+"""So many in a row give operators the alert that the link is slow."""
 
 
 def _stale(what: str, behavior: BehaviorId, epoch: int, newest: int) -> StaleCommandError:
