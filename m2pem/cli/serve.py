@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from m2pem.cli.options import (
     example,
@@ -102,6 +103,9 @@ def serve(
     Takes up runs of the journal that were interrupted, if they had this fleet. Ctrl-C or SIGTERM
     stop the runs, wait until their vehicles are released, and end it with 0.
     """
+    given = click.get_current_context().get_parameter_source("backup_every_s")
+    if backup_to is None and given is not ParameterSource.DEFAULT:
+        raise click.UsageError("--backup-every needs --backup-to FOLDER")
     return asyncio.run(
         _serve(
             fleet_file,

@@ -39,7 +39,8 @@ def main() -> int:
         played = rounds
     wrong = [each.plan.number for each in played if each.verdict.faults]
     took_s = time.monotonic() - began_s
-    print(f"{len(played)} rounds in {took_s:.0f} s; faults in {len(wrong)} of them: {wrong}")
+    names = f": {', '.join(map(str, wrong))}" if wrong else ""
+    print(f"{len(played)} rounds in {took_s:.0f} s; faults in {len(wrong)} of them{names}")
     return 1 if wrong else 0
 
 

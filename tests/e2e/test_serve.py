@@ -141,10 +141,12 @@ def test_runs_that_ended_long_ago_are_deleted_and_named_and_the_journal_is_copie
 
 
 def test_a_journal_that_is_no_file_is_not_copied(m2pem: CommandLine, tmp_path: Path) -> None:
-    for url in ("memory:", "postgresql://nobody@127.0.0.1:1/x"):
+    for url in ("memory:", "postgresql://m2pem@127.0.0.1:1/x"):
         words = ("--journal", url, "--backup-to", tmp_path)
         status, _, err = m2pem.run("serve", "--fleet", FLEET, *words)
         assert (status, "--backup-to copies a journal in a file" in err) == (2, True), err
+    status, _, err = m2pem.run("serve", "--fleet", FLEET, "--backup-every", "2h")
+    assert (status, "--backup-every needs --backup-to FOLDER" in err) == (2, True), err
 
 
 def test_a_time_to_keep_runs_that_is_none_is_refused(m2pem: CommandLine) -> None:
