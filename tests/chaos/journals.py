@@ -34,16 +34,27 @@ def make(kind: JournalKind, folder: Path) -> Path:
 
 
 def downgrade(kind: JournalKind, file: Path) -> None:
-    """Make a journal of the newest format one of an older m2pem: it is migrated when opened."""
+    """Make a journal of the newest format one of an older m2pem: it is migrated when opened.
+
+    One whose executive was killed before it had made it is left as it is.
+    """
     if kind is POSTGRES:
-        statements, version = _undone([each.__name__ for each in postgres_database.MIGRATIONS])
+        steps = [each.__name__ for each in postgres_database.MIGRATIONS]
+        statements, version = _undone(steps)
         with psycopg.connect(read_address(file).url) as server:
+            if server.execute("SELECT to_regclass('m2pem_format')").fetchone() == (None,):
+                return
+            if server.execute("SELECT version FROM m2pem_format").fetchone() != (len(steps),):
+                return
             for statement in statements:
                 server.execute(statement.encode())
             server.execute("UPDATE m2pem_format SET version = %s", (version,))
         return
-    statements, version = _undone([each.__name__ for each in migrations.MIGRATIONS])
+    steps = [each.__name__ for each in migrations.MIGRATIONS]
+    statements, version = _undone(steps)
     with closing(sqlite3.connect(file, isolation_level=None)) as connection:
+        if connection.execute("PRAGMA user_version").fetchone() != (len(steps),):
+            return
         connection.execute("BEGIN IMMEDIATE")
         for statement in (*statements, f"PRAGMA user_version = {version}", "COMMIT"):
             connection.execute(statement)
