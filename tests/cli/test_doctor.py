@@ -22,7 +22,7 @@ from m2pem.journal.standbys import StandbyNote, standbys_of
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE
 from m2pem.plugins import PluginManager
 from m2pem.scripting.sources import arbiters_of
-from m2pem.testing.contracts.journal import opened
+from m2pem.testing.contracts.journal_harness import opened
 from tests.cli.conftest import Invoke
 from tests.command_line import FLEET, CommandLine, fleet_with_state, install_plugin
 

@@ -9,7 +9,7 @@ import pytest
 from m2pem.control_socket import client
 from m2pem.journal import Journal, open_journal
 from m2pem.scheduling.entry import EntryState
-from m2pem.testing.contracts.journal import HEADER, PLAN
+from m2pem.testing.contracts.journal_harness import HEADER, PLAN
 from tests.cli.conftest import Invoke
 from tests.command_line import MISSION
 from tests.postgres_server import postgres, postgres_url

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import ENDED, HEADER, entry, opened
+from m2pem.testing.contracts.journal_harness import ENDED, HEADER, entry, opened
 from tests.command_line import FLEET, MISSION, CommandLine, Program
 
 DAY_US = 86_400_000_000

@@ -10,7 +10,7 @@ from m2pem.errors import JournalError
 from m2pem.executive import backups
 from m2pem.executive.backups import add_backup, keep_backups
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, opened, written
 
 
 async def test_a_copy_of_a_journal_in_use_has_what_was_acknowledged(tmp_path):

@@ -11,7 +11,7 @@ from m2pem.executive.retention import DAY_S, delete_old_runs, delete_runs, keep_
 from m2pem.executive.runtime_directory import runtime_directory
 from m2pem.journal import MemoryJournal
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import ENDED, HEADER, entry, opened
+from m2pem.testing.contracts.journal_harness import ENDED, HEADER, entry, opened
 
 START_US = HEADER.created_us
 DAY_US = round(DAY_S * 1_000_000)

@@ -13,7 +13,7 @@ import sys
 
 from m2pem.engine.records import InputIgnored
 from m2pem.journal import open_journal
-from m2pem.testing.contracts.journal import HEADER, entry
+from m2pem.testing.contracts.journal_harness import HEADER, entry
 
 
 async def drive(journal, run):

@@ -13,7 +13,7 @@ import pytest
 from m2pem.errors import JournalError
 from m2pem.journal import Entry, RunInfo
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import opened, written
+from m2pem.testing.contracts.journal_harness import opened, written
 from tests.wal import commits
 
 

@@ -13,7 +13,7 @@ from m2pem.errors import JournalError
 from m2pem.journal.database import LOG_BYTES, open_for_reading, open_for_writing
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, opened
+from m2pem.testing.contracts.journal_harness import HEADER, entry, opened
 
 NOBODY = 65534
 

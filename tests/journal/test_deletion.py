@@ -7,7 +7,7 @@ import pytest
 
 from m2pem.errors import JournalError
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import ENDED, HEADER, entry, opened, written
+from m2pem.testing.contracts.journal_harness import ENDED, HEADER, entry, opened, written
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from m2pem.journal.database import open_for_writing
 from m2pem.journal.hash_chain import entry_hash, header_hash
 from m2pem.journal.migrations import MIGRATIONS
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, opened, written
 
 
 @pytest.fixture

@@ -5,7 +5,8 @@ import pytest
 from m2pem.errors import JournalError
 from m2pem.journal.base import Entry
 from m2pem.journal.memory import MemoryJournal
-from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info, written
+from m2pem.testing.contracts.journal import JournalContract
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, written
 
 
 class TestMemoryJournal(JournalContract):

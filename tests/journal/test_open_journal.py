@@ -7,7 +7,7 @@ import pytest
 from m2pem.errors import JournalError
 from m2pem.journal import MemoryJournal, default_url, open_journal
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, opened
+from m2pem.testing.contracts.journal_harness import HEADER, opened
 
 
 async def assert_opens(url, path):

@@ -3,7 +3,7 @@ import pytest
 from m2pem.engine.records import RunEnded, RunOutcome, RunPaused, RunResumed, RunStarted
 from m2pem.errors import InternalError, StaleEpochError
 from m2pem.journal.position import RunPosition
-from m2pem.testing.contracts.journal import entry
+from m2pem.testing.contracts.journal_harness import entry
 
 NEW = RunPosition(epoch=3, pid=1, started_us=5)
 

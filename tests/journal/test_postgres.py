@@ -12,15 +12,8 @@ from m2pem.errors import JournalError
 from m2pem.journal import file_of, open_journal
 from m2pem.journal.postgres_database import MIGRATIONS
 from m2pem.scheduling.entry import EntryState
-from m2pem.testing.contracts.journal import (
-    HEADER,
-    PLAN,
-    JournalContract,
-    entry,
-    info,
-    opened,
-    written,
-)
+from m2pem.testing.contracts.journal import JournalContract
+from m2pem.testing.contracts.journal_harness import HEADER, PLAN, entry, info, opened, written
 
 
 class TestPostgresJournal(JournalContract):

@@ -9,7 +9,7 @@ import pytest
 
 from m2pem.errors import JournalError
 from m2pem.journal import open_journal
-from m2pem.testing.contracts.journal import info, opened, written
+from m2pem.testing.contracts.journal_harness import info, opened, written
 from tests.postgres_server import replicated
 
 __all__ = ["replicated"]

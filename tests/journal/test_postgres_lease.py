@@ -15,7 +15,7 @@ import pytest
 from m2pem.boot_time import boot_time_s
 from m2pem.errors import FleetServedError, JournalError, StaleEpochError
 from m2pem.journal import open_journal
-from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, opened, written
 
 LEASE_S = "1"
 

@@ -15,7 +15,15 @@ from m2pem.journal.inspection import Inspection, inspected
 from m2pem.journal.salvage import salvage
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.scheduling.entry import EntryState
-from m2pem.testing.contracts.journal import ENDED, HEADER, PLAN, entry, info, opened, written
+from m2pem.testing.contracts.journal_harness import (
+    ENDED,
+    HEADER,
+    PLAN,
+    entry,
+    info,
+    opened,
+    written,
+)
 from tests.journal.test_damage import copied, kill_executive
 
 RUNS = 3

@@ -8,7 +8,8 @@ from m2pem.engine.records import InputIgnored
 from m2pem.errors import JournalError
 from m2pem.journal.codec import encode_body
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, JournalContract, entry, info, opened, written
+from m2pem.testing.contracts.journal import JournalContract
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, opened, written
 
 
 class TestSqliteJournal(JournalContract):

@@ -5,7 +5,7 @@ import pytest
 from m2pem.errors import JournalError
 from m2pem.journal.sqlite import SqliteJournal
 from m2pem.journal.storage_checks import MIN_FREE_VARIABLE, min_free_mb, space_shortage
-from m2pem.testing.contracts.journal import HEADER, entry, info, opened
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, opened
 
 MORE_THAN_ANY_DISK_MB = "1e15"
 

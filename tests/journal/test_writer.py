@@ -9,7 +9,7 @@ import pytest
 from m2pem.engine.records import InputIgnored
 from m2pem.errors import InternalError, JournalError
 from m2pem.journal.sqlite import SqliteJournal
-from m2pem.testing.contracts.journal import HEADER, entry, info, opened, written
+from m2pem.testing.contracts.journal_harness import HEADER, entry, info, opened, written
 
 
 @pytest.fixture
