@@ -99,6 +99,20 @@ async def test_a_line_without_an_end_is_answered(
     assert "longer than 1,000 bytes" in answer["error"]["message"]
 
 
+async def test_a_stop_is_carried_out_among_callers_that_ask_without_end(served: Served) -> None:
+    """Some never finish a line, and others never read an answer."""
+    run, _ = await served.asked()
+    with address(served.path) as there:
+        callers = [await asyncio.open_unix_connection(there) for _ in range(200)]
+    for number, (_, writer) in enumerate(callers):
+        writer.write(b'{"jsonrpc"' if number % 10 else 200 * (call("runs") + b"\n"))
+    [answer] = await exchange(served.path, call("stop", run=run))
+    assert answer["result"] is None
+    assert (await served.control.runs())[0].status == "stopped"
+    for _, writer in callers:
+        writer.close()
+
+
 async def test_a_process_of_another_user_is_turned_away(
     served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
