@@ -45,7 +45,6 @@ HEAVY_TASKS = 2
 HEAVY_EVERY = 10
 """One vehicle in so many is heavy."""
 KINDS = ("light", "heavy")
-WAY_M = 100.0
 SPEED_M_S = 5.0
 TELEMETRY_HZ = 0.02
 """Few states, as those of many vehicles that drive take longer to simulate than the choices."""

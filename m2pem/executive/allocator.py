@@ -120,7 +120,7 @@ class Allocator:
             self._space.release(allocation)
         self._availability.release(allocation)
 
-    def on_records(self, run: RunId, records: Sequence[r.Record]) -> None:
+    def on_records(self, records: Sequence[r.Record]) -> None:
         """Hand what is held for a request to the behavior that was requested for it."""
         for record in records:
             if isinstance(record, r.BehaviorRequested):

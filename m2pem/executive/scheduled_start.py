@@ -176,16 +176,16 @@ class StartConditions:
         kept: Mapping[ResourceId, EntryId],
     ) -> Wait | None:
         """Return what keeps a time that has come from its start; None: nothing that is known."""
-        if (wait := self._wait_after(entry, now_us)) is not None:
+        if (wait := self._wait_after(entry)) is not None:
             return wait
         one = entry.plan.when.concurrency is Concurrency.FORBID
         if one and entry.state.run and self.outcome(entry.state.run) == "":
             return Wait(f"its run {entry.state.run} goes on", self._in(ASK_AGAIN_S))
         if (wait := self._wait_condition(entry, look, now_us)) is not None:
             return wait
-        return self._wait_resources(look, now_us, kept)
+        return self._wait_resources(look, kept)
 
-    def _wait_after(self, entry: ScheduleEntry, now_us: int) -> Wait | None:
+    def _wait_after(self, entry: ScheduleEntry) -> Wait | None:
         name, is_entry = times.after_of(entry.plan.when)
         if not name:
             return None
@@ -234,9 +234,7 @@ class StartConditions:
             return Wait(reason, min(again_us, until_us))
         return None
 
-    def _wait_resources(
-        self, look: Look, now_us: int, kept: Mapping[ResourceId, EntryId]
-    ) -> Wait | None:
+    def _wait_resources(self, look: Look, kept: Mapping[ResourceId, EntryId]) -> Wait | None:
         users = self._starter.users()
         reasons = []
         for resource in look.resources or ():

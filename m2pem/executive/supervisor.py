@@ -341,7 +341,7 @@ class Supervisor:
 
     def _observe(self, run: RunId, records: Sequence[Record]) -> None:
         self.losses.on_records(run, records)
-        self.allocator.on_records(run, records)
+        self.allocator.on_records(records)
         self._returns.on_records(run, records)
         if (runner := self.runners.get(run)) is not None:
             self.emergency.on_records(runner, records)

@@ -289,7 +289,7 @@ class _Check:
                     takers.append(_Taker(spec, role_name, f"{place(self.fleet, resource)}: "))
         for role in matching:
             for resource in resources_of(role, self.fleet):
-                self._check_manned(behavior, role, resource, findings)
+                self._check_manned(role, resource, findings)
                 spec = self.graph.spec(resource, behavior.name, behavior.type)
                 if spec is None:
                     message, remedy, rule = self._not_offered(behavior, resource)
@@ -335,9 +335,7 @@ class _Check:
                     severity=Severity.WARNING,
                 )
 
-    def _check_manned(
-        self, behavior: Behavior, role: Role, resource: ResourceId, findings: TaskFindings
-    ) -> None:
+    def _check_manned(self, role: Role, resource: ResourceId, findings: TaskFindings) -> None:
         vehicle = self.fleet.vehicles.get(resource)
         if vehicle and vehicle.manned:
             message = f"{place(self.fleet, resource)} is manned and cannot be commanded"

@@ -16,17 +16,6 @@ FAILED = "FAILED"
 REJECTED = "REJECTED"
 UNAVAILABLE = "RESOURCE_UNAVAILABLE"
 
-LOSSES = {
-    LINK_LOST: "the link is lost, or its arbiter knows the behavior no more",
-    BATTERY_LOW: "the battery is low, or will be too low for the rest",
-    TAKEN_OVER: "an operator, or a pilot, has taken it",
-    PREEMPTED: "a task of another run with a greater priority has taken it",
-    REJECTED: "it refuses the behavior, or its airspace is refused",
-    UNAVAILABLE: "it was lost or taken before the behavior began",
-    FAILED: "of a payload: it has failed",
-}
-"""The error codes that are losses, and what happened."""
-
 _STATES = frozenset({BehaviorState.LOST, BehaviorState.REJECTED})
 
 

@@ -385,7 +385,7 @@ class SimArbiter:
         strike = self._scripts.pop(request.id, None)
         fault = self._take_fault(request) if strike is None else None
         if fault is not None and fault.kind == "reject":
-            self._simulation.reject(execution, fault.error or "REJECTED", SCRIPTED, now_us)
+            self._simulation.reject(execution, fault.error or "REJECTED", SCRIPTED)
             return
         if fault is not None:
             end = {"fail": "failed", "stall": "stalled", "lose_link": "lose_link"}[fault.kind]

@@ -171,7 +171,7 @@ class Simulation:
             assignments = self._planner.assign(request, now_us)
             self._check_free(request)
         except RefusedError as refused:
-            self.reject(execution, refused.code, refused.reason, now_us)
+            self.reject(execution, refused.code, refused.reason)
             return
         taken = {assignment.body.id for assignment in assignments}
         for preempted in request.preempts:
@@ -187,7 +187,7 @@ class Simulation:
         self._reschedule(execution, now_us)
         self.memory.save(execution)
 
-    def reject(self, execution: Execution, code: str, reason: str, now_us: int) -> None:
+    def reject(self, execution: Execution, code: str, reason: str) -> None:
         """Refuse a behavior before anything of it has happened."""
         execution.outcome = Outcome(BehaviorState.REJECTED, code, reason)
         self._logger.info("%s refused: %s", execution.id, reason)

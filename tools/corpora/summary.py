@@ -1,7 +1,7 @@
 """Counts what became of many files."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,7 +17,6 @@ class Summary:
     rules: Counter[str] = field(default_factory=Counter)
     ends: Counter[str] = field(default_factory=Counter)
     problems: list[tuple[Path, str]] = field(default_factory=list)
-    slowest: list[tuple[float, Path]] = field(default_factory=list)
 
     def add(self, path: Path, found: Examination) -> None:
         """Count one file."""
@@ -43,11 +42,3 @@ def _table(title: str, counts: Counter[str]) -> Iterator[str]:
         yield f"{title}:"
     for name, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
         yield f"  {count:6} {name}"
-
-
-def summarize(examined: Iterable[tuple[Path, Examination]]) -> Summary:
-    """Count all."""
-    summary = Summary()
-    for path, found in examined:
-        summary.add(path, found)
-    return summary

@@ -328,7 +328,7 @@ def _flow(tree: Tree, element: etree._Element) -> None:
         tree.report(MESSAGE_FLOW_INTO_THROW, element, f"{what(target)} is one")
     elif target.tag in CATCHING and not has_trigger(tree, target, "message"):
         tree.report(MESSAGE_FLOW_INTO_OTHER, element, what(target))
-    homes = {_pool(tree, source), _pool(tree, target)}
+    homes = {_pool(source), _pool(target)}
     if len(homes) == 1 and None not in homes:
         tree.report(MESSAGE_FLOW_INSIDE, element, f"both ends are in '{homes.pop()}'")
 
@@ -345,7 +345,7 @@ def _carries(tree: Tree, flow: etree._Element, end: etree._Element) -> None:
         )
 
 
-def _pool(tree: Tree, element: etree._Element) -> str | None:
+def _pool(element: etree._Element) -> str | None:
     """The id of the process of an element or of a pool."""
     if name_of(element) == "participant":
         name = element.get("processRef", "").rpartition(":")[2]

@@ -149,7 +149,7 @@ def _fused(
         if transition.kind is Kind.INTERNAL:
             watched |= set(transition.read) | sources
             if len(transition.consume) == 0 or transition.inhibit:
-                watched |= _seen_absent(net, transition)
+                watched |= _seen_absent(transition)
             if any(transition.read) or transition.moves:
                 watched |= {p for p, _ in transition.consume}
     initial = {place for place, _ in net.initial}
@@ -187,7 +187,7 @@ def _fused(
     return list(alive.values())
 
 
-def _seen_absent(net: PetriNet, transition: Transition) -> set[int]:
+def _seen_absent(transition: Transition) -> set[int]:
     """Places that a transition tests for emptiness, other than with all places of its scope."""
     if transition.quiet:
         return set()

@@ -336,7 +336,7 @@ def _outside_work(
     for effect in product(well, instance.done()):
         net.transition(effect, Kind.EXTERNAL, Trigger.SUCCEEDS, unasked)
     if context.options.failures:
-        named = catchable(context, instance.outer, instance)
+        named = catchable(instance.outer, instance)
         other = _other_error(named)
         codes = dict.fromkeys((*named, other))
         if may_be_preempted(context.fleet, behavior_of(instance.node)):

@@ -374,7 +374,7 @@ def _given(
     for filled in choice.filled:
         need = filled.role.role.need
         if need is not None and need.store and filled.count:
-            value = _stored_value(context, filled, one=need.most == 1)
+            value = _stored_value(filled, one=need.most == 1)
             source = None if value is None else constant(value)
             effects = context.data.write(effects, need.store, source, instance.outer, instance.node)
     return effects
@@ -408,7 +408,7 @@ def _no_more(
     return [rest, *(Effect(read=frozenset({place})) for place in others)]
 
 
-def _stored_value(context: TranslationContext, each: RoleFilling, *, one: bool) -> Value | None:
+def _stored_value(each: RoleFilling, *, one: bool) -> Value | None:
     """What a role stores; None: which of a pool is not known."""
     if any(len(pool) > 1 for pool in each.amounts):
         return None

@@ -289,7 +289,7 @@ def arm_handler(context: TranslationContext, scope: ScopeDraft, start: e.StartEv
                     )
                     for effect in product([when], begun)
                 ]
-                holder = holder_of(context, scope)
+                holder = holder_of(scope)
                 runs(context, holder, fixed(definition), (scope.open, *running), made)
             case SignalEventDefinition() | MessageEventDefinition():
                 caught = net.place(start, scope, Role.TRIGGERED, f":reached{number}")

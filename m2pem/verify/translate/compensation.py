@@ -266,7 +266,7 @@ def compensate(
     if name and node.qualifier:
         name = f"{node.qualifier}:{name}"
     named = context.mission.elements.get(name) if name else None
-    target = _target(context, scope, named)
+    target = _target(scope, named)
     found = _points(context, target)
     if named is not None and named is not container_of(target):
         found = [point for point in found if point.instance.node is named]
@@ -287,7 +287,7 @@ def compensate(
     return product(begun, product([thrown], [Effect(produce=(waiting,))])), []
 
 
-def _target(context: TranslationContext, scope: ScopeDraft, named: e.Element | None) -> ScopeDraft:
+def _target(scope: ScopeDraft, named: e.Element | None) -> ScopeDraft:
     """The scope in which a throw event compensates, as in the engine."""
     here = scope
     if named is None:

@@ -113,7 +113,7 @@ class Data:
         chosen: dict[Outcome, list[tuple[int, ...]]] = {}
         ranges = [range(len(self.domains.of[name].values)) for name in names]
         for combination in itertools.product(*ranges):
-            options = [self._truths(c, names, combination, hidden) for c in conditions]
+            options = [self._truths(c, names, combination) for c in conditions]
             for truths in itertools.product(*options):
                 self._size_limit.count_case(node.id)
                 where = chosen.setdefault(choose(truths), [])
@@ -140,7 +140,6 @@ class Data:
         condition: Expression,
         names: Sequence[str],
         combination: Sequence[int],
-        hidden: frozenset[str],
     ) -> tuple[Truth, ...]:
         numbers = dict(zip(names, combination, strict=True))
         if any(name not in numbers for name in condition.names):

@@ -44,12 +44,10 @@ def translate_keeping(
             _kept_place(context, until, pool, instance.node)
             if _may_execute_again(instance.node):
                 _own_place(context, instance, each.role.name, until, pool)
-        _note_approximations(context, instance, until)
+        _note_approximations(context, instance)
 
 
-def _note_approximations(
-    context: TranslationContext, instance: ActivityInstance, until: ScopeDraft
-) -> None:
+def _note_approximations(context: TranslationContext, instance: ActivityInstance) -> None:
     def bounded(what: str) -> None:
         context.net.approximate(instance.node, Exactness.BOUNDED, what)
 

@@ -222,12 +222,9 @@ def begin_without_entries(
 
 def _outside(context: TranslationContext) -> None:
     mission = context.mission
-    thrown_signals: set[str] = set()
     thrown_messages: set[str] = set()
     for node in mission.nodes:
-        signals, messages = thrown_by(node)
-        thrown_signals |= signals
-        thrown_messages |= messages
+        thrown_messages |= thrown_by(node)[1]
     for message in sorted(thrown_messages & set(context.messages)):
         deliver_stored(context, message)
     for signal in mission.signals.values():

@@ -451,8 +451,8 @@ def enter_at_once(net: NetBuilder, initial: Sequence[int]) -> tuple[int, ...]:
     needed: set[int] = set()
     """Entry places to which some transition still brings a token."""
     for draft in net.drafts:
-        draft.effect = _joined(net, draft.effect, entries, needed)
-    first = _joined(net, Effect(produce=tuple(initial)), entries, needed)
+        draft.effect = _joined(draft.effect, entries, needed)
+    first = _joined(Effect(produce=tuple(initial)), entries, needed)
     over = {id(entry) for place, entry in entries.items() if place not in needed}
     net.drafts = [draft for draft in net.drafts if id(draft) not in over]
     return first.produce
@@ -470,9 +470,7 @@ def _entry(net: NetBuilder, place: int) -> TransitionDraft | None:
     return None if effect.consume != (place,) or asks or does_more else takes[0]
 
 
-def _joined(
-    net: NetBuilder, effect: Effect, entries: dict[int, TransitionDraft], needed: set[int]
-) -> Effect:
+def _joined(effect: Effect, entries: dict[int, TransitionDraft], needed: set[int]) -> Effect:
     waiting = [place for place in effect.produce if place in entries]
     while waiting:
         place = waiting.pop()

@@ -21,9 +21,7 @@ from m2pem.verify.translate.scopes import begin_event_subprocess, handler_instan
 Catching = TypeVar("Catching", bound=e.Event)
 
 
-def catchable(
-    context: TranslationContext, scope: ScopeDraft, instance: ActivityInstance | None
-) -> list[str]:
+def catchable(scope: ScopeDraft, instance: ActivityInstance | None) -> list[str]:
     """The error codes that events around a place name."""
     codes: dict[str, None] = {}
     for event in _around(scope, instance):
@@ -68,7 +66,7 @@ def throw_error(
     catch the error itself.
     """
     thrown = Step(thrower.id, Action.THROWN, code)
-    return _go_up(context, scope, thrower, instance, code, thrown, uncaught, error_code, first=True)
+    return _go_up(context, scope, thrower, instance, code, thrown, uncaught)
 
 
 def failing(
@@ -169,9 +167,6 @@ def _go_up(
     code: str,
     thrown: Step,
     uncaught: Flag,
-    code_of: "object",
-    *,
-    first: bool,
 ) -> list[Effect]:
     found: list[Effect] = []
     condition = Effect(steps=(thrown,))

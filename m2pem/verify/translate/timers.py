@@ -62,7 +62,7 @@ def runs(
         context.net.timed.setdefault(holder, []).append(Timed(after_us, running, transitions))
 
 
-def holder_of(context: TranslationContext, scope: ScopeDraft) -> int:
+def holder_of(scope: ScopeDraft) -> int:
     """The place with whose token the timers of a scope's event subprocesses begin to run: that of
     the activity around it, or of the process itself.
     """

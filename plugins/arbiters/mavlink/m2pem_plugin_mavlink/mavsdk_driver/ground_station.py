@@ -64,8 +64,8 @@ class GroundStation:
             await asyncio.gather(self._search, return_exceptions=True)
         if self._mavsdk is not None:
             # In a thread, as it waits for its own threads. Other MAVSDK objects are kept until
-            # then: were
-            # it collected, and thereby destroyed, at the same time, the process would be aborted.
+            # then: one that were collected, and thereby destroyed, at the same time would abort the
+            # process.
             await asyncio.get_running_loop().run_in_executor(None, self._mavsdk.destroy)
             self._mavsdk = None
             library.leave_log()

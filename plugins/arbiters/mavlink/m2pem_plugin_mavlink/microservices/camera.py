@@ -10,7 +10,6 @@ from m2pem_plugin_mavlink.microservices.commands import Command
 from m2pem_plugin_mavlink.microservices.message_requests import RequestMessage
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 
-MS_PER_S = 1000.0
 _NAN = math.nan
 
 
@@ -20,7 +19,6 @@ class Camera:
 
     address: Address
     device: int
-    vendor: str
     model: str
     capabilities: int
 
@@ -59,12 +57,10 @@ class Camera:
 @dataclass(frozen=True, slots=True)
 class CaptureStatus:
     """The activity of a camera (CAMERA_CAPTURE_STATUS). `images`: taken since its storage was
-    formatted; `free_mib`: free space."""
+    formatted."""
 
     takes_images: bool
     records: bool
-    recorded_s: float
-    free_mib: float
     images: int
 
 
@@ -78,7 +74,6 @@ class FindCamera(RequestMessage[Camera]):
             return Camera(
                 target,
                 message.camera_device_id,
-                _text(message.vendor_name),
                 _text(message.model_name),
                 message.flags,
             )
@@ -96,8 +91,6 @@ class ReadCaptureStatus(RequestMessage[CaptureStatus]):
             return CaptureStatus(
                 takes_images=message.image_status != 0,
                 records=message.video_status != 0,
-                recorded_s=message.recording_time_ms / MS_PER_S,
-                free_mib=message.available_capacity,
                 images=message.image_count,
             )
 

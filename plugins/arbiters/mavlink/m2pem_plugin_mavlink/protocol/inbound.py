@@ -67,11 +67,10 @@ AdmitSender: TypeAlias = Callable[[Sender], bool]
 class Inbound:
     """One peer. A sender becomes known by a frame with a right checksum.
 
-    `junk_bytes`: those that belong to no frame; `bad_frames`: with a wrong checksum, or of a
-    sender that is unknown and cannot be checked.
+    `junk_bytes`: those that belong to no frame.
     """
 
-    __slots__ = ("_admit", "_marked", "_marked_s", "_rest", "bad_frames", "junk_bytes", "senders")
+    __slots__ = ("_admit", "_marked", "_marked_s", "_rest", "junk_bytes", "senders")
 
     def __init__(self, admit: AdmitSender) -> None:
         self._admit = admit
@@ -80,7 +79,6 @@ class Inbound:
         self._marked_s = 0.0
         self.senders: dict[int, Sender] = {}
         self.junk_bytes = 0
-        self.bad_frames = 0
 
     def datagram(self, data: bytes, now_s: float) -> None:
         """Receive a datagram."""
@@ -98,7 +96,6 @@ class Inbound:
                 if wanted is not None:
                     sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(data[1:-2], CRC_START))
                     if data[-2] != sum_ & 255 or data[-1] != sum_ >> 8:
-                        self.bad_frames += 1
                         return
                 if sequence == sender.expected & 255:
                     sender.expected += 1
@@ -140,7 +137,6 @@ class Inbound:
         sender = self.senders.get(source)
         if sender is None:
             if id_ not in EXTRA or not (checked or right(raw, id_)):
-                self.bad_frames += 1
                 return
             sender = self._met(source, sequence, now_s)
             if sender is None:
@@ -148,7 +144,6 @@ class Inbound:
             checked = True
         wanted = sender.wanted.get(id_)
         if wanted is not None and not checked and not right(raw, id_):
-            self.bad_frames += 1
             return
         sender.count(sequence, now_s)
         if wanted is not None:

@@ -57,9 +57,9 @@ class Leg(Maneuver):
         if self._there_s < 0:
             return self.reach(self.place)
         self._there_s += dt_s
-        return self.there(dt_s)
+        return self.there()
 
-    def there(self, dt_s: float) -> MotionSetpoint:
+    def there(self) -> MotionSetpoint:
         """It has arrived: wait as long as the first parameter says (planes don't wait)."""
         plane = self.autopilot.spec.kind is Kind.PLANE
         self.done = plane or self._there_s > self.item.param1
@@ -103,7 +103,7 @@ class Px4Takeoff(Leg):
             return self._climb.step(dt_s)
         return super().step(dt_s)
 
-    def there(self, dt_s: float) -> MotionSetpoint:
+    def there(self) -> MotionSetpoint:
         """Its first parameter is no time."""
         self.done = True
         return self.stay(self.place)
@@ -112,7 +112,7 @@ class Px4Takeoff(Leg):
 class Loiter(Leg):
     """Stay there for ever."""
 
-    def there(self, dt_s: float) -> MotionSetpoint:
+    def there(self) -> MotionSetpoint:
         """Stay, or go around if there is a radius."""
         return self.stay(self.place)
 
@@ -120,10 +120,10 @@ class Loiter(Leg):
 class LoiterTime(Loiter):
     """Stay there as many seconds as the first parameter says."""
 
-    def there(self, dt_s: float) -> MotionSetpoint:
+    def there(self) -> MotionSetpoint:
         """Stay."""
         self.done = self._there_s >= self.item.param1
-        return super().there(dt_s)
+        return super().there()
 
 
 class LoiterLaps(Leg):
@@ -149,7 +149,7 @@ class LoiterLaps(Leg):
 class LoiterToAltitude(Leg):
     """Go there, and be done at the height."""
 
-    def there(self, dt_s: float) -> MotionSetpoint:
+    def there(self) -> MotionSetpoint:
         """It was there at that height."""
         self.done = True
         return self.stay(self.place)
@@ -199,7 +199,7 @@ class Land(Leg):
         speed_mps = autopilot.modes.speed_mps
         return PositionSetpoint(self.place.at_height(-10.0), speed_mps, 0.0, max(sink_mps, 0.5))
 
-    def there(self, dt_s: float) -> MotionSetpoint:
+    def there(self) -> MotionSetpoint:
         """Down; on the ground the motors stop."""
         setpoint = descend_to_land(self, self.place)
         self.done = self.autopilot.body.on_ground
