@@ -2,12 +2,10 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
 from m2pem.api.allocation import (
-    RoleAssignment,
     SharedSpaceState,
     StartPreview,
     TakeEffect,
@@ -21,7 +19,6 @@ from m2pem.api.authoring import (
     Outline,
     SearchLimits,
     SearchProgress,
-    file_of,
 )
 from m2pem.api.control import ControlEvent
 from m2pem.api.health import ExecutiveAddress, HealthCheck
@@ -45,20 +42,18 @@ from m2pem.engine import inputs as i
 from m2pem.engine import records as r
 from m2pem.engine.state import RunStatus as EngineStatus
 from m2pem.errors import (
-    BusyError,
     MissionError,
     OperatorError,
     StuckError,
 )
-from m2pem.executive.ended_runs import describe_end, in_words
+from m2pem.executive.ended_runs import explain_end, in_words, refuse_ended
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee, IncidentChoices, open_incidents
 from m2pem.executive.journal_loss import PROMPT as LOSS_PROMPT
 from m2pem.executive.journal_loss import unknown_decision
-from m2pem.executive.loading import findings_for, library_of, load_source, requirement_findings
+from m2pem.executive.loading import library_of, load_source
 from m2pem.executive.run_starter import RunStarter
 from m2pem.executive.run_summary import summary
-from m2pem.executive.runner import Runner
 from m2pem.executive.schedule_admission import planned
 from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduler import Scheduler
@@ -66,7 +61,6 @@ from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.executive.waiting_tasks import holder_label, waiting_tasks
 from m2pem.findings import Finding
-from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.operator_roles import why_not_allowed
 from m2pem.journal.mission import mission_of
@@ -137,38 +131,14 @@ class Control:
         self, mission: MissionSource, *, process: str | None = None, data: Iterable[str] = ()
     ) -> StartPreview:
         """What a start would begin with now, and what speaks against it."""
-        supervisor, given = self._supervisor, tuple(data)
-        try:
-            loaded = await asyncio.to_thread(load_source, mission, supervisor.settings.search_path)
-        except MissionError as error:
-            return StartPreview(file_of(mission), findings=error.findings)
-        findings = await asyncio.to_thread(self._findings, loaded, process, given)
-        names = {each.id: each.name for each in loaded.processes}
-        begun = process or loaded.process().id
-        roles = {(each.name, each.resource): each for each in roles_of_mission(loaded)}
-        fleet, busy = supervisor.fleet, ""
-        try:
-            self._starter.refuse_busy(loaded)
-        except BusyError as error:
-            busy = str(error)
-        return StartPreview(
-            loaded.file,
-            names.get(begun, ""),
-            begun,
-            tuple(findings),
-            tuple(
-                RoleAssignment(each.name, each.resource, resources_of(each, fleet))
-                for each in roles.values()
-            ),
-            busy,
-        )
+        return await self._starter.preview(mission, process, tuple(data))
 
     async def stop(self, run: RunId, *, by: str = "", reason: str = "") -> None:
         """End every token, cancel every behavior."""
         emergency, interrupted = self._supervisor.emergency, self._supervisor.interrupted
         if run not in self._supervisor.runners and interrupted.stop(run, by, reason):
             return
-        async with self._explain_end("stop", run):
+        async with explain_end(self._supervisor, "stop", run):
             asked = emergency.stop(self._supervisor.runner(run), by, reason)
             self._schedule.run_stopping(run, by)
             await emergency.written("stop", {run: asked})
@@ -241,7 +211,7 @@ class Control:
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""
         emergency = self._supervisor.emergency
-        async with self._explain_end("pause", run):
+        async with explain_end(self._supervisor, "pause", run):
             asked = emergency.pause(self._supervisor.runner(run), by)
             await emergency.written("pause", {run: asked})
 
@@ -260,8 +230,8 @@ class Control:
         """Emit a signal to one run or to all that are active."""
         given = _bounded(data)
         if run is not None:
-            async with self._explain_end("signal", run):
-                self._refuse_ended(run)
+            async with explain_end(self._supervisor, "signal", run):
+                refuse_ended(self._supervisor.runner(run))
         runners = (
             [self._supervisor.runner(run)]
             if run is not None
@@ -322,8 +292,8 @@ class Control:
         if run is None:
             self._supervisor.set_geometry(name, given, None, by)
             return
-        async with self._explain_end("set_geometry", run):
-            self._refuse_ended(run)
+        async with explain_end(self._supervisor, "set_geometry", run):
+            refuse_ended(self._supervisor.runner(run))
             self._supervisor.set_geometry(name, given, run, by)
 
     async def take(self, resource: str, *, by: str = "") -> None:
@@ -377,8 +347,8 @@ class Control:
         roles: Mapping[str, Sequence[str]] | None = None,
     ) -> IncidentPreview:
         """Whether the mission still completes after a choice about an incident."""
-        async with self._explain_end("preview_incident", run):
-            self._refuse_ended(run)
+        async with explain_end(self._supervisor, "preview_incident", run):
+            refuse_ended(self._supervisor.runner(run))
             item = self._choices.checked(run, incident, choice, _bounded(data), to, roles or {})
         return await self._choices.outlook(run, item)
 
@@ -395,8 +365,8 @@ class Control:
         even_if_stuck: bool = False,
     ) -> None:
         """Decide about an incident."""
-        async with self._explain_end("resolve_incident", run):
-            self._refuse_ended(run)
+        async with explain_end(self._supervisor, "resolve_incident", run):
+            refuse_ended(self._supervisor.runner(run))
             item = self._choices.checked(run, incident, choice, _bounded(data), to, roles or {}, by)
             known = self._supervisor.runner(run).run.state.incidents[item.incident]
             self._refuse_others(item.incident, known.operator_role, by)
@@ -421,45 +391,10 @@ class Control:
 
         What came during a pause is decided with the resume, and may be ignored then: after it.
         """
-        async with self._explain_end(request, run):
+        async with explain_end(self._supervisor, request, run):
             match (await self._supervisor.runner(run).submit(item)).records:
                 case [r.InputIgnored(reason), *_]:
                     raise OperatorError(f"{run}: {in_words(item, reason)}")
-
-    @asynccontextmanager
-    async def _explain_end(self, request: str, run: RunId) -> AsyncIterator[None]:
-        """Say how and when a run has ended that refuses a request for that reason.
-
-        `request`: the method's name. A run that ended long ago is known to the journal alone. An
-        end that the request itself has caused, and a journal that stalls has not written, is none.
-        """
-        runner = self._supervisor.runners.get(run)
-        ended = runner is None or self._has_ended(run)
-        try:
-            yield
-        except OperatorError as error:
-            if runner is not None and not ended and not self._ended_and_released(runner):
-                raise
-            lines = {each.run: each for each in await self._supervisor.journal.runs()}
-            line = lines.get(run)
-            if runner is None and (line is None or line.outcome is None):
-                raise
-            held = "" if runner is None else ", ".join(runner.run.state.held)
-            raise OperatorError(describe_end(request, run, line, held)) from error
-
-    def _refuse_ended(self, run: RunId) -> None:
-        if self._has_ended(run):
-            raise OperatorError(f"{run} has ended")
-
-    @staticmethod
-    def _ended_and_released(runner: Runner) -> bool:
-        """Whether a run's end is in the journal, and nothing that it commanded is left."""
-        return runner.failure is None and runner.done.is_set()
-
-    def _has_ended(self, run: RunId) -> bool:
-        """Whether a run has ended that this executive knows, and its journal has that."""
-        runner = self._supervisor.runner(run)
-        return runner.failure is None and runner.run.state.status is EngineStatus.ENDED
 
     # --- watching -------------------------------------------------------------------------------
 
@@ -569,24 +504,7 @@ class Control:
             loaded = load_source(mission, self._supervisor.settings.search_path)
         except MissionError as error:
             return error.findings
-        return self._findings(loaded, process, tuple(data))
-
-    def _findings(
-        self, loaded: Mission, process: str | None, names: tuple[str, ...]
-    ) -> list[Finding]:
-        supervisor = self._supervisor
-        arbiters, plugins = supervisor.arbiters, supervisor.plugins
-        return [
-            *findings_for(
-                loaded,
-                arbiters,
-                plugins,
-                names,
-                process,
-                handed_over=supervisor.handed_over,
-            ),
-            *requirement_findings(loaded, arbiters, plugins, names),
-        ]
+        return self._starter.findings(loaded, process, tuple(data))
 
     async def simulate(self, mission: MissionSource, **options: Any) -> SimulationResult:
         """Rehearse a mission with this fleet on a virtual clock."""

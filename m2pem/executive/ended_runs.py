@@ -1,12 +1,20 @@
 """What operators read when a run takes a request no more, or not in its state."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 from m2pem.engine import inputs as i
 from m2pem.engine.inputs import Input
 from m2pem.engine.state import RunStatus
+from m2pem.errors import OperatorError
 from m2pem.journal.base import RunInfo
 from m2pem.units import US_PER_S
+
+if TYPE_CHECKING:
+    from m2pem.executive.runner import Runner
+    from m2pem.executive.supervisor import Supervisor
 
 NOTHING_TO_DO = {
     "attach": "m2pem replay prints what it did",
@@ -21,6 +29,48 @@ NOTHING_TO_DO = {
     "set_geometry": "it takes no geometries any more",
 }
 """By the method of `MissionControl`, or the command: what its end means for the request."""
+
+
+def has_ended(runner: "Runner") -> bool:
+    """Whether a run that this executive drives has ended, and its journal has that."""
+    return runner.failure is None and runner.run.state.status is RunStatus.ENDED
+
+
+def refuse_ended(runner: "Runner") -> None:
+    """Check that a run has not ended.
+
+    Raises:
+        OperatorError: it has.
+    """
+    if has_ended(runner):
+        raise OperatorError(f"{runner.id} has ended")
+
+
+@asynccontextmanager
+async def explain_end(supervisor: "Supervisor", request: str, run: str) -> AsyncIterator[None]:
+    """Say how and when a run has ended that refuses a request for that reason.
+
+    `request`: the method's name. A run that ended long ago is known to the journal alone. An
+    end that the request itself has caused, and a journal that stalls has not written, is none.
+    """
+    runner = supervisor.runners.get(run)
+    ended = runner is None or has_ended(runner)
+    try:
+        yield
+    except OperatorError as error:
+        if runner is not None and not ended and not _ended_and_released(runner):
+            raise
+        lines = {each.run: each for each in await supervisor.journal.runs()}
+        line = lines.get(run)
+        if runner is None and (line is None or line.outcome is None):
+            raise
+        held = "" if runner is None else ", ".join(runner.run.state.held)
+        raise OperatorError(describe_end(request, run, line, held)) from error
+
+
+def _ended_and_released(runner: "Runner") -> bool:
+    """Whether a run's end is in the journal, and nothing that it commanded is left."""
+    return runner.failure is None and runner.done.is_set()
 
 
 def describe_end(request: str, run: str, line: RunInfo | None, released: str = "") -> str:

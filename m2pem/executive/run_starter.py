@@ -5,17 +5,25 @@ import time
 from collections.abc import Callable, Mapping
 
 from m2pem.allocation.assignment import load_solver
-from m2pem.api.authoring import MissionSource
+from m2pem.api.allocation import RoleAssignment, StartPreview
+from m2pem.api.authoring import MissionSource, file_of
 from m2pem.api.runs import RunId
 from m2pem.engine.inputs import StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.engine.state import RunStatus
-from m2pem.errors import M2pemError
+from m2pem.errors import BusyError, M2pemError, MissionError
 from m2pem.executive.handover import refuse_busy_resources
-from m2pem.executive.loading import findings_for, known_data, load_source, refuse_errors
+from m2pem.executive.loading import (
+    findings_for,
+    known_data,
+    load_source,
+    refuse_errors,
+    requirement_findings,
+)
 from m2pem.executive.scheduled_start import NotBegunError
 from m2pem.executive.supervisor import Supervisor
 from m2pem.findings import Finding
+from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import dump
 from m2pem.fleet.space import waits_for_space
 from m2pem.journal.base import RunHeader
@@ -53,6 +61,54 @@ class RunStarter:
         if loaded.chooses_resources or waits_for_space(supervisor.fleet):
             load_solver()
         return loaded.process(process).id, findings
+
+    def findings(
+        self, loaded: Mission, process: str | None, names: tuple[str, ...]
+    ) -> list[Finding]:
+        """Return all findings of `m2pem check`. `names`: those of the data that a run gets."""
+        supervisor = self._supervisor
+        arbiters, plugins = supervisor.arbiters, supervisor.plugins
+        return [
+            *findings_for(
+                loaded,
+                arbiters,
+                plugins,
+                names,
+                process,
+                handed_over=supervisor.handed_over,
+            ),
+            *requirement_findings(loaded, arbiters, plugins, names),
+        ]
+
+    async def preview(
+        self, mission: MissionSource, process: str | None, names: tuple[str, ...]
+    ) -> StartPreview:
+        """Return what a start would begin with now, and what speaks against it."""
+        supervisor = self._supervisor
+        try:
+            loaded = await asyncio.to_thread(load_source, mission, supervisor.settings.search_path)
+        except MissionError as error:
+            return StartPreview(file_of(mission), findings=error.findings)
+        findings = await asyncio.to_thread(self.findings, loaded, process, names)
+        processes = {each.id: each.name for each in loaded.processes}
+        begun = process or loaded.process().id
+        roles = {(each.name, each.resource): each for each in roles_of_mission(loaded)}
+        fleet, busy = supervisor.fleet, ""
+        try:
+            self.refuse_busy(loaded)
+        except BusyError as error:
+            busy = str(error)
+        return StartPreview(
+            loaded.file,
+            processes.get(begun, ""),
+            begun,
+            tuple(findings),
+            tuple(
+                RoleAssignment(each.name, each.resource, resources_of(each, fleet))
+                for each in roles.values()
+            ),
+            busy,
+        )
 
     def load(
         self,
