@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -138,7 +139,7 @@ class Control:
         emergency, interrupted = self._supervisor.emergency, self._supervisor.interrupted
         if run not in self._supervisor.runners and interrupted.stop(run, by, reason):
             return
-        async with explain_end(self._supervisor, "stop", run):
+        async with self._explain_end("stop", run):
             asked = emergency.stop(self._supervisor.runner(run), by, reason)
             self._schedule.run_stopping(run, by)
             await emergency.written("stop", {run: asked})
@@ -211,7 +212,7 @@ class Control:
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers."""
         emergency = self._supervisor.emergency
-        async with explain_end(self._supervisor, "pause", run):
+        async with self._explain_end("pause", run):
             asked = emergency.pause(self._supervisor.runner(run), by)
             await emergency.written("pause", {run: asked})
 
@@ -230,7 +231,7 @@ class Control:
         """Emit a signal to one run or to all that are active."""
         given = _bounded(data)
         if run is not None:
-            async with explain_end(self._supervisor, "signal", run):
+            async with self._explain_end("signal", run):
                 refuse_ended(self._supervisor.runner(run))
         runners = (
             [self._supervisor.runner(run)]
@@ -292,7 +293,7 @@ class Control:
         if run is None:
             self._supervisor.set_geometry(name, given, None, by)
             return
-        async with explain_end(self._supervisor, "set_geometry", run):
+        async with self._explain_end("set_geometry", run):
             refuse_ended(self._supervisor.runner(run))
             self._supervisor.set_geometry(name, given, run, by)
 
@@ -347,7 +348,7 @@ class Control:
         roles: Mapping[str, Sequence[str]] | None = None,
     ) -> IncidentPreview:
         """Whether the mission still completes after a choice about an incident."""
-        async with explain_end(self._supervisor, "preview_incident", run):
+        async with self._explain_end("preview_incident", run):
             refuse_ended(self._supervisor.runner(run))
             item = self._choices.checked(run, incident, choice, _bounded(data), to, roles or {})
         return await self._choices.outlook(run, item)
@@ -365,7 +366,7 @@ class Control:
         even_if_stuck: bool = False,
     ) -> None:
         """Decide about an incident."""
-        async with explain_end(self._supervisor, "resolve_incident", run):
+        async with self._explain_end("resolve_incident", run):
             refuse_ended(self._supervisor.runner(run))
             item = self._choices.checked(run, incident, choice, _bounded(data), to, roles or {}, by)
             known = self._supervisor.runner(run).run.state.incidents[item.incident]
@@ -391,10 +392,13 @@ class Control:
 
         What came during a pause is decided with the resume, and may be ignored then: after it.
         """
-        async with explain_end(self._supervisor, request, run):
+        async with self._explain_end(request, run):
             match (await self._supervisor.runner(run).submit(item)).records:
                 case [r.InputIgnored(reason), *_]:
                     raise OperatorError(f"{run}: {in_words(item, reason)}")
+
+    def _explain_end(self, request: str, run: RunId) -> AbstractAsyncContextManager[None]:
+        return explain_end(request, run, self._supervisor.runners, self._supervisor.journal)
 
     # --- watching -------------------------------------------------------------------------------
 

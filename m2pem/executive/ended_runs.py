@@ -1,20 +1,20 @@
 """What operators read when a run takes a request no more, or not in its state."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
+from m2pem.api.runs import RunId
 from m2pem.engine import inputs as i
 from m2pem.engine.inputs import Input
 from m2pem.engine.state import RunStatus
 from m2pem.errors import OperatorError
-from m2pem.journal.base import RunInfo
+from m2pem.journal.base import Journal, RunInfo
 from m2pem.units import US_PER_S
 
 if TYPE_CHECKING:
     from m2pem.executive.runner import Runner
-    from m2pem.executive.supervisor import Supervisor
 
 NOTHING_TO_DO = {
     "attach": "m2pem replay prints what it did",
@@ -47,20 +47,23 @@ def refuse_ended(runner: "Runner") -> None:
 
 
 @asynccontextmanager
-async def explain_end(supervisor: "Supervisor", request: str, run: str) -> AsyncIterator[None]:
+async def explain_end(
+    request: str, run: RunId, runners: "Mapping[RunId, Runner]", journal: Journal
+) -> AsyncIterator[None]:
     """Say how and when a run has ended that refuses a request for that reason.
 
-    `request`: the method's name. A run that ended long ago is known to the journal alone. An
-    end that the request itself has caused, and a journal that stalls has not written, is none.
+    `request`: the method's name. `runners`: those of this executive; a run that ended long ago is
+    known to the journal alone. An end that the request itself has caused, and a journal that stalls
+    has not written, is none.
     """
-    runner = supervisor.runners.get(run)
+    runner = runners.get(run)
     ended = runner is None or has_ended(runner)
     try:
         yield
     except OperatorError as error:
         if runner is not None and not ended and not _ended_and_released(runner):
             raise
-        lines = {each.run: each for each in await supervisor.journal.runs()}
+        lines = {each.run: each for each in await journal.runs()}
         line = lines.get(run)
         if runner is None and (line is None or line.outcome is None):
             raise
