@@ -2,11 +2,11 @@
 
 import json
 import logging
-import os
 from pathlib import Path
 
 from m2pem.api.arbiter import BehaviorId
 from m2pem.errors import StaleCommandError
+from m2pem.whole_file import write_whole
 
 REMEMBERED = 10_000
 
@@ -79,13 +79,7 @@ def _read(file: Path) -> dict[str, int]:
 
 
 def _write(file: Path, epochs: dict[str, int]) -> None:
-    new = file.with_name(f"{file.name}.new")
     try:
-        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
-        with os.fdopen(descriptor, "w") as out:
-            json.dump(epochs, out)
-            out.flush()
-            os.fsync(descriptor)
-        new.replace(file)
+        write_whole(file, json.dumps(epochs).encode())
     except OSError as error:
         log.warning("%s: the epoch of a command cannot be kept: %s", file, error.strerror)

@@ -10,6 +10,7 @@ from pathlib import Path
 from m2pem.api.clock import Clock
 from m2pem.errors import JournalError
 from m2pem.journal.maintenance import back_up
+from m2pem.journal.marks import beside
 from m2pem.journal.storage_checks import min_free_mb
 
 KEPT = 24
@@ -44,22 +45,18 @@ def add_backup(journal: Path, folder: Path) -> Path:
         if (free_mb := shutil.disk_usage(folder).free / 1e6) < needed_mb:
             raise JournalError(f"{free_mb:.0f} MB are free in {folder}; {needed_mb:.0f} are needed")
         unfinished = folder / f"{journal.name}-unfinished"
-        for left in (unfinished, _mark(unfinished)):  # by a crash
+        for left in (unfinished, beside(unfinished, "mark")):  # by a crash
             left.unlink(missing_ok=True)
         back_up(journal, unfinished, lambda *_: None)
         copy = folder / f"{journal.stem}-{datetime.now(UTC):%Y%m%dT%H%M%S.%f}Z{journal.suffix}"
-        _mark(unfinished).rename(_mark(copy))
+        beside(unfinished, "mark").rename(beside(copy, "mark"))
         unfinished.rename(copy)
         pattern = f"{glob.escape(journal.stem)}-????????T??????.??????Z{journal.suffix}"
         # What is dated after this one was made before it, while the clock was ahead.
         found = sorted(folder.glob(pattern), key=lambda each: (each.name <= copy.name, each.name))
         for old in found[:-KEPT]:
             old.unlink()
-            _mark(old).unlink(missing_ok=True)
+            beside(old, "mark").unlink(missing_ok=True)
     except OSError as error:
         raise JournalError(f"{error.filename or folder}: {error.strerror}") from error
     return copy
-
-
-def _mark(journal: Path) -> Path:
-    return journal.with_name(f"{journal.name}-mark")

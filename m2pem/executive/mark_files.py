@@ -6,7 +6,6 @@ They are written by threads of their own: nothing waits for a disk that hangs.
 import asyncio
 import json
 import logging
-import os
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
@@ -16,6 +15,7 @@ from typing import Any
 from uuid import UUID
 
 from m2pem.executive.runtime_directory import runtime_directory
+from m2pem.whole_file import write_whole
 
 CLOSED_WITHIN_S = 1.0
 
@@ -101,19 +101,8 @@ def _serve(queue: "Queue[tuple[Path, bytes | None]]") -> None:
             if content is None:
                 path.unlink(missing_ok=True)
             else:
-                _write(path, content)
+                write_whole(path, content)
         except OSError as error:
             log.warning("%s: it cannot be written or removed: %s", path, error.strerror)
         finally:
             queue.task_done()
-
-
-def _write(path: Path, content: bytes) -> None:
-    new = path.with_name(f"{path.name}.new")
-    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
-    try:
-        os.write(descriptor, content)
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-    new.rename(path)

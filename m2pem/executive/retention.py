@@ -19,6 +19,7 @@ from m2pem.executive.lost_marks import LostMark, LostMarks, left_by
 from m2pem.executive.runtime_directory import runtime_directory
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
+from m2pem.journal.marks import beside
 from m2pem.mission.catalogue import ResourceId
 from m2pem.units import US_PER_S
 
@@ -72,8 +73,8 @@ def _remove_files(journal: Path, identity: UUID, runs: Sequence[str]) -> None:
 
 def _files(journal: Path, identity: UUID, run: str) -> Iterator[Path]:
     """Yield the files of a run beside the journal (docs/journal.md), if they exist or not."""
-    yield journal.with_name(f"{journal.name}-tracks") / f"{run}.jsonl"
-    yield journal.with_name(f"{journal.name}-stopped-{run}")
+    yield beside(journal, "tracks") / f"{run}.jsonl"
+    yield beside(journal, f"stopped-{run}")
     with suppress(OSError):
         yield runtime_directory() / f"{identity}-stopped-{run}"
 

@@ -6,13 +6,14 @@ import shutil
 import sqlite3
 import tempfile
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.parse import quote
 from uuid import UUID
 
 from m2pem.errors import JournalError, JournalUrlError
-from m2pem.journal.marks import of_another_journal
+from m2pem.journal.marks import beside, of_another_journal
 from m2pem.journal.migrations import check, migrate
 from m2pem.journal.storage_checks import DISK_FAILED, DISK_FULL, READ_ONLY
 
@@ -63,7 +64,7 @@ def _prepare(connection: sqlite3.Connection, path: Path, marked: UUID | None) ->
     try:
         check(connection, path)
         if marked is not None and not _is(connection, marked):
-            raise of_another_journal(path.with_name(f"{path.name}-mark"))
+            raise of_another_journal(beside(path, "mark"))
     finally:
         if connection.in_transaction:  # after a failure SQLite itself has rolled back
             connection.execute("ROLLBACK")
@@ -76,7 +77,7 @@ def _prepare(connection: sqlite3.Connection, path: Path, marked: UUID | None) ->
     disk = os.statvfs(path.parent)
     # On a small or almost full disk the log would take what the files beside it need.
     roomy = disk.f_bavail * disk.f_frsize >= 2 * LOG_BYTES
-    if roomy and path.with_name(f"{path.name}-wal").stat().st_size < LOG_BYTES:
+    if roomy and beside(path, "wal").stat().st_size < LOG_BYTES:
         _lengthen_log(connection)
 
 
@@ -147,7 +148,7 @@ def open_unchanged(path: Path, stack: ExitStack) -> sqlite3.Connection:
             raise explained_error(error, path) from error
     try:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="m2pem-")))
-        for file in (path, path.with_name(f"{path.name}-wal")):
+        for file in (path, beside(path, "wal")):
             if file.exists():
                 shutil.copyfile(file, folder / file.name)
         return _opened_unchanged(folder / path.name)
@@ -207,6 +208,17 @@ _NEEDS_COPY = (
 )
 
 _TRANSIENT = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY)
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Raise what fails within the block as a `JournalError` that names the file."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise explained_error(error, path) from error
+    except OSError as error:
+        raise JournalError(f"{error.filename or path}: {error.strerror}") from error
 
 
 def explained_error(error: sqlite3.Error, path: Path) -> JournalError:

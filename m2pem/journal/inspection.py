@@ -21,7 +21,7 @@ from m2pem.journal.base import Entry, Loss
 from m2pem.journal.codec import decode_body, decode_library, decode_part, run_id
 from m2pem.journal.database import explained_error, open_for_writing, open_unchanged
 from m2pem.journal.hash_chain import entry_hash, header_hash
-from m2pem.journal.marks import Mark, MarkState, find_loss, is_deleted, read_marks
+from m2pem.journal.marks import Mark, MarkState, beside, find_loss, is_deleted, read_marks
 from m2pem.journal.migrations import check
 from m2pem.journal.position import RunPosition
 from m2pem.journal.transaction import position_from
@@ -135,7 +135,7 @@ def inspected(path: Path) -> Iterator[tuple[sqlite3.Connection, Inspection]]:
 
 def _marks(path: Path, found: Inspection) -> Mapping[int, Mark]:
     # Before the tables, as both grow meanwhile.
-    file = path.with_name(f"{path.name}-mark")
+    file = beside(path, "mark")
     try:
         of, marks = read_marks(file)
     except JournalError as error:

@@ -6,15 +6,15 @@ in the copy, or was lost before.
 
 import os
 import sqlite3
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from m2pem.errors import JournalError
-from m2pem.journal.database import explained_error, open_for_reading, open_for_writing
-from m2pem.journal.marks import identity_in
+from m2pem.journal.database import explained, open_for_reading, open_for_writing
+from m2pem.journal.marks import beside, identity_in
 from m2pem.journal.migrations import MIGRATIONS, check
 from m2pem.units import US_PER_S
 
@@ -45,13 +45,13 @@ def file_info(path: Path) -> FileInfo:
     Raises:
         JournalError: it cannot be read, or is not a journal.
     """
-    with _explained(path), closing(open_for_reading(path)) as connection:
+    with explained(path), closing(open_for_reading(path)) as connection:
         check(connection, path)
         version, free_pages, page_size = (
             connection.execute(f"PRAGMA {name}").fetchone()[0]
             for name in ("user_version", "freelist_count", "page_size")
         )
-        log = _beside(path, "wal")
+        log = beside(path, "wal")
         return FileInfo(
             version,
             path.stat().st_size,
@@ -78,8 +78,8 @@ def compact(path: Path) -> None:
     Raises:
         JournalError: the disk is full, another program has it locked, ...
     """
-    marked = identity_in(_beside(path, "mark"))
-    with _explained(path), closing(open_for_writing(path, marked)) as connection:
+    marked = identity_in(beside(path, "mark"))
+    with explained(path), closing(open_for_writing(path, marked)) as connection:
         connection.execute("BEGIN IMMEDIATE")
         connection.execute(
             "DELETE FROM entries WHERE run IN (SELECT run FROM deletions WHERE NOT emptied)"
@@ -99,13 +99,13 @@ def back_up(path: Path, copy: Path, progress: Callable[[int, int], None]) -> Non
         JournalError: there is such a file already, it cannot be written, or the copy is damaged;
             no copy is left then.
     """
-    mark, copied_mark = _beside(path, "mark"), _beside(copy, "mark")
-    for file in (copy, copied_mark, _beside(copy, "wal")):
+    mark, copied_mark = beside(path, "mark"), beside(copy, "mark")
+    for file in (copy, copied_mark, beside(copy, "wal")):
         if file.exists():
             raise JournalError(f"{file} exists already; name a new file")
     made: list[Path] = []
     try:
-        with _explained(copy):
+        with explained(copy):
             # Before the tables, so that they are ahead of it, and never behind.
             marks = mark.read_bytes() if mark.exists() else b""
             _make(copy, b"", made)
@@ -138,17 +138,3 @@ def _make(file: Path, content: bytes, made: list[Path]) -> None:
         written.write(content)
         written.flush()
         os.fsync(descriptor)
-
-
-@contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except sqlite3.Error as error:
-        raise explained_error(error, path) from error
-    except OSError as error:
-        raise JournalError(f"{error.filename or path}: {error.strerror}") from error
-
-
-def _beside(path: Path, what: str) -> Path:
-    return path.with_name(f"{path.name}-{what}")

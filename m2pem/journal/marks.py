@@ -134,6 +134,11 @@ class MarkFile:
         os.close(self._file)
 
 
+def beside(journal: Path, what: str) -> Path:
+    """Return the path of a file that is kept beside a journal: `FILE-what`."""
+    return journal.with_name(f"{journal.name}-{what}")
+
+
 def identity_in(path: Path) -> UUID | None:
     """The identity of the journal that a mark file belongs to; None: there is no such file.
 

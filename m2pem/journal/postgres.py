@@ -17,7 +17,7 @@ from m2pem.journal.codec import run_id, run_number
 from m2pem.journal.database_journal import DatabaseJournal
 from m2pem.journal.fleet_server import FleetServer, command_line
 from m2pem.journal.lease import Executive, Lease, end_dead, lease_s, process_space
-from m2pem.journal.marks import MarkFile, find_losses
+from m2pem.journal.marks import MarkFile, beside, find_losses
 from m2pem.journal.position import RunPosition
 from m2pem.journal.postgres_address import PostgresAddress, write_address
 from m2pem.journal.postgres_changes import ChangeListener
@@ -485,8 +485,7 @@ class PostgresJournal(DatabaseJournal):
                 identity = identity_of(connection.raw, shown)
                 end_dead(connection)
                 write_address(address)
-                mark = address.file.with_name(f"{address.file.name}-mark")
-                marks = MarkFile(mark, identity)
+                marks = MarkFile(beside(address.file, "mark"), identity)
                 undo.callback(marks.close)
                 for number, loss in find_losses(connection, marks.read()).items():
                     log.error("%s: %s: %s", shown, run_id(number), loss)

@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from m2pem.errors import JournalError, JournalUrlError
+from m2pem.whole_file import write_whole
 
 SUFFIX = ".postgresql"
 SCHEMES = ("postgresql", "postgres")
@@ -84,9 +85,7 @@ def write_address(address: PostgresAddress) -> None:
     try:
         if address.file.exists() and address.file.read_bytes() == content:
             return
-        descriptor = os.open(address.file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
+        write_whole(address.file, content)
     except OSError as error:
         raise JournalError(f"{address.file} cannot be written: {error.strerror}") from error
 

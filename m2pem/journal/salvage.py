@@ -5,20 +5,18 @@ other one. So every run that had not ended counts as one that has lost entries, 
 are there: an operator is asked before it goes on. The schedule is held.
 """
 
-import os
 import sqlite3
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from uuid import UUID
 
 from m2pem.errors import JournalError
 from m2pem.journal.codec import decode_part, encode_part
-from m2pem.journal.database import explained_error, open_for_writing
+from m2pem.journal.database import explained, open_for_writing
 from m2pem.journal.inspection import Inspection, RunState, entry_rows, inspected
-from m2pem.journal.marks import Mark, MarkFile, MarkState
+from m2pem.journal.marks import Mark, MarkFile, MarkState, beside
 from m2pem.journal.transaction import mark_of, position_columns
 from m2pem.scheduling.entry import EntryState, Hold, SchedulePlan
 
@@ -34,13 +32,13 @@ def salvage(source: Path, target: Path, by: str) -> Inspection:
         JournalError: there is such a file already, it cannot be written, nothing of `source` can be
             read; no new journal is left then.
     """
-    files = [target.with_name(target.name + what) for what in ("", "-wal", "-shm", "-mark")]
+    files = [target, *(beside(target, what) for what in ("wal", "shm", "mark"))]
     for file in files:
         if file.exists():
             raise JournalError(f"{file} exists already; name a new file")
     with inspected(source) as (reading, found):
         try:
-            with _explained(target), closing(open_for_writing(target)) as writing:
+            with explained(target), closing(open_for_writing(target)) as writing:
                 _copy(reading, writing, found, target, by)
                 writing.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         except BaseException:
@@ -58,7 +56,7 @@ def _copy(
     by: str,
 ) -> None:
     (identity,) = writing.execute("SELECT uuid FROM identity").fetchone()
-    marks = MarkFile(target.with_name(f"{target.name}-mark"), UUID(identity))
+    marks = MarkFile(beside(target, "mark"), UUID(identity))
     try:
         writing.execute("BEGIN IMMEDIATE")
         for run in found.runs:
@@ -125,13 +123,3 @@ def _mark(run: RunState) -> Mark:
     other = bytes(byte ^ 0xFF for byte in own.hash)
     seq = max(acknowledged, run.position.last_seq)
     return replace(own, seq=seq, hash=other, state=MarkState.SALVAGED)
-
-
-@contextmanager
-def _explained(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except sqlite3.Error as error:
-        raise explained_error(error, path) from error
-    except OSError as error:
-        raise JournalError(f"{error.filename or path}: {os.strerror(error.errno or 0)}") from error

@@ -2,7 +2,6 @@
 
 import hashlib
 import logging
-import os
 import sqlite3
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -22,11 +21,12 @@ from m2pem.journal.database import (
 )
 from m2pem.journal.database_journal import DatabaseJournal
 from m2pem.journal.fleet_server import FleetServer, decode, encode, this_process
-from m2pem.journal.marks import MarkFile, find_losses, identity_in, of_another_journal
+from m2pem.journal.marks import MarkFile, beside, find_losses, identity_in, of_another_journal
 from m2pem.journal.position import RunPosition
 from m2pem.journal.run_locks import RunLocks, run_locks
 from m2pem.journal.storage_checks import OpenFiles, disk_fault, min_free_mb
 from m2pem.journal.transaction import mark_of, position_columns, position_from
+from m2pem.whole_file import write_whole
 
 log = logging.getLogger("m2pem.journal")
 
@@ -48,7 +48,7 @@ class SqliteStorage:
         self.connection = connection
         self.owners = locks
         self._path = path
-        self._files = OpenFiles([path, _beside(path, "wal"), _beside(path, "lock"), mark])
+        self._files = OpenFiles([path, beside(path, "wal"), beside(path, "lock"), mark])
         self._data_version = 0
         self._fleets: dict[str, set[str]] = {}
 
@@ -92,7 +92,9 @@ class SqliteStorage:
             if not self.owners.mine(lock):
                 self.owners.acquire(lock)
                 self._fleets.setdefault(fleet, set()).add(resource)
-                _write_note(_fleet_note(self._path, lock), this_process(digest, page))
+                note = encode(this_process(digest, page))
+                # It ends with its process: it need not be durable.
+                write_whole(_fleet_note(self._path, lock), note, durable=False)
         return None
 
     def leave_fleet(self, fleet: str) -> None:
@@ -200,18 +202,18 @@ class SqliteJournal(DatabaseJournal):
         """
         path = path.resolve()
         min_free_mb()  # a wrong setting is reported now, not when a run is to begin
-        marked = identity_in(_beside(path, "mark"))
+        marked = identity_in(beside(path, "mark"))
         if marked is not None and not path.exists():
-            raise of_another_journal(_beside(path, "mark"))
+            raise of_another_journal(beside(path, "mark"))
         with ExitStack() as undo:
             writing = undo.enter_context(closing(open_for_writing(path, marked)))
             reading = undo.enter_context(closing(open_for_reading(path)))
             identity = _identity_of(writing, path)
             try:
-                locks = run_locks(_beside(path, "lock"))
-                marks = MarkFile(_beside(path, "mark"), identity)
+                locks = run_locks(beside(path, "lock"))
+                marks = MarkFile(beside(path, "mark"), identity)
             except OSError as error:
-                name = error.filename or _beside(path, "mark")  # what is written has no name
+                name = error.filename or beside(path, "mark")  # what is written has no name
                 raise JournalError(f"{name} can't be opened: {error.strerror}") from error
             undo.callback(marks.close)
             try:
@@ -257,10 +259,6 @@ class SqliteJournal(DatabaseJournal):
         self._locks.close()
 
 
-def _beside(path: Path, what: str) -> Path:
-    return path.with_name(f"{path.name}-{what}")
-
-
 def fleet_server(
     path: Path, locks: RunLocks, fleet: str, resources: Collection[str]
 ) -> FleetServer | None:
@@ -275,17 +273,8 @@ def fleet_server(
     return None
 
 
-def _write_note(note: Path, server: FleetServer) -> None:
-    new = note.with_name(f"{note.name}-new")
-    new.unlink(missing_ok=True)
-    file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    with os.fdopen(file, "wb") as writing:
-        writing.write(encode(server))
-    new.replace(note)
-
-
 def _fleet_note(path: Path, lock: int) -> Path:
-    return _beside(path, f"fleet-{lock:016x}")
+    return beside(path, f"fleet-{lock:016x}")
 
 
 def _fleet_lock(fleet: str, resource: str) -> int:
