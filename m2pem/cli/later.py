@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from m2pem.api.command_options import DurationOption
 from m2pem.cli.completers import runs_and_entries
 
 if TYPE_CHECKING:
@@ -14,25 +15,6 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 FREE = "free"
 """What `--when` takes for: as soon as its vehicles are free."""
-
-
-class DurationOption(click.ParamType):  # type: ignore[type-arg]  # older clicks have it bare
-    """A duration in seconds: 30 s, 10 min, 2 h."""
-
-    name = "duration"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        from m2pem.units import Dimension, UnitError, quantity
-
-        try:
-            seconds = quantity(str(value), Dimension.DURATION)
-        except UnitError as error:
-            self.fail(str(error), param, ctx)
-        if seconds < 0:
-            self.fail("a duration cannot be negative", param, ctx)
-        return seconds
 
 
 _OPTIONS = (
