@@ -179,6 +179,18 @@ class MissionControl(Protocol):
         """
         ...
 
+    async def switch_over(self, *, by: str = "") -> ExecutiveAddress:
+        """Leave every run, as it is, to the executive that stands by, and end; returns which one.
+
+        Vehicles go on with what they do. The standby takes the runs up as those of an executive
+        that was killed.
+
+        Raises:
+            OperatorError: no executive stands by. Nothing has changed then.
+            JournalError: the journal cannot say which one does.
+        """
+        ...
+
     async def pause(self, run: RunId, *, by: str = "") -> None:
         """Hold every commanded resource and freeze timers.
 

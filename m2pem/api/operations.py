@@ -78,6 +78,12 @@ class StopAll(Params, frozen=True):
     reason: str = ""
 
 
+class SwitchOver(Params, frozen=True):
+    """As `MissionControl.switch_over`."""
+
+    by: str = ""
+
+
 class Answer(Params, frozen=True):
     """As `MissionControl.answer`."""
 
@@ -274,6 +280,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("release_schedule", ReleaseSchedule),
         Operation("stop", Stop, alone=True),
         Operation("stop_all", StopAll, list[RunId], alone=True),
+        Operation("switch_over", SwitchOver, ExecutiveAddress, alone=True),
         Operation("pause", OfRun, alone=True),
         Operation("resume", OfRun),
         Operation("set_geometry", Geometry),

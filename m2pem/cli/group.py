@@ -44,6 +44,7 @@ COMMANDS = {
     "stop": "Stop a run that is running on this host, or all of them.",
     "pause": "Pause a run that is running on this host.",
     "continue": "Let a run on this host go on after a pause.",
+    "switchover": "Have the executive of this host leave its runs to the one that stands by.",
     "attach": "Serve an operator of an executive that is running on this host.",
     "plugins": "List the plugins and what they provide.",
     "fleet": "Show a fleet: who is there and can do what.",

@@ -38,6 +38,11 @@ format_option = click.option(
     help="Print for people, or for programs.",
 )
 
+run_on_option = click.option(
+    "--run-on",
+    metavar="EXECUTIVE",
+    help="Which executive, if several write to the journal: its process id or its fleet's name.",
+)
 journal_option = click.option(
     "--journal",
     metavar="URL",

@@ -198,7 +198,8 @@ async def _serve(
                 for task in keeping:
                     task.cancel()
         tidy_up(executive, file_of(url))
-        return 1 if executive.superseded.is_set() else 0
+        left = executive.superseded.is_set() and not executive.switchover.by_operator
+        return 1 if left else 0
 
 
 def _refuse_memory(url: str, *, standby: bool) -> None:

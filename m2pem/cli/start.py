@@ -13,6 +13,7 @@ from m2pem.cli.options import (
     mission_argument,
     path_option,
     process_option,
+    run_on_option,
 )
 from m2pem.cli.run_control import by_option, found_elsewhere, journal_file
 
@@ -25,11 +26,7 @@ if TYPE_CHECKING:
 @process_option
 @path_option
 @data_option
-@click.option(
-    "--run-on",
-    metavar="EXECUTIVE",
-    help="Which executive, if several write to the journal: its process id or its fleet's name.",
-)
+@run_on_option
 @click.option(
     "--even-if-busy", is_flag=True, help="Start although other runs or operators have its vehicles."
 )

@@ -59,6 +59,7 @@ from m2pem.executive.schedule_admission import planned
 from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.supervisor import Supervisor
+from m2pem.executive.switchover import Switchover
 from m2pem.executive.verification_worker import verify_in_subprocess
 from m2pem.executive.waiting_tasks import holder_label, waiting_tasks
 from m2pem.findings import Finding
@@ -94,6 +95,7 @@ class Control:
         health: ExecutiveHealth,
         schedule: ScheduleEntries,
         scheduler: Scheduler,
+        switchover: Switchover,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
     ) -> None:
@@ -101,6 +103,7 @@ class Control:
         self._starter = starter
         self._schedule = schedule
         self._scheduler = scheduler
+        self._switchover = switchover
         self._bus = bus
         self._health = health
         self._rehearse = rehearse
@@ -153,6 +156,10 @@ class Control:
         if hold is not None:
             await self._schedule.written(hold)
         return list(dict.fromkeys((*asked, *interrupted)))
+
+    async def switch_over(self, *, by: str = "") -> ExecutiveAddress:
+        """Leave every run, as it is, to the executive that stands by, and end."""
+        return await self._switchover.ask(by)
 
     # --- the schedule ---------------------------------------------------------------------------
 

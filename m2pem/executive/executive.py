@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Self
 
-from m2pem.api.arbiter import ArbiterContext, BehaviorId
+from m2pem.api.arbiter import ArbiterContext, BehaviorId, BehaviorReport
 from m2pem.api.clock import Clock, SystemClock
 from m2pem.api.runs import RunId
 from m2pem.errors import FleetServedError, JournalError, M2pemError
@@ -35,13 +35,14 @@ from m2pem.executive.scheduled_runs import ScheduledRuns
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.shared_space_watch import watch_shared_space
 from m2pem.executive.supervisor import RunSettings, Supervisor
+from m2pem.executive.switchover import Switchover
 from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of, refusal
 from m2pem.findings import Finding
 from m2pem.fleet.allocation import Availability, spelled_out
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal
 from m2pem.journal.fleet_server import FleetServer
-from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.plugins import Plugins
@@ -113,7 +114,7 @@ class Executive:
             observers=self._observers,
         )
         self._connections = FleetConnections(
-            self.arbiters, self._supervisor.on_report, self._supervisor.on_telemetry
+            self.arbiters, self._on_report, self._supervisor.on_telemetry
         )
         self.stalls = self._supervisor.stalls
         self.ownership = self._supervisor.ownership
@@ -129,6 +130,9 @@ class Executive:
         )
         self._scheduler = Scheduler(scheduled, self._schedule)
         self._supervisor.on_change = self._schedule.changed.set
+        self.superseded = asyncio.Event()
+        """Set when another executive serves the fleet, or is to: this one must end."""
+        self.switchover = Switchover(self._supervisor, self.superseded)
         self.control = Control(
             self._supervisor,
             self._starter,
@@ -136,6 +140,7 @@ class Executive:
             self.health,
             self._schedule,
             self._scheduler,
+            self.switchover,
             rehearse,
             foresee,
         )
@@ -143,10 +148,9 @@ class Executive:
         self._locks = VehicleLocks(addresses_of(self.arbiters), journal.file, page)
         if journal.lease_s is not None and self._locks.resources:
             self._supervisor.served_by_another = self._served_by_another
-        self.superseded = asyncio.Event()
-        """Set when another executive serves the fleet, after the lease on the journal had ended."""
         self._speed = speed
         self._watch_links = watch_links
+        self._links: LinkMonitor | None = None
         self._listeners: list[asyncio.Task[None]] = []
         self._stack = AsyncExitStack()
 
@@ -189,8 +193,15 @@ class Executive:
         if self._watch_links:
             # On a fast clock a delay of this process would look like the silence of a vehicle.
             bounds_s = self._connections.lost_after_s(max(1.0, self._speed))
-            rules = LinkMonitor(bounds_s, self.clock.now_us())
-            monitoring = partial(monitor_links, self.bus, self.clock, self._supervisor.fault, rules)
+            self._links = rules = LinkMonitor(bounds_s, self.clock.now_us())
+            monitoring = partial(
+                monitor_links,
+                self.bus,
+                self.clock,
+                self._supervisor.fault,
+                rules,
+                self._left_to_another,
+            )
             self._listen(group, "link monitor", monitoring)
         return self
 
@@ -255,6 +266,19 @@ class Executive:
             log.info("who serves %s is not known: %s", self.fleet.name, error)
             return f"who serves {self.fleet.name} is not known: {error}"
         return ""
+
+    async def _on_report(self, report: BehaviorReport) -> None:
+        if report.state is BehaviorState.LOST and await self._left_to_another():
+            return
+        self._supervisor.on_report(report)
+
+    async def _left_to_another(self) -> bool:
+        """A link is being lost. Returns whether the runs are left to another executive, as nothing
+        is received here any more."""
+        links = self._links
+        if links is None or not links.receives_nothing(self.clock.now_us()):
+            return False
+        return await self.switchover.no_vehicle_received()
 
     async def load_schedule(self) -> None:
         """Read what the journal has scheduled for this fleet, before runs are taken up.

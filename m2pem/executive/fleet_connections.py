@@ -243,7 +243,7 @@ class FleetConnections:
     def __init__(
         self,
         arbiters: FleetArbiters,
-        on_report: Callable[[BehaviorReport], None],
+        on_report: Callable[[BehaviorReport], Awaitable[None]],
         on_telemetry: Callable[[Telemetry], None],
     ) -> None:
         self._arbiters = arbiters
@@ -291,7 +291,7 @@ class FleetConnections:
 
     async def _read_reports(self, arbiter: Arbiter) -> None:
         async for report in arbiter.reports():
-            self._on_report(report)
+            await self._on_report(report)
 
     async def _read_telemetry(self, arbiter: Arbiter) -> None:
         async for state in arbiter.telemetry():

@@ -136,6 +136,7 @@ class Supervisor:
         self.marks = StopMarks(journal.file, journal.identity)
         self.interrupted = InterruptedRuns(self.marks)
         self._tasks: dict[RunId, asyncio.Task[None]] = {}
+        self._left: StaleEpochError | None = None
         self._group: asyncio.TaskGroup | None = None
         self.ownership = Ownership(
             journal, self.stalls, self.runners, self.replaced, self._claim_unknown
@@ -222,8 +223,10 @@ class Supervisor:
         """Check that runs can be driven.
 
         Raises:
-            OperatorError: the arbiters are not connected yet.
+            OperatorError: the arbiters are not connected yet, or the runs are left to a standby.
         """
+        if self._left is not None:
+            raise OperatorError(f"no run begins here any more: {self._left}")
         if self._group is None:
             raise OperatorError(
                 "no run begins: the executive is not connected to its vehicles yet; try again in a "
@@ -238,6 +241,15 @@ class Supervisor:
         for runner in self.runners.values():
             if not runner.done.is_set() and runner.run.state.status is not RunStatus.ENDED:
                 self.emergency.stop(runner, "", reason)
+        await asyncio.gather(*self._tasks.values())
+
+    async def leave_runs(self, why: StaleEpochError) -> None:
+        """Drive no run any more, from now on, and leave their vehicles as they are: another
+        executive may take them up when this returns."""
+        self._left = why
+        for runner in self.runners.values():
+            if not runner.done.is_set():
+                self.replaced(runner.id, why)
         await asyncio.gather(*self._tasks.values())
 
     async def end_calls(self) -> None:
@@ -303,6 +315,8 @@ class Supervisor:
         """Have a run decide its inputs from now on."""
         assert self._group is not None
         self._tasks[runner.id] = self._group.create_task(self._drive_and_release(runner))
+        if self._left is not None:
+            self.replaced(runner.id, self._left)
 
     async def forget(self, run: RunId) -> None:
         """Wait until the task of a run that failed to begin has ended; it is no run then."""

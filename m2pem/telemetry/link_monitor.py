@@ -7,7 +7,7 @@ level. A payload is monitored by itself: its vehicle's link and battery are not 
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -20,6 +20,10 @@ from m2pem.units import US_PER_S
 
 STALL_US = 500_000
 """A check that is later than this shows that this process was not running, not a lost link."""
+
+SILENT_SHARE = 0.4
+"""Of its bound: a link from which nothing came for so long is about to be lost, if others are lost.
+Arbiters publish a state when half of it has passed, with a degraded link."""
 
 
 @dataclass(slots=True)
@@ -88,6 +92,14 @@ class LinkMonitor:
             faults += self._battery(state.resource, state.battery_fraction)
         return faults
 
+    def receives_nothing(self, now_us: int) -> bool:
+        """Whether nothing is received any more of all that was received since connecting: each link
+        is lost, or silent for two fifths of its bound."""
+        were = [each for each in self._links.values() if not each.never_received]
+        return bool(were) and all(
+            each.lost or now_us - each.received_us > SILENT_SHARE * each.bound_us for each in were
+        )
+
     def check(self, now_us: int) -> list[ResourceFault]:
         """Return a fault for each resource without telemetry for longer than its bound."""
         if self._next_check_us is None or now_us < self._next_check_us:
@@ -154,18 +166,26 @@ async def monitor_links(
     clock: Clock,
     sink: Callable[[ResourceFault], None],
     rules: LinkMonitor,
+    left: Callable[[], Awaitable[bool]],
     size: int = 10_000,
 ) -> None:
     """Hand every fault to `sink` until the bus is closed or this is cancelled.
 
-    `size`: how many states may wait while the process is busy.
+    `left` is awaited before a lost link is handed over; True: the runs are left to another
+    executive, which may receive what this one does not. `size`: how many states may wait while the
+    process is busy.
     """
+
+    async def report(faults: Sequence[ResourceFault]) -> None:
+        if any(not fault.reachable for fault in faults) and await left():
+            return
+        for fault in faults:
+            sink(fault)
 
     async def check() -> None:
         while (due_us := rules.next_check_us) is not None:
             await clock.sleep_until(due_us)
-            for fault in rules.check(clock.now_us()):
-                sink(fault)
+            await report(rules.check(clock.now_us()))
 
     states = bus.subscribe(size)
     async with asyncio.TaskGroup() as group:
@@ -173,6 +193,5 @@ async def monitor_links(
         async for state in states:
             if isinstance(state, TeamState):
                 continue
-            for fault in rules.received(state, clock.now_us()):
-                sink(fault)
+            await report(rules.received(state, clock.now_us()))
         checking.cancel()

@@ -62,6 +62,7 @@ OTHERWISE = {
     "journal_file": "--journal names it",
     "health": "m2pem doctor --running",
     "standbys": "m2pem doctor --running",
+    "switch_over": "m2pem switchover, which tests/e2e/test_switchover.py tries",
 }
 NO_COMMAND = {
     "message": "programs send messages: over the control socket, REST or ROS",

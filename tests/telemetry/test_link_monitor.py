@@ -14,6 +14,11 @@ UGV, UAV, PTZ = ResourceId("evsg1"), ResourceId("uav1"), ResourceId("evsg1/ptz")
 S = 1_000_000
 
 
+async def stays() -> bool:
+    """No other executive may receive what this one does not."""
+    return False
+
+
 def vehicle(
     resource: ResourceId = UGV,
     battery: float | None = None,
@@ -181,7 +186,7 @@ def test_watch_hands_on_faults_at_the_time_they_come_true_until_the_bus_is_close
             seen.append((clock.now_us(), fault.resource, fault.code))
 
         rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=clock.now_us())
-        watching = asyncio.create_task(monitor_links(bus, clock, sink, rules))
+        watching = asyncio.create_task(monitor_links(bus, clock, sink, rules, stays))
         for second in range(10):
             await clock.sleep_until(second * S)
             bus.publish(vehicle(UAV, battery=0.1 if second == 7 else 0.9))
@@ -200,7 +205,7 @@ def test_watch_sees_a_vehicle_that_comes_back_and_is_lost_again() -> None:
         seen: list[int] = []
         rules = LinkMonitor({UGV: 2.0}, since_us=0)
         watching = asyncio.create_task(
-            monitor_links(bus, clock, lambda _: seen.append(clock.now_us()), rules)
+            monitor_links(bus, clock, lambda _: seen.append(clock.now_us()), rules, stays)
         )
         for second in (0, 1, 10, 11, 12, 13):
             await clock.sleep_until(second * S)
@@ -216,10 +221,42 @@ def test_watch_sees_a_vehicle_that_comes_back_and_is_lost_again() -> None:
 def test_watch_can_be_cancelled() -> None:
     async def main(_: VirtualClock) -> bool:
         rules = LinkMonitor({UGV: 2.0}, since_us=0)
-        watching = asyncio.create_task(monitor_links(Bus(), _, lambda _: None, rules))
+        watching = asyncio.create_task(monitor_links(Bus(), _, lambda _: None, rules, stays))
         await asyncio.sleep(0)
         watching.cancel()
         await asyncio.wait([watching])
         return watching.cancelled()
 
     assert run_virtual(main, 0)
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_lost_link_is_not_handed_over_when_the_runs_are_left_to_another_executive(
+    leaves: bool,
+) -> None:
+    async def main(clock: VirtualClock) -> tuple[list[str], list[bool]]:
+        bus = Bus()
+        seen: list[str] = []
+        nothing: list[bool] = []
+        rules = LinkMonitor({UGV: 2.0, UAV: 2.0, PTZ: 2.0}, since_us=0)
+
+        async def left() -> bool:
+            nothing.append(rules.receives_nothing(clock.now_us()))
+            return leaves and nothing[-1]
+
+        watching = asyncio.create_task(
+            monitor_links(bus, clock, lambda fault: seen.append(fault.resource), rules, left)
+        )
+        for tenth in range(60):
+            await clock.sleep_until(tenth * S // 10)
+            bus.publish(vehicle(UAV))
+            if tenth < 20:
+                bus.publish(vehicle(UGV))
+        await clock.sleep_until(20 * S)
+        bus.close()
+        await watching
+        return seen, nothing
+
+    # PTZ was never received, and UGV is lost while UAV is received.
+    seen = [PTZ, UGV] if leaves else [PTZ, UGV, UAV]
+    assert run_virtual(main, 0) == (seen, [False, False, True])

@@ -18,11 +18,12 @@ class Router:
     """Autopilots send to `port`, and executives connect to `ground` (udpout).
 
     `sent`: what moves a vehicle and has reached it, in order, with the executive's address.
-    `cut`: it carries nothing.
+    `cut`: it carries nothing; `cut_off`: nothing from and to these executives.
     """
 
     def __init__(self) -> None:
         self.cut = False
+        self.cut_off: set[Address] = set()
         self.sent: list[tuple[Address, object]] = []
         self._vehicles: set[Address] = set()
         self._executives: dict[Address, Any] = {}
@@ -56,9 +57,9 @@ class Router:
                 if each is inner:
                     self._vehicles.add(sender)
                     if not self.cut:
-                        for executive in self._executives:
+                        for executive in self._executives.keys() - self.cut_off:
                             outer.sendto(frames, executive)
-                elif not self.cut:
+                elif not self.cut and sender not in self.cut_off:
                     self._carry(frames, sender)
 
     def _carry(self, frames: bytes, sender: Address) -> None:

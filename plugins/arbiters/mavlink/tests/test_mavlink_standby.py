@@ -51,11 +51,24 @@ sys.argv = ["m2pem", *{words!r}]
 runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
 """
 
+ELSEWHERE = """
+import ctypes, runpy, socket, sys
+
+NEW_UTS = 0x04000000
+assert ctypes.CDLL(None, use_errno=True).unshare(NEW_UTS) == 0, ctypes.get_errno()
+socket.sethostname("elsewhere")
+sys.argv = ["m2pem", *{words!r}]
+runpy.run_module("m2pem", run_name="__main__", alter_sys=True)
+"""
+"""An executive on a host of another name, as root: a process with a UTS namespace of its own."""
+
 
 class World:
     """The copter, the router, and executives of this host, and of another one."""
 
-    def __init__(self, m2pem: CommandLine, journal: str) -> None:
+    def __init__(
+        self, m2pem: CommandLine, journal: str, *, speed: str = SPEED, lost_after: str = "20 s"
+    ) -> None:
         self.journal = journal
         self.router = Router()
         self._m2pem = m2pem
@@ -65,20 +78,26 @@ class World:
         }
         (m2pem.folder / "elsewhere").mkdir()
         self.mission, self.fleet = write(
-            m2pem.folder, self.router.ground, MISSION, lost_after="20 s", rounds=2
+            m2pem.folder, self.router.ground, MISSION, lost_after=lost_after, rounds=2
         )
         text = self.fleet.read_text()
         self.fleet.write_text(text.replace("udpin:", "udpout:") + "on_error: incident\n")
-        words = simulated(self.router.port, SPEED)
+        self._speed = speed
+        words = simulated(self.router.port, speed)
         m2pem.start("-c", COPTER.format(words=words))
 
     def serve(self, *words: str, journal: str = "", elsewhere: bool = False) -> Program:
         """Start an executive; it is on its way, or stands by."""
-        program = self._m2pem.start(
-            "serve", "--fleet", self.fleet, "--speed", SPEED, "--ocu", "none", "--format", "json",
-            "--journal", journal or self.journal, *words,
-            M2PEM_LEASE_S=f"{LEASE_S:g}", **(self._elsewhere if elsewhere else {}),
+        command = (
+            "serve", "--fleet", self.fleet, "--speed", self._speed, "--ocu", "none",
+            "--format", "json", "--journal", journal or self.journal, *words,
         )  # fmt: skip
+        lease = {"M2PEM_LEASE_S": f"{LEASE_S:g}"}
+        if elsewhere:
+            code = ELSEWHERE.format(words=[str(each) for each in command])
+            program = self._m2pem.start("-c", code, **lease, **self._elsewhere)
+        else:
+            program = self._m2pem.start(*command, **lease)
         until_said(program, "standing by for" if words else "serving")
         return program
 
@@ -173,6 +192,29 @@ def test_a_stopped_executive_whose_copter_flies_for_another_one_moves_it_no_more
         assert f"process {standby.process.pid} on" in errors
         assert standby.until_record("RunEnded")["outcome"] == "completed"
         assert stopped not in [sender for sender, _ in world.router.sent[before:]]
+        world.assert_undisturbed()
+    finally:
+        world.close()
+
+
+@pytest.mark.long
+def test_an_executive_that_receives_no_vehicle_leaves_its_copter_to_the_standby_of_another_host(
+    m2pem: CommandLine, postgres_url: str
+) -> None:
+    world = World(m2pem, postgres_url, speed="1", lost_after="5 s")
+    try:
+        owner = world.serve()
+        standby = world.serve("--standby", elsewhere=True)
+        world.fly(owner)
+        (cut_off,) = world.router.senders()
+        world.router.cut_off.add(cut_off)
+        standby.until_record("RunClaimed", epoch=2)
+        status, errors = owner.rest()
+        assert status == 1, errors
+        assert "switchover: no vehicle is received here any more" in errors
+        assert f"process {standby.process.pid} on elsewhere" in errors
+        world.router.cut_off.clear()
+        assert standby.until_record("RunEnded")["outcome"] == "completed"
         world.assert_undisturbed()
     finally:
         world.close()

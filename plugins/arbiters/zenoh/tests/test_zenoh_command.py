@@ -11,6 +11,7 @@ from zenoh_world import free_port
 
 from m2pem import load_fleet
 from m2pem.api import SystemClock
+from m2pem.api.arbiter import BehaviorReport
 from m2pem.errors import PluginError
 from m2pem.executive.fleet_connections import FleetArbiters, FleetConnections
 from m2pem.plugins import PluginManager
@@ -100,7 +101,11 @@ async def test_the_way_to_its_host_adds_to_the_bound_of_a_vehicle(tmp_path: Path
     (tmp_path / "fleet.yaml").write_text(text.replace('7447"]', '7447"], round_trip: 3 s'))
     fleet = load_fleet(tmp_path / "fleet.yaml")
     arbiters = FleetArbiters(fleet, PluginManager(), context(SystemClock()))
-    connections = FleetConnections(arbiters, lambda _: None, lambda _: None)
+
+    async def ignore(_: BehaviorReport) -> None:
+        return
+
+    connections = FleetConnections(arbiters, ignore, lambda _: None)
     try:
         assert connections.lost_after_s(1.0) == {"rover1": 8.0, "rover2": 5.0}
     finally:

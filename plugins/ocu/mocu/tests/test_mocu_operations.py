@@ -88,6 +88,7 @@ NOT_SERVED = {
     "speed": "missions with operators over ROS run in real time",
     "health": "m2pem doctor --running asks it on the executive's machine",
     "standbys": "m2pem doctor --running asks it on the executive's machine",
+    "switch_over": "m2pem switchover asks for it on the executive's machine",
     "journal_file": "a path of the executive's machine",
 }
 

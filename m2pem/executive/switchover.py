@@ -1,0 +1,71 @@
+"""A switchover: an executive leaves its runs, as they are, to the one that stands by, and ends.
+
+An operator asks for it (maintenance of a host). It happens by itself when no vehicle is received
+any more and another host has a standby, which may reach them. The standby takes the runs up as
+those of an executive that was killed; this one commands nothing more before.
+"""
+
+import asyncio
+import logging
+
+from m2pem.api.health import ExecutiveAddress
+from m2pem.errors import JournalError, OperatorError, StaleEpochError
+from m2pem.executive.supervisor import Supervisor
+from m2pem.journal.fleet_server import FleetServer
+from m2pem.journal.standbys import standbys_of
+
+log = logging.getLogger("m2pem.executive")
+
+ANSWERED_WITHIN_S = 1.0
+"""A journal that has not said by then who stands by: lost vehicles count as lost here."""
+
+
+class Switchover:
+    """`left` is set when the runs are left, and this executive must end. `by_operator`: an operator
+    asked for it: nothing need start this executive again."""
+
+    def __init__(self, supervisor: Supervisor, left: asyncio.Event) -> None:
+        self._supervisor = supervisor
+        self._left = left
+        self.by_operator = False
+
+    async def ask(self, by: str) -> ExecutiveAddress:
+        """Leave the runs to a standby, as an operator asks; returns which one stands by.
+
+        Raises:
+            OperatorError: no executive stands by; nothing has changed then.
+            JournalError: the journal cannot say it.
+        """
+        supervisor = self._supervisor
+        standbys = await standbys_of(supervisor.journal, supervisor.fleet.name)
+        if not standbys:
+            raise OperatorError(
+                f"no executive stands by for {supervisor.fleet.name}, and nothing has changed: "
+                "start one with m2pem serve --standby, on the same journal and with the same fleet"
+            )
+        self.by_operator = True
+        return await self._leave(standbys[0], f"{by or 'an operator'} asked for it")
+
+    async def no_vehicle_received(self) -> bool:
+        """No vehicle is received any more. Returns whether the runs were left to another host."""
+        supervisor = self._supervisor
+        if supervisor.journal.lease_s is None or self._left.is_set():
+            return self._left.is_set()  # a journal of this host: so are its standbys
+        try:
+            async with asyncio.timeout(ANSWERED_WITHIN_S):
+                standbys = await standbys_of(supervisor.journal, supervisor.fleet.name)
+        except (JournalError, TimeoutError) as error:
+            log.warning("who stands by is not known: %s", error or "the journal does not answer")
+            return False
+        elsewhere = [each for each in standbys if not each.is_here]
+        if elsewhere:
+            await self._leave(elsewhere[0], "no vehicle is received here any more")
+        return bool(elsewhere)
+
+    async def _leave(self, standby: FleetServer, why: str) -> ExecutiveAddress:
+        log.warning("switchover to %s: %s", standby, why)
+        await self._supervisor.leave_runs(
+            StaleEpochError(f"switchover: {why}; {standby} may drive the runs from now on")
+        )
+        self._left.set()
+        return ExecutiveAddress(standby.host, standby.pid, standby.page)
