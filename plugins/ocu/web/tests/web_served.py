@@ -2,14 +2,14 @@
 
 import os
 import re
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
+
+from tests.preloaded import Process, preloaded
 
 REPOSITORY = Path(__file__).parents[4]
 FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
@@ -22,7 +22,7 @@ _URL = re.compile(r"https?://\S+")
 class Served:
     """An executive with a page. `url`: what it printed, with the token that works once."""
 
-    process: subprocess.Popen[str]
+    process: Process
     url: str
     missions: Path
     printed: list[str]
@@ -50,30 +50,27 @@ def served(
     """Start it, with its missions in `folder`/missions, and end it."""
     missions = folder / "missions"
     missions.mkdir(exist_ok=True)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "m2pem", "serve", "--fleet", str(fleet), "--ocu", "web", *words],
-        cwd=folder,
-        env={
-            **os.environ,
-            "M2PEM_OPERATOR": "anna",
-            "M2PEM_WEB_PORT": "0",
-            "M2PEM_WEB_MISSIONS": str(missions),
-            **(environment or {}),
-        },
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    variables = {
+        **os.environ,
+        "M2PEM_OPERATOR": "anna",
+        "M2PEM_WEB_PORT": "0",
+        "M2PEM_WEB_MISSIONS": str(missions),
+        **(environment or {}),
+    }
+    command = ["serve", "--fleet", str(fleet), "--ocu", "web", *words]
+    output, theirs = os.pipe()
+    with Path(os.devnull).open() as nothing:
+        process = preloaded().start(command, folder, variables, (nothing.fileno(), theirs, theirs))
+    os.close(theirs)
     printed: list[str] = []
     said = threading.Event()
 
     def read() -> None:
-        assert process.stdout is not None
-        for line in process.stdout:
-            printed.append(line)
-            if _URL.search(line):
-                said.set()
+        with os.fdopen(output) as lines:
+            for line in lines:
+                printed.append(line)
+                if _URL.search(line):
+                    said.set()
         said.set()
 
     reading = threading.Thread(target=read, daemon=True)
