@@ -7,8 +7,8 @@ process (`formKey="camunda-forms:bpmn:ID"`), or in a file of its own (`formId`).
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from html import escape  # xml.sax.saxutils would import urllib.request
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 
@@ -72,7 +72,9 @@ def form_remedy(definition: etree._Element) -> str:
         texts = [_text(each, "text") for each in fields if each.get("type") == "text"]
         text = shorten(texts[0].strip("# \n")) if texts else ""
         said.append(
-            f"write <m2pem:prompt>{escape(text)}</m2pem:prompt>" if text else f"write {EXAMPLE}"
+            f"write <m2pem:prompt>{escape(text, quote=False)}</m2pem:prompt>"
+            if text
+            else f"write {EXAMPLE}"
         )
     if typed:
         names = ", ".join(f"'{shorten(each)}'" for each in typed)
@@ -123,13 +125,13 @@ def _question(field: dict[str, Any]) -> _Question | None:
 
 def _written(question: _Question) -> str:
     answers = "".join(
-        f"<m2pem:decision value={quoteattr(shorten(value))} label={quoteattr(shorten(label))}/>"
+        f'<m2pem:decision value="{escape(shorten(value))}" label="{escape(shorten(label))}"/>'
         for value, label in question.answers[:_MOST_ANSWERS]
     )
     more = " ..." if len(question.answers) > _MOST_ANSWERS else ""
-    text = escape(shorten(question.label or question.key))
-    store = quoteattr(shorten(question.key))
-    return f"<m2pem:prompt store={store}>{text}</m2pem:prompt>{answers}{more}"
+    text = escape(shorten(question.label or question.key), quote=False)
+    store = escape(shorten(question.key))
+    return f'<m2pem:prompt store="{store}">{text}</m2pem:prompt>{answers}{more}'
 
 
 def _text(field: dict[str, Any], key: str) -> str:
