@@ -195,26 +195,28 @@ format: setup ## put the code into shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-# Tests wait a third of their time: one more than there are processors keeps these busy.
-WORKERS := 3
+# Tests wait a third of their time: two workers for each processor keep these busy.
+WORKERS := 4
 UNITS := $(addprefix tests/,api bpmn control_socket deconfliction diagram editing engine executive fleet geo journal \
   mission rehearsal scripting services simulation teams telemetry)
 
 check: lint ## check style, types, layers and the core's unit tests: two minutes
 	@$(BIN)/pytest -n 2 -m "not long" $(UNITS)
 
+# What the tests leave of the processors, the others use; each of these is printed when it has ended.
+ASIDE := lint bench-quick page-test test-ros
+
 test: setup ## check all but the long tests
-	@$(MAKE) --silent --jobs 3 --output-sync=target lint bench-quick page-test
-	@$(MAKE) --silent --jobs 2 test-core test-ros-aside
+	@$(MAKE) --silent --jobs 5 $(ASIDE:%=%-aside) test-core
 
-.PHONY: test-core test-ros-aside
+.PHONY: test-core $(ASIDE:%=%-aside)
 
+# The tests of ROS have the processor first: DDS drops what comes too late.
 test-core:
-	@$(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not long"
+	@nice -n 5 $(BIN)/pytest -n $(WORKERS) --dist worksteal -m "not long"
 
-# The tests of ROS wait more than they compute: they run beside the others, and are told of when they are through.
-test-ros-aside:
-	@status=0; printed=$$($(MAKE) --silent test-ros 2>&1) || status=$$?; echo "$$printed"; exit $$status
+$(ASIDE:%=%-aside): %-aside:
+	@status=0; printed=$$($(MAKE) --silent $* ROS_WORKERS=2 2>&1) || status=$$?; echo "$$printed"; exit $$status
 
 # The unit tests of the page's own code.
 page-test: setup
