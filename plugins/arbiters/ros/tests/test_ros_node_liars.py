@@ -1,5 +1,6 @@
 """Nodes on vehicles that break the rules: the driver tells what is true, once, and goes on."""
 
+import asyncio
 import logging
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 from m2pem_plugin_ros.settings import Via
 from m2pem_plugin_ros.testing import Peer, reserved_domain
-from ros_node_bench import FAILED, REJECTED, SUCCEEDED, Bench, bench
+from ros_node_bench import AMPLE_S, FAILED, REJECTED, SUCCEEDED, Bench, bench
 
 LIARS = Path(__file__).with_name("ros_lying_peer.py")
 
@@ -89,8 +90,8 @@ async def test_holding_what_never_says_it_is_held_ends_some_time(domain: int) ->
         await one.alive()
         one.driver.hold()
         await one.until(lambda: commands >= 15)
-        events = 0
-        while events != commands:
-            events = commands
-            assert events <= 20
-            await one.clock.sleep(20.0)
+        before = 0
+        async with asyncio.timeout(AMPLE_S):  # those while the node is silent do not count
+            while before != commands:
+                before = commands
+                await one.clock.sleep(20.0)
