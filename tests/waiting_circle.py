@@ -23,8 +23,11 @@ routes: {north: north.geojson}
 """
 
 
-def holding_and_waiting(holds: str, needs: str) -> bytes:
-    """A run that drives one vehicle by hand until, after signal `GO`, it has got another one.
+def holding_and_waiting(
+    holds: str, needs: str, behavior: str = "teleop", parameters: str = ""
+) -> bytes:
+    """A run that drives one vehicle by hand, or does another behavior with it that does not end,
+    until, after signal `GO`, it has got another one.
 
     Its elements: Hold, Wait, Need. When Need is done, the run ends at T.
     """
@@ -35,7 +38,7 @@ def holding_and_waiting(holds: str, needs: str) -> bytes:
     return mission(
         f'<signal id="{GO}"/><process id="P" isExecutable="true"><startEvent id="S"/>'
         f"<parallelGateway id='F'/>{catch}"
-        + task("Hold", f"vehicle='{holds}'", "teleop")
+        + task("Hold", f"vehicle='{holds}'", behavior, parameters)
         + task("Need", f"vehicle='{needs}' wait='unlimited'")
         + '<endEvent id="T"><terminateEventDefinition/></endEvent>'
         f"{flow('S', 'F')}{flow('F', 'Hold')}{flow('F', 'Wait')}{flow('Wait', 'Need')}"

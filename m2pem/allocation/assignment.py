@@ -114,22 +114,27 @@ def load_solver() -> None:
 
 
 def assign(
-    requests: Sequence[Request], order: Mapping[ResourceId, int]
+    requests: Sequence[Request],
+    order: Mapping[ResourceId, int],
+    kept: dict[ResourceId, str] | None = None,
 ) -> dict[str, dict[str, tuple[ResourceId, ...]]]:
     """Return by request and role what fills it; a request that must wait is left out.
 
-    `requests`: the first comes first. `order`: the place of each resource in the fleet.
+    `requests`: the first comes first. `order`: the place of each resource in the fleet. `kept` gets
+    the free resources that are kept from later requests, with the request that waits.
     """
     matching = _Matching()
     served: list[Request] = []
-    kept: set[ResourceId] = set()
+    kept = {} if kept is None else kept
     for request in requests:
         if matching.add(list(_slots(request, kept if request.in_turn else ()))):
             served.append(request)
             continue
-        kept.update(request.keeps)
+        keeps = [*request.keeps]
         if request.waits:
-            kept.update(_kept_for(request, kept, matching))
+            keeps += _kept_for(request, {*kept, *keeps}, matching)
+        for each in keeps:
+            kept.setdefault(each, request.id)
     for request in served:
         for role in request.roles:
             options = _without(role.costs_s, kept)

@@ -1,68 +1,68 @@
-"""Circles of waiting: runs of which none can go on, because each waits for what another one holds.
+"""Circles of waiting: requests of which none can be met, because each waits for what is not free
+until another one is met.
 
-A run in a circle has nothing else to do: no question, service, timer or message is open, and its
-behaviors end only when the run goes on. An operator has to end one of them.
+What a run has is free by then if the run has nothing else to do: no question, service, timer or
+message is open, and its behaviors end only when the run goes on. What is kept for a request is free
+when that one is met. An operator has to end one of them.
 """
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+Until = frozenset[str]
+"""The requests of which one must be met until something is free; none: it becomes free by itself,
+is lost, or is with an operator."""
+
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A request that waits. `needed`: by each role, how many more resources it needs than are free,
-    and how many each run holds for as long as it does not go on; None stands for holders that will
-    release their resources by themselves, and for resources that are lost or with an operator."""
+    """A request that waits. `needed`: of each thing that it lacks, how many more than are free, and
+    how many are not free until one of some requests is met."""
 
     request: str
-    run: str
-    needed: tuple[tuple[int, Mapping[str | None, int]], ...]
+    needed: tuple[tuple[int, Mapping[Until, int]], ...]
 
     def can_be_met(self, stuck: Collection[str]) -> bool:
-        """Whether its roles can be filled though some runs hold what they have for ever."""
+        """Whether it gets all that it lacks though some requests are never met."""
         return all(
-            sum(n for holder, n in holders.items() if holder is None or holder not in stuck)
-            >= count
-            for count, holders in self.needed
+            sum(n for until, n in held.items() if not until or not until.issubset(stuck)) >= count
+            for count, held in self.needed
         )
+
+    def waits_for(self) -> set[str]:
+        """Return the requests on which it depends."""
+        return {request for _, held in self.needed for until in held for request in until}
 
 
 def circles(waiting: Sequence[Waiting]) -> list[frozenset[str]]:
-    """Return the sets of runs that wait for each other for ever.
+    """Return the sets of requests that wait for each other for ever."""
+    stuck = {each.request: each for each in waiting}
+    while met := [each.request for each in stuck.values() if each.can_be_met(stuck)]:
+        for request in met:
+            del stuck[request]
+    before = {request: each.waits_for() & stuck.keys() for request, each in stuck.items()}
+    # What waits for a circle is not in it, nor is what waits for more than there is.
+    while True:
+        awaited = set[str]().union(*before.values())
+        off = {each for each, others in before.items() if not others or each not in awaited}
+        if not off:
+            return _connected(before)
+        before = {each: others - off for each, others in before.items() if each not in off}
 
-    `waiting`: the requests of runs that nothing but these requests can make go on.
-    """
-    asked: dict[str, list[Waiting]] = {}
-    for each in waiting:
-        asked.setdefault(each.run, []).append(each)
-    stuck = set(asked)
-    while goes_on := {run for run in stuck if any(each.can_be_met(stuck) for each in asked[run])}:
-        stuck -= goes_on
-    return _connected(stuck, asked)
 
-
-def _connected(stuck: set[str], asked: Mapping[str, Sequence[Waiting]]) -> list[frozenset[str]]:
-    """Return the stuck runs in groups that wait for each other, directly or not."""
-    left, found = set(stuck), []
-    while left:
-        group, queue = set[str](), [min(left)]
-        for run in queue:
-            if run in group:
-                continue
-            group.add(run)
-            holders = {
-                holder
-                for each in asked[run]
-                for _, runs in each.needed
-                for holder in runs
-                if holder in stuck
-            }
-            queue += [holder for holder in holders if holder is not None]
-            queue += [other for other in left - group if _waits_for(asked[other], run)]
+def _connected(before: Mapping[str, Collection[str]]) -> list[frozenset[str]]:
+    """Return the requests in groups that wait for each other, directly or not. `before`: by each,
+    those on which it depends."""
+    neighbours: dict[str, set[str]] = {request: set() for request in before}
+    for request, others in before.items():
+        for other in others:
+            neighbours[request].add(other)
+            neighbours[other].add(request)
+    found = []
+    while neighbours:
+        group = queue = {next(iter(neighbours))}
+        while queue:
+            queue = set[str]().union(*(neighbours.pop(each) for each in queue)) - group
+            group = group | queue
         found.append(frozenset(group))
-        left -= group
     return found
-
-
-def _waits_for(requests: Sequence[Waiting], run: str) -> bool:
-    return any(run in holders for each in requests for _, holders in each.needed)

@@ -207,7 +207,7 @@ class Allocator:
             )
             for each in waiting
         }
-        chosen, without_space = self._assign(waiting, requests)
+        chosen, without_space, kept = self._assign(waiting, requests)
         refusals = {
             number: _foremost(list(found.values()))
             for number, found in without_space.items()
@@ -252,22 +252,30 @@ class Allocator:
             if roles not in of_queues:
                 of_queues[roles] = self._lack(each, given)
             self._refuse(each, of_queues[roles], given)
-        self._circles.look(list(merge(left, behind, key=_place)), refusals)
+        reasons = {
+            number: [each, *without_space.get(number, {}).values()]
+            for number, each in refusals.items()
+        }
+        self._circles.look(list(merge(left, behind, key=_place)), reasons, kept)
 
     def _assign(
         self, waiting: Sequence[ConsideredRequest], requests: dict[str, Request]
     ) -> tuple[
-        dict[str, dict[str, tuple[ResourceId, ...]]], "dict[str, dict[ResourceId, Refusal]]"
+        dict[str, dict[str, tuple[ResourceId, ...]]],
+        "dict[str, dict[ResourceId, Refusal]]",
+        dict[ResourceId, str],
     ]:
         """Choose for all requests that can be served, in their order. What is chosen has its space:
         it is chosen again without a vehicle that has not.
 
-        Returns what is chosen, and by request why vehicles have no space for it, the best first.
+        Returns what is chosen; by request why vehicles have no space for it, the best first; and
+        what is kept from later ones, with the request that waits.
         """
         space = self._space
-        chosen = assign(list(requests.values()), self._queue.order)
+        kept: dict[ResourceId, str] = {}
+        chosen = assign(list(requests.values()), self._queue.order, kept)
         if space is None:
-            return chosen, {}
+            return chosen, {}, kept
         refusals: dict[str, dict[ResourceId, Refusal]] = {}
         space.begin()
         while True:
@@ -286,8 +294,9 @@ class Allocator:
             else:
                 for number in chosen:
                     space.commit(number)
-                return chosen, refusals
-            chosen = assign(list(requests.values()), self._queue.order)
+                return chosen, refusals, kept
+            kept.clear()
+            chosen = assign(list(requests.values()), self._queue.order, kept)
 
     def _without_space(
         self, each: ConsideredRequest, chosen: Mapping[str, tuple[ResourceId, ...]]

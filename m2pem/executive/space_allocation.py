@@ -1,4 +1,4 @@
-"""Reserves space for what the allocator chooses, and finds tasks that wait for each other's space.
+"""Reserves space for what the allocator chooses.
 
 A task that waits for space holds none. Later tasks get nothing that it needs, neither the space nor
 its vehicles, as long as behaviors that will end are in its way: so it is not overtaken for ever. A
@@ -6,14 +6,10 @@ vehicle at rest in its way, or that is lost, may stay there: what the task needs
 others.
 """
 
-import re
-from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from m2pem.allocation.circles import Waiting, circles
 from m2pem.api.arbiter import BehaviorId, BehaviorRequest
-from m2pem.engine.state import AllocationRequest
 from m2pem.executive.separation import VehicleSeparation
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
 
@@ -128,53 +124,3 @@ def holders_of(refusal: "Refusal") -> dict[str, str]:
     if not refusal.space:
         return {each.vehicle: each.behavior or each.vehicle for each in refusal.blockers}
     return {refusal.space: ", ".join(each.behavior or each.vehicle for each in refusal.blockers)}
-
-
-def space_circles(
-    refusals: Mapping[str, "Refusal"], vehicles: Mapping[str, Collection[ResourceId]]
-) -> list[frozenset[str]]:
-    """Return the sets of requests that wait for each other's vehicles to leave.
-
-    `refusals`: of the requests that wait for space. `vehicles`: by all requests that wait, those
-    that they name: a vehicle at rest is moved by the request that waits for it.
-    """
-
-    def holder(request: str, blocker: "Occupant") -> str | None:
-        if blocker.behavior or blocker.lost:
-            return blocker.behavior if blocker.behavior in refusals else None
-        movers = (other for other, named in vehicles.items() if blocker.vehicle in named)
-        return next((other for other in movers if other != request), None)
-
-    return circles(
-        [
-            Waiting(
-                request,
-                request,
-                ((refusal.lacking, Counter(holder(request, each) for each in refusal.blockers)),),
-            )
-            for request, refusal in refusals.items()
-            if refusal.wait_s is not None
-        ]
-    )
-
-
-def space_circle_text(
-    circle: Mapping[str, AllocationRequest],
-    refusals: Mapping[str, "Refusal"],
-    who: Callable[[str], str],
-) -> str:
-    """Say which tasks wait for each other, for what, and the way out. `who`: returns what the id of
-    a behavior or request means, in words."""
-    said: list[str] = []
-    for number, request in circle.items():
-        reason = refusals[number].reason
-        ids = {blocker.behavior for blocker in refusals[number].blockers if blocker.behavior}
-        if ids:
-            any_of_them = rf"\b({'|'.join(map(re.escape, sorted(ids)))})\b"
-            reason = re.sub(any_of_them, lambda found: who(found[0]), reason)
-        said.append(f"{who(request.id)}: {reason}")
-    first = next(iter(circle))
-    return (
-        f"{'; '.join(said)}: none of them can go on by itself. Stop one of the runs, or take "
-        f"{refusals[first].vehicle}, drive it out of the way and give it back"
-    )

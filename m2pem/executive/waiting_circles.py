@@ -1,23 +1,30 @@
-"""Circles of runs and tasks that wait for each other: found when they close, said to operators."""
+"""Circles of tasks that wait for each other: found when they close, said to operators.
 
+A task waits for a vehicle or payload that a run has or keeps, or that is kept for another task; or
+for space where a vehicle is.
+"""
+
+import re
 from collections import Counter
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from m2pem.allocation.circles import Waiting, circles
+from m2pem.allocation.circles import Until, Waiting, circles
 from m2pem.allocation.needs import ConsideredRole
 from m2pem.api.runs import Alert, RunId
-from m2pem.engine.state import BehaviorPhase
+from m2pem.engine.state import Behavior, BehaviorPhase
 from m2pem.executive.allocation_requests import ConsideredRequest
 from m2pem.executive.runner import Runner
-from m2pem.executive.space_allocation import space_circle_text, space_circles
 from m2pem.executive.waiting_tasks import holder_label
 from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import ResourceId
 
 if TYPE_CHECKING:
     from m2pem.deconfliction.conflicts import Refusal
+
+BY_ITSELF = Until()
 
 
 class WaitingCircles:
@@ -37,47 +44,37 @@ class WaitingCircles:
     def look(
         self,
         left: Sequence[ConsideredRequest],
-        refusals: Mapping[str, "Refusal"],
+        refusals: "Mapping[str, Sequence[Refusal]]",
+        kept: Mapping[ResourceId, str],
     ) -> None:
-        """Warn operators of runs and tasks that wait for each other, once for each circle.
+        """Warn operators of tasks that wait for each other, once for each circle.
 
-        `left`: all that waits. `refusals`: why some of it has no space; the rest waits for
-        resources.
+        `left`: all that waits, in its order. `refusals`: of what waits for space, why its vehicles
+        have none, the one that it would go with first; the rest waits for resources. `kept`: what
+        is free and kept from later tasks, and for which request.
         """
-        waiting = [each for each in left if each.request.id not in refusals]
-        requests = {each.request.id: each for each in left} if refusals else {}
-        vehicles = {number: each.named_vehicles for number, each in requests.items()}
-        certain = {  # a task that may get another vehicle need not wait for ever
-            number: refusal
-            for number, refusal in refusals.items()
-            if all(role.named for role in requests[number].roles)
+        waiting = {
+            each.request.id: each
+            for each in left
+            if not each.asked.chosen  # else vehicles are taken from other runs for it
+            and (each.request.id in refusals or (each.waits and not each.request.deadline))
         }
-        in_space = space_circles(certain, vehicles)
-        for circle in in_space:
-            if circle not in self._known:
-                asking = {number: requests[number].request for number in sorted(circle)}
-                text = space_circle_text(asking, refusals, self._who)
-                for run in sorted({requests[number].asked.runner.id for number in circle}):
-                    self._publish(Alert(run, "WAITING_CIRCLE", text))
-        runners = {each.asked.runner.id: each.asked.runner for each in waiting if each.waits}
-        idle = {run: runner for run, runner in runners.items() if self._is_idle(runner)}
-        found = circles(_asked(waiting, idle))
+        runners = {each.asked.runner.id: each.asked.runner for each in waiting.values()}
+        idle = [each for each in runners.values() if self._is_idle(each, refusals)]
+        needs = _Needs(waiting, idle, refusals, kept)
+        found = circles([Waiting(number, needs.of(each)) for number, each in waiting.items()])
         for circle in found:
             if circle not in self._known:
-                text = self._text([each for each in waiting if each.asked.runner.id in circle])
-                for run in sorted(circle):
+                asking = [each for number, each in waiting.items() if number in circle]
+                lacks = "; ".join(self._lacks(each, needs) for each in asking)
+                text = f"{lacks}: {_advice(asking, needs)}"
+                for run in sorted({each.asked.runner.id for each in asking}):
                     self._publish(Alert(run, "WAITING_CIRCLE", text))
-        self._known = {*found, *in_space}
+        self._known = set(found)
 
-    def _goes_on(self, holder: str) -> bool:
-        """Whether a behavior ends only when its run ends it, as what a run keeps does."""
-        runner = self._runners.get(holder.partition(".")[0])
-        if runner is None:
-            return False
-        if any(each.id == holder for each in runner.run.state.kept.values()):
-            return True
-        known = runner.run.state.behaviors.get(holder)
-        if known is None or known.phase is not BehaviorPhase.ACTIVE:
+    def _goes_on(self, known: Behavior) -> bool:
+        """Whether a behavior ends only when its run ends it."""
+        if known.phase is not BehaviorPhase.ACTIVE:
             return False
         if not ENDING_PARAMETERS.isdisjoint(known.parameters):
             return False
@@ -85,64 +82,151 @@ class WaitingCircles:
         spec = self._graph.spec(known.resources[0], known.name, kind)
         return spec is not None and not spec.ends
 
-    def _is_idle(self, runner: Runner) -> bool:
-        """Whether a run can go on only by getting what it asked for."""
+    def _is_idle(self, runner: Runner, in_space: Collection[str]) -> bool:
+        """Whether a run can go on only by getting what it asked for. `in_space`: the requests that
+        wait for space, which they do for a while."""
         state = runner.run.state
-        limits = {request.deadline for request in state.allocations.values()}
-        if limits != {0} or state.prompts or state.services or state.waits or state.incidents:
+        limits = {e.deadline for number, e in state.allocations.items() if number in in_space}
+        others = [e.deadline for number, e in state.allocations.items() if number not in in_space]
+        if any(others) or state.prompts or state.services or state.incidents:
             return False
-        return all(self._goes_on(behavior) for behavior in state.behaviors)
+        return state.waits.keys() <= limits and all(map(self._goes_on, state.behaviors.values()))
 
     def _who(self, holder: str) -> str:
         """Return what holds something in words: its task, run and mission."""
         return holder_label(self._runners, holder, mission=True) or holder
 
-    def _text(self, waiting: Sequence[ConsideredRequest]) -> str:
-        said = [
-            f"{self._who(each.request.id)} waits for "
-            + ", ".join(
-                f"{resource} (held by {self._who(role.occupied[resource].holder)})"
-                for role in each.roles
-                for resource in role.options.busy
+    def _lacks(self, each: ConsideredRequest, needs: "_Needs") -> str:
+        """Say which task waits for what, and who has it."""
+        who = self._who(each.request.id)
+        if refusal := needs.refusal(each):
+            ids = {blocker.behavior for blocker in refusal.blockers if blocker.behavior}
+            words = re.compile(rf"\b({'|'.join(map(re.escape, sorted(ids)))})\b")
+            said = words.sub(lambda found: self._who(found[0]), refusal.reason)
+            return f"{who}: {said if ids else refusal.reason}"
+        has = [
+            f"{resource} ({how} {self._who(by)})"
+            for role in each.roles
+            for how, found in (
+                ("held by", {e: role.occupied[e].holder for e in role.options.busy}),
+                ("kept for", needs.kept_from(each, role)),
             )
-            for each in waiting
+            for resource, by in found.items()
         ]
-        runs = [each.asked.runner.id for each in waiting]
-        return (
-            f"{'; '.join(said)}: none of them can go on by itself. Stop one of them (`m2pem stop "
-            f"{runs[-1]}`), or take what it has and give it back"
-        )
+        return f"{who} waits for {', '.join(has)}"
 
 
-def _asked(waiting: Sequence[ConsideredRequest], idle: Mapping[RunId, Runner]) -> list[Waiting]:
-    """Return the requests of runs that can go on only by getting what they asked for.
+class _Needs:
+    """What requests lack, and who has it. `waiting`: by their ids. `idle`: the runs that can go on
+    only by getting what they asked for; what others have becomes free by itself."""
 
-    `idle`: these runs. What others have becomes free by itself.
-    """
-    idle_holders = {
-        holder: run
-        for run, runner in idle.items()
-        for holder in (
-            *runner.run.state.behaviors,
-            *(kept.id for kept in runner.run.state.kept.values()),
-        )
-    }
-    known: dict[int, Counter[str | None]] = {}
+    def __init__(
+        self,
+        waiting: Mapping[str, ConsideredRequest],
+        idle: Sequence[Runner],
+        refusals: "Mapping[str, Sequence[Refusal]]",
+        kept: Mapping[ResourceId, str],
+    ) -> None:
+        self._refusals = refusals
+        self._kept = kept
+        self._order = {number: place for place, number in enumerate(waiting)}
+        self._holders: dict[str, Until] = {}
+        self._at_rest: dict[str, Until] = {}
+        for runner in idle:
+            state = runner.run.state
+            until = Until(state.allocations)
+            self._holders |= dict.fromkeys(state.behaviors, until)
+            self._holders |= {each.id: until for each in state.kept.values()}
+            self._at_rest |= dict.fromkeys(state.kept, until)
+        self._movers: dict[str, list[str]] = {}
+        if refusals:  # a vehicle at rest is moved by the task that waits for it
+            for number, each in waiting.items():
+                for vehicle in each.named_vehicles:
+                    self._movers.setdefault(vehicle, []).append(number)
+        self._known: dict[int, Counter[Until]] = {}
 
-    def needed(role: ConsideredRole, lost: Container[str]) -> tuple[int, Mapping[str | None, int]]:
-        """How many it lacks, and how many each run has. What the task has lost may return by
-        itself; it shares its candidates with no other task."""
-        found = role.candidacy
-        if id(found) not in known:
-            known[id(found)] = Counter(
-                None if each in lost else idle_holders.get(found.occupied[each].holder)
-                for each in found.resources
-                if each in lost or (each in found.occupied and each not in found.excluded)
+    def refusal(self, each: ConsideredRequest) -> "Refusal | None":
+        """Return why a request has no space; None: it waits for resources."""
+        found = self._refusals.get(each.request.id)
+        return found[0] if found else None
+
+    def in_way(self, each: ConsideredRequest) -> list[ResourceId]:
+        """Return the vehicles that a request waits for to leave."""
+        refusal = self.refusal(each)
+        blockers = refusal.blockers if refusal else ()
+        return [blocker.vehicle for blocker in blockers if blocker.behavior not in self._refusals]
+
+    def kept_from(self, each: ConsideredRequest, role: ConsideredRole) -> dict[ResourceId, str]:
+        """Return what is free for a role, but kept for requests that come first."""
+        if not each.in_turn:
+            return {}
+        number, last = each.request.id, len(self._order)
+        place = self._order[number]
+        return {
+            resource: by
+            for resource, by in self._kept.items()
+            if self._order.get(by, last) < place and resource in role.options.costs_s
+        }
+
+    def of(self, each: ConsideredRequest) -> tuple[tuple[int, Mapping[Until, int]], ...]:
+        """Return what a request lacks, as `Waiting` has it."""
+        lacks = [self._lacks(each, role) for role in each.roles]
+        number, refusal = each.request.id, self.refusal(each)
+        if refusal is None:
+            return tuple((count, held) for count, held in lacks if count > 0)
+        if refusal.wait_s is None:
+            return ()  # it is refused
+        if all(role.named for role in each.roles):
+            return ((refusal.lacking, Counter(self._leave(number, refusal))),)
+        # It may also go with others: it is taken to need one of all that is in their way.
+        held = sum((more for _, more in lacks), Counter[Until]())
+        for other in self._refusals[number]:
+            held.update(self._leave(number, other))
+        return ((min(1, refusal.lacking), held),)
+
+    def _lacks(self, each: ConsideredRequest, role: ConsideredRole) -> tuple[int, Counter[Until]]:
+        """Return how many more a role needs than are free, and who has how many. What its task has
+        lost may return by itself; it shares its candidates with no other task."""
+        found, lost = role.candidacy, each.task.lost
+        if id(found) not in self._known:
+            self._known[id(found)] = Counter(
+                BY_ITSELF
+                if one in lost
+                else self._holders.get(found.occupied[one].holder, BY_ITSELF)
+                for one in found.resources
+                if one in lost or (one in found.occupied and one not in found.excluded)
             )
-        return max(0, role.options.least - len(role.options.costs_s)), known[id(found)]
+        held, options = self._known[id(found)], role.options
+        kept = self.kept_from(each, role)
+        if kept:
+            held = held + Counter(Until({by}) for by in kept.values())
+        return options.least - len(options.costs_s) + len(kept), held
 
-    return [
-        Waiting(each.request.id, run, tuple(needed(role, each.task.lost) for role in each.roles))
-        for each in waiting
-        if (run := each.asked.runner.id) in idle
+    def _leave(self, number: str, refusal: "Refusal") -> Iterator[Until]:
+        """Return when each of those goes that are in the way of a request."""
+        for blocker in refusal.blockers:
+            if blocker.lost:
+                yield BY_ITSELF
+            elif blocker.behavior in self._refusals:
+                yield Until({blocker.behavior})
+            elif blocker.behavior:
+                yield self._holders.get(blocker.behavior, BY_ITSELF)
+            else:
+                movers = (each for each in self._movers.get(blocker.vehicle, ()) if each != number)
+                mover = next(movers, None)
+                rests = self._at_rest.get(blocker.vehicle, BY_ITSELF)
+                yield rests if mover is None else Until({mover})
+
+
+def _advice(asking: Sequence[ConsideredRequest], needs: _Needs) -> str:
+    """Say what operators can do. The vehicle of a run that is stopped stays where it is: that helps
+    if it is in no other one's way."""
+    in_way = [vehicle for each in asking for vehicle in needs.in_way(each)]
+    runs = [
+        each.asked.runner.id
+        for each in asking
+        if not in_way or ((refusal := needs.refusal(each)) and refusal.vehicle not in in_way)
     ]
+    out = f"take {in_way[0]}, drive it out of the way" if in_way else "take what it has"
+    way = f"stop one of them (`m2pem stop {runs[-1]}`), or {out}" if runs else out
+    return f"none of them can go on by itself. {way[0].upper()}{way[1:]} and give it back"
