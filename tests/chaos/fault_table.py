@@ -175,7 +175,7 @@ _STORAGE = (
     "::test_a_fault_during_a_run_holds_its_vehicles_and_stop_reaches_them"
 )
 _STANDBY = "plugins/arbiters/mavlink/tests/test_mavlink_standby.py"
-_HOSTS = "plugins/arbiters/zenoh/tests/test_zenoh_three_hosts.py"
+_HOSTS = "plugins/arbiters/ros/tests/test_ros_three_hosts.py"
 _REPLACED = (
     f"{_ROUNDS}::test_an_executive_that_goes_on_after_a_standby_has_taken_over_moves_nothing"
 )

@@ -1,6 +1,6 @@
 """A simulated MAVLink copter, which a host of its own commands over UDP on its loopback.
 
-    python zenoh_copter_process.py PORT
+    python ros_hosts_copter.py PORT
 
 It answers each line at its standard input with what it has physically begun: takeoffs, motions and
 missions; and its speed in m/s.
