@@ -123,6 +123,12 @@ class CommandLine:
         self._started.append(Program(process, process.stdin, process.stdout, process.stderr))
         return self._started[-1]
 
+    def start_on(self, inside: Sequence[str], *words: str | Path) -> Program:
+        """Start it after the words that lead to another host (`bench.network`); none: to this."""
+        if not inside:
+            return self.start(*words)
+        return self.start_other(*inside, sys.executable, "-m", "m2pem", *words)
+
     def run(self, *words: str | Path, **environment: str) -> tuple[int, str, str]:
         """Run it to its end with no input: exit status, standard output, standard error."""
         with (

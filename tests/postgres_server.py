@@ -1,7 +1,8 @@
 """A PostgreSQL server of the tests' own, in a temporary folder: the fixtures `postgres`, and
 `postgres_url`, an empty database of it.
 
-It answers on a Unix socket alone. The server refuses to run as root: root runs it as `postgres`.
+It answers on a Unix socket alone, or also on a host of its own (`bench.network`), and its clock may
+be set wrong. The server refuses to run as root: root runs it as `postgres`.
 """
 
 import atexit
@@ -11,7 +12,8 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -20,6 +22,8 @@ from pathlib import Path
 
 import psycopg
 import pytest
+
+from tests.faults import Faults, library
 
 ROLE = "m2pem"
 
@@ -35,31 +39,58 @@ def _programs() -> Path | None:
 class PostgresServer:
     """A server that runs until `remove`. The role `m2pem` may log in, and owns each database.
 
-    `primary`: whose standby it is, until it is promoted.
+    `primary`: whose standby it is, until it is promoted. `ahead_s`: how far its clock is ahead.
+    `inside`: the words before a command that is to run on its host; `address`: of that host.
     """
 
-    def __init__(self, programs: Path, primary: "PostgresServer | None" = None) -> None:
+    def __init__(
+        self,
+        programs: Path,
+        primary: "PostgresServer | None" = None,
+        *,
+        ahead_s: int = 0,
+        inside: Sequence[str] = (),
+        address: str = "",
+    ) -> None:
         self.programs = programs
         self._numbers = count(1)
+        self._inside, self._address = inside, address
         self.folder = Path(tempfile.mkdtemp(prefix="m2pem-pg-"))
         if os.geteuid() == 0:
             user = pwd.getpwnam("postgres")
             os.chown(self.folder, user.pw_uid, user.pw_gid)
         self.folder.chmod(0o755)
         self._data = self.folder / "data"
+        self._variables: dict[str, str] = {}
+        if ahead_s:
+            clock = Faults(self.folder)
+            clock.set(f"clock {time.CLOCK_REALTIME} {ahead_s}")
+            self._variables = {"LD_PRELOAD": str(library()), **clock.variables}
         if primary is not None:
-            self._run("pg_basebackup", "-D", self._data, "-h", primary.folder, "-U", "postgres",
+            self._run("pg_basebackup", "-D", self._data, "-U", "postgres",
+                      "-h", primary.host,
                       "--write-recovery-conf", "--checkpoint=fast", "--no-sync")  # fmt: skip
             self.start()
             return
         self._run("initdb", "-D", self._data, "-U", "postgres", "-A", "trust", "--no-sync",
                   "-E", "UTF8", "--locale=C")  # fmt: skip
+        if address:
+            with (self._data / "pg_hba.conf").open("a") as rules:
+                rules.write("host all,replication all samenet trust\n")
         self.start()
         self.execute(f"CREATE ROLE {ROLE} LOGIN")
 
+    @property
+    def host(self) -> str:
+        """Where it is, as libpq takes it."""
+        return self._address or str(self.folder)
+
     def start(self) -> None:
         """Start it; returns when it answers."""
-        options = f"-k {self.folder} -c listen_addresses= -c fsync=off -c max_connections=200"
+        options = (
+            f"-k {self.folder} -c listen_addresses={self._address} -c fsync=off"
+            " -c max_connections=200"
+        )
         self._run("pg_ctl", "-D", self._data, "-o", options, "-l", self.folder / "log", "-w",
                   "start")  # fmt: skip
 
@@ -106,6 +137,11 @@ class PostgresServer:
     def _run(self, program: str, *arguments: object) -> None:
         words = [str(self.programs / program), *map(str, arguments)]
         user = pwd.getpwnam("postgres") if os.geteuid() == 0 else None
+        if self._inside:  # for which root is needed: nsenter becomes the user
+            assert user is not None
+            ids = ("--setuid", str(user.pw_uid), "--setgid", str(user.pw_gid), "--")
+            words = [*self._inside[:-1], *ids, *words]
+            user = None
         with (self.folder / "output").open("ab") as output:
             code = subprocess.run(
                 words,
@@ -116,6 +152,7 @@ class PostgresServer:
                 user=user and user.pw_uid,
                 group=user and user.pw_gid,
                 extra_groups=user and os.getgrouplist("postgres", user.pw_gid),
+                env={**os.environ, **self._variables},
             ).returncode
         assert code == 0, (self.folder / "output").read_text()
 
@@ -156,17 +193,22 @@ class Replicated:
         self.standby.promote()
 
 
+def replicate(primary: PostgresServer, standby: PostgresServer) -> Replicated:
+    """Let a server wait for its standby with each commit; makes a database without tables."""
+    url = primary.new_database().replace(str(primary.folder), f"{primary.host},{standby.host}")
+    primary.execute("ALTER SYSTEM SET synchronous_standby_names = '*'")
+    primary.execute("ALTER SYSTEM SET synchronous_commit = 'remote_apply'")
+    primary.execute("SELECT pg_reload_conf()")
+    return Replicated(primary, standby, url)
+
+
 @pytest.fixture
 def replicated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Replicated]:
     """A database without tables, on two servers."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     primary = start_server()
-    url = primary.new_database()
     standby = PostgresServer(primary.programs, primary)
-    primary.execute("ALTER SYSTEM SET synchronous_standby_names = '*'")
-    primary.execute("ALTER SYSTEM SET synchronous_commit = 'remote_apply'")
-    primary.execute("SELECT pg_reload_conf()")
-    yield Replicated(primary, standby, f"{url},{standby.folder}")
+    yield replicate(primary, standby)
     standby.remove()
     primary.remove()
 

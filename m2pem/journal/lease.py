@@ -7,7 +7,9 @@ when the lease of its owner has ended; it removes the row of the owner then, so 
 never renewed again.
 
 The executive knows by its own clock until when it surely has its runs: the lease counts from the
-moment before the last successful renewal was sent. So the clocks of the hosts need not agree.
+moment before the last successful renewal was sent. So the clocks of the hosts need not agree. Nor
+need those of two servers: on one that takes over, or starts again, each lease lasts its full length
+from when the first executive connects to it (`postgres_database.connect`).
 """
 
 import logging
@@ -144,10 +146,11 @@ class Lease:
             )
 
     def end(self) -> None:
-        """Note that the server says that the lease has ended."""
+        """Note that the lease has ended: nothing that it covered may be commanded any more."""
         if not self._ended:
             self._ended = True
             self._on_end()
+            self.until_s = boot_time_s()
 
     def wake(self) -> None:
         """Look at once whether a lease may begin again."""
@@ -190,18 +193,25 @@ class Lease:
                     self._register()
                     self._ended = False
                 return not self._ended
+            connection = self._connected()
             asked_s = boot_time_s()
-            found = self._connected().execute(
-                "UPDATE executives SET lease_until = clock_timestamp() + %s * interval '1 second'"
-                " WHERE id = %s AND lease_until > clock_timestamp()",
-                (self.length_s, self.id),
-            )
+            if self.until_s is not None and asked_s >= self.until_s:
+                # Also where the server would renew it: its runs are let go of already.
+                found = connection.execute("DELETE FROM executives WHERE id = %s", (self.id,))
+                renewed = False
+            else:
+                found = connection.execute(
+                    "UPDATE executives SET lease_until = clock_timestamp() + lease"
+                    " WHERE id = %s AND lease_until > clock_timestamp()",
+                    (self.id,),
+                )
+                renewed = found.rowcount == 1
         except psycopg.Error as error:
             log.info("the lease is not renewed: %s", error)
             if self._connection is not None:
                 self._connection.close()
             return False
-        if found.rowcount != 1:
+        if not renewed:
             log.error("the lease of this executive has ended: others may take its runs")
             self.end()
             return False
@@ -217,9 +227,9 @@ class Lease:
             "DELETE FROM executives WHERE lease_until < clock_timestamp() - interval '1 day'"
         )
         connection.execute(
-            "INSERT INTO executives VALUES"
-            " (%s, %s, %s, %s, %s, %s, %s, clock_timestamp() + %s * interval '1 second')",
-            (self.id, *astuple(it), self.length_s),
+            "INSERT INTO executives VALUES (%s, %s, %s, %s, %s, %s, %s,"
+            " clock_timestamp() + %s * interval '1 second', %s * interval '1 second')",
+            (self.id, *astuple(it), self.length_s, self.length_s),
         )
         self.until_s = asked_s + self.length_s
 

@@ -23,6 +23,16 @@ _LOCK = 0x6D327065
 """The advisory lock of who makes or changes the tables: "m2pe"."""
 
 
+_RENEW_ALL = """DO $$ BEGIN
+    UPDATE executives SET lease_until = clock_timestamp() + lease,
+        server_start = pg_postmaster_start_time()
+        WHERE server_start <> pg_postmaster_start_time();
+    EXCEPTION WHEN undefined_table OR undefined_column OR insufficient_privilege THEN NULL;
+END $$"""
+"""A server that has taken over, or was started again, may have another clock than the one by which
+leases were renewed: whoever connects first lets each last its full length from then on. What is
+excepted: a new database, an old one before `migrate`, and a role that may only read."""
+
 CHANNEL = "m2pem"
 """On which executives are notified of what others change."""
 
@@ -73,6 +83,7 @@ def connect(
             # What BEGIN begins: rows that another executive has changed are waited for, and seen.
             connection.execute("SET default_transaction_isolation = 'read committed'")
             connection.execute("SET default_transaction_read_only = off")
+            connection.execute(_RENEW_ALL)
     except BaseException:
         connection.close()
         raise
@@ -252,11 +263,21 @@ def pages(connection: psycopg.Connection[Any]) -> None:
     connection.execute("ALTER TABLE fleets ADD COLUMN page TEXT NOT NULL DEFAULT ''")
 
 
+def server_starts(connection: psycopg.Connection[Any]) -> None:
+    """0.2: which start of which server has renewed a lease, by whose clock, and for how long."""
+    connection.execute(
+        "ALTER TABLE executives"
+        " ADD COLUMN lease INTERVAL NOT NULL DEFAULT '5 seconds',"
+        " ADD COLUMN server_start TIMESTAMPTZ NOT NULL DEFAULT pg_postmaster_start_time()"
+    )
+
+
 MIGRATIONS: tuple[Callable[[psycopg.Connection[Any]], None], ...] = (
     first_tables,
     fleets,
     notifications,
     pages,
+    server_starts,
 )
 """A released step is never changed; a change becomes a new step at the end."""
 

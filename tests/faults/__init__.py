@@ -46,10 +46,12 @@ class Faults:
 
 
 @cache
-def _library() -> Path:
+def library() -> Path:
+    """Return the library, which any user may load."""
     compiler = next(filter(None, map(shutil.which, ("cc", "tcc", "gcc", "clang"))), None)
     assert compiler is not None, "these tests need a C compiler: install tcc"
     made = Path(tempfile.mkdtemp(prefix="m2pem-faults-")) / "faults.so"
+    made.parent.chmod(0o755)
     subprocess.run([compiler, "-shared", "-fPIC", "-w", "-o", made, _SOURCE, "-ldl"], check=True)
     return made
 
@@ -57,4 +59,4 @@ def _library() -> Path:
 @cache
 def with_faults() -> Preloaded:
     """The process from which those are forked that may have faults."""
-    return Preloaded({"LD_PRELOAD": str(_library())})
+    return Preloaded({"LD_PRELOAD": str(library())})
