@@ -19,6 +19,19 @@ MISSION = REPOSITORY / "missions" / "vignette1.bpmn"
 FLEET = REPOSITORY / "fleet_configs" / "vignette1.yaml"
 ANSWERS = REPOSITORY / "missions" / "answers"
 
+BLOCKING = """
+import asyncio, signal, time
+
+def block():
+    time.sleep(3600)
+
+def soon(*_):
+    asyncio.get_running_loop().call_soon_threadsafe(block)
+
+signal.signal(signal.SIGUSR1, soon)
+"""
+"""A plugin that blocks the event loop of its process after a signal."""
+
 Record = dict[str, Any]
 AnyProcess = Process | subprocess.Popen[bytes]
 
@@ -61,6 +74,13 @@ class Program:
 
         found: Record = json.loads(self.until(wanted))
         return found
+
+    def until_said(self, text: str) -> str:
+        """Read standard error until a line of it has this text."""
+        for line in self.stderr:
+            if text in line:
+                return line
+        raise AssertionError(f"it ended before it said {text!r}: {self.rest()}")
 
     def send(self, number: signal.Signals) -> None:
         self.process.send_signal(number)

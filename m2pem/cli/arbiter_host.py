@@ -1,7 +1,6 @@
 """`m2pem arbiter-host`: the arbiters of vehicles, beside them, for an executive on another host."""
 
 import asyncio
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import click
 from m2pem.cli.options import UnusableError, example, fleet_option
 
 if TYPE_CHECKING:
+    from m2pem.cli.interruption import Interruption
     from m2pem.fleet.fleet import Fleet
 
 
@@ -56,12 +56,15 @@ def arbiter_host(
     The fleet file is the executive's; this host serves the vehicles that have it as their `host`.
     Ctrl-C or SIGTERM end it with 0: the vehicles go on.
     """
+    from m2pem.cli.interruption import Interruption
     from m2pem.fleet.fleet_file import load_fleet
 
     if connect and listen:
         raise click.UsageError("--connect and --listen: a host does one or the other")
     fleet = load_fleet(fleet_file)
-    return asyncio.run(_serve(fleet, _chosen(fleet, name), connect, listen, state))
+    with Interruption("its arbiters") as interruption:
+        serving = _serve(fleet, _chosen(fleet, name), connect, listen, state, interruption)
+        return asyncio.run(serving)
 
 
 def _chosen(fleet: "Fleet", name: str | None) -> str:
@@ -88,6 +91,7 @@ async def _serve(
     connect: tuple[str, ...],
     listen: tuple[str, ...],
     state: Path | None,
+    interruption: "Interruption",
 ) -> int:
     import logging
     from uuid import uuid4
@@ -127,8 +131,11 @@ async def _serve(
                 ready=lambda line: note(f"m2pem: {line}"),
             )
         )
-        for each in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(each, serving.cancel)
+        interruption.begin()
+        asked = asyncio.create_task(interruption.asked.wait())
+        await asyncio.wait({serving, asked}, return_when=asyncio.FIRST_COMPLETED)
+        asked.cancel()
+        serving.cancel()
         await asyncio.wait({serving})
         if not serving.cancelled():
             serving.result()

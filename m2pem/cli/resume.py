@@ -3,6 +3,7 @@
 import asyncio
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -15,6 +16,9 @@ from m2pem.cli.options import (
     ocu_option,
     run_argument,
 )
+
+if TYPE_CHECKING:
+    from m2pem.cli.interruption import Interruption
 
 
 @click.command(epilog=example("m2pem resume r1"))
@@ -37,7 +41,12 @@ def resume(
     The mission, the fleet, whether it is simulated, and its speed, are in the journal. Ends as
     `m2pem run` does.
     """
-    return asyncio.run(_resume(run_id, journal, ocu_names, answers, output, stop=stop))
+    from m2pem.cli.interruption import Interruption
+
+    with Interruption() as interruption:
+        return asyncio.run(
+            _resume(run_id, journal, ocu_names, answers, output, interruption, stop=stop)
+        )
 
 
 async def _resume(
@@ -46,6 +55,7 @@ async def _resume(
     ocu_names: str | None,
     answers_file: Path | None,
     output: str,
+    interruption: "Interruption",
     *,
     stop: bool,
 ) -> int:
@@ -64,6 +74,7 @@ async def _resume(
 
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
+    interruption.begin()
     async with existing_journal(journal_url) as journal:
         line = await find_run(journal, run_id)
         header = line.header
@@ -98,7 +109,13 @@ async def _resume(
                 return run_id
 
             status = await drive_run(
-                executive, out, operators, answers, file_of(url_of(journal_url)), take_up
+                executive,
+                out,
+                operators,
+                answers,
+                file_of(url_of(journal_url)),
+                interruption,
+                take_up,
             )
         tidy_up(executive, file_of(url_of(journal_url)))
     return status

@@ -22,6 +22,7 @@ from m2pem.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from m2pem.cli.interruption import Interruption
     from m2pem.mission.values import Value
 
 
@@ -61,26 +62,31 @@ def run(
     cannot be started, and with 130 if an operator stopped it. Ctrl-C stops it, and waits until its
     vehicles are released.
     """
-    return asyncio.run(
-        _run(
-            mission,
-            fleet_file,
-            process=process,
-            search_path=search_path,
-            data=data,
-            journal_url=journal,
-            ocu_names=ocu_names,
-            answers_file=answers,
-            simulated=simulate,
-            speed=speed,
-            output=output,
+    from m2pem.cli.interruption import Interruption
+
+    with Interruption() as interruption:
+        return asyncio.run(
+            _run(
+                mission,
+                fleet_file,
+                interruption,
+                process=process,
+                search_path=search_path,
+                data=data,
+                journal_url=journal,
+                ocu_names=ocu_names,
+                answers_file=answers,
+                simulated=simulate,
+                speed=speed,
+                output=output,
+            )
         )
-    )
 
 
 async def _run(
     mission_file: str,
     fleet_name: str,
+    interruption: "Interruption",
     *,
     process: str | None,
     search_path: tuple[Path, ...],
@@ -115,6 +121,7 @@ async def _run(
     fleet = fleet_of(fleet_name, mission)
     fleet = with_own_state(simulated_fleet(fleet) if simulated else fleet, file_of(url))
     refuse_speed(fleet, speed)
+    interruption.begin()
     async with journal_at(url) as journal:
         clock = SystemClock(speed)
         executive = make_executive(
@@ -135,6 +142,7 @@ async def _run(
                 operators,
                 answers,
                 file_of(url),
+                interruption,
                 lambda: executive.begin(mission, process_id, data, ""),
             )
         tidy_up(executive, file_of(url))

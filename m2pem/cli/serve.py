@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Coroutine, Iterator
 
     from m2pem.api.clock import SystemClock
+    from m2pem.cli.interruption import Interruption
     from m2pem.cli.ocus import Operators
     from m2pem.executive.executive import Executive
     from m2pem.fleet.fleet import Fleet
@@ -103,24 +104,28 @@ def serve(
     Takes up runs of the journal that were interrupted, if they had this fleet. Ctrl-C or SIGTERM
     stop the runs, wait until their vehicles are released, and end it with 0.
     """
+    from m2pem.cli.interruption import Interruption
+
     given = click.get_current_context().get_parameter_source("backup_every_s")
     if backup_to is None and given is not ParameterSource.DEFAULT:
         raise click.UsageError("--backup-every needs --backup-to FOLDER")
-    return asyncio.run(
-        _serve(
-            fleet_file,
-            journal,
-            ocu_names,
-            search_path,
-            simulate,
-            speed,
-            keep_s,
-            output,
-            standby=standby,
-            backup_to=backup_to,
-            backup_every_s=backup_every_s,
+    with Interruption() as interruption:
+        return asyncio.run(
+            _serve(
+                fleet_file,
+                journal,
+                ocu_names,
+                search_path,
+                simulate,
+                speed,
+                keep_s,
+                output,
+                interruption,
+                standby=standby,
+                backup_to=backup_to,
+                backup_every_s=backup_every_s,
+            )
         )
-    )
 
 
 async def _serve(
@@ -132,6 +137,7 @@ async def _serve(
     speed: float,
     keep_s: float | None,
     output: str,
+    interruption: "Interruption",
     *,
     standby: bool,
     backup_to: Path | None,
@@ -164,8 +170,11 @@ async def _serve(
     _refuse_memory(url, standby=standby)
     if backup_to is not None:
         _refuse_other_than_file(url)
+    interruption.begin()
     async with journal_at(url) as journal:
-        if standby and not await standing_by(journal, fleet, plugins, speed, operators):
+        if standby:
+            await standing_by(journal, fleet, plugins, speed, operators, interruption)
+        if interruption.asked.is_set():
             return 0
         mine, _ = await interrupted_runs(journal, fleet, speed)
         clock = SystemClock(speed, await _start_us(journal, mine, speed))
@@ -174,7 +183,7 @@ async def _serve(
         )
         executive.expect_interrupted([line.run for line in mine])
         with output_of(output) as out:
-            async with driving(executive, out, operators, file_of(url), one=False) as interruption:
+            async with driving(executive, out, operators, file_of(url), interruption, one=False):
                 who = ", ".join(operators.names) or "none"
                 note(f"m2pem: serving {fleet.name}; operators: {who}")
                 await executive.load_schedule()
@@ -246,8 +255,9 @@ async def standing_by(
     plugins: "PluginManager",
     speed: float,
     operators: "Operators",
-) -> bool:
-    """Wait until this executive serves the fleet; False: SIGINT or SIGTERM ended it before.
+    interruption: "Interruption",
+) -> None:
+    """Wait until this executive serves the fleet, or SIGINT or SIGTERM ends it before.
 
     Meanwhile it prints which executive serves it, and units that can say so to operators do.
 
@@ -257,7 +267,7 @@ async def standing_by(
     from m2pem.api.clock import SystemClock
     from m2pem.api.health import ExecutiveAddress
     from m2pem.cli.notes import note
-    from m2pem.cli.session import SIGNALS, make_executive
+    from m2pem.cli.session import make_executive
     from m2pem.executive.standby import stand_by
     from m2pem.executive.vehicle_locks import VehicleLocks, addresses_of
     from m2pem.scripting.sources import arbiters_of
@@ -279,19 +289,15 @@ async def standing_by(
         note(f"m2pem: {text}")
     waiting = asyncio.create_task(stand_by(journal, fleet, locks, say, page))
     telling = asyncio.create_task(operators.stand_by(fleet.name, lambda: served_by))
-    loop = asyncio.get_running_loop()
-    for number in SIGNALS:
-        loop.add_signal_handler(number, waiting.cancel)
+    asked = asyncio.create_task(interruption.asked.wait())
     try:
-        await waiting
-    except asyncio.CancelledError:
-        return False
+        await asyncio.wait((waiting, asked), return_when=asyncio.FIRST_COMPLETED)
+        if waiting.done():
+            waiting.result()
     finally:
-        for number in SIGNALS:
-            loop.remove_signal_handler(number)
-        telling.cancel()
-        await asyncio.gather(telling, return_exceptions=True)
-    return True
+        for task in (waiting, telling, asked):
+            task.cancel()
+        await asyncio.gather(waiting, telling, asked, return_exceptions=True)
 
 
 async def unreadable(journal: "Journal", fleet: "Fleet", speed: float) -> list[str]:

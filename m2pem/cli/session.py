@@ -4,20 +4,19 @@ import asyncio
 import logging
 import os
 import shlex
-import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from m2pem.api.clock import SystemClock
 from m2pem.api.runs import RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
+from m2pem.cli.interruption import PRINTING_S, Interruption
 from m2pem.cli.journals import url_of
 from m2pem.cli.notes import note
 from m2pem.cli.ocus import PLAIN, Operators
@@ -54,12 +53,18 @@ EXIT_STATUS = {
 
 @asynccontextmanager
 async def driving(
-    executive: Executive, output: Output, operators: Operators, journal: Path | None, *, one: bool
-) -> AsyncIterator["Interruption"]:
+    executive: Executive,
+    output: Output,
+    operators: Operators,
+    journal: Path | None,
+    interruption: Interruption,
+    *,
+    one: bool,
+) -> AsyncIterator[None]:
     """Connect, print and serve within the block; at its end, stop what still runs and close.
 
-    `journal`: its file, beside which other processes find the executive. `one`: the command is
-    about one run, not several.
+    `journal`: its file, beside which other processes find the executive. `interruption`: stops its
+    runs. `one`: the command is about one run, not several.
     """
 
     def mission(run: RunId) -> Mission | None:
@@ -69,49 +74,50 @@ async def driving(
     log_from_a_thread()
     output.format_with(mission, one=one, asks=PLAIN not in operators.names)
     loop = asyncio.get_running_loop()
-    with Interruption(executive) as interruption:
+    interruption.executive = executive
 
-        def stop_output() -> None:
-            loop.call_soon_threadsafe(interruption.stop, "the reader of its output has ended")
+    def stop_output() -> None:
+        loop.call_soon_threadsafe(interruption.stop, "the reader of its output has ended")
 
-        output.writer.when_broken(stop_output)
-        # First, as nothing may come between connecting and taking up a run: reports would be lost.
-        async with (
-            ControlSocket(executive.control, journal),
-            executive,
-            LoopMonitor(executive.events, executive.health),
-        ):
-            notices = executive.control.subscribe(size=BACKLOG)
-            printing = asyncio.create_task(output.follow(notices))
-            if operators.take_terminal:
-                output.cover()
+    output.writer.when_broken(stop_output)
+    # First, as nothing may come between connecting and taking up a run: reports would be lost.
+    async with (
+        ControlSocket(executive.control, journal),
+        executive,
+        LoopMonitor(executive.events, executive.health),
+    ):
+        notices = executive.control.subscribe(size=BACKLOG)
+        printing = asyncio.create_task(output.follow(notices))
+        if operators.take_terminal:
+            interruption.take_terminal()
+            output.cover()
 
-            superseded = asyncio.create_task(executive.superseded.wait())
-            superseded.add_done_callback(
-                lambda task: (
-                    None
-                    if task.cancelled()
-                    else interruption.stop("another executive serves the fleet")
-                )
+        superseded = asyncio.create_task(executive.superseded.wait())
+        superseded.add_done_callback(
+            lambda task: (
+                None
+                if task.cancelled()
+                else interruption.stop("another executive serves the fleet")
             )
+        )
 
-            def left() -> None:
-                output.uncover()
-                running = [key for key, each in executive.runners.items() if not each.done.is_set()]
-                if running or not one:
-                    here = ("Ctrl-C here stops everything",)
-                    note(what_goes_on(running, journal, here, serves=not one))
+        def left() -> None:
+            output.uncover()
+            running = [key for key, each in executive.runners.items() if not each.done.is_set()]
+            if running or not one:
+                here = ("Ctrl-C here stops everything",)
+                note(what_goes_on(running, journal, here, serves=not one))
 
-            try:
-                operators.begin(executive.control, left)
-                yield interruption
-            finally:
-                superseded.cancel()
-                await operators.end()
-                output.uncover()
-        await printing
-        await output.drain()
-        await asyncio.to_thread(writer_for(sys.stderr).drain, GIVE_UP_PRINTING_S)
+        try:
+            operators.begin(executive.control, left)
+            yield
+        finally:
+            superseded.cancel()
+            await operators.end()
+            output.uncover()
+    await printing
+    await output.drain()
+    await asyncio.to_thread(writer_for(sys.stderr).drain, PRINTING_S)
     if output.writer.broken:
         ignore_closed_stdout()
 
@@ -144,6 +150,7 @@ async def drive_run(
     operators: Operators,
     answers: "Answers | None",
     journal: Path | None,
+    interruption: Interruption,
     begin: Callable[[], Awaitable[RunId]],
 ) -> int:
     """Begin a run, see it to its end, and return the exit status.
@@ -153,7 +160,7 @@ async def drive_run(
     Raises:
         M2pemError: it cannot begin, or its executive can drive it no further.
     """
-    async with driving(executive, output, operators, journal, one=True) as interruption:
+    async with driving(executive, output, operators, journal, interruption, one=True):
         if interruption.asked.is_set():
             return STOPPED
         run = await begin()
@@ -178,72 +185,6 @@ async def _act(answers: "Answers | None", executive: Executive, run: RunId) -> N
         await answers.act(executive.control, run, executive.clock, default_first_decision=False)
     except Exception:
         log.exception("the answers file broke off; the mission goes on without it")
-
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-GIVE_UP = 3
-GIVE_UP_PRINTING_S = 1.0
-
-
-class Interruption:
-    """Handles SIGINT and SIGTERM within its block. `asked` is set when all runs must stop."""
-
-    def __init__(self, executive: Executive) -> None:
-        self.asked = asyncio.Event()
-        self._executive = executive
-        self._count = 0
-        self._stopping: asyncio.Task[None] | None = None
-
-    def __enter__(self) -> Self:
-        loop = asyncio.get_running_loop()
-        for number in SIGNALS:
-            loop.add_signal_handler(number, self._received, number)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        loop = asyncio.get_running_loop()
-        for number in SIGNALS:
-            loop.remove_signal_handler(number)
-
-    def stop(self, reason: str) -> None:
-        """Stop every run; the end of the block waits until the vehicles are released."""
-        self.asked.set()
-        if self._stopping is None:
-            self._stopping = asyncio.create_task(self._executive.stop_all(reason))
-
-    def _received(self, number: signal.Signals) -> None:
-        self._count += 1
-        name = signal.Signals(number).name
-        if self._count == 1:
-            self.stop(f"stopped by {name}")
-            if self._held():
-                self._say(f"{name}: stopping; waiting for {self._held()}")
-        elif self._count < GIVE_UP:
-            held = self._held() or "the journal"
-            self._say(f"{name}: still waiting for {held}; once more to give up")
-        else:
-            self._say(f"{name}: gave up; not released: {self._held() or 'nothing'}")
-            writer_for(sys.stderr).drain(GIVE_UP_PRINTING_S)
-            os._exit(STOPPED)
-
-    def _held(self) -> str:
-        """The resources that runs still command."""
-        held = {
-            resource: None
-            for runner in self._executive.runners.values()
-            if not runner.done.is_set()
-            for resource in runner.run.state.held
-        }
-        return ", ".join(held)
-
-    def _say(self, text: str) -> None:
-        # From a thread: a full pipe at standard error must not delay the stop.
-        writer_for(sys.stderr).put(f"m2pem: {text}")
 
 
 def refuse_speed(fleet: Fleet, speed: float) -> None:

@@ -6,16 +6,25 @@ from pathlib import Path
 import pytest
 
 from m2pem.simulation.state_file import recorded_effects
-from tests.command_line import ANSWERS, FLEET, MISSION, CommandLine, Program, fleet_with_state
+from tests.command_line import (
+    ANSWERS,
+    BLOCKING,
+    FLEET,
+    MISSION,
+    CommandLine,
+    Program,
+    fleet_with_state,
+    install_plugin,
+)
 
 ABORTED = ANSWERS / "vignette1_detection.yaml"
 
 
-def driving(m2pem: CommandLine, fleet: Path, *words: str) -> Program:
+def driving(m2pem: CommandLine, fleet: Path, *words: str, **environment: str) -> Program:
     """The mission, with evsg1 on its route."""
     program = m2pem.start(
         "run", MISSION, "--fleet", fleet, "--format", "json", "--ocu", "none",
-        "--answers", ABORTED, *words,
+        "--answers", ABORTED, *words, **environment,
     )  # fmt: skip
     program.until_record("BehaviorProgressed", state="RUNNING")
     return program
@@ -59,6 +68,62 @@ def test_a_second_signal_says_what_is_waited_for_and_a_third_gives_up(
     status, errors = program.rest()
     assert status == 130
     assert "gave up; not released: evsg1" in errors
+
+
+CLOSING = """
+import asyncio, os, sys
+from m2pem.journal.sqlite import SqliteJournal
+
+close = SqliteJournal.close
+
+async def slowly(self):
+    print("it is closing", file=sys.stderr, flush=True)
+    while not os.path.exists("go on"):
+        await asyncio.sleep(0.01)
+    await close(self)
+
+SqliteJournal.close = slowly
+"""
+
+
+@pytest.mark.parametrize("gives_up", [False, True], ids=["waits", "gives up"])
+@pytest.mark.parametrize("standby", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_signals_while_it_closes_end_nothing_before_the_third(
+    m2pem: CommandLine, tmp_path: Path, gives_up: bool, standby: bool
+) -> None:
+    words = ("serve", "--fleet", fleet_with_state(tmp_path)[0], "--ocu", "none")
+    if standby:
+        owner = m2pem.start(*words)
+        owner.until_said("serving")
+    plugin = install_plugin(tmp_path, "closing", CLOSING)
+    program = m2pem.start(*words, *(("--standby",) if standby else ()), **plugin)
+    program.until_said("standing by" if standby else "serving")
+    program.send(signal.SIGTERM)
+    program.until_said("it is closing")
+    program.send(signal.SIGTERM)
+    program.until_said("SIGTERM: still waiting for the journal; once more to give up")
+    if gives_up:
+        program.send(signal.SIGINT)
+    else:
+        (tmp_path / "go on").touch()
+    status, errors = program.rest()
+    assert status == (130 if gives_up else 0), errors
+    assert ("SIGINT: gave up; not released: nothing" in errors) is gives_up
+
+
+def test_a_third_signal_ends_an_executive_that_a_plugin_blocks(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    plugin = install_plugin(tmp_path, "blocking", BLOCKING)
+    program = driving(m2pem, FLEET, **plugin)
+    program.send(signal.SIGUSR1)
+    program.until_said("blocks the executive")
+    program.send(signal.SIGTERM)
+    program.until_said("SIGTERM: stopping; waiting for evsg1")
+    program.send(signal.SIGINT)
+    program.until_said("SIGINT: still waiting for evsg1; once more to give up")
+    program.send(signal.SIGTERM)
+    assert program.rest()[0] == 130
 
 
 def test_a_run_whose_reader_goes_away_is_stopped(m2pem: CommandLine, tmp_path: Path) -> None:
