@@ -28,7 +28,7 @@ from m2pem.control_socket.server import ControlSocket
 from m2pem.errors import PluginError
 from m2pem.executive.executive import Executive
 from m2pem.executive.outlook_worker import outlook_in_subprocess
-from m2pem.executive.process_monitors import LoopMonitor
+from m2pem.executive.process_monitors import LeaveToStandby, LoopMonitor
 from m2pem.fleet.fleet import Fleet, real_resources
 from m2pem.journal import file_of
 from m2pem.journal.base import Journal
@@ -80,11 +80,13 @@ async def driving(
         loop.call_soon_threadsafe(interruption.stop, "the reader of its output has ended")
 
     output.writer.when_broken(stop_output)
+    end = partial(interruption.end_at_once, status=1)
+    leave = LeaveToStandby(executive.journal, executive.fleet.name, end)
     # First, as nothing may come between connecting and taking up a run: reports would be lost.
     async with (
         ControlSocket(executive.control, journal),
         executive,
-        LoopMonitor(executive.events, executive.health),
+        LoopMonitor(executive.events, executive.health, leave),
     ):
         notices = executive.control.subscribe(size=BACKLOG)
         printing = asyncio.create_task(output.follow(notices))

@@ -4,7 +4,8 @@
         ...
 
 A plugin that blocks the event loop delays everything, STOP included. A thread sees that the loop
-does not turn, and reads off its stack which module blocks it.
+does not turn, and reads off its stack which module blocks it. If another executive stands by, the
+thread then ends the process, so that operators are served again.
 """
 
 import asyncio
@@ -12,14 +13,17 @@ import logging
 import sys
 import threading
 import time
+from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import FrameType
 from typing import Self
 
 from m2pem.api.runs import Alert
+from m2pem.errors import JournalError
 from m2pem.executive.control_events import ControlEvents
 from m2pem.executive.health import ExecutiveHealth
+from m2pem.journal.base import Journal
 from m2pem.journal.storage_checks import space_shortage
 
 log = logging.getLogger("m2pem.loop")
@@ -28,17 +32,50 @@ TICK_S = 0.1
 LATE_AFTER_S = 0.5
 """A loop that has not turned for so long is blocked."""
 
+LEFT_AFTER_S = 2.5
+"""A blocked process ends after so long, if its journal has no lease."""
+
+ASKED_EACH_S = 1.0
+"""Between two questions of a blocked process, who stands by."""
+
+
+class LeaveToStandby:
+    """Ends the process whose event loop is blocked, if another executive stands by for its fleet.
+
+    `end` ends the process at once; its argument is for people. `after_s`: half the lease of the
+    journal, which the executive surely still has then.
+    """
+
+    def __init__(self, journal: Journal, fleet: str, end: Callable[[str], None]) -> None:
+        self.after_s = journal.lease_s / 2 if journal.lease_s else LEFT_AFTER_S
+        self._journal = journal
+        self._fleet = fleet
+        self._end = end
+
+    def act(self, why: str) -> None:
+        """End the process, from any thread; return if no other executive stands by."""
+        try:
+            standby = self._journal.abandon(self._fleet)
+        except JournalError as error:
+            log.warning("who stands by is not known: %s", error)
+            return
+        if standby is not None:
+            self._end(f"{why}: this executive ends, and leaves its missions to {standby}")
+
 
 class LoopMonitor:
     """Watch the event loop in which the block runs.
 
     While the loop is blocked, the log says so; operators get an alert as soon as it turns again.
-    `health` notes it, too.
+    `health` notes it, too. `leave`: ends the process after a while; None: it is never ended.
     """
 
-    def __init__(self, events: ControlEvents, health: ExecutiveHealth) -> None:
+    def __init__(
+        self, events: ControlEvents, health: ExecutiveHealth, leave: LeaveToStandby | None = None
+    ) -> None:
         self._events = events
         self._health = health
+        self._leave = leave
         self._ticked_s = time.monotonic()
         self._ended = threading.Event()
         self._blocked_by = ""
@@ -73,11 +110,20 @@ class LoopMonitor:
 
     def _watch(self) -> None:
         woken_s, used_s = time.monotonic(), time.process_time()
+        seen_s = watched_s = asked_s = 0.0
         while not self._ended.wait(TICK_S):
             slept_s, worked_s = time.monotonic() - woken_s, time.process_time() - used_s
             woken_s, used_s = woken_s + slept_s, used_s + worked_s
             if slept_s > LATE_AFTER_S and worked_s < slept_s / 2:
                 continue  # the whole process was stopped: see `StallMonitor`
+            # Only what this thread has seen counts, and no time in which the process was stopped.
+            if seen_s != self._ticked_s:
+                seen_s, watched_s, asked_s = self._ticked_s, 0.0, 0.0
+            watched_s += slept_s
+            leave = self._leave if self._blocked_by else None
+            if leave is not None and watched_s >= max(leave.after_s, asked_s):
+                asked_s = watched_s + ASKED_EACH_S
+                leave.act(f"{self._blocked_by} has blocked it for {watched_s:.1f} s")
             late_s = time.monotonic() - self._ticked_s - TICK_S
             if late_s < LATE_AFTER_S or self._blocked_by:
                 continue
@@ -86,7 +132,8 @@ class LoopMonitor:
             self._blocked_by = blocking(frame)
             log.error(
                 "%s blocks the executive: STOP reaches no vehicle until it returns. Use the "
-                "vehicles' own stop",
+                "vehicles' own stop. An arbiter that may block runs in a process of its own with "
+                "`m2pem arbiter-host`: then it delays no other vehicle",
                 self._blocked_by,
             )
 

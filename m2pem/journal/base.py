@@ -180,6 +180,17 @@ class Journal(Protocol):
         """
         ...
 
+    def abandon(self, fleet: str) -> FleetServer | None:
+        """Let an executive that stands by for a fleet of this name have all runs and vehicles in a
+        moment: this process ends now. Return that executive; None: none stands by.
+
+        Any thread may call it. It blocks, for as long as the database does.
+
+        Raises:
+            JournalError: the journal cannot say who stands by.
+        """
+        ...
+
     async def serve_fleet(
         self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
     ) -> None:

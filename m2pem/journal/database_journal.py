@@ -121,6 +121,10 @@ class DatabaseJournal(ABC):
         """See `Journal.owned_until_s`."""
         return None
 
+    @abstractmethod
+    def abandon(self, fleet: str) -> FleetServer | None:
+        """See `Journal.abandon`."""
+
     @property
     def commits(self) -> int:
         """How many transactions have been written since it was opened."""

@@ -35,6 +35,9 @@ LEASE_VARIABLE = "M2PEM_LEASE_S"
 DEFAULT_S = 5.0
 SHORTEST_S = 0.5
 
+ABANDONED_S = 0.2
+"""After that another executive has what this one had, whose process ends meanwhile."""
+
 
 def lease_s() -> float:
     """Return the length of a lease, in seconds.
@@ -155,6 +158,21 @@ class Lease:
     def wake(self) -> None:
         """Look at once whether a lease may begin again."""
         self._wake.set()
+
+    def abandon(self, connection: Connection) -> None:
+        """Renew it no more, and have it end in `ABANDONED_S`: this process ends before that."""
+        self._stop.set()
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join(timeout=self.length_s / 3)
+        try:
+            connection.execute(
+                "UPDATE executives SET lease_until = LEAST(lease_until, clock_timestamp()"
+                " + ? * interval '1 second') WHERE id = ?",
+                (ABANDONED_S, self.id),
+            )
+        except psycopg.Error as error:
+            log.info("the lease is left to end by itself: %s", error)
 
     def close(self) -> None:
         """Renew it no more, and let others have its runs at once."""

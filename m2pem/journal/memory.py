@@ -75,6 +75,10 @@ class MemoryJournal:
         """See `Journal.owned_until_s`."""
         return None
 
+    def abandon(self, fleet: str) -> FleetServer | None:
+        """See `Journal.abandon`: no other executive has this journal."""
+        return None
+
     async def serve_fleet(
         self, fleet: str, resources: Collection[str], digest: str = "", page: str = ""
     ) -> None:

@@ -4,7 +4,7 @@ import os
 import socket
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from typing import Any, TypeVar
 from uuid import UUID, uuid4
@@ -30,6 +30,7 @@ from m2pem.journal.postgres_database import (
     log,
     migrate,
 )
+from m2pem.journal.standbys import PLACES, standby_of
 from m2pem.journal.storage import RetryError
 from m2pem.journal.storage_checks import OpenFiles, min_free_mb
 from m2pem.journal.transaction import position_columns
@@ -455,7 +456,8 @@ class PostgresJournal(DatabaseJournal):
         )
         self._owners = owners
         self._writing = connection
-        self._pooled = PostgresConnection(lambda: connect(address, length_s))
+        self._connect = partial(connect, address, length_s)
+        self._pooled = PostgresConnection(self._connect)
         self._changes = ChangeListener(address, length_s, session)
         storage = PostgresStorage(address, connection, owners, OpenFiles([marks.path]))
         super().__init__(address.file, identity, storage, self._pooled, marks)
@@ -506,6 +508,18 @@ class PostgresJournal(DatabaseJournal):
     def lease_s(self) -> float | None:
         """See `Journal.lease_s`."""
         return self._lease.length_s
+
+    def abandon(self, fleet: str) -> FleetServer | None:
+        """See `Journal.abandon`."""
+        try:
+            with closing(PostgresConnection(self._connect)) as connection:
+                standby = connection.execute(_SERVER, (standby_of(fleet), list(PLACES))).fetchone()
+                if standby is None:
+                    return None
+                self._lease.abandon(connection)
+        except psycopg.Error as error:
+            raise explained_error(error, self._place) from error
+        return FleetServer(*standby)
 
     async def changed(self, seen: int) -> int:
         """See `Journal.changed`."""

@@ -24,6 +24,7 @@ from m2pem.journal.fleet_server import FleetServer, decode, encode, this_process
 from m2pem.journal.marks import MarkFile, beside, find_losses, identity_in, of_another_journal
 from m2pem.journal.position import RunPosition
 from m2pem.journal.run_locks import RunLocks, run_locks
+from m2pem.journal.standbys import PLACES, standby_of
 from m2pem.journal.storage_checks import OpenFiles, disk_fault, min_free_mb
 from m2pem.journal.transaction import mark_of, position_columns, position_from
 from m2pem.whole_file import write_whole
@@ -246,6 +247,10 @@ class SqliteJournal(DatabaseJournal):
 
     def _fleet_server(self, fleet: str, resources: Collection[str]) -> FleetServer | None:
         return fleet_server(self._path, self._locks, fleet, resources)
+
+    def abandon(self, fleet: str) -> FleetServer | None:
+        """See `Journal.abandon`: locks end with the process."""
+        return fleet_server(self._path, self._locks, standby_of(fleet), PLACES)
 
     def _finish(self) -> None:
         self._reader.submit(self._closing)

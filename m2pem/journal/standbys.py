@@ -20,7 +20,7 @@ class StandbyNote:
 
     def __init__(self, journal: Journal, fleet: Fleet, page: str) -> None:
         self._journal = journal
-        self._fleet = _served(fleet.name)
+        self._fleet = standby_of(fleet.name)
         self._digest = digest_of(fleet)
         self._page = page
         self._place = ""
@@ -61,9 +61,10 @@ async def standbys_of(journal: Journal, fleet: str) -> list[FleetServer]:
     Raises:
         JournalError: the journal cannot say it.
     """
-    found = [await journal.fleet_server(_served(fleet), [place]) for place in PLACES]
+    found = [await journal.fleet_server(standby_of(fleet), [place]) for place in PLACES]
     return [each for each in found if each is not None]
 
 
-def _served(fleet: str) -> str:
+def standby_of(fleet: str) -> str:
+    """Return the name of what the standbys of a fleet serve."""
     return f"{STANDBY_OF}{fleet}"

@@ -29,7 +29,7 @@ from tests.chaos.judge import Verdict, judge
 from tests.chaos.rounds import Evidence, Plan, Play
 from tests.chaos.table import text_table
 from tests.chaos.troubles import TROUBLES, Trouble, database_of, disk_of
-from tests.chaos.worlds import Sign, World
+from tests.chaos.worlds import BLOCK, TROUBLE, WORLDS, Sign, World
 from tests.faults import Faults, with_faults
 from tests.preloaded import Process
 
@@ -128,7 +128,7 @@ def plan_stop(seed: int, number: int, world: str, journal: str, trouble: str = "
         chance.uniform(0.0, 3.0),
         chance.choice([0.0, chance.uniform(0.0, 1.0)]),
         way != "signal" and chance.random() < 0.3,  # which is not answered
-        chance.choice(SPEEDS),
+        min(chance.choice(SPEEDS), WORLDS[world].speed),
     )
 
 
@@ -177,7 +177,7 @@ class StopPlay(Play):
         self.stop_plan = plan
         self.trouble: Trouble = TROUBLES[plan.trouble]
         self.stop = Stop()
-        self._flag = folder / "trouble"
+        self._flag = folder / TROUBLE
         self.watcher = Watcher(self._world)
 
     def close(self) -> None:
@@ -311,6 +311,10 @@ class StopPlay(Play):
                     yield
                 finally:
                     self._world.send_signal(signal.SIGCONT)
+            case "arbiter blocks":
+                self._flag.touch()  # for as long as which it blocks
+                self._world.send_signal(BLOCK)
+                yield
             case _:
                 with nullcontext():
                     yield

@@ -1,4 +1,5 @@
-"""Rounds in which a standby takes over: its owner is killed, stopped, or cut off from its database.
+"""Rounds in which a standby takes over: its owner is killed, stopped, blocked by a plugin, or cut
+off from its database.
 
 `python -m tests.chaos.takeovers [--rounds 200]` plays them in turn, on a journal in PostgreSQL, and
 prints how long each take-over took.
@@ -20,7 +21,7 @@ from statistics import quantiles
 from m2pem.simulation.executions import Effect, EffectKind
 from m2pem.simulation.state_file import recorded_effects
 from tests.chaos.worlds import FORK, process
-from tests.command_line import CommandLine, Program
+from tests.command_line import BLOCKING, CommandLine, Program, install_plugin
 from tests.executive.conftest import question, task
 from tests.faults.tcp_proxy import TcpProxy
 from tests.postgres_server import PostgresServer, start_server
@@ -34,10 +35,17 @@ class Fault(StrEnum):
     KILLED = "killed"
     STOPPED = "stopped, goes on after the take-over"
     CUT_OFF = "cut off from its database, which is there again after the take-over"
+    BLOCKED = "blocked by a plugin, and ends"
 
 
-WITHIN_S = {Fault.KILLED: 2.0, Fault.STOPPED: LEASE_S + 1.0, Fault.CUT_OFF: LEASE_S + 1.0}
+WITHIN_S = {each: 2.0 if each is Fault.KILLED else LEASE_S + 1.0 for each in Fault}
 """Each take-over is due, on a computer with much to do."""
+
+_SIGNALS = {
+    Fault.KILLED: signal.SIGKILL,
+    Fault.STOPPED: signal.SIGSTOP,
+    Fault.BLOCKED: signal.SIGUSR1,
+}
 
 _FLEET = """version: 1
 name: takeovers
@@ -67,7 +75,7 @@ def play(fault: Fault, server: PostgresServer, folder: Path) -> Takeover:
         AssertionError: the standby did not take over in time, or the owner moved a vehicle later.
     """
     with ExitStack() as stack:
-        m2pem = CommandLine(folder, {"M2PEM_LEASE_S": f"{LEASE_S:g}"})
+        m2pem = CommandLine(folder, {"M2PEM_LEASE_S": f"{LEASE_S:g}", **_with_plugin(folder)})
         stack.callback(m2pem.end)
         direct = server.new_database()
         proxy = TcpProxy(server.folder / ".s.PGSQL.5432")
@@ -85,9 +93,9 @@ def play(fault: Fault, server: PostgresServer, folder: Path) -> Takeover:
         mission.write_bytes(_MISSION)
         words = ("serve", "--fleet", fleet, "--ocu", "none", "--format", "json", "--journal")
         owner = m2pem.start(*words, through, **here)
-        _until_said(owner, "serving")
+        owner.until_said("serving")
         standby = m2pem.start(*words, journal, "--standby", **host)
-        _until_said(standby, "standing by")
+        standby.until_said("standing by")
         status, _, errors = m2pem.run("start", mission, "--journal", through, **here)
         assert status == 0, errors
         owner.until_record("BehaviorProgressed", state="RUNNING")
@@ -99,12 +107,12 @@ def play(fault: Fault, server: PostgresServer, folder: Path) -> Takeover:
 
         began_s = time.monotonic()
         _begin(fault, owner, proxy)
-        _until_said(standby, "taking over")
+        standby.until_said("taking over")
         serves_s = time.monotonic() - began_s
         standby.until_record("RunClaimed", epoch=2)
         claimed_s = time.monotonic() - began_s
         if attached is not None:
-            _until_said(attached, "has taken over")
+            attached.until_said("has taken over")
         else:
             attached = m2pem.start(*attach, **host)
             attached.until_text("Ask")
@@ -119,28 +127,27 @@ def play(fault: Fault, server: PostgresServer, folder: Path) -> Takeover:
         return Takeover(serves_s, claimed_s, attached_s)
 
 
-def _until_said(program: Program, text: str) -> None:
-    for line in program.stderr:
-        if text in line:
-            return
-    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
+def _with_plugin(folder: Path) -> dict[str, str]:
+    return install_plugin(folder, "blocking", BLOCKING)
 
 
 def _begin(fault: Fault, owner: Program, proxy: TcpProxy) -> None:
     if fault is Fault.CUT_OFF:
         proxy.partitioned = True
     else:
-        owner.send(signal.SIGKILL if fault is Fault.KILLED else signal.SIGSTOP)
+        owner.send(_SIGNALS[fault])
 
 
 def _end(fault: Fault, owner: Program, proxy: TcpProxy, standby: Program) -> None:
     """End the fault: the owner learns that it was replaced, and ends."""
     proxy.partitioned = False
-    owner.send(signal.SIGCONT)
+    if fault is Fault.STOPPED:
+        owner.send(signal.SIGCONT)
     status, errors = owner.rest()
     if fault is Fault.KILLED:
         return
     assert status == 1, (status, errors)
+    assert ("has blocked it for" in errors) is (fault is Fault.BLOCKED), errors
     assert f"process {standby.process.pid} on" in errors, errors
 
 

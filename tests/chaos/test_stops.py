@@ -11,7 +11,7 @@ from tests.chaos import stops
 from tests.chaos.kill_points import POSTGRES, SQLITE
 from tests.chaos.stops import StopPlan, plan_stop, play_stop
 from tests.chaos.troubles import TROUBLES
-from tests.chaos.worlds import MavlinkVehicles, SimulatedVehicles
+from tests.chaos.worlds import WORLDS, MavlinkVehicles, SimulatedVehicles
 
 PATIENCE_S = 60.0
 SHORT = "the disk hangs"
@@ -26,7 +26,8 @@ CASES = [
 def plan(trouble: str, world: str = SimulatedVehicles.name, journal: str = SQLITE.name) -> StopPlan:
     """A stop soon after the vehicles have begun: autopilots arm first."""
     after_s = 2.0 if world == MavlinkVehicles.name else 0.2
-    return StopPlan(1, world, journal, trouble, after_s=after_s, lead_s=0.0, speed=4.0)
+    speed = min(4.0, WORLDS[world].speed)
+    return StopPlan(1, world, journal, trouble, after_s=after_s, lead_s=0.0, speed=speed)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,13 @@ from typing import Any
 
 from m2pem.journal.postgres_address import read_address
 from tests.chaos.kill_points import POSTGRES, SQLITE, Place, place_of
-from tests.chaos.worlds import ChaosMission, MavlinkVehicles, SimulatedVehicles, process
+from tests.chaos.worlds import (
+    BlockingHost,
+    ChaosMission,
+    MavlinkVehicles,
+    SimulatedVehicles,
+    process,
+)
 from tests.faults import Faults
 from tests.postgres_server import shared_server
 
@@ -65,7 +71,8 @@ SLOW = ChaosMission(
     (),
 )
 
-NONE = Trouble("nothing")
+_WORLDS = (SimulatedVehicles.name, MavlinkVehicles.name, BlockingHost.name)
+NONE = Trouble("nothing", worlds=_WORLDS)
 TROUBLES = {
     each.name: each
     for each in (
@@ -81,6 +88,7 @@ TROUBLES = {
         Trouble("database gone", journals=(POSTGRES.name,), mute=True),
         Trouble("database silent", journals=(POSTGRES.name,), mute=True),
         Trouble("link cut", worlds=(SimulatedVehicles.name,), deaf=VEHICLE),
+        Trouble("arbiter blocks", worlds=(BlockingHost.name,), deaf=VEHICLE),
         Trouble("vehicles silent", worlds=(MavlinkVehicles.name,), deaf=""),
     )
 }

@@ -18,7 +18,7 @@ from typing import Protocol
 
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
-from tests.command_line import CommandLine, Program
+from tests.command_line import CommandLine, Program, install_plugin
 from tests.executive.conftest import flow, mission, question, task
 from tests.faults.tcp_proxy import TcpProxy
 from tests.preloaded import preloaded
@@ -341,6 +341,8 @@ class HostedVehicles(SimulatedVehicles):
     arbiter = "m2pem_plugin_zenoh.remote_arbiter:RemoteArbiter"
     speed = 1.0
     pauses = False
+    hosted = -1
+    """How many of them are of the host, the others of the executive's own process; -1: all."""
 
     def __init__(self, folder: Path, speed: float = speed) -> None:
         super().__init__(folder, speed)
@@ -350,14 +352,18 @@ class HostedVehicles(SimulatedVehicles):
         self.proxy = TcpProxy(port)
         host = f'hosts: {{pi: {{connect: ["tcp/127.0.0.1:{self.proxy.port}"]}}}}\nvehicles:'
         text = self.fleet.read_text(encoding="utf-8").replace("vehicles:", host)
-        text = text.replace("arbiter: sim,", "arbiter: sim, host: pi, lost_after: 10 s,")
+        text = text.replace("arbiter: sim,", "arbiter: sim, lost_after: 10 s,")
+        text = text.replace("arbiter: sim,", "arbiter: sim, host: pi,", self.hosted)
         self.fleet.write_text(text, encoding="utf-8")
-        self._m2pem = CommandLine(folder)
+        self._m2pem = CommandLine(folder, self._environment(folder))
         self._words = (
             *("arbiter-host", "--fleet", self.fleet, "--state", folder / "host"),
             *("--listen", f"tcp/127.0.0.1:{port}"),
         )
         self._host = self._start()
+
+    def _environment(self, folder: Path) -> dict[str, str]:
+        return {}
 
     def _start(self) -> Program:
         host = self._m2pem.start(*self._words)
@@ -377,6 +383,37 @@ class HostedVehicles(SimulatedVehicles):
         """See `World.close`."""
         self._m2pem.end()
         self.proxy.close()
+
+
+BLOCK = signal.SIGUSR1
+TROUBLE = "trouble"
+"""The file in the folder of a round that is there for as long as something is wrong."""
+
+_BLOCKING = f"""
+import asyncio, signal, time
+from pathlib import Path
+
+def block():
+    while Path({TROUBLE!r}).exists():
+        time.sleep(0.01)
+
+def soon(*_):
+    asyncio.get_running_loop().call_soon_threadsafe(block)
+
+signal.signal({BLOCK:d}, soon)
+"""
+
+
+class BlockingHost(HostedVehicles):
+    """One vehicle of an arbiter host, where a plugin blocks all after the signal `BLOCK`, as long
+    as there is the file `TROUBLE`."""
+
+    name = "one on a host"
+    arbiter = SimulatedVehicles.arbiter
+    hosted = 1
+
+    def _environment(self, folder: Path) -> dict[str, str]:
+        return install_plugin(folder, "blocking", _BLOCKING)
 
 
 STOPPED = ("BRAKE", "HOLD", "LOITER")
@@ -406,5 +443,5 @@ def _begun(vehicle: str, kind: str, detail: str) -> Begun | None:
 
 
 WORLDS: Mapping[str, type[SimulatedVehicles] | type[MavlinkVehicles]] = {
-    each.name: each for each in (SimulatedVehicles, MavlinkVehicles, HostedVehicles)
+    each.name: each for each in (SimulatedVehicles, MavlinkVehicles, HostedVehicles, BlockingHost)
 }

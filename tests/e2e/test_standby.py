@@ -9,8 +9,17 @@ import pytest
 
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
-from tests.command_line import MISSION, CommandLine, Program, Record, fleet_with_state
+from tests.command_line import (
+    BLOCKING,
+    MISSION,
+    CommandLine,
+    Program,
+    Record,
+    fleet_with_state,
+    install_plugin,
+)
 from tests.postgres_server import postgres, postgres_url
+from tests.terminal import Terminal
 
 __all__ = ["postgres", "postgres_url"]
 
@@ -32,14 +41,6 @@ def serve(
         "serve", "--fleet", fleet, "--ocu", "none", "--format", "json", "--journal", journal,
         *words, **LEASE, **environment,
     )  # fmt: skip
-
-
-def until_said(program: Program, text: str) -> str:
-    """Read standard error until a line of it has this text."""
-    for line in program.stderr:
-        if text in line:
-            return line
-    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
 
 
 def start_mission(m2pem: CommandLine, journal: str) -> None:
@@ -71,10 +72,10 @@ def test_a_standby_takes_over_from_a_killed_executive(
 ) -> None:
     fleet, state = fleet_with_state(tmp_path)
     owner = serve(m2pem, fleet, journal)
-    until_said(owner, "serving")
+    owner.until_said("serving")
     standbys = [serve(m2pem, fleet, journal, "--standby") for _ in range(2)]
     for each in standbys:
-        assert f"process {owner.process.pid} on" in until_said(each, "standing by for")
+        assert f"process {owner.process.pid} on" in each.until_said("standing by for")
     start_mission(m2pem, journal)
     answer(m2pem, journal, prompted(owner), "continue")
     owner.until_record("BehaviorProgressed", state="RUNNING")
@@ -91,7 +92,7 @@ def test_a_standby_takes_over_from_a_killed_executive(
     assert m2pem.run("replay", "r1", "--verify", "--journal", journal)[0] == 0
     again.send(signal.SIGTERM)
     assert again.rest()[0] == 0
-    until_said(other, "serving")  # nothing is left to take over: it serves
+    other.until_said("serving")  # nothing is left to take over: it serves
     other.send(signal.SIGTERM)
     assert other.rest()[0] == 0
 
@@ -108,7 +109,7 @@ def who_took_over(standbys: list[Program], before: Program) -> tuple[Program, Pr
     (again,) = (each for each in standbys if "taking over" in said[each.process.pid])
     (other,) = (each for each in standbys if each is not again)
     assert f"process {again.process.pid} on" in said[other.process.pid]
-    until_said(again, "serving")
+    again.until_said("serving")
     return again, other
 
 
@@ -117,17 +118,17 @@ def test_an_executive_that_stood_still_moves_nothing_after_it_was_replaced(
 ) -> None:
     fleet, state = fleet_with_state(tmp_path)
     owner = serve(m2pem, fleet, postgres_url)
-    until_said(owner, "serving")
+    owner.until_said("serving")
     # As on another host: on this one the kernel keeps the locks of a process that stands still.
     elsewhere = {"M2PEM_RUNTIME_DIR": str(tmp_path / "elsewhere")}
     standby = serve(m2pem, fleet, postgres_url, "--standby", **elsewhere)
-    until_said(standby, "standing by for")
+    standby.until_said("standing by for")
     start_mission(m2pem, postgres_url)
     answer(m2pem, postgres_url, prompted(owner), "continue")
     owner.until_record("BehaviorProgressed", state="RUNNING")
     owner.send(signal.SIGSTOP)
     try:
-        until_said(standby, "taking over")  # when the lease has ended
+        standby.until_said("taking over")  # when the lease has ended
         standby.until_record("RunClaimed", epoch=2)
         before = recorded_effects(state)
     finally:
@@ -145,6 +146,30 @@ def test_an_executive_that_stood_still_moves_nothing_after_it_was_replaced(
     assert_each_behavior_began_once(state, [json.loads(line) for line in out.splitlines()])
 
 
+def test_an_executive_that_a_plugin_blocks_leaves_its_missions_to_a_standby(
+    m2pem: CommandLine, tmp_path: Path, journal: str
+) -> None:
+    fleet, state = fleet_with_state(tmp_path)
+    plugin = install_plugin(tmp_path, "blocking", BLOCKING)
+    owner = serve(m2pem, fleet, journal, **plugin)
+    owner.until_said("serving")
+    standby = serve(m2pem, fleet, journal, "--standby")
+    standby.until_said("standing by for")
+    start_mission(m2pem, journal)
+    answer(m2pem, journal, prompted(owner), "continue")
+    owner.until_record("BehaviorProgressed", state="RUNNING")
+    owner.send(signal.SIGUSR1)
+    status, errors = owner.rest()
+    assert status == 1, errors
+    assert "m2pem_plugin_blocking, block, line 6 has blocked it for" in errors
+    assert f"leaves its missions to process {standby.process.pid} on" in errors
+    standby.until_record("RunClaimed", epoch=2)
+    status, _, errors = m2pem.run("stop", "r1", "--journal", journal)
+    assert status == 0, errors
+    standby.until_record("RunEnded", outcome="stopped")
+    assert recorded_effects(state)[-1].kind in (EffectKind.CANCEL, EffectKind.END)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -157,7 +182,7 @@ def test_a_standby_that_could_take_nothing_over_is_refused(
 ) -> None:
     fleet, _ = fleet_with_state(tmp_path)
     owner = serve(m2pem, fleet, "journal.db")
-    until_said(owner, "serving")
+    owner.until_said("serving")
     other = fleet.with_name("other.yaml")
     other.write_text(fleet.read_text().replace("max_outage: 10 min", "max_outage: 9 min"))
     status, _, errors = m2pem.run(
@@ -167,20 +192,36 @@ def test_a_standby_that_could_take_nothing_over_is_refused(
     assert said in errors
 
 
+@pytest.mark.long
+def test_an_executive_that_ends_itself_leaves_the_terminal_as_it_was(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, _ = fleet_with_state(tmp_path)
+    words = ("serve", "--fleet", fleet, "--journal", "journal.db")
+    plugin = install_plugin(tmp_path, "blocking", BLOCKING)
+    with Terminal(tmp_path, *words, "--ocu", "terminal", **plugin) as owner:
+        owner.until("no mission is running")
+        standby = serve(m2pem, fleet, "journal.db", "--standby")
+        standby.until_said("standing by for")
+        owner.process.send_signal(signal.SIGUSR1)
+        owner.until(r"\x1b\[\?1049l(?s:.*) leaves its missions to process")
+        assert owner.process.wait() == 1
+
+
 def test_an_attached_operator_goes_on_at_the_executive_that_has_taken_over(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:
     fleet, _ = fleet_with_state(tmp_path)
     owner = serve(m2pem, fleet, "journal.db")
-    until_said(owner, "serving")
+    owner.until_said("serving")
     standby = serve(m2pem, fleet, "journal.db", "--standby")
-    until_said(standby, "standing by for")
+    standby.until_said("standing by for")
     start_mission(m2pem, "journal.db")
     prompted(owner)
     attached = m2pem.start("attach", "--ocu", "plain", "--journal", "journal.db")
     attached.until_text("[p1] UserSendRoute")
     owner.kill()
-    assert f"process {standby.process.pid} has taken over" in until_said(attached, "taken over")
+    assert f"process {standby.process.pid} has taken over" in attached.until_said("taken over")
     attached.until_text("[p1] UserSendRoute")
     attached.type("abort")
     standby.until_record("RunEnded", outcome="terminated")
