@@ -41,6 +41,8 @@ class Interruption:
         self._before: dict[signal.Signals, Any] = {}
         self._stopping: asyncio.Task[None] | None = None
         self._terminal: list[Any] | None = None
+        self._errors = sys.stderr
+        """Itself: a unit that has the terminal puts another one in its place."""
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def __enter__(self) -> Self:
@@ -84,10 +86,11 @@ class Interruption:
     def end_at_once(self, text: str, status: int) -> None:
         """Say why, and end the process, from any thread: nothing is closed; locks end with it."""
         if self._terminal is not None:
-            os.write(sys.stderr.fileno(), _LEAVE_SCREEN)
+            os.write(self._errors.fileno(), _LEAVE_SCREEN)
             termios.tcsetattr(sys.stdin.fileno(), termios.TCSANOW, self._terminal)
-        self._say(text)
-        writer_for(sys.stderr).drain(PRINTING_S)
+        writer = writer_for(self._errors)
+        writer.put(f"m2pem: {text}")
+        writer.drain(PRINTING_S)
         os._exit(status)
 
     def _held(self) -> str:

@@ -81,7 +81,13 @@ class _ToScreen(logging.Handler):
     def __init__(self, app: "TerminalApp") -> None:
         super().__init__(logging.WARNING)
         self._app = app
+        self._loop = asyncio.get_running_loop()
 
     def emit(self, record: logging.LogRecord) -> None:
         text = record.getMessage()
-        self._app.call_later(lambda: self._app.say(text, alarm=True))
+
+        def say() -> None:
+            self._app.call_later(lambda: self._app.say(text, alarm=True))
+
+        # Not from this thread: Textual would wait for the event loop, which may be blocked.
+        self._loop.call_soon_threadsafe(say)
