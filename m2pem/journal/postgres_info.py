@@ -29,13 +29,16 @@ class DatabaseInfo:
 
 @dataclass(frozen=True, slots=True)
 class ExecutiveElsewhere:
-    """An executive of another host whose lease lasts: what it serves, and the runs it drives."""
+    """An executive of another host whose lease lasts: what it serves, and the runs it drives.
+
+    `page`: the address of its web page; "": it has none."""
 
     host: str
     pid: int
     command: str
     fleets: tuple[str, ...]
     runs: tuple[str, ...]
+    page: str
 
     def __str__(self) -> str:
         return f"process {self.pid}: {self.command}"
@@ -52,7 +55,8 @@ def executives_elsewhere(address: PostgresAddress) -> tuple[ExecutiveElsewhere, 
             rows = connection.execute(
                 "SELECT host, pid, command,"
                 " ARRAY(SELECT DISTINCT fleet FROM fleets WHERE executive = id ORDER BY fleet),"
-                " ARRAY(SELECT run FROM owners WHERE executive = id ORDER BY run)"
+                " ARRAY(SELECT run FROM owners WHERE executive = id ORDER BY run),"
+                " COALESCE((SELECT max(page) FROM fleets WHERE executive = id), '')"
                 " FROM executives WHERE lease_until > clock_timestamp() AND host <> %s"
                 " ORDER BY host, pid",
                 (socket.gethostname(),),
@@ -60,10 +64,11 @@ def executives_elsewhere(address: PostgresAddress) -> tuple[ExecutiveElsewhere, 
     except psycopg.Error as error:
         raise explained_error(error, address.shown) from error
     found = []
-    for host, pid, command, served, runs in rows:
+    for host, pid, command, served, runs, page in rows:
         fleets = tuple(each for each in served if not each.startswith(STANDBY_OF))
         if fleets or runs or not served:  # not one that only stands by
-            found.append(ExecutiveElsewhere(host, pid, command, fleets, tuple(map(run_id, runs))))
+            ids = tuple(map(run_id, runs))
+            found.append(ExecutiveElsewhere(host, pid, command, fleets, ids, page))
     return tuple(found)
 
 

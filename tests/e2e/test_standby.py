@@ -208,6 +208,61 @@ def test_an_executive_that_ends_itself_leaves_the_terminal_as_it_was(
         assert owner.process.wait() == 1
 
 
+ANOTHER_HOST = """
+import socket
+
+socket.gethostname = lambda: "gcs2"
+"""
+"""A plugin by which an executive of this host is one of another host."""
+
+
+@pytest.mark.long
+def test_an_attached_operator_reads_where_another_host_has_taken_over(
+    m2pem: CommandLine, tmp_path: Path, postgres_url: str
+) -> None:
+    fleet, _ = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, postgres_url)
+    owner.until_said("serving")
+    home = tmp_path / "there"
+    home.mkdir()
+    there = {"M2PEM_RUNTIME_DIR": str(home), "HOME": str(home)}
+    plugin = install_plugin(home, "gcs2", ANOTHER_HOST)
+    # Plugins are loaded before the journal is opened where an operator unit is.
+    words = ("--standby", "--ocu", "plain")
+    standby = serve(m2pem, fleet, postgres_url, *words, **there, **plugin)
+    standby.until_said("standing by for")
+    attached = m2pem.start("attach", "--ocu", "plain", "--journal", postgres_url, **LEASE)
+    attached.until_said("attached to process")
+    owner.send(signal.SIGSTOP)
+    status, errors = attached.rest()
+    assert status == 1
+    gone = f"process {owner.process.pid} does not serve mehds-vignette-1 any more. gcs2 serves it"
+    assert f"{gone} now (process {standby.process.pid}: m2pem serve" in errors
+    assert "run `m2pem attach` there" in errors
+
+
+@pytest.mark.long
+def test_an_attached_operator_reads_that_the_executive_is_silent(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, _ = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, "journal.db")
+    owner.until_said("serving")
+    standby = serve(m2pem, fleet, "journal.db", "--standby")
+    standby.until_said("standing by for")
+    attached = m2pem.start("attach", "--ocu", "plain", "--journal", "journal.db")
+    attached.until_said(f"process {standby.process.pid} on")
+    owner.send(signal.SIGSTOP)
+    said = attached.until_said("does not answer: STOP from here reaches no vehicle")
+    assert f"`kill -9 {owner.process.pid}` lets process {standby.process.pid} on" in said
+    owner.send(signal.SIGCONT)
+    attached.until_said(f"process {owner.process.pid} answers again")
+    owner.send(signal.SIGSTOP)
+    attached.until_said("does not answer")
+    owner.kill()
+    attached.until_said(f"process {standby.process.pid} has taken over")
+
+
 def test_an_attached_operator_goes_on_at_the_executive_that_has_taken_over(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:

@@ -1,8 +1,10 @@
 """The screen of the operator control unit: its panes, which follow the executive."""
 
+import asyncio
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 from textual import work
 from textual.app import App, ComposeResult
@@ -12,6 +14,7 @@ from textual.widgets import Static
 
 from m2pem.api import (
     Alert,
+    ExecutiveAddress,
     Importance,
     Listener,
     MissionControl,
@@ -38,9 +41,14 @@ from m2pem_plugin_terminal.vehicles_pane import Vehicles
 
 REFRESH_S = 0.25
 
+STANDBYS_EVERY_S = 2.0
+"""Between two questions to the executive, who stands by."""
+
 LOG_LINES = 2000
 
 DONE_TOKENS = 20
+
+ALONE = "No executive stands by any more"
 
 THEME = Theme(
     name="m2pem",
@@ -110,6 +118,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._asking_time = False
         self._holders: Mapping[ResourceId, str] = {}
         self._asking_holders = False
+        self._standbys: Sequence[ExecutiveAddress] = ()
         self.own_answers: set[tuple[RunId, str]] = set()
         # Stored, not queried: Textual cannot find them while it closes the screen.
         self._header = Static(id="header")
@@ -141,6 +150,7 @@ class Display(App[None], Listener, inherit_bindings=False):
         self._around.border_title = "Vehicles"
         self.run_worker(self._follow())
         self.run_worker(self._follow_telemetry())
+        self.run_worker(self._follow_standbys())
         self.set_interval(REFRESH_S, self.show)
 
     async def _follow(self) -> None:
@@ -157,6 +167,16 @@ class Display(App[None], Listener, inherit_bindings=False):
                 self._vehicles.update(state, self.now())
         except M2pemError as error:
             self.say(f"The telemetry has failed: {error}", alarm=True)
+
+    async def _follow_standbys(self) -> None:
+        while True:
+            with suppress(M2pemError, OSError):  # the last answer stays
+                found = await self.control.standbys()
+                if self._standbys and not found:
+                    self.alerts.add(ALONE)
+                    self.say(ALONE, alarm=True)
+                self._standbys = found
+            await asyncio.sleep(STANDBYS_EVERY_S)
 
     # --- panes ----------------------------------------------------------------------------------
 
@@ -177,7 +197,8 @@ class Display(App[None], Listener, inherit_bindings=False):
             self._ask_holders()
         active = [b for b in self.follower.views.values() if not b.status.ended]
         others = sum(1 for each in active if each is not view)
-        self._header.update(header(view, others, time_s, self.size.width))
+        hosts = list(dict.fromkeys(each.host for each in self._standbys))
+        self._header.update(header(view, others, time_s, self.size.width, hosts))
         if view is not None:
             width = self._mission.scrollable_content_region.width
             self._tree.update(mission_tree(view, self.logs[view.run].done, now, time_s, width))

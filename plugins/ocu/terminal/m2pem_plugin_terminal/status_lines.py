@@ -3,7 +3,7 @@
 STOP is on every screen and over every dialog; a second press confirms it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from rich.text import Text
 from textual.widgets import Static
@@ -39,15 +39,19 @@ HINTS = (
 )
 
 
-def header(view: RunView | None, others: int, time_s: float, width: int) -> Text:
-    """Return one line of `width` cells: status, mission, progress, time.
+def header(
+    view: RunView | None, others: int, time_s: float, width: int, standbys: Sequence[str] = ()
+) -> Text:
+    """Return one line of `width` cells: status, mission, who stands by, progress, time.
 
-    `others`: runs beside this one that have not ended.
+    `others`: runs beside this one that have not ended. `standbys`: hosts of executives that stand
+    by.
     """
+    right = Text(f"standby: {', '.join(standbys)}  " if standbys else "", "#7fc8a9")
     if view is None:
-        return Text(" m2pem: no mission is running", "#9aa4af")
+        left = Text(" m2pem: no mission is running", "#9aa4af")
+        return Text.assemble(left, " " * max(1, width - left.cell_len - right.cell_len), right)
     done, total = view.progress()
-    right = Text()
     if total:
         filled = round(done / total * BAR_CELLS)
         right.append("━" * filled, "#7fc8a9")
