@@ -20,6 +20,9 @@ GIVE_UP = 3
 PRINTING_S = 1.0
 """What the last lines of a process are given to be printed."""
 
+AT_ONCE_S = 0.2
+"""The same of a process that ends at once: shorter than `m2pem.journal.lease.ABANDONED_S`."""
+
 _LEAVE_SCREEN = b"\x1b[<u\x1b[?1004l\x1b[?2004l\x1b[?1049l\x1b[?25h\x1b[0m"
 """Ends what Textual asks of a terminal: keys and focus as events, another screen, no cursor."""
 
@@ -39,6 +42,7 @@ class Interruption:
         self._closing = closing
         self._count = 0
         self._before: dict[signal.Signals, Any] = {}
+        """Of the block: `asyncio.run` has a handler of its own for SIGINT."""
         self._stopping: asyncio.Task[None] | None = None
         self._terminal: list[Any] | None = None
         self._errors = sys.stderr
@@ -46,6 +50,7 @@ class Interruption:
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def __enter__(self) -> Self:
+        self._before = {number: signal.getsignal(number) for number in SIGNALS}
         return self
 
     def __exit__(self, *reason: object) -> None:
@@ -56,7 +61,7 @@ class Interruption:
         """Handle signals in the running event loop from now on; before, one ends the process."""
         self._loop = asyncio.get_running_loop()
         for number in SIGNALS:
-            self._before[number] = signal.signal(number, self._received)
+            signal.signal(number, self._received)
 
     def take_terminal(self) -> None:
         """Note how the terminal is, before a unit draws on the whole of it."""
@@ -90,7 +95,7 @@ class Interruption:
             termios.tcsetattr(sys.stdin.fileno(), termios.TCSANOW, self._terminal)
         writer = writer_for(self._errors)
         writer.put(f"m2pem: {text}")
-        writer.drain(PRINTING_S)
+        writer.drain(AT_ONCE_S)
         os._exit(status)
 
     def _held(self) -> str:

@@ -35,8 +35,9 @@ LEASE_VARIABLE = "M2PEM_LEASE_S"
 DEFAULT_S = 5.0
 SHORTEST_S = 0.5
 
-ABANDONED_S = 0.2
-"""After that another executive has what this one had, whose process ends meanwhile."""
+ABANDONED_S = 0.5
+"""After that another executive has what this one had, whose process ends meanwhile; it needs a
+moment to print why."""
 
 
 def lease_s() -> float:
