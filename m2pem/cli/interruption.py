@@ -30,7 +30,8 @@ _LEAVE_SCREEN = b"\x1b[<u\x1b[?1004l\x1b[?2004l\x1b[?1049l\x1b[?25h\x1b[0m"
 class Interruption:
     """Handles the signals from `begin` to the end of its block, which is around `asyncio.run`: so
     a signal in the middle of closing ends nothing. They are handled while a plugin blocks the event
-    loop, too, as soon as Python code runs.
+    loop, too: each interrupts a system call of the main thread, but for one that comes just before
+    that call, which the next signal brings to light.
 
     `asked`: set when all must end. `closing`: what is waited for when no vehicle is.
     """
