@@ -236,8 +236,9 @@ CHAOS_ROUNDS := 1000
 # One of these alone again: make chaos CHAOS="--seed 5 --round 17"
 CHAOS :=
 
-chaos: python-packages ## kill executives at chosen points and random moments, CHAOS_ROUNDS times (1000)
-	@$(BIN)/python -m tests.chaos --rounds $(CHAOS_ROUNDS) $(CHAOS)
+OF_ROS := $(findstring --vehicles ros,$(CHAOS))
+chaos: $(if $(OF_ROS),ros,python-packages) ## kill executives at chosen points and random moments, CHAOS_ROUNDS times (1000)
+	@$(if $(OF_ROS),$(ROS_PYTHON),$(BIN)/python) -m tests.chaos --rounds $(CHAOS_ROUNDS) $(CHAOS)
 
 dist: $(CREATED) ## build the wheels of m2pem and its plugins, into dist/
 	@echo "Building the wheels of m2pem and its plugins into dist; this takes about two minutes"

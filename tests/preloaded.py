@@ -26,7 +26,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
+
+from m2pem_plugin_ros import fork_server
 
 from m2pem.plugins import PluginManager
 
@@ -93,7 +96,7 @@ class Preloaded:
             subprocess.Popen(
                 [sys.executable, "-m", "tests.preloaded", str(theirs.fileno())],
                 cwd=REPOSITORY,
-                env={**os.environ, **(environment or {})},
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", **(environment or {})},
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
             )
@@ -140,6 +143,9 @@ def _import_all() -> None:
     plugins = PluginManager()  # their hooks import what they register
     for offers in (plugins.arbiters, plugins.ocus, plugins.services):
         offers()
+    if find_spec("rclpy"):
+        for name in fork_server.PRELOADED:
+            importlib.import_module(name)
 
 
 def _become(

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 from tests.chaos.kill_points import JOURNALS, REPLACED, SQLITE, points_of
@@ -19,7 +20,7 @@ from tests.chaos.stops import StopRound, plan_stop, play_stop
 from tests.chaos.stops import as_table as stops_as_table
 from tests.chaos.table import as_table
 from tests.chaos.troubles import NONE, TROUBLES
-from tests.chaos.worlds import WORLDS, SimulatedVehicles
+from tests.chaos.worlds import OF_ROS, WORLDS, SimulatedVehicles
 
 
 def main() -> int:
@@ -76,6 +77,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--stop", action="store_true", help="stop all, while something is wrong")
     parser.add_argument("--trouble", choices=list(TROUBLES), default="", help="what is wrong then")
     given = parser.parse_args()
+    if given.vehicles in OF_ROS and not find_spec("rclpy"):
+        parser.error(f"--vehicles {given.vehicles}: ROS 2 is not here; .venv-ros/bin/python has it")
     if given.stop and given.vehicles not in NONE.worlds:
         parser.error(f"--stop: --vehicles is one of {', '.join(NONE.worlds)}")
     return given

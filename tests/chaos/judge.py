@@ -140,7 +140,11 @@ def _vehicle_faults(runs: Sequence[_Run], evidence: "Evidence", verdict: Verdict
     begun = [
         each
         if each.behavior
-        else replace(each, behavior=by_element.get(each.element, each.element))
+        else replace(
+            each,
+            behavior=by_element.get(each.element, each.element),
+            overlaps=by_element.get(each.overlaps, each.overlaps),
+        )
         for each in evidence.world.begun()
     ]
     counts = Counter(each.behavior for each in begun)

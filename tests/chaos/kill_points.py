@@ -126,6 +126,17 @@ POSTGRES = JournalKind(
 )
 JOURNALS: Mapping[str, JournalKind] = {each.name: each for each in (SQLITE, POSTGRES)}
 
+_ROS_CALLS = "m2pem_plugin_ros.runtime.calls:Calls"
+_ROS_VEHICLE = "m2pem_plugin_ros.vehicle:Vehicle"
+POINTS_OF_ARBITERS: Mapping[str, tuple[KillPoint, ...]] = {
+    "m2pem_plugin_ros.arbiter:RosArbiter": (
+        KillPoint("ROS: a request or goal is sent, not answered", f"{_ROS_CALLS}._wait"),
+        KillPoint("ROS: a request or goal is answered", f"{_ROS_CALLS}._wait", When.AFTER),
+        KillPoint("ROS: the vehicle says that it goes on", f"{_ROS_VEHICLE}.progress"),
+        KillPoint("ROS: the vehicle says that it has ended", f"{_ROS_VEHICLE}.ended"),
+    )
+}
+
 _DISPATCHER = "m2pem.executive.dispatcher:Dispatcher"
 _TAKEOVER = "m2pem.executive.run_takeover"
 
@@ -153,6 +164,7 @@ def executive_points(journal: JournalKind, arbiter: str) -> tuple[KillPoint, ...
         KillPoint(
             "resume: taken up", "m2pem.executive.runner:Runner.take_up", When.AFTER, resuming=True
         ),
+        *POINTS_OF_ARBITERS.get(arbiter, ()),
     )
 
 

@@ -26,7 +26,8 @@ from m2pem.journal.lease import LEASE_VARIABLE
 from tests.chaos import journals
 from tests.chaos.judge import Verdict, judge
 from tests.chaos.kill_points import JOURNALS, RANDOM, REPLACED, points_of
-from tests.chaos.worlds import WORLDS, ChaosMission, World
+from tests.chaos.missions import ChaosMission
+from tests.chaos.worlds import WORLDS, World
 from tests.command_line import CommandLine
 from tests.preloaded import Preloaded, Process, preloaded
 
@@ -185,7 +186,8 @@ class Play:
         self._kind = JOURNALS[plan.journal]
         self._file = journals.make(self._kind, folder)
         lease = {LEASE_VARIABLE: self._kind.lease_s} if self._kind.lease_s else {}
-        self._environment = CommandLine(folder, {**lease, **(environment or {})}).environment
+        variables = {**self._world.environment, **lease, **(environment or {})}
+        self._environment = CommandLine(folder, variables).environment
         self._forked_from = forked_from or preloaded()
         self._processes: list[Process] = []
         self._chance = random.Random(f"{plan.number}")

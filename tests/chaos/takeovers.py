@@ -20,7 +20,7 @@ from statistics import quantiles
 
 from m2pem.simulation.executions import Effect, EffectKind
 from m2pem.simulation.state_file import recorded_effects
-from tests.chaos.worlds import FORK, process
+from tests.chaos.missions import FORK, process
 from tests.command_line import BLOCKING, CommandLine, Program, install_plugin
 from tests.executive.conftest import question, task
 from tests.faults.tcp_proxy import TcpProxy

@@ -15,13 +15,8 @@ from typing import Any
 
 from m2pem.journal.postgres_address import read_address
 from tests.chaos.kill_points import POSTGRES, SQLITE, Place, place_of
-from tests.chaos.worlds import (
-    BlockingHost,
-    ChaosMission,
-    MavlinkVehicles,
-    SimulatedVehicles,
-    process,
-)
+from tests.chaos.missions import ChaosMission, process
+from tests.chaos.worlds import OF_ROS, BlockingHost, MavlinkVehicles, SimulatedVehicles
 from tests.faults import Faults
 from tests.postgres_server import shared_server
 
@@ -36,7 +31,7 @@ class Trouble:
     the vehicle that nothing reaches, "" for all; None: there is none."""
 
     name: str
-    worlds: tuple[str, ...] = (SimulatedVehicles.name, MavlinkVehicles.name)
+    worlds: tuple[str, ...] = (SimulatedVehicles.name, MavlinkVehicles.name, *OF_ROS)
     journals: tuple[str, ...] = (SQLITE.name, POSTGRES.name)
     mute: bool = False
     calls: tuple[str, ...] = ()
@@ -89,7 +84,7 @@ TROUBLES = {
         Trouble("database silent", journals=(POSTGRES.name,), mute=True),
         Trouble("link cut", worlds=(SimulatedVehicles.name,), deaf=VEHICLE),
         Trouble("arbiter blocks", worlds=(BlockingHost.name,), deaf=VEHICLE),
-        Trouble("vehicles silent", worlds=(MavlinkVehicles.name,), deaf=""),
+        Trouble("vehicles silent", worlds=(MavlinkVehicles.name, *OF_ROS), deaf=""),
     )
 }
 

@@ -1,25 +1,26 @@
-"""Vehicles, and the missions that rounds run on them.
+"""Vehicles on which rounds run missions.
 
 The vehicles outlive every executive, and note themselves what they begin: the judge compares that
 with the journal.
 """
 
 import json
-import math
 import os
 import signal
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
+from m2pem_plugin_ros import loopback
+from m2pem_plugin_ros.testing import reserved_domain
+
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
+from tests.chaos.missions import HOME, ChaosMission, element_at, in_turn, place, two_ways
 from tests.command_line import CommandLine, Program, install_plugin
-from tests.executive.conftest import flow, mission, question, task
 from tests.faults.tcp_proxy import TcpProxy
 from tests.preloaded import preloaded
 
@@ -47,18 +48,6 @@ class Sign:
     arrived: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class ChaosMission:
-    """A mission that ends alone, but for its user tasks, which are answered `yes`.
-
-    `orders`: elements in the order in which a run must leave them.
-    """
-
-    name: str
-    source: bytes
-    orders: tuple[tuple[str, ...], ...]
-
-
 class World(Protocol):
     """The vehicles of one round, in a folder of its own."""
 
@@ -70,6 +59,8 @@ class World(Protocol):
     """Whether they begin nothing again when a pause ends."""
     missions: tuple[ChaosMission, ...]
     fleet: Path
+    environment: Mapping[str, str]
+    """Variables that executives need to reach them."""
 
     def begun(self) -> Sequence[Begun]:
         """Return what the vehicles have begun, in order, by what they noted themselves."""
@@ -86,80 +77,6 @@ class World(Protocol):
     def close(self) -> None:
         """End the vehicles."""
         ...
-
-
-_HOME = (38.1075, -77.3192)
-
-
-def place(east_m: float, north_m: float) -> str:
-    """A position as missions write it; metres from the fleet's origin."""
-    latitude, longitude = _HOME[0] + north_m / 111_000, _HOME[1] + east_m / 87_500
-    return f"[{latitude:.6f}, {longitude:.6f}]"
-
-
-PLACES = {
-    "Out": (12.0, 0.0),
-    "Back": (-2.0, 0.0),
-    "Fly": (0.0, 25.0),
-    "Last": (6.0, 8.0),
-    "Near": (5.0, -10.0),
-    "Shared": (10.0, 5.0),
-}
-"""Where tasks move vehicles; metres east and north. None is the aircraft's home."""
-
-
-def goto(element: str, role: str) -> str:
-    """A task that moves a vehicle to its place of `PLACES`."""
-    target = f'<m2pem:property name="target" value="{place(*PLACES[element])}"/>'
-    return task(element, role, "goto", target)
-
-
-def _flows(*ways: str) -> str:
-    pairs = dict.fromkeys(pair for way in ways for pair in pairwise(way.split()))
-    return "".join(flow(*pair) for pair in pairs)
-
-
-def process(elements: str, *ways: str) -> bytes:
-    """A mission from its elements and its flows: each way names elements one after the other."""
-    inside = f'<startEvent id="S"/>{elements}<endEvent id="E"/>{_flows(*ways)}'
-    return mission(f'<process id="P" isExecutable="true">{inside}</process>')
-
-
-PAUSE = (
-    '<intermediateCatchEvent id="Wait"><timerEventDefinition>'
-    "<timeDuration>PT6S</timeDuration></timerEventDefinition></intermediateCatchEvent>"
-)
-FORK = '<parallelGateway id="Fork"/><parallelGateway id="Join"/>'
-
-
-def two_ways(ground: str, air: str) -> ChaosMission:
-    """A ground vehicle and an aircraft at the same time, with a question; then one by need."""
-    altitude = '<m2pem:property name="altitude" value="10"/>'
-    elements = (
-        FORK,
-        goto("Out", f'vehicle="{ground}"'),
-        question("Ask"),
-        goto("Back", f'vehicle="{ground}" wait="unlimited"'),
-        task("Up", f'vehicle="{air}"', "takeoff", altitude),
-        goto("Fly", f'vehicle="{air}"'),
-        task("Home", f'vehicle="{air}"', "land"),
-        goto("Last", 'requires="vehicle.domain == \'ground\'" wait="unlimited"'),
-    )
-    ways = ("S Fork Out Ask Back Join Last E", "Fork Up Fly Home Join")
-    orders = (("Out", "Ask", "Back", "Last"), ("Up", "Fly", "Home", "Last"))
-    return ChaosMission("two_ways.bpmn", process("".join(elements), *ways), orders)
-
-
-def in_turn(first: str, second: str) -> ChaosMission:
-    """One vehicle after a timer, then one that another run may have: its task waits."""
-    elements = (
-        PAUSE,
-        goto("Near", f'vehicle="{first}"'),
-        goto("Shared", f'vehicle="{second}" wait="unlimited"'),
-        task("Reverse", f'vehicle="{second}" wait="unlimited"', "reverse"),
-    )
-    source = process("".join(elements), "S Wait Near Shared Reverse E")
-    return ChaosMission("in_turn.bpmn", source, (("Wait", "Near", "Shared", "Reverse"),))
 
 
 _SIMULATED = """version: 1
@@ -180,6 +97,7 @@ class SimulatedVehicles:
     speed = 60.0
     pauses = True
     missions = (two_ways("ugv1", "uav1"), in_turn("ugv2", "ugv1"))
+    environment: Mapping[str, str] = {}
 
     def __init__(self, folder: Path, speed: float = speed) -> None:
         self.speed = speed
@@ -278,6 +196,7 @@ class MavlinkVehicles:
     speed = 20.0
     pauses = False
     missions = SimulatedVehicles.missions
+    environment: Mapping[str, str] = {}
 
     def __init__(self, folder: Path, speed: float = speed) -> None:
         self.speed = speed
@@ -303,7 +222,7 @@ class MavlinkVehicles:
                 "--ekf",
                 "1s",
                 "--home",
-                ",".join(map(str, (*_HOME, 60))),
+                ",".join(map(str, (*HOME, 60))),
             ),
             *("--set", "FS_GCS_ENABLE=0"),
         ]
@@ -434,14 +353,133 @@ def _begun(vehicle: str, kind: str, detail: str) -> Begun | None:
         return Begun(vehicle, "", element="Home")
     if kind != "motion":
         return None
-    latitude, longitude = map(float, detail.split(","))
-    east_m, north_m = (longitude - _HOME[1]) * 87_500, (latitude - _HOME[0]) * 111_000
-    near = [name for name, at in PLACES.items() if math.dist(at, (east_m, north_m)) < 0.5]
     # A takeoff that begins again in the air climbs where it is.
     other = "Up" if vehicle.startswith("uav") else "Reverse"
-    return Begun(vehicle, "", element=near[0] if near else other)
+    return Begun(vehicle, "", element=element_at(detail) or other)
 
+
+@dataclass(frozen=True, slots=True)
+class _Rover:
+    """`connection`: how it is reached. `home`: where it is at first, metres east and north."""
+
+    connection: Mapping[str, str]
+    home: tuple[float, float]
+
+    def line(self, name: str) -> str:
+        """Its line of a fleet."""
+        home = json.loads(place(*self.home))
+        sim = {"home": home, "max_speed": "6 m/s", "acceleration": "3 m/s2"}
+        settings = {
+            "domain": "ground",
+            "arbiter": "ros",
+            "sitl": True,
+            "lost_after": "120 s",
+            "connection": {"namespace": f"/{name}", "sim": sim, **self.connection},
+        }
+        return f"  {name}: {json.dumps(settings)}\n"
+
+
+class RosVehicles(SimulatedVehicles):
+    """Simulated ROS 2 rovers in a process of their own, over DDS: one is reached by the topics of
+    an m2pem node, one by Nav2. The aircraft is a simulated vehicle."""
+
+    name = "ros"
+    arbiter = "m2pem_plugin_ros.arbiter:RosArbiter"
+    speed = 8.0
+    pauses = False
+    rovers: Mapping[str, _Rover] = {
+        "ugv1": _Rover({}, (0.0, -5.0)),
+        "ugv2": _Rover({"driver": "nav2"}, (0.0, -15.0)),
+    }
+
+    def __init__(self, folder: Path, speed: float = speed) -> None:
+        super().__init__(folder, speed)
+        simulated = self.fleet.read_text(encoding="utf-8").splitlines(keepends=True)
+        lines = [line for line in simulated if line.partition(":")[0].strip() not in self.rovers]
+        lines += [rover.line(name) for name, rover in self.rovers.items()]
+        self.fleet.write_text("".join(lines), encoding="utf-8")
+        self._notes = folder / "vehicles.jsonl"
+        self._signs: list[Sign] = []
+        self._read = [0, 0]
+        self._domain = ExitStack()
+        self.environment = loopback.environment(self._domain.enter_context(reserved_domain()))
+        words = ("sim", "ros", "--fleet", str(self.fleet), "--speed", f"{self.speed:g}")
+        self._m2pem = CommandLine(folder, dict(self.environment))
+        code = _ROVERS_CODE.format(notes=str(self._notes), words=words)
+        self._process = self._m2pem.start("-c", code)
+        self._process.until_text("ready")
+
+    def begun(self) -> list[Begun]:
+        """See `World.begun`."""
+        return [*super().begun(), *(begun for begun, _ in self._rover_signs() if begun is not None)]
+
+    def signs(self) -> list[Sign]:
+        """See `World.signs`."""
+        for file, found in enumerate((super().signs(), [sign for _, sign in self._rover_signs()])):
+            self._signs += found[self._read[file] :]
+            self._read[file] = len(found)
+        return self._signs
+
+    def _rover_signs(self) -> Iterator[tuple[Begun | None, Sign]]:
+        """What rovers noted: what was begun by it, and the sign. A base that starts to move with no
+        order has begun what no journal requested."""
+        doing: dict[str, Begun] = {}
+        for line in self._notes.read_text(encoding="utf-8").splitlines(keepends=True):
+            if not line.endswith("\n"):
+                return
+            vehicle, kind, detail, at_s = json.loads(line)
+            begun: Begun | None = None
+            if kind == "begin":
+                element = element_at(detail) if detail else "Reverse"
+                before = doing.get(vehicle)
+                begun = Begun(vehicle, "", before.element if before else "", element)
+                doing[vehicle] = begun
+            elif kind == "motion" and vehicle not in doing:
+                begun = Begun(vehicle, "", element="a motion without an order")
+            elif kind == "ended":
+                doing.pop(vehicle, None)
+            if kind != "motion" or begun is not None:
+                moves = kind in ("begin", "resume", "motion")
+                now = doing.get(vehicle, begun) if moves else None
+                yield begun, Sign(vehicle, now, at_s, arrived=kind == "ended")
+
+    def send_signal(self, number: int) -> None:
+        """See `World.send_signal`."""
+        self._process.send(signal.Signals(number))
+
+    def close(self) -> None:
+        """See `World.close`."""
+        self._m2pem.end()
+        self._domain.close()
+
+
+class RosActionVehicles(RosVehicles):
+    """The same, reached by Nav2 and by the action of an m2pem node."""
+
+    name = "ros-action"
+    rovers: Mapping[str, _Rover] = {
+        "ugv1": _Rover({"driver": "nav2"}, (0.0, -5.0)),
+        "ugv2": _Rover({"via": "action"}, (0.0, -15.0)),
+    }
+
+
+_ROVERS_CODE = """
+from pathlib import Path
+from tests.chaos.ros_rovers import main
+
+main(Path({notes!r}), {words!r})
+"""
 
 WORLDS: Mapping[str, type[SimulatedVehicles] | type[MavlinkVehicles]] = {
-    each.name: each for each in (SimulatedVehicles, MavlinkVehicles, HostedVehicles, BlockingHost)
+    each.name: each
+    for each in (
+        SimulatedVehicles,
+        MavlinkVehicles,
+        HostedVehicles,
+        BlockingHost,
+        RosVehicles,
+        RosActionVehicles,
+    )
 }
+OF_ROS = tuple(name for name, world in WORLDS.items() if issubclass(world, RosVehicles))
+"""Those that need ROS 2, which is in an environment of its own."""
