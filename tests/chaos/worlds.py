@@ -368,7 +368,7 @@ class _Rover:
     def line(self, name: str) -> str:
         """Its line of a fleet."""
         home = json.loads(place(*self.home))
-        sim = {"home": home, "max_speed": "6 m/s", "acceleration": "3 m/s2"}
+        sim = {"home": home, "max_speed": "2 m/s", "acceleration": "2 m/s2"}
         settings = {
             "domain": "ground",
             "arbiter": "ros",
@@ -385,7 +385,7 @@ class RosVehicles(SimulatedVehicles):
 
     name = "ros"
     arbiter = "m2pem_plugin_ros.arbiter:RosArbiter"
-    speed = 8.0
+    speed = 3.0  # what is on board steers each 0.05 s, or less often on a busy computer
     pauses = False
     rovers: Mapping[str, _Rover] = {
         "ugv1": _Rover({}, (0.0, -5.0)),
