@@ -1,6 +1,7 @@
 """Nav2Driver when Nav2 fails, is not there, is somebody else's, or was given a goal long ago."""
 
 import math
+import signal
 import sys
 from collections.abc import AsyncIterator, Iterator
 from typing import Any
@@ -10,9 +11,10 @@ import pytest
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from m2pem_plugin_ros.drivers.nav2.goal_client import number_of, numbered
-from m2pem_plugin_ros.runtime import RosError
+from m2pem_plugin_ros.runtime import RosError, qos
 from m2pem_plugin_ros.testing import Peer, reserved_domain
 from nav2_msgs.action import NavigateToPose
+from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient
 from ros_nav2_bench import AMPLE_S, PEER, Bench, along, at, bench
 
@@ -240,7 +242,9 @@ async def test_what_was_found_after_a_restart_can_be_held_and_ended(
         assert await after.state(order.goal) is BehaviorState.CANCELLED
 
 
-async def test_what_ended_while_nobody_looked_is_found(domain: int, ugv1: Bench) -> None:
+async def test_what_ended_while_nobody_looked_is_found_and_what_was_held_is_begun_again(
+    domain: int, ugv1: Bench
+) -> None:
     done = ugv1.order("goto", target=away(ugv1, 1.0))
     ugv1.driver.begin(done)
     assert await ugv1.state(done.goal) is BehaviorState.SUCCEEDED
@@ -269,6 +273,8 @@ async def test_what_ended_while_nobody_looked_is_found(domain: int, ugv1: Bench)
             BehaviorState.UNKNOWN,
             "Nav2 does not have the goal",
         )
+        after.driver.begin(held)  # by a goal that Nav2 does not have yet
+        await after.moving(held.goal)
 
 
 async def test_a_vehicle_that_was_lost_drives_on_until_it_is_told_something_else(
@@ -316,10 +322,37 @@ async def test_a_nav2_that_has_ended_lets_its_order_fail(
             goal = ugv1.begin("goto", target=away(ugv1))
             await ugv1.moving(goal)
             peer.kill()
+            odometry = ugv1.ros.node.create_publisher(Odometry, "/ugv1/odom", qos.TELEMETRY)
+            message = Odometry()
+            message.header.frame_id = "map"
+
+            def ended() -> bool:
+                message.header.stamp.sec += 1_000_000
+                odometry.publish(message)
+                return goal in ugv1.events.outcomes
+
+            await ugv1.until(ended)
             outcome = await ugv1.outcome(goal)
             assert (outcome.state, outcome.code) == (BehaviorState.FAILED, "FAILED")
             assert outcome.reason == "Nav2 has sent no message for 3 s"
             assert ugv1.driver.health.not_ready_reasons == ("Nav2 does not answer",)
+
+
+@pytest.mark.long
+async def test_a_vehicle_that_is_silent_with_its_nav2_is_lost_and_does_not_fail(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("m2pem_plugin_ros.drivers.nav2.driver.GONE_S", 2.0)
+    with reserved_domain() as domain, Peer(PEER, domain, ["/ugv1", "0", "0"]) as peer:
+        async with bench(domain) as ugv1:
+            order = ugv1.order("goto", target=away(ugv1))
+            ugv1.driver.begin(order)
+            await ugv1.moving(order.goal)
+            peer.process.send_signal(signal.SIGSTOP)
+            await ugv1.until(lambda: ugv1.localization.age_s > 5.0)
+            assert ugv1.driver.health.not_ready_reasons == ("Nav2 does not answer",)
+            peer.process.send_signal(signal.SIGCONT)
+            assert await ugv1.state(order.goal) is BehaviorState.SUCCEEDED
 
 
 async def test_without_nav2_msgs_the_driver_says_what_to_install(

@@ -88,6 +88,7 @@ class Nav2:
     def ask_again(self) -> None:
         """The vehicle is silent: when it is back, Nav2 has time to answer, as at first."""
         self._refreshes = 0
+        self._last_activity_s = self._now_s()
 
     @property
     def problem(self) -> str:
@@ -98,7 +99,7 @@ class Nav2:
 
     @property
     def silent_s(self) -> float:
-        """Real seconds since the last message."""
+        """Real seconds since the last message, while the vehicle is received."""
         return self._now_s() - self._last_activity_s
 
     @property

@@ -110,6 +110,9 @@ class Nav2GoalTask(Nav2Task):
             self.context.begun()
             return await self.nav2.finish(self.client, self._current)
         self.nav2.limit_speed(self.parameters.speed_m_s)
+        # A goal of before a restart keeps its number, also if it was cancelled there.
+        known = (number_of(self.context.order.goal, goal) for goal in self.client.statuses)
+        self._goals = max([self._goals, *(each + 1 for each in known if each is not None)])
         self._current = numbered(self.context.order.goal, self._goals)
         self._goals += 1
         return await self.nav2.drive(self.client, self._current, goal, self.context.begun)
