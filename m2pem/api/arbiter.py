@@ -107,7 +107,8 @@ class BehaviorRequest:
 
 @dataclass(frozen=True, slots=True)
 class BehaviorReport:
-    """The state of a behavior. `number` rises from 1 with each report of one behavior.
+    """The state of a behavior. `number` rises from 1 with each report of one behavior; 0 of an
+    answer UNKNOWN, or more: the resource has had the behavior, and does not go on with it.
 
     ACCEPTED comes before RUNNING, exactly one terminal state comes last. `code` is an error code
     of docs/missions.md ("ROUTE_BLOCKED", ...), "" unless it failed; `reason` is for people.

@@ -257,7 +257,9 @@ def _is_not_begun(behavior: Behavior, report: BehaviorReport) -> bool:
     its arbiter neither."""
     if behavior.phase is not BehaviorPhase.ACTIVE or report.state is not BehaviorState.UNKNOWN:
         return False
-    return behavior.state is None or (behavior.state is BehaviorState.ACCEPTED and report.not_begun)
+    if behavior.state is None:
+        return report.number == 0
+    return behavior.state is BehaviorState.ACCEPTED and report.not_begun
 
 
 def _what_to_post(

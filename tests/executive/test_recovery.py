@@ -155,6 +155,20 @@ def test_what_a_vehicle_shows_not_to_have_begun_is_started_and_nobody_is_asked(p
     assert not any(isinstance(each, PromptOpened) for each in seen)
 
 
+def test_what_a_vehicle_has_had_is_not_started_unasked_though_the_journal_has_no_report_of_it(play):
+    async def story(world: World):
+        await world.fake.until_called("hold", "ugv1")
+        (prompt,) = world.executive.control.prompts()
+        return prompt.text, world.fake.count("start")
+
+    known = {"r1.b1": BehaviorReport("r1.b1", 1, BehaviorState.UNKNOWN, reason="it was cancelled")}
+    text, starts = resumed(play, left_behind(GOTO), story, known=known)
+    assert (text.partition(".")[0], starts) == (
+        "Drive: goto of ugv1 is not as it was (it was cancelled)",
+        0,
+    )
+
+
 @pytest.mark.parametrize(("inputs", "bound_s"), [((ACCEPTED, RUNNING), None), ((), 10.0)])
 def test_what_was_running_or_is_long_ago_is_not_started_unasked(play, monkeypatch, inputs, bound_s):
     monkeypatch.setattr("tests.executive.conftest.MAX_OUTAGE_S", bound_s)

@@ -340,7 +340,7 @@ class RosArbiter:
             checkpoint = Checkpoint((vehicle.resource,), "", 0, {})
             looks.append(self._query_vehicle(vehicle, behavior, checkpoint, None))
         for found in await asyncio.gather(*looks):
-            if found.state is not BehaviorState.UNKNOWN:
+            if found.state is not BehaviorState.UNKNOWN or found.number:
                 self._queried.discard(behavior)
                 return found
         return unknown
@@ -383,7 +383,7 @@ class RosArbiter:
                 self._unknown[behavior] = (checkpoint, reference)
         return BehaviorReport(
             behavior,
-            3 if outcome.is_end else 0,
+            3 if outcome.is_end else int(outcome.known),
             outcome.state,
             outcome.code,
             outcome.reason,

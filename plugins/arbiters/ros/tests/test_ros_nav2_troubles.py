@@ -4,6 +4,7 @@ import math
 import signal
 import sys
 from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
 from typing import Any
 from uuid import UUID, uuid4
 
@@ -268,6 +269,10 @@ async def test_what_ended_while_nobody_looked_is_found_and_what_was_held_is_begu
             BehaviorState.UNKNOWN,
             "its goal was cancelled at Nav2",
         )
+        request = replace(held.request, behavior="", parameters={})  # as without a checkpoint
+        assert (await after.driver.query(replace(held, request=request))).known
+        request = replace(done.request, behavior="", parameters={})
+        assert not (await after.driver.query(replace(done, request=request))).known
         found = await after.driver.query(after.order("goto", target=at(1.0, 1.0)))
         assert (found.state, found.reason) == (
             BehaviorState.UNKNOWN,

@@ -41,7 +41,8 @@ class Order:
 class Outcome:
     """The state of a goal on the vehicle. UNKNOWN: the vehicle does not know the goal. `outputs` of
     a goal that has ended go to the mission's data store. `held`: the vehicle reports that it is
-    held. `remaining`: what it last reported that is left; None: nothing."""
+    held. `remaining`: what it last reported that is left; None: nothing. `known`, of UNKNOWN: the
+    vehicle has had the goal, which was cancelled there, by a hold or by another client."""
 
     state: BehaviorState
     code: str = ""
@@ -49,6 +50,7 @@ class Outcome:
     outputs: Mapping[str, Value] = field(default_factory=dict)
     held: bool = False
     remaining: Mapping[str, Value] | None = None
+    known: bool = False
 
     @property
     def is_end(self) -> bool:

@@ -12,7 +12,7 @@ from lifecycle_msgs.srv import GetState
 
 from m2pem.api import BehaviorState
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, aborted, taken_over
-from m2pem_plugin_ros.drivers.nav2.goal_client import GoalClient
+from m2pem_plugin_ros.drivers.nav2.goal_client import ACTIVE, GoalClient, number_of
 from m2pem_plugin_ros.installation import require_interfaces
 from m2pem_plugin_ros.runtime import RosRuntime, RosTimeoutError, qos
 
@@ -133,6 +133,16 @@ class Nav2:
     def other_client(self) -> str:
         """Return the action that Nav2 executes for another client; "" if there is none."""
         return self._other_client((self.waypoints, self.through_poses, self.to_pose))
+
+    def was_cancelled(self, order: UUID) -> bool:
+        """Whether goals of an order were cancelled, and none of them goes on."""
+        found = {
+            status
+            for client in self._clients()
+            for goal, status in client.statuses.items()
+            if number_of(order, goal) is not None
+        }
+        return GoalStatus.STATUS_CANCELED in found and found.isdisjoint(ACTIVE)
 
     def own_goals(self) -> set[UUID]:
         """Return the goals of this client that go on."""

@@ -15,7 +15,7 @@ from m2pem_plugin_ros.drivers.driver import DriverSetup, Health, Order, Outcome
 from m2pem_plugin_ros.drivers.nav2.client import Nav2
 from m2pem_plugin_ros.drivers.nav2.errors import NavigationError, taken_over
 from m2pem_plugin_ros.drivers.nav2.goal_client import number_of
-from m2pem_plugin_ros.drivers.nav2.tasks import TASKS, Nav2Task, TaskContext
+from m2pem_plugin_ros.drivers.nav2.tasks import CANCELLED_THERE, TASKS, Nav2Task, TaskContext
 from m2pem_plugin_ros.runtime import RosError
 from m2pem_plugin_ros.sensors.localization import stands
 
@@ -164,6 +164,8 @@ class Nav2Driver:
         if self._nav2 is None:
             return Outcome(BehaviorState.UNKNOWN, reason="the driver is not open")
         if order.request.behavior not in TASKS:
+            if self._nav2.was_cancelled(order.goal):
+                return CANCELLED_THERE
             # An active goal is found when the order is sent again, with all parameters.
             return Outcome(
                 BehaviorState.UNKNOWN, reason="the parameters of the behavior are not known"

@@ -6,7 +6,7 @@ from m2pem_plugin_ros.drivers.nav2.tasks.goto import Follow, Goto
 from m2pem_plugin_ros.drivers.nav2.tasks.hold import Hold, Stop, Teleop
 from m2pem_plugin_ros.drivers.nav2.tasks.reverse import Reverse
 from m2pem_plugin_ros.drivers.nav2.tasks.route import Route
-from m2pem_plugin_ros.drivers.nav2.tasks.task import Nav2Task, TaskContext
+from m2pem_plugin_ros.drivers.nav2.tasks.task import CANCELLED_THERE, Nav2Task, TaskContext
 
 TASKS: Mapping[str, type[Nav2Task]] = {
     "single_vehicle_routing": Route,
@@ -19,4 +19,4 @@ TASKS: Mapping[str, type[Nav2Task]] = {
 }
 """By name of the behavior."""
 
-__all__ = ["TASKS", "Nav2Task", "TaskContext"]
+__all__ = ["CANCELLED_THERE", "TASKS", "Nav2Task", "TaskContext"]

@@ -25,6 +25,11 @@ from m2pem_plugin_ros.frames import quaternion_of_yaw
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.runtime import RosTimeoutError
 
+CANCELLED_THERE = Outcome(
+    BehaviorState.UNKNOWN, reason="its goal was cancelled at Nav2", known=True
+)
+"""A hold or another client has cancelled it: the status is the same."""
+
 FOUND_WITHIN_S = 1.0
 """Timeout of the result query, in real seconds. Nav2 does not answer for a goal that goes on."""
 
@@ -169,8 +174,7 @@ class Nav2GoalTask(Nav2Task):
         if ended.status == GoalStatus.STATUS_ABORTED:
             error = await self.nav2.why_aborted(self.client, ended.result)
             return Outcome(error.state, error.code, error.reason)
-        # A hold or another client has cancelled it: the status is the same.
-        return Outcome(BehaviorState.UNKNOWN, reason="its goal was cancelled at Nav2")
+        return CANCELLED_THERE
 
     def _on_message(self, goal: UUID, feedback: Any) -> None:
         if goal == self._current:
