@@ -1,10 +1,12 @@
 """Rounds of chaos with ROS rovers over DDS; `make chaos CHAOS="--vehicles ros"` is for many."""
 
 import random
+from pathlib import Path
 
 import pytest
 
-from tests.chaos.kill_points import JOURNALS, POINTS_OF_ARBITERS, KillPoint, place_of
+from tests.chaos.fault_table import PLAYED, Fault, Row, check
+from tests.chaos.kill_points import JOURNALS, POINTS_OF_ARBITERS, SQLITE, KillPoint, place_of
 from tests.chaos.rounds import plan_round, play_round
 from tests.chaos.worlds import OF_ROS, RosVehicles
 
@@ -26,3 +28,14 @@ def test_rovers_begin_nothing_twice(world: str, point: str, journal: str) -> Non
     seed = random.SystemRandom().randrange(10**6)
     played = play_round(plan_round(seed, 1, world, journal, point))
     assert not played.verdict.faults, f"seed {seed}, {played.plan}: {played.verdict.faults}"
+
+
+def _case(row: Row) -> object:
+    is_short = (row.fault, row.journal) == (Fault.KILLED, SQLITE.name)
+    marks = () if is_short else (pytest.mark.long, pytest.mark.timeout(600))
+    return pytest.param(row, id=row.id, marks=marks)
+
+
+@pytest.mark.parametrize("row", [_case(row) for row in PLAYED if row.arbiter in OF_ROS])
+def test_a_fault_comes_to_what_the_table_says(row: Row, tmp_path: Path) -> None:
+    check(row, tmp_path)
