@@ -8,6 +8,8 @@ import pytest
 from tests.chaos.fault_table import PLAYED, Fault, Row, check
 from tests.chaos.kill_points import JOURNALS, POINTS_OF_ARBITERS, SQLITE, KillPoint, place_of
 from tests.chaos.rounds import plan_round, play_round
+from tests.chaos.stops import StopPlan, play_stop
+from tests.chaos.troubles import TROUBLES
 from tests.chaos.worlds import OF_ROS, RosVehicles
 
 OWN_POINTS = POINTS_OF_ARBITERS[RosVehicles.arbiter]
@@ -28,6 +30,22 @@ def test_rovers_begin_nothing_twice(world: str, point: str, journal: str) -> Non
     seed = random.SystemRandom().randrange(10**6)
     played = play_round(plan_round(seed, 1, world, journal, point))
     assert not played.verdict.faults, f"seed {seed}, {played.plan}: {played.verdict.faults}"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("journal", "trouble"),
+    [
+        (each.journals[0], each.name)
+        for each in TROUBLES.values()
+        if RosVehicles.name in each.worlds
+    ],
+)
+def test_stop_reaches_each_vehicle_while_something_is_wrong(journal: str, trouble: str) -> None:
+    plan = StopPlan(1, RosVehicles.name, journal, trouble, after_s=2.0, lead_s=0.0, within_s=60.0)
+    played = play_stop(plan)
+    assert not played.verdict.faults
+    assert played.commanded_s or trouble == "paused"  # then they are held already
 
 
 def _case(row: Row) -> object:
