@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import pairwise, permutations
 
 from m2pem.api.behavior_parameters import BehaviorParameters
 from m2pem.api.remaining import RemainingRoute, RemainingSurvey, RemainingWork, raw_parameters
@@ -11,6 +11,7 @@ from m2pem.fleet.behaviors import SHARED
 from m2pem.fleet.parameters import ParameterError, ResolvedValue, resolve
 from m2pem.geo.lawn_mower import lawn_mower, longest_edge_yaw, strip_width_m
 from m2pem.geo.local_frame import EastNorth, LocalFrame
+from m2pem.geo.polyline import Polyline
 from m2pem.geo.survey_tracks import SurveyTracks
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
@@ -25,6 +26,12 @@ ALL_ORDERS_UP_TO = 5
 
 SHORTEST_M = 2.0
 """Less than this is left to the neighbour."""
+
+CORNER_S = 5.0
+"""About what a vehicle loses at a corner, where it brakes and turns: the way is cut at the corner
+where a member would do less than that beyond it."""
+
+_CORNER_RAD = math.radians(45)
 
 _ROUNDS = 4
 """The way to a piece depends on where it begins, and that on the pieces before it."""
@@ -105,8 +112,8 @@ class Piece:
 def divide(works: Sequence[RemainingWork], takers: Sequence[Taker]) -> list[Piece]:
     """Return the pieces of ways, so that the last member ends as early as possible.
 
-    The ways are cut where the times are even: each member takes what is between two cuts, and
-    begins at the end that is nearer.
+    The ways are cut where the times are even, or at a corner near there: each member takes what is
+    between two cuts, and begins at the end that is nearer.
     """
     if not works:
         return []
@@ -168,6 +175,17 @@ def _at(works: Sequence[RemainingWork], along_m: float) -> EastNorth:
     return works[-1].line.points[-1]
 
 
+def _cut_m(line: Polyline, even_m: float, near_m: float) -> float:
+    """Return the nearest corner along a way if one is near; else where the times are even."""
+    corners_m = [
+        mark_m
+        for mark_m, (before, after) in zip(line.marks_m[1:], pairwise(line.segments), strict=False)
+        if abs(math.remainder(after.yaw_rad - before.yaw_rad, math.tau)) > _CORNER_RAD
+    ]
+    found_m = min(corners_m, key=lambda each: abs(each - even_m), default=even_m)
+    return found_m if abs(found_m - even_m) < near_m else even_m
+
+
 def _pieces(
     works: Sequence[RemainingWork], order: Sequence[Taker], lengths: Sequence[float]
 ) -> list[Piece]:
@@ -179,7 +197,7 @@ def _pieces(
         cuts = [0.0]
         takers: list[Taker] = []
         for taker, end_m in zip(order, ends, strict=True):
-            cut_m = min(end_m, after_m) - before_m
+            cut_m = _cut_m(work.line, min(end_m, after_m) - before_m, CORNER_S * taker.speed_m_s)
             if work.line.length_m - cut_m < SHORTEST_M:
                 cut_m = work.line.length_m
             if cut_m - cuts[-1] >= SHORTEST_M:

@@ -15,7 +15,7 @@ from m2pem.geo.local_frame import LocalFrame
 from m2pem.mission.catalogue import BehaviorSpec, BehaviorState, ResourceId
 from m2pem.mission.geometry import Area, Route
 from m2pem.simulation.arbiters import SimArbiter
-from m2pem.teams.division import Taker, divide, work_of
+from m2pem.teams.division import CORNER_S, Taker, divide, work_of
 from m2pem.teams.partition import Partition
 from m2pem.teams.plan import Leg, Plan
 from m2pem.teams.restart import Reference, read_reference
@@ -106,7 +106,7 @@ def test_all_is_surveyed_once_and_the_others_end_together(kind: type[SimArbiter]
     coverage = tracks.coverage
     assert coverage.covered > 0.98
     assert coverage.twice < 0.05
-    assert abs(tracks.ends_s["a"] - tracks.ends_s["c"]) < 5.0
+    assert abs(tracks.ends_s["a"] - tracks.ends_s["c"]) < 1.5 * CORNER_S  # cut at a corner
 
 
 @KINDS
@@ -164,6 +164,13 @@ def test_several_ways_are_taken_whole_where_that_is_even() -> None:
     pieces = divide([way((0, 0), (200, 0)), way((0, 50), (200, 50))], takers)
     assert [(piece.work, piece.from_m) for piece in pieces] == [(0, 0.0), (1, 0.0)]
     assert all(piece.to_m == pytest.approx(200.0, abs=1e-3) for piece in pieces)
+
+
+@pytest.mark.parametrize(("north_m", "cut_m"), [(210.0, 200.0), (190.0, 200.0), (270.0, 235.0)])
+def test_no_member_turns_for_a_bit_beyond_a_corner(north_m: float, cut_m: float) -> None:
+    takers = [Taker(ResourceId(name), 0.0, None, 5.0) for name in "ab"]
+    first, second = divide([way((0, 0), (200, 0), (200, north_m))], takers)
+    assert first.to_m == second.from_m == pytest.approx(cut_m, abs=0.1)
 
 
 def test_nothing_is_divided_where_nothing_is_left() -> None:
