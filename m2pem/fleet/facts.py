@@ -69,7 +69,9 @@ def unfit(
     if vehicle_of(fleet, resource).manned:
         return "it is manned"
     if graph.spec(resource, name, kind) is None:
-        return f"it offers no {kind.value} behavior {name}"
+        alone = kind is BehaviorType.TEAM and not graph.teams(resource)
+        why = ", as it is in no team of the fleet file" if alone else ""
+        return f"it offers no {kind.value} behavior {name}{why}"
     return ""
 
 

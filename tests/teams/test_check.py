@@ -1,6 +1,7 @@
 """Which missions with teams are accepted, and who serves them."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import pytest
@@ -12,6 +13,7 @@ from m2pem.executive.fleet_connections import ArbiterPlugins, FleetArbiters
 from m2pem.executive.loading import findings_for
 from m2pem.findings import Finding
 from m2pem.fleet.behaviors import SHARED
+from m2pem.fleet.facts import unfit
 from m2pem.fleet.fleet import Domain, Fleet, Team, Vehicle
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
@@ -63,6 +65,17 @@ def findings(known: FleetArbiters, name: str, **parameters: str) -> list[Finding
 
 def test_members_that_can_drive_a_route_can_march_together() -> None:
     assert findings(arbiters(ROUTING, f"{ROUTING}+goto"), "road_sweep", route="road") == []
+
+
+def test_a_vehicle_in_no_team_cannot_fill_a_role_of_a_team_behavior() -> None:
+    member = arbiters(ROUTING)
+    alone = FleetArbiters(
+        replace(member.fleet, teams={}), cast("ArbiterPlugins", Plugins()), context(SystemClock())
+    )
+    of = "road_sweep", TEAM, ResourceId("v0")
+    assert unfit(member.fleet, member.graph, *of) == ""
+    said = "it offers no team behavior road_sweep, as it is in no team of the fleet file"
+    assert unfit(alone.fleet, alone.graph, *of) == said
 
 
 def test_what_keeps_a_member_out_is_said() -> None:
