@@ -18,18 +18,19 @@ class Router:
     """Autopilots send to `port`, and executives connect to `ground` (udpout).
 
     `sent`: what moves a vehicle and has reached it, in order, with the executive's address.
-    `cut`: it carries nothing; `cut_off`: nothing from and to these executives.
+    `cut`: it carries nothing; `cut_off`: nothing from and to these executives. `port` 0: any that is
+    free.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, port: int = 0) -> None:
         self.cut = False
         self.cut_off: set[Address] = set()
         self.sent: list[tuple[Address, object]] = []
         self._vehicles: set[Address] = set()
         self._executives: dict[Address, Any] = {}
         self._sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
-        for each in self._sockets:
-            each.bind(("127.0.0.1", 0))
+        for each, number in zip(self._sockets, (port, 0), strict=True):
+            each.bind(("127.0.0.1", number))
         self.port, self.ground = (int(each.getsockname()[1]) for each in self._sockets)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run)
