@@ -28,12 +28,15 @@ from tests.faults import Faults, library
 ROLE = "m2pem"
 
 
-def _programs() -> Path | None:
+def programs() -> Path:
+    """Return the folder of the server's programs; fails where PostgreSQL is not installed."""
     found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"), key=lambda each: each.parts[4])
     if found:
         return found[-1].parent
     initdb = shutil.which("initdb")
-    return Path(initdb).parent if initdb else None
+    if initdb is None:
+        pytest.fail("PostgreSQL is not installed: make test installs it (Debian: postgresql)")
+    return Path(initdb).parent
 
 
 class PostgresServer:
@@ -159,10 +162,7 @@ class PostgresServer:
 
 def start_server() -> PostgresServer:
     """Start a server; fails where PostgreSQL is not installed."""
-    programs = _programs()
-    if programs is None:
-        pytest.fail("PostgreSQL is not installed: make test installs it (Debian: postgresql)")
-    return PostgresServer(programs)
+    return PostgresServer(programs())
 
 
 @cache

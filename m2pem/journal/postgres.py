@@ -448,7 +448,9 @@ class PostgresJournal(DatabaseJournal):
             session,
         )
         self._lease = owners.lease = Lease(
-            lambda: connect(address, length_s / 3),
+            # A server's host that is off is given up in time to renew at another one before the
+            # runs are held: a third of the lease after the last renewal, this, and one try.
+            lambda: connect(address, length_s / 9),
             length_s,
             executive,
             owners.lose,
@@ -478,7 +480,7 @@ class PostgresJournal(DatabaseJournal):
         session = f"m2pem {uuid4()}"
         # An executive that is stopped or cut off within a transaction keeps others waiting no
         # longer than its lease, after which it could not commit. One that reads has no locks.
-        connection = PostgresConnection(lambda: connect(address, length_s, session, length_s))
+        connection = PostgresConnection(lambda: connect(address, length_s / 3, session, length_s))
         with ExitStack() as undo:
             undo.callback(connection.close)
             try:

@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
+from bench.network import Network
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
 from tests.chaos.worlds import process
 from tests.command_line import CommandLine, Program
 from tests.executive.conftest import task
-from tests.postgres_server import PostgresServer, Replicated, replicate, start_server
+from tests.postgres_server import PostgresServer, Replicated, programs, replicate, start_server
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
 
@@ -178,3 +179,65 @@ def test_an_executive_whose_lease_is_over_leaves_its_run_to_another_one(
     status, errors = world.owner.rest()
     assert status == 1
     assert f"process {world.standby.process.pid} on" in errors
+
+
+@pytest.fixture
+def network() -> Iterator[Network]:
+    with Network("db1", "db2", "gcs1", "gcs2") as made:
+        yield made
+
+
+def on_hosts(opened: ExitStack, network: Network) -> Replicated:
+    """The primary on db1, and its standby on db2."""
+    servers: list[PostgresServer] = []
+    for name in ("db1", "db2"):
+        made = PostgresServer(
+            programs(),
+            *servers,
+            inside=network.inside(name),
+            address=network.address(name),
+        )
+        opened.callback(made.remove)
+        servers.append(made)
+    return replicate(*servers)
+
+
+def power_off(network: Network, host: str) -> None:
+    """No packet leaves the host any more, also none that ends a connection."""
+    for other in {"db1", "db2", "gcs1", "gcs2"} - {host}:
+        network.link(host, other).cut = True
+
+
+LONG_LEASE_S = 30
+
+
+def test_an_executive_goes_on_when_the_servers_host_is_off_and_another_one_takes_over_at_once(
+    network: Network, opened: ExitStack, tmp_path: Path
+) -> None:
+    servers = on_hosts(opened, network)
+    inside = [network.inside(each) for each in ("gcs1", "gcs2")]
+    world = World(tmp_path, servers, inside=inside, lease_s=LONG_LEASE_S)
+    opened.callback(world.close)
+    until_renewed(servers.primary, servers)
+    power_off(network, "db1")
+    servers.standby.promote()
+    for _ in range(3):
+        until_renewed(servers.standby, servers)
+    world.goes_on()
+
+
+def test_an_executive_holds_when_the_servers_host_is_off_until_another_one_takes_over(
+    network: Network, opened: ExitStack, tmp_path: Path
+) -> None:
+    servers = on_hosts(opened, network)
+    inside = [network.inside(each) for each in ("gcs1", "gcs2")]
+    world = World(tmp_path, servers, inside=inside)
+    opened.callback(world.close)
+    until_renewed(servers.primary, servers)
+    power_off(network, "db1")
+    until_said(world.owner, f"after {LEASE_S} s another one may. Commanded to hold: ugv1")
+    assert world.effects() == HELD
+    until_said(world.owner, "did not renew the lease of this executive in time")
+    world.owner.kill()  # else it may serve its fleet again before the other one does
+    servers.standby.promote()
+    world.taken_over()
