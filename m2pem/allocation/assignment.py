@@ -166,29 +166,28 @@ def _kept_for(
     """
     if sum(role.least for role in request.roles) == 1:
         return ()  # nothing that could fill its one place is free
-    taken = set(matching.resources_of_all())
-    free = {each for role in request.roles for each in role.costs_s} - taken
-    if free <= set(kept):
+    could = {each for role in request.roles for each in role.costs_s}
+    if could <= set(kept):
         return ()
+    free = could.difference(kept, matching.resources_of_all())
     alone = _Matching()
     slots = [
         _Slot(
             request.id,
             role,
-            dict.fromkeys(
-                (
-                    *(each for each in _without(role.costs_s, kept) if each not in taken),
-                    *role.busy,
-                    *(each for each in role.costs_s if each in taken),
-                )
-            ),
+            dict.fromkeys((*(e for e in role.costs_s if e in free), *role.busy, *role.costs_s)),
         )
         for role in request.roles
         for _ in range(role.least)
     ]
     if not alone.add(slots):
         return ()
-    return [each for each in alone.resources_of(request.id) if each in free]
+    keeps = free.intersection(alone.resources_of(request.id))
+    for role in request.roles:
+        if role.least and free.isdisjoint(role.costs_s.keys() - keeps):
+            # Nor do later ones get what it could have where those before it are given others.
+            keeps.update(role.costs_s)
+    return keeps
 
 
 def _of_least_cost(

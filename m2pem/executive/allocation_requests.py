@@ -27,14 +27,15 @@ class AskedFor:
     chosen: bool = False
     lacks: object = None
     preempts: "Preempting | None" = None
-    place: tuple[int, int, str] | None = None
+    place: tuple[int, int, int, str] | None = None
     need: tuple[object, ...] | None = None
 
-    def look_at(self, request: AllocationRequest) -> tuple[int, int, str]:
+    def look_at(self, request: AllocationRequest) -> tuple[int, int, int, str]:
         """Find its place in the order, and what it needs, once. Returns its place."""
         if self.place is None:
             roles = behavior_of(request).roles
-            self.place = -priority_of(roles), request.at_us, request.id
+            # Of one moment and run, r1.a2 asked before r1.a10.
+            self.place = -priority_of(roles), request.at_us, len(request.id), request.id
             self.need = _constant_need(request)
         return self.place
 

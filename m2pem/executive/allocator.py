@@ -496,7 +496,7 @@ class Allocator:
         return self._space.refusal_after(*preempts.wanted, (), ()) is None
 
 
-def _place(each: ConsideredRequest) -> tuple[int, int, str]:
+def _place(each: ConsideredRequest) -> tuple[int, int, int, str]:
     return each.asked.look_at(each.request)
 
 

@@ -7,7 +7,6 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from operator import itemgetter
 
 from m2pem.allocation.candidates import Candidates, LatestState, Place
 from m2pem.allocation.needs import Occupancy, RoleEvaluator, Task
@@ -92,7 +91,7 @@ class WaitingQueue:
         occupied = self._occupied()
         of_runs: dict[RunId, Mapping[ResourceId, Occupancy]] = {}
         queues: dict[tuple[object, ...] | None, SameNeed] = {}
-        for _, asked, request in self._open_requests():
+        for asked, request in self._open_requests():
             state = asked.runner.run.state
             if state.run not in of_runs:
                 of_runs[state.run] = _without(occupied, _ending(state))
@@ -123,15 +122,15 @@ class WaitingQueue:
                 queues[need] = SameNeed(found[-1])
         return found, behind
 
-    def _open_requests(self) -> "list[tuple[tuple[int, int, str], AskedFor, AllocationRequest]]":
-        """Return all that nothing was chosen for, with its place, in the order of service."""
+    def _open_requests(self) -> list[tuple[AskedFor, AllocationRequest]]:
+        """Return all that nothing was chosen for, in the order of service."""
         found = []
         for allocation, asked in self.asked.items():
             state = asked.runner.run.state
             request = state.allocations.get(allocation)
             if not asked.chosen and request is not None and state.status is RunStatus.RUNNING:
-                found.append((asked.look_at(request), asked, request))
-        found.sort(key=itemgetter(0))
+                found.append((asked, request))
+        found.sort(key=lambda each: each[0].look_at(each[1]))
         return found
 
     def _task(

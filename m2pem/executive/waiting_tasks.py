@@ -23,7 +23,7 @@ def waiting_tasks(runners: Iterable[Runner], now_us: int) -> list[WaitingTask]:
         for request in runner.run.state.allocations.values()
         if request.reason
     ]
-    requests.sort(key=lambda found: (-_priority(found[1]), found[1].at_us, found[1].id))
+    requests.sort(key=_place)
     return [_task(state, request, now_us) for state, request in requests]
 
 
@@ -46,6 +46,11 @@ def holder_label(runners: Mapping[RunId, Runner], holder: str, *, mission: bool 
             label = state.mission.elements[keeping.element].label
             return f"{label} of {run}, which keeps it until {keeping.until.container.label} ends"
     return ""
+
+
+def _place(found: tuple[RunState, AllocationRequest]) -> tuple[int, int, int, str]:
+    request = found[1]
+    return -_priority(request), request.at_us, len(request.id), request.id
 
 
 def _priority(request: AllocationRequest) -> int:

@@ -62,6 +62,17 @@ def test_a_request_that_lacks_something_else_keeps_what_it_names_from_those_in_t
     assert choose(later, waiting) == {"r2.a1": {"r": ("a",)}}
 
 
+def test_it_keeps_its_own_also_when_the_rest_is_kept_by_one_before_it() -> None:
+    first = ask("r1.a1", role(least=2, a=1, busy=["b"]))
+    waiting = ask("r2.a1", role(least=2, a=1, c=1))
+    assert choose(first, waiting, ask("r3.a1", role(c=1))) == {}
+
+
+def test_it_does_not_keep_more_of_a_role_than_it_needs() -> None:
+    waiting = ask("r1.a1", role("x", a=1, b=1), role("y", busy=["c"]))
+    assert choose(waiting, ask("r2.a1", role(a=1, b=1))) == {"r2.a1": {"r": ("b",)}}
+
+
 def test_a_request_that_does_not_wait_keeps_nothing() -> None:
     fails = Request("r1.a1", (role(least=2, a=1, busy=["b"]),), waits=False)
     assert choose(fails, ask("r2.a1", role(a=1))) == {"r2.a1": {"r": ("a",)}}
@@ -146,6 +157,16 @@ def test_the_choice_is_that_of_trying_everything(requests: list[Request]) -> Non
     assert chosen.keys() == {each.id for each in served}
     assert cost_of(chosen, requests) == min(cost for _, cost in every_choice(served))
     assert chosen == choose(*requests)
+
+
+def test_later_ones_get_nothing_that_one_which_waits_for_several_could_have() -> None:
+    some = [each for n in (1, 2, 3) for each in combinations("abc", n)]
+    roles = [role(least=n, busy="xy", **dict.fromkeys(each, 1.0)) for each in some for n in (1, 2)]
+    for asked in product(roles, repeat=3):
+        chosen = choose(*(ask(f"r{number}.a1", each) for number, each in enumerate(asked)))
+        if asked[1].least == 2 and "r1.a1" not in chosen:
+            given_later = chosen.get("r2.a1", {"r": ()})["r"]
+            assert asked[1].costs_s.keys().isdisjoint(given_later)
 
 
 @given(SEVERAL)

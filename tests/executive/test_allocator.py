@@ -1,6 +1,7 @@
 """Roles by need and waiting tasks on an executive: who gets which vehicle, and when."""
 
 import asyncio
+from unittest.mock import Mock
 
 import pytest
 
@@ -17,6 +18,7 @@ from m2pem.engine.records import (
 )
 from m2pem.engine.run import MissionRun
 from m2pem.errors import InternalError
+from m2pem.executive.allocation_requests import AskedFor
 from m2pem.fleet.fleet import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
@@ -110,6 +112,21 @@ def test_tasks_that_begin_in_one_step_get_a_vehicle_each(play):
         return given(world)
 
     assert play(story, "ugv1", "ugv2") == {"A": ("ugv1",), "B": ("ugv2",)}
+
+
+def test_tasks_that_begin_in_one_step_are_served_in_the_order_in_which_they_begin():
+    tasks = "".join(
+        task(f"T{number}", "requires='true' wait='unlimited'") + flow("F", f"T{number}")
+        for number in range(11)
+    )
+    source = mission(
+        '<process id="P" isExecutable="true"><startEvent id="S"/><parallelGateway id="F"/>'
+        f"{tasks}{flow('S', 'F')}</process>"
+    )
+    run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), fleet("ugv1"), "r1")
+    run.receive(StartRun("P"), START_US)
+    requests = sorted(run.state.allocations.values(), key=AskedFor(Mock()).look_at)
+    assert [each.id for each in requests] == [f"r1.a{number}" for number in range(1, 12)]
 
 
 def test_a_task_that_does_not_wait_fails_with_what_is_in_its_way(play):
