@@ -6,13 +6,13 @@ Subscribers get them in the order of commits. No run ever waits for a subscriber
 import asyncio
 import logging
 import threading
+import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
 from queue import Full, Queue
 from types import TracebackType
 from typing import Self
-from weakref import WeakValueDictionary
 
 from m2pem.api.control import ControlEvent
 from m2pem.api.runs import LOGGED, Alert, RunId
@@ -73,7 +73,7 @@ class ControlEvents:
     """All subscriptions of an executive, held weakly: a reader that is gone leaves nothing."""
 
     def __init__(self) -> None:
-        self._subscriptions = WeakValueDictionary[int, Subscription]()
+        self._subscriptions: list[weakref.ref[Subscription]] = []
         self._ended = False
 
     @property
@@ -87,20 +87,31 @@ class ControlEvents:
         if self._ended:
             subscription.end()
         else:
-            self._subscriptions[id(subscription)] = subscription
+            # A new list: one may be let go while `publish` walks over the old.
+            self._subscriptions = [
+                *self._subscriptions,
+                weakref.ref(subscription, self._forget),
+            ]
         return subscription
 
     def publish(self, *events: ControlEvent) -> None:
         """Send events to all subscriptions."""
-        for subscription in self._subscriptions.values():
-            subscription.put(events)
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.put(events)
 
     def end(self) -> None:
         """Let every reader come to its end, after what waits for it."""
         self._ended = True
-        for subscription in self._subscriptions.values():
-            subscription.end()
-        self._subscriptions.clear()
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.end()
+        self._subscriptions = []
+
+    def _forget(self, gone: "weakref.ref[Subscription]") -> None:
+        self._subscriptions = [kept for kept in self._subscriptions if kept is not gone]
 
 
 MAX_WAITING = 10_000

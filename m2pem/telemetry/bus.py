@@ -1,9 +1,9 @@
 """The fleet bus inside one process: the latest state of each resource, and subscriptions to all."""
 
 import asyncio
+import weakref
 from collections import deque
 from typing import TypeAlias, Union
-from weakref import WeakValueDictionary
 
 from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
 from m2pem.mission.catalogue import ResourceId
@@ -75,7 +75,7 @@ class Bus:
 
     def __init__(self) -> None:
         self._latest: dict[ResourceId, State] = {}
-        self._subscriptions = WeakValueDictionary[int, Subscription]()
+        self._subscriptions: list[weakref.ref[Subscription]] = []
         self._closed = False
 
     def latest(self, resource: ResourceId) -> State | None:
@@ -88,8 +88,10 @@ class Bus:
             return
         if not isinstance(state, TeamState):
             self._latest[state.resource] = state
-        for subscription in self._subscriptions.values():
-            subscription.put(state)
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.put(state)
 
     def subscribe(self, size: int = 100) -> Subscription:
         """States from now on, for one reader; `size` of them wait at most."""
@@ -97,12 +99,21 @@ class Bus:
         if self._closed:
             subscription.end()
         else:
-            self._subscriptions[id(subscription)] = subscription
+            # A new list: one may be let go while `publish` walks over the old.
+            self._subscriptions = [
+                *self._subscriptions,
+                weakref.ref(subscription, self._forget),
+            ]
         return subscription
 
     def close(self) -> None:
         """End every subscription, after what waits in it; `latest` stays."""
         self._closed = True
-        for subscription in self._subscriptions.values():
-            subscription.end()
-        self._subscriptions.clear()
+        for reference in self._subscriptions:
+            subscription = reference()
+            if subscription is not None:
+                subscription.end()
+        self._subscriptions = []
+
+    def _forget(self, gone: "weakref.ref[Subscription]") -> None:
+        self._subscriptions = [kept for kept in self._subscriptions if kept is not gone]
