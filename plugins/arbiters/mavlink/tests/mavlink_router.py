@@ -18,8 +18,8 @@ class Router:
     """Autopilots send to `port`, and executives connect to `ground` (udpout).
 
     `sent`: what moves a vehicle and has reached it, in order, with the executive's address.
-    `cut`: it carries nothing; `cut_off`: nothing from and to these executives. `port` 0: any that is
-    free.
+    `cut`: it carries nothing; `cut_off`: nothing from and to these executives. `port` 0: any that
+    is free.
     """
 
     def __init__(self, port: int = 0) -> None:
