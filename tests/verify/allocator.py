@@ -48,24 +48,38 @@ class Allocator:
         self._dice = dice
         self._graph = ResourceGraph(fleet, offers_all)
         self.order = {r: n for n, r in enumerate((*fleet.vehicles, *fleet.payloads))}
+        self._decided: list[i.ResourcesChosen | i.ResourcesNotFree] = []
 
     def answer(self, run: MissionRun) -> i.Input | None:
-        """The next answer to a request; None: those that are left wait."""
+        """The next answer to a request; None: those that are left wait. What is decided at one
+        moment is answered before the next decision."""
         state = run.state
+        self._decided = [each for each in self._decided if each.allocation in state.allocations]
+        if not self._decided:
+            self._decided = self._decide(state)
+        return self._decided.pop(0) if self._decided else None
+
+    def _decide(self, state: RunState) -> list[i.ResourcesChosen | i.ResourcesNotFree]:
         asked = {each.id: self.roles_of(state, each) for each in state.allocations.values()}
         ordered = sorted(
             state.allocations.values(),
-            key=lambda each: (-self._priority(asked[each.id]), each.at_us, self._dice.random()),
+            key=lambda each: (-self._priority(asked[each.id]), each.at_us, len(each.id), each.id),
         )
-        requests = [Request(each.id, tuple(r.options for r in asked[each.id])) for each in ordered]
+        requests = [
+            Request(each.id, tuple(r.options for r in asked[each.id]), _waits(asked[each.id]))
+            for each in ordered
+        ]
         chosen = assign(requests, self.order)
-        for each in ordered:
-            if each.id in chosen:
-                return self._chosen(each, asked[each.id], chosen[each.id])
-        for each in ordered:
-            if not any(r.role.need is not None and r.role.need.waits for r in asked[each.id]):
-                return i.ResourcesNotFree(each.id, "too few are free", {}, UNAVAILABLE)
-        return None
+        found: list[i.ResourcesChosen | i.ResourcesNotFree] = [
+            self._chosen(each, asked[each.id], chosen[each.id])
+            for each in ordered
+            if each.id in chosen
+        ]
+        return found + [
+            i.ResourcesNotFree(each.id, "too few are free", {}, UNAVAILABLE)
+            for each in ordered
+            if each.id not in chosen and not _waits(asked[each.id])
+        ]
 
     def _priority(self, roles: Sequence[ConsideredRole]) -> int:
         return max(each.role.need.priority for each in roles if each.role.need is not None)
@@ -104,3 +118,7 @@ class Allocator:
             if each.role.name in chosen
         }
         return i.ResourcesChosen(request.id, dict(filled), {})
+
+
+def _waits(roles: Sequence[ConsideredRole]) -> bool:
+    return any(each.role.need is not None and each.role.need.waits for each in roles)

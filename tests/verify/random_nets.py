@@ -21,6 +21,7 @@ _OF_RESOURCES = (
     Action.LEFT,
     Action.STANDS,
     Action.REFUSED,
+    Action.PASSED_OVER,
     Action.RELEASED,
 )
 _ACTIONS = [each for each in Action if each not in _OF_RESOURCES]

@@ -138,7 +138,8 @@ class Place:
     and that none of these has it now."""
     keepers: tuple[str, ...] = ()
     """Of a place of kept resources: the tasks that keep them, until the end of the process or
-    subprocess `until`."""
+    subprocess `until`. Of a place without `kept`: the task that keeps what is free while it waits
+    for the rest."""
     until: str = ""
     holder: int | None = None
     """Of a place with `returns`: the active place of the task that holds the resources."""
@@ -186,6 +187,8 @@ class Action(StrEnum):
     """A vehicle of an activity leaves the shared space of `detail`."""
     STANDS = "stands"
     """A vehicle of the process has stopped; `detail` says where it stands in a shared space."""
+    PASSED_OVER = "passed over"
+    """A task gets nothing: task `detail`, which comes before and waits, may keep what is free."""
     RELEASED = "released"
     """A process has nothing left to do, and keeps nothing more."""
     REFUSED = "refused"

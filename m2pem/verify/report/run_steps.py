@@ -375,6 +375,8 @@ def _internal(first: Step, actions: Sequence[Step], element_names: ElementNames)
             return f"{name} is given {given}"
         case Action.ALLOCATED:
             return f"{name} gets nothing: too few of what could fill its roles are free"
+        case Action.PASSED_OVER:
+            return f"{name} gets nothing: {element_names.name(first.detail)} may keep what is free"
         case Action.LEFT:
             return f"the vehicle of {name} has left {first.detail}"
         case Action.REFUSED:

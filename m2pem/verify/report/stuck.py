@@ -58,6 +58,7 @@ def waits_for_resources(
     asked: dict[str, dict[str, None]] = {}
     full: dict[str, dict[str, None]] = {}
     asking: dict[str, None] = {}
+    keepers: dict[str, dict[str, None]] = {}
     for transition in net.transitions:
         first = transition.steps[0] if transition.steps else None
         if first is None or first.action is not Action.ALLOCATED or not first.detail:
@@ -70,6 +71,9 @@ def waits_for_resources(
             asking[first.element] = None
             spaces = full.setdefault(first.element, {})
             spaces.update(dict.fromkeys(_only_lacks(net, transition, marking)))
+            keepers.setdefault(first.element, {}).update(
+                dict.fromkeys(_who_keeps(net, transition, marking))
+            )
     holders = _holders(net, element_names, marking)
     found: dict[str, str] = {}
     for element in asking:
@@ -78,7 +82,11 @@ def waits_for_resources(
             found[element] = f"waits for {' and '.join(said)}"
             continue
         held = {r: holders[r] for r in asked[element] if r in holders}
-        who = ", ".join(f"{r} is {by}" for r, by in held.items())
+        said = [f"{r} is {by}" for r, by in held.items()]
+        if keepers[element]:
+            names = " and ".join(map(element_names.name, keepers[element]))
+            said.append(f"what is free is kept by {names} until it has the rest")
+        who = ", ".join(said)
         found[element] = (
             f"waits for {_any_of(list(asked[element]))}, {who or 'which it cannot get'}"
         )
@@ -107,6 +115,19 @@ def _holders(net: PetriNet, element_names: ElementNames, marking: Marking) -> di
             said += f" and kept until {element_names.name(ends[0])} ends"
         found.update(dict.fromkeys(place.resources or pools, said))
     return found
+
+
+def _who_keeps(net: PetriNet, transition: Transition, marking: Marking) -> list[str]:
+    """Return the tasks that wait and keep what a transition would take, if it is all free."""
+    tokens = marking.tokens
+    if any(tokens.get(place, 0) < count for place, count in transition.consume):
+        return []
+    return [
+        keeper
+        for place in transition.inhibit
+        if place in tokens and not net.places[place].kept
+        for keeper in net.places[place].keepers
+    ]
 
 
 def _only_lacks(net: PetriNet, transition: Transition, marking: Marking) -> list[str]:

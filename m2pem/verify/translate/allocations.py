@@ -13,8 +13,8 @@ depends on telemetry: each is a transition.
 
 import itertools
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from m2pem.mission.behavior import Behavior, OnLoss
 from m2pem.mission.catalogue import ResourceId
@@ -66,6 +66,12 @@ from m2pem.verify.translate.role_choices import (
 )
 from m2pem.verify.translate.throwing import failing
 from m2pem.verify.translate.timers import due_us, runs, written
+from m2pem.verify.translate.waiting_order import (
+    may_take,
+    not_kept,
+    refusals_by_kept,
+    served_before,
+)
 
 
 def asking_place(context: TranslationContext, instance: ActivityInstance) -> int:
@@ -134,11 +140,11 @@ def choose_resources(
     roles = context.candidates[instance.node]
     asks = asking_place(context, instance)
     waits = any(each.role.need is not None and each.role.need.waits for each in roles)
-    _note_approximations(context, instance, roles, waits=waits)
     cases = list(role_cases(context, instance, roles))
-    certain = len(cases) == 1 and not instance.inside.several
+    asking = _asking(context, instance, roles, cases, waits=waits)
+    context.asking.append(asking)
+    _note_approximations(context, asking, roles, waits=waits)
     translate_keeping(context, instance, roles)
-    context.asking.append(_asking(context, instance, roles, certain=certain))
     asks_space = asks_for_space(context, instance.node)
     if waits:
         _wait_limit(context, instance, roles)
@@ -149,7 +155,7 @@ def choose_resources(
         for guard, offered in cases:
             when = Effect(guard=guard)
             for choice, taken in _takings(context, instance, behavior, roles, offered):
-                given = product([when], _given(context, instance, behavior, choice, taken))
+                given = product([when], _given(context, asking, behavior, choice, taken))
                 movers = movers_of(context, instance.node, (), choice.total)
                 moved = begin_moving(context, instance, behavior, movers)
                 context.transitions(product(given, moved), Kind.JOIN)
@@ -165,7 +171,7 @@ def choose_resources(
             if not waits:
                 fewest = role_choices(context, instance, roles, offered, fewest=True)
                 for limits in _refusals([each.total for each in fewest]):
-                    refused = product([when], _refused(context, instance, limits))
+                    refused = product([when], _refused(context, asking, limits))
                     fails = failing(context, instance, UNAVAILABLE, Flag.UNCAUGHT)
                     context.transitions(product(refused, fails), Kind.JOIN)
 
@@ -206,54 +212,51 @@ def _asking(
     context: TranslationContext,
     instance: ActivityInstance,
     roles: Sequence[RoleCandidates],
+    cases: Sequence[tuple[object, Sequence[tuple[ResourceId, ...]]]],
     *,
-    certain: bool,
+    waits: bool,
 ) -> Asking:
     """Return who asks. Only of a task that needs one resource, whatever telemetry and data are, it
     is known that it gets one as soon as one is free.
     """
-    urgent = certain and len(roles) == 1 and least_of(roles[0]) == 1 and not roles[0].unknown
-    urgent = urgent and not asks_for_space(context, instance.node)  # what it needs may have no room
     pools = pools_among(context, (resource for each in roles for resource in each.resources))
-    asks = asking_place(context, instance)
-    return Asking(asks, _priority(roles), instance.outer, frozenset(pools), urgent)
+    asks, least = asking_place(context, instance), sum(map(least_of, roles))
+    asks_space, several = asks_for_space(context, instance.node), instance.inside.several
+    urgent = len(cases) == 1 and not several and not asks_space  # what it needs may have no room
+    urgent = urgent and len(roles) == 1 and least_of(roles[0]) == 1 and not roles[0].unknown
+    totals: list[Counter[Pool]] = []
+    if waits and least > 1 and not several and not asks_space:
+        for _, offered in cases:
+            fewest = role_choices(context, instance, roles, offered, fewest=True)
+            totals += [each.total for each in fewest]
+    needed = {pools_among(context, each.resources) for each in roles if least_of(each)}
+    named = any(each.named for each in roles)
+    return Asking(
+        asks,
+        instance,
+        _priority(roles),
+        frozenset(pools),
+        urgent,
+        waits,
+        least,
+        tuple(totals),
+        any_will_do=len(cases) == 1 and len(needed) == 1 and not named,
+    )
 
 
 def _priority(roles: Sequence[RoleCandidates]) -> int:
     return max((each.role.need.priority for each in roles if each.role.need is not None), default=0)
 
 
-def _served_before(
-    context: TranslationContext, roles: Sequence[RoleCandidates], taken: Iterable["_Taken"]
-) -> frozenset[int]:
-    """The places of tasks of a greater priority that ask for some of the same."""
-    priority = _priority(roles)
-    pools = {each.pool: None for each in taken}
-    places = {each.source.place for each in taken}
-    return frozenset(
-        each.place
-        for each in context.asking
-        if each.urgent and each.priority > priority and _may_take(context, each, pools) & places
-    )
-
-
-def _may_take(context: TranslationContext, asking: Asking, pools: Iterable[Pool]) -> set[int]:
-    """The places from which a task may take resources of some pools."""
-    return {
-        source.place
-        for pool in pools
-        if pool in asking.pools
-        for source in sources(context, asking.scope, pool)
-    }
-
-
 def _note_approximations(
     context: TranslationContext,
-    instance: ActivityInstance,
+    asking: Asking,
     roles: Sequence[RoleCandidates],
     *,
     waits: bool,
 ) -> None:
+    instance = asking.instance
+
     def bounded(what: str) -> None:
         context.net.approximate(instance.node, Exactness.BOUNDED, what)
 
@@ -264,9 +267,8 @@ def _note_approximations(
         same = each.role.need.same if each.role.need is not None else ""
         if same and context.data.values_of(same, instance.outer, instance.node) is None:
             bounded(f"role '{each.role.name}': '{same}' is not followed, so it may be any resource")
-    wanted = sum(least_of(each) for each in roles)
     others = [other for other in context.candidates if other is not instance.node]
-    if waits and wanted > 1 and others:
+    if waits and asking.least > 1 and others and not asking.totals:
         bounded("that it keeps what is free, while it waits for the rest, is not followed")
     if asks_for_space(context, instance.node):
         able = [resource for each in roles for resource in each.resources]
@@ -332,13 +334,13 @@ def _takings(
 
 def _given(
     context: TranslationContext,
-    instance: ActivityInstance,
+    asking: Asking,
     behavior: Behavior,
     choice: RoleChoices,
     taken: Sequence[_Taken],
 ) -> list[Effect]:
     """A task is given resources, and begins its behavior."""
-    asks = asking_place(context, instance)
+    instance = asking.instance
     chosen = Counter((each.pool, each.returns) for each in taken if not each.role.named)
     holds = [
         holds_place(
@@ -364,13 +366,15 @@ def _given(
         fillings.setdefault(each.role.role.name, []).append(filling)
     begins = Effect(
         steps=(Step(instance.node.id, Action.ALLOCATED, choices.written(fillings)),),
-        consume=(asks, *(each.source.place for each in taken)),
-        inhibit=_served_before(context, context.candidates[instance.node], taken)
+        consume=(asking.place, *(each.source.place for each in taken)),
+        inhibit=served_before(context, asking, {each.source.place: each.pool for each in taken})
         | frozenset(holds if instance.inside.several else ()),
         lets_go=lets_go(context, instance),
         produce=tuple(holds),
     )
-    effects = product([begins], _no_more(context, instance, choice, taken))
+    counts = Counter(each.source.place for each in taken)
+    effects = product([begins], _no_more(context, asking, choice, counts))
+    effects = product(effects, not_kept(context, asking, counts))
     for filled in choice.filled:
         need = filled.role.role.need
         if need is not None and need.store and filled.count:
@@ -382,12 +386,12 @@ def _given(
 
 def _no_more(
     context: TranslationContext,
-    instance: ActivityInstance,
+    asking: Asking,
     choice: RoleChoices,
-    taken: Sequence[_Taken],
+    counts: Mapping[int, int],
 ) -> list[Effect]:
     """Return when a choice may leave a role with fewer than it can have: no more are free, or
-    another task asks for them at the same time.
+    another task asks for them at the same time. `counts`: how many it takes, by place.
     """
     wanting: dict[Pool, None] = {}
     for each in choice.filled:
@@ -396,14 +400,12 @@ def _no_more(
             wanting.update(dict.fromkeys(each.offered))
     if not wanting:
         return [Effect()]
-    counts = Counter(each.source.place for each in taken)
-    places = [s.place for pool in wanting for s in sources(context, instance.outer, pool)]
-    rest = Effect(at_most=tuple((place, counts[place]) for place in places))
-    asks = asking_place(context, instance)
+    places = may_take(context, asking, wanting)
+    rest = Effect(at_most=tuple((place, counts.get(place, 0)) for place in sorted(places)))
     others = [
         each.place
         for each in context.asking
-        if each.place != asks and not _may_take(context, each, wanting).isdisjoint(places)
+        if each.place != asking.place and not may_take(context, each, wanting).isdisjoint(places)
     ]
     return [rest, *(Effect(read=frozenset({place})) for place in others)]
 
@@ -453,26 +455,35 @@ def _covers(one: Mapping[Pool, int], other: Mapping[Pool, int]) -> bool:
 
 
 def _refused(
-    context: TranslationContext, instance: ActivityInstance, limits: Mapping[Pool, int]
+    context: TranslationContext, asking: Asking, limits: Mapping[Pool, int]
 ) -> list[Effect]:
-    asks = asking_place(context, instance)
-    ways: list[dict[int, int]] = [{}]
-    for pool, most in limits.items():
-        places = [source.place for source in sources(context, instance.outer, pool)]
-        ways = [
-            {**way, **Counter(shared), **{p: 0 for p in places if p not in shared}}
+    """A task gets nothing: no more than that is free which is not kept by tasks before it."""
+    instance = asking.instance
+    found: list[Effect] = []
+    for when, kept in [(Effect(), {}), *refusals_by_kept(context, asking)]:
+        ways: list[dict[int, int]] = [{}]
+        for pool, most in limits.items():
+            places = [
+                source.place
+                for source in sources(context, instance.outer, pool)
+                if kept.get(source.place, 0) < len(pool)
+            ]
+            ways = [
+                {**way, **{p: kept.get(p, 0) + shared.count(p) for p in places}}
+                for way in ways
+                for shared in itertools.combinations_with_replacement(places, most if places else 0)
+            ]
+        found += [
+            replace(
+                when,
+                steps=(Step(instance.node.id, Action.ALLOCATED),),
+                consume=(asking.place, instance.active),
+                inhibit=frozenset(place for place, count in way.items() if not count),
+                at_most=tuple((place, count) for place, count in way.items() if count),
+            )
             for way in ways
-            for shared in itertools.combinations_with_replacement(places, most)
         ]
-    return [
-        Effect(
-            steps=(Step(instance.node.id, Action.ALLOCATED),),
-            consume=(asks, instance.active),
-            inhibit=frozenset(place for place, count in way.items() if not count),
-            at_most=tuple((place, count) for place, count in way.items() if count),
-        )
-        for way in ways
-    ]
+    return found
 
 
 def _not_taken(

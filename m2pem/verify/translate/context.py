@@ -5,7 +5,7 @@ signals and messages, so that those who throw them know their catchers. `held_by
 vehicles and payloads an activity's behavior holds.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -102,15 +102,36 @@ class Contender:
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """A place that has a token while a task in `scope` asks for resources of `pools`. `urgent`: it
-    gets one of them as soon as one is free, as far as its priority allows.
+    """A place that has a token while a task asks for resources of `pools`. `urgent`: it gets one of
+    them as soon as one is free, as far as its priority allows.
+
+    `least`: how many it needs. `totals`: of a task that waits for several, and keeps those that are
+    free, how many of each pool it may get at least. `any_will_do`: any so many of its pools.
     """
 
     place: int
+    instance: ActivityInstance
     priority: int
-    scope: ScopeDraft
     pools: frozenset[Pool]
     urgent: bool
+    waits: bool
+    least: int
+    totals: tuple[Mapping[Pool, int], ...] = ()
+    any_will_do: bool = False
+
+    @property
+    def scope(self) -> ScopeDraft:
+        """The scope that its token is in."""
+        return self.instance.outer
+
+
+@dataclass(frozen=True, slots=True)
+class PassedOver:
+    """A place that has a token while a task gets nothing that others may keep. `keepers`: these, by
+    the place of a token while one asks that comes before."""
+
+    place: int
+    keepers: dict[int, Asking] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +196,10 @@ class TranslationContext:
         self.later: list[Callable[[], None]] = []
         self.contended: list[Contender] = []
         self.asking: list[Asking] = []
+        self.before: dict[tuple[int, int], int] = {}
+        """By two places of tasks that ask, the place of the first one asking before the other."""
+        self.passed_over: dict[int, PassedOver] = {}
+        """By the place of a task that asks, while it gets nothing that others may keep."""
         self.keeps = any(each.role.keep for roles in self.candidates.values() for each in roles)
         self.kept: dict[Pool, list[Source]] = {}
         """By pool, the places of what is kept between tasks."""

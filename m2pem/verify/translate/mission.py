@@ -40,6 +40,7 @@ from m2pem.verify.translate.throwing import (
     thrown_by,
 )
 from m2pem.verify.translate.timers import put_in_order, timer_us
+from m2pem.verify.translate.waiting_order import follow_order
 
 
 def translate(
@@ -84,7 +85,7 @@ def translate(
     if context.options.timers_in_order:
         put_in_order(context)
     _completes(context)
-    initial = enter_at_once(context.net, initial)
+    initial = follow_order(context, enter_at_once(context.net, initial))
     return context.net.finish(
         mission.file,
         root.id,
