@@ -66,7 +66,7 @@ SLOW = ChaosMission(
     (),
 )
 
-_WORLDS = (SimulatedVehicles.name, MavlinkVehicles.name, BlockingHost.name)
+_WORLDS = (SimulatedVehicles.name, MavlinkVehicles.name, BlockingHost.name, *OF_ROS)
 NONE = Trouble("nothing", worlds=_WORLDS)
 TROUBLES = {
     each.name: each
