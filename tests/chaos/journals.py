@@ -19,6 +19,7 @@ UNDONE = {
     "fleets": ("DROP TABLE fleets",),
     "notifications": ("DROP FUNCTION m2pem_tell CASCADE",),
     "pages": ("ALTER TABLE fleets DROP COLUMN page",),
+    "server_starts": ("ALTER TABLE executives DROP COLUMN lease, DROP COLUMN server_start",),
 }
 """How the last steps of migration are undone in a journal with no deletion and no schedule,
 which was not salvaged, and whose executives are dead."""

@@ -61,9 +61,9 @@ class World:
         self._hosts = hosts
         self._journals = servers.url.rpartition(",")[0] if only_first else servers.url, servers.url
         self.owner = self._serve(0)
-        until_said(self.owner, "serving")
+        self.owner.until_said("serving")
         self.standby = self._serve(1, "--standby")
-        until_said(self.standby, "standing by")
+        self.standby.until_said("standing by")
         self.run(0, "start", "m.bpmn")
         self.owner.until_record("BehaviorProgressed", state="RUNNING")
 
@@ -86,7 +86,7 @@ class World:
     def taken_over(self) -> None:
         """Wait for the standby: the owner has held the vehicle before, and nothing moves it then
         before an operator says so."""
-        until_said(self.standby, "taking over")
+        self.standby.until_said("taking over")
         assert self.effects() == HELD
         self.standby.until_record("PromptOpened")
         assert self.effects() == HELD
@@ -102,13 +102,6 @@ class World:
     def close(self) -> None:
         for host in self._hosts:
             host.end()
-
-
-def until_said(program: Program, text: str) -> None:
-    for line in program.stderr:
-        if text in line:
-            return
-    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
 
 
 def until(true: Callable[[], Any]) -> None:
@@ -173,7 +166,7 @@ def test_an_executive_whose_lease_is_over_leaves_its_run_to_another_one(
     world = World(tmp_path, servers)
     opened.callback(world.close)
     servers.primary.kill()
-    until_said(world.owner, "did not renew the lease of this executive in time")
+    world.owner.until_said("did not renew the lease of this executive in time")
     servers.standby.promote()
     world.taken_over()
     status, errors = world.owner.rest()
@@ -235,9 +228,9 @@ def test_an_executive_holds_when_the_servers_host_is_off_until_another_one_takes
     opened.callback(world.close)
     until_renewed(servers.primary, servers)
     power_off(network, "db1")
-    until_said(world.owner, f"after {LEASE_S} s another one may. Commanded to hold: ugv1")
+    world.owner.until_said(f"after {LEASE_S} s another one may. Commanded to hold: ugv1")
     assert world.effects() == HELD
-    until_said(world.owner, "did not renew the lease of this executive in time")
+    world.owner.until_said("did not renew the lease of this executive in time")
     world.owner.kill()  # else it may serve its fleet again before the other one does
     servers.standby.promote()
     world.taken_over()

@@ -14,7 +14,6 @@ from tests.e2e.test_standby import (
     prompted,
     serve,
     start_mission,
-    until_said,
 )
 
 __all__ = ["journal", "postgres", "postgres_url"]
@@ -25,9 +24,9 @@ def test_a_switchover_leaves_the_runs_to_the_standby(
 ) -> None:
     fleet, state = fleet_with_state(tmp_path)
     owner = serve(m2pem, fleet, journal)
-    until_said(owner, "serving")
+    owner.until_said("serving")
     standby = serve(m2pem, fleet, journal, "--standby")
-    until_said(standby, "standing by for")
+    standby.until_said("standing by for")
     start_mission(m2pem, journal)
     answer(m2pem, journal, prompted(owner), "continue")
     owner.until_record("BehaviorProgressed", state="RUNNING")
@@ -50,7 +49,7 @@ def test_a_switchover_leaves_the_runs_to_the_standby(
 def test_without_a_standby_a_switchover_changes_nothing(m2pem: CommandLine, tmp_path: Path) -> None:
     fleet, _ = fleet_with_state(tmp_path)
     owner = serve(m2pem, fleet, "journal.db")
-    until_said(owner, "serving")
+    owner.until_said("serving")
     start_mission(m2pem, "journal.db")
     prompt = prompted(owner)
     status, _, errors = m2pem.run("switchover", "--journal", "journal.db")

@@ -119,7 +119,7 @@ class World:
         elsewhere = str(self.folder / "elsewhere")
         host = {"M2PEM_RUNTIME_DIR": elsewhere, "HOME": elsewhere} if more else {}
         program = self._m2pem.start(*words, **host)
-        until_said(program, "standing by for" if more else "serving")
+        program.until_said("standing by for" if more else "serving")
         return program
 
     def begin(self, owner: Program) -> None:
@@ -170,13 +170,6 @@ class World:
             self.router.close()
             self._sitl.send_signal(signal.SIGINT)
             self._sitl.communicate()
-
-
-def until_said(program: Program, text: str) -> None:
-    for line in program.stderr:
-        if text in line:
-            return
-    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
 
 
 def assert_begun_once(commanded: dict[str, list[str]]) -> None:
@@ -236,7 +229,7 @@ def test_an_executive_that_loses_its_vehicles_keeps_them_from_its_standby(world:
     owner.until_record("RunEnded", outcome="stopped")
     owner.send(signal.SIGTERM)
     assert owner.rest()[0] == 0
-    until_said(standby, "serving")
+    standby.until_said("serving")
     assert not standby.lines  # it has taken no run
     for vehicle, found in world.commanded().items():
         assert HOLDING[vehicle] in found, (vehicle, found)
@@ -251,7 +244,7 @@ def test_stop_reaches_a_copter_while_the_arbiter_hangs_for_a_rover(world: World)
     world.run("stop", "r1")
     world.until_sent(HOLDING["uav1"], before)
     assert HOLDING["ugv1"] not in world.sent(before)
-    until_said(owner, "ugv1 may not have received the STOP of r1")
+    owner.until_said("ugv1 may not have received the STOP of r1")
     assert HOLDING["ugv1"] not in world.sent(before)
     flag.unlink()
     world.until_sent(HOLDING["ugv1"], before)

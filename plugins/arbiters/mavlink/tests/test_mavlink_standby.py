@@ -98,7 +98,7 @@ class World:
             program = self._m2pem.start("-c", code, **lease, **self._elsewhere)
         else:
             program = self._m2pem.start(*command, **lease)
-        until_said(program, "standing by for" if words else "serving")
+        program.until_said("standing by for" if words else "serving")
         return program
 
     def fly(self, owner: Program, journal: str = "") -> None:
@@ -139,14 +139,6 @@ class World:
         modes = [detail for kind, detail in self.noted() if kind == "mode"]
         assert modes == ["GUIDED", "AUTO", "LAND"], self.noted()
         assert self.noted()[-1][0] == "disarmed"
-
-
-def until_said(program: Program, text: str) -> str:
-    """Read standard error until a line of it has this text."""
-    for line in program.stderr:
-        if text in line:
-            return line
-    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
 
 
 @pytest.fixture
@@ -239,7 +231,7 @@ def test_a_standby_leaves_an_executive_alone_that_has_lost_its_copter(m2pem: Com
         owner.until_record("RunEnded")
         owner.send(signal.SIGTERM)
         assert owner.rest()[0] == 0
-        until_said(standby, "serving")
+        standby.until_said("serving")
         standby.send(signal.SIGTERM)
         assert standby.rest()[0] == 0
         assert not standby.lines  # it has taken no run
@@ -268,7 +260,7 @@ def test_an_executive_cut_off_from_its_database_holds_its_copter_before_another_
         (cut_off,) = world.router.senders()
         proxy.partitioned = True
         began_s = time.monotonic()
-        until_said(standby, "taking over")
+        standby.until_said("taking over")
         assert time.monotonic() - began_s < LEASE_S + 1.0
         before = len(world.router.sent)
         assert ("mode", "BRAKE") in world.noted()  # before the other one may command it

@@ -53,16 +53,9 @@ def serve(m2pem: CommandLine, port: str, *words: str) -> Program:
     )  # fmt: skip
 
 
-def until_said(program: Program, text: str) -> str:
-    for line in program.stderr:
-        if text in line:
-            return line
-    raise AssertionError(f"it ended before it said {text!r}: {program.rest()}")
-
-
 def page_of(program: Program) -> str:
     """Return the address of its page, with the token, once it is printed."""
-    return until_said(program, "the page is at").split()[-1]
+    return program.until_said("the page is at").split()[-1]
 
 
 @pytest.mark.long
@@ -71,7 +64,7 @@ async def test_an_open_page_goes_on_at_the_standby_that_has_taken_over(m2pem: Co
     owner = serve(m2pem, first)
     at_first = page_of(owner)
     standby = serve(m2pem, second, "--standby")
-    until_said(standby, "standing by for")
+    standby.until_said("standing by for")
     async with browser() as chromium:
         page = await chromium.new_page()
         await page.goto(f"http://127.0.0.1:{second}/")
