@@ -61,8 +61,8 @@ class DurationOption(click.ParamType):  # type: ignore[type-arg]  # older clicks
     ) -> float:
         try:
             seconds = quantity(str(value), Dimension.DURATION)
-        except ValueError:
-            seconds = math.nan
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
         if math.isnan(seconds) or (seconds < 0 and not self._negative):
             self.fail(f"{value!r} is not a duration such as 50ms or 6s", param, ctx)
         return seconds

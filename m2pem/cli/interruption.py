@@ -86,6 +86,8 @@ class Interruption:
             held = self._held() or self._closing
             self._say(f"{name}: still waiting for {held}; once more to give up")
         else:
+            for each in SIGNALS:  # one that comes again would begin this again
+                signal.signal(each, signal.SIG_IGN)
             held = self._held() or "nothing"
             self.end_at_once(f"{name}: gave up; not released: {held}", STOPPED)
 

@@ -15,7 +15,6 @@ from tests.executive.conftest import behavior, flow, mission
 from tests.faults import Faults
 
 from .test_full_disk import DRIVE, wait_until_recorded
-from .test_standby import until_said
 
 DAY_S = 86_400
 
@@ -96,7 +95,7 @@ def test_after_a_suspend_a_run_looks_at_its_vehicles_before_its_timers_fire(
         f"clock {time.CLOCK_REALTIME} {SUSPENDED_S + 3 * DAY_S}",
     )
     program.send(signal.SIGCONT)
-    until_said(program, f"the executive did nothing for {SUSPENDED_S} s")
+    program.until_said(f"the executive did nothing for {SUSPENDED_S} s")
     asked = program.until_record("PromptOpened")
     assert f"the executive did nothing for {SUSPENDED_S} s" in asked["text"]
     assert "EventTriggered" not in [each["record"] for each in program.records]

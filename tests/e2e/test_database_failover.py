@@ -12,7 +12,7 @@ import pytest
 from bench.network import Network
 from m2pem.simulation.executions import EffectKind
 from m2pem.simulation.state_file import recorded_effects
-from tests.chaos.worlds import process
+from tests.chaos.missions import process
 from tests.command_line import CommandLine, Program
 from tests.executive.conftest import task
 from tests.postgres_server import PostgresServer, Replicated, programs, replicate, start_server

@@ -70,7 +70,7 @@ def test_vehicles_are_named_and_simulated_until_they_are_ended() -> None:
         (["--home", "zurich"], "is not LAT,LON,ALT"),
         (["--home", "95,8,0"], "is not on Earth"),
         (["--home", "47,nan,0"], "is not on Earth"),
-        (["--ekf", "soon"], "is not a duration such as 50ms or 6s"),
+        (["--ekf", "soon"], "is not a number with a unit"),
         (["--speed", "0"], "--speed"),
     ],
 )

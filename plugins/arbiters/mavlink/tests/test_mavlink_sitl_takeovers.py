@@ -16,7 +16,8 @@ from mavlink_kills import read_log
 from mavlink_router import Router
 
 from m2pem.api import offset
-from tests.chaos.worlds import FORK, MavlinkVehicles, process
+from tests.chaos.missions import FORK, process
+from tests.chaos.worlds import MavlinkVehicles
 from tests.command_line import CommandLine, Program
 from tests.executive.conftest import task
 from tests.postgres_server import postgres, postgres_url

@@ -57,7 +57,7 @@ def test_a_camera_is_simulated_until_ctrl_c():
     [
         (["--listen", "8081"], "is not HOST:PORT, such as 127.0.0.1:8081"),
         (["--pan", "170,-170"], "it goes up from LOW to HIGH"),
-        (["--latency", "soon"], "is not a duration such as 50ms"),
+        (["--latency", "soon"], "is not a number with a unit"),
         (["--fault", "melt at 3 s"], "'melt' is no action. Actions: silent; slow 2 s;"),
         (["--credentials", "none.yaml"], "none.yaml: cannot be read"),
     ],

@@ -50,7 +50,7 @@ async def test_the_header_says_who_stands_by_and_an_alert_when_there_is_no_stand
         await terminal.until_shown("RUNNING", f"standby: {socket.gethostname()}")
         await journal.leave_fleet(served)
         await terminal.until_shown("No executive stands by any more")
-        assert not terminal.shows("standby:")
+        await terminal.until_gone("standby:")
         await terminal.press("a")
         await terminal.until_shown("! ")
         assert "No executive stands by any more" in terminal.line("! ")
