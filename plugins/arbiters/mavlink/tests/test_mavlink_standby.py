@@ -146,15 +146,20 @@ def m2pem(tmp_path: Path) -> Iterator[CommandLine]:
     yield from command_line(tmp_path)
 
 
-def test_a_standby_takes_over_a_flying_copter_from_a_killed_executive(
-    m2pem: CommandLine,
+@pytest.mark.parametrize("kills", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_a_standby_takes_over_a_flying_copter_from_a_killed_executive_or_at_a_switchover(
+    m2pem: CommandLine, kills: bool
 ) -> None:
     world = World(m2pem, "journal.db")
     try:
         owner = world.serve()
         standby = world.serve("--standby")
         world.fly(owner)
-        owner.kill()
+        if kills:
+            owner.kill()
+        else:
+            assert m2pem.run("switchover", "--journal", world.journal)[0] == 0
+            assert owner.rest()[0] == 0
         standby.until_record("RunClaimed", epoch=2)
         assert standby.until_record("RunEnded")["outcome"] == "completed"
         world.assert_undisturbed()

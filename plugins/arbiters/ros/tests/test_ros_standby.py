@@ -60,9 +60,16 @@ def assert_undisturbed(standby: Program, watch: Watch) -> None:
 
 
 @pytest.mark.long
-def test_a_standby_takes_over_robots_from_a_killed_executive(m2pem: Programs, watch: Watch) -> None:
+@pytest.mark.parametrize("kills", [True, False])
+def test_a_standby_takes_over_robots_from_a_killed_executive_or_at_a_switchover(
+    m2pem: Programs, watch: Watch, kills: bool
+) -> None:
     owner, standby = driving(m2pem, watch, "journal.db")
-    owner.kill()
+    if kills:
+        owner.kill()
+    else:
+        assert m2pem.m2pem("switchover", "--journal", "journal.db").rest() == 0
+        assert owner.rest() == 0, owner.said
     standby.until_record("RunClaimed", epoch=2)
     assert_undisturbed(standby, watch)
 
