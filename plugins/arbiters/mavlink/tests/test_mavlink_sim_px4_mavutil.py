@@ -46,9 +46,12 @@ async def test_a_px4_is_flown_by_its_modes_and_a_mission(ground: Ground) -> None
         ground.wait("HEARTBEAT", that=lambda m: m.custom_mode == 4 << 16 | 2 << 24)
         ground.wait("HEARTBEAT", that=lambda m: m.custom_mode == 4 << 16 | 3 << 24)
         ground.link.mav.mission_count_send(1, 1, len(plan))
-        for each in plan:
-            assert ground.wait("MISSION_REQUEST_INT").seq == each.seq
-            ground.link.mav.send(each)
+        asked: list[int] = []
+        while asked[-1:] != [plan[-1].seq]:  # an answer that is late is asked for again
+            asked.append(ground.wait("MISSION_REQUEST_INT").seq)
+            ground.link.mav.send(plan[asked[-1]])
+        assert sorted(set(asked)) == [each.seq for each in plan]
+        assert asked == sorted(asked)
         assert ground.wait("MISSION_ACK").type == 0
         while ground.command(300) != 0:
             continue  # it checks the mission at first
