@@ -36,6 +36,12 @@ class _Link:
     lost: bool = False
     steady_since_us: int | None = None
 
+    def is_silent(self, now_us: int) -> bool:
+        """Whether nothing is received: one that returns counts as lost for a while, and is not."""
+        if self.lost and self.steady_since_us is None:
+            return True
+        return now_us - self.received_us > SILENT_SHARE * self.bound_us
+
 
 class LinkMonitor:
     """Times are microseconds since the Unix epoch.
@@ -94,11 +100,13 @@ class LinkMonitor:
 
     def receives_nothing(self, now_us: int) -> bool:
         """Whether nothing is received any more of all that was received since connecting: each link
-        is lost, or silent for two fifths of its bound."""
+        is lost, or silent for two fifths of its bound. False also while states may still wait, as
+        this process was not running."""
+        due_us = self._next_check_us
+        if self._stalled or (due_us is not None and now_us - due_us > STALL_US):
+            return False
         were = [each for each in self._links.values() if not each.never_received]
-        return bool(were) and all(
-            each.lost or now_us - each.received_us > SILENT_SHARE * each.bound_us for each in were
-        )
+        return bool(were) and all(each.is_silent(now_us) for each in were)
 
     def check(self, now_us: int) -> list[ResourceFault]:
         """Return a fault for each resource without telemetry for longer than its bound."""

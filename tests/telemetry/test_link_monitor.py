@@ -138,6 +138,32 @@ def test_a_check_before_its_time_changes_nothing() -> None:
     assert rules.next_check_us == 3 * S + 1
 
 
+# --- nothing is received ------------------------------------------------------------------------
+
+
+def test_a_link_that_returns_is_received_though_it_still_counts_as_lost() -> None:
+    rules = LinkMonitor({UGV: 3.0, UAV: 3.0}, since_us=0)
+    rules.received(vehicle(UGV), 1 * S)
+    rules.received(vehicle(UAV), 3 * S)
+    assert [fault.resource for fault in run_checks(rules, 5 * S)] == [UGV]
+    rules.received(vehicle(UGV), 6 * S)
+    assert [fault.resource for fault in run_checks(rules, 6 * S + 1)] == [UAV]
+    assert not rules.receives_nothing(6 * S + 1)
+    assert rules.receives_nothing(8 * S)
+
+
+def test_after_a_stall_nobody_knows_whether_anything_is_received() -> None:
+    rules = LinkMonitor({UGV: 3.0}, since_us=0)
+    rules.received(vehicle(), 1 * S)
+    assert run_checks(rules, 3 * S + 1) == []
+    assert not rules.receives_nothing(20 * S)
+    assert rules.check(20 * S) == []
+    rules.received(vehicle(link=LinkState.LOST), 20 * S)
+    assert not rules.receives_nothing(20 * S)
+    run_checks(rules, 23 * S)
+    assert rules.receives_nothing(24 * S)
+
+
 # --- batteries ----------------------------------------------------------------------------------
 
 
