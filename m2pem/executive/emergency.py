@@ -157,8 +157,8 @@ def _problem(what: str, asked: "asyncio.Future[Step]") -> str:
     error = asked.exception()
     if isinstance(error, StaleEpochError):
         return (
-            f"its vehicles were commanded to hold, and it is not stopped: {error}. Stop it at the "
-            "other executive, too"
+            f"its vehicles were commanded to hold, and the {what} is not recorded: {error}. "
+            f"Ask for the {what} at the other executive, too"
         )
     if isinstance(error, M2pemError):
         return f"the {what} went to its vehicles, but was not recorded: {error}"

@@ -276,9 +276,9 @@ class Executive:
         """A link is being lost. Returns whether the runs are left to another executive, as nothing
         is received here any more."""
         links = self._links
-        if links is None or not links.receives_nothing(self.clock.now_us()):
+        if links is None:
             return False
-        return await self.switchover.no_vehicle_received()
+        return await self.switchover.link_lost(lambda: links.receives_nothing(self.clock.now_us()))
 
     async def load_schedule(self) -> None:
         """Read what the journal has scheduled for this fleet, before runs are taken up.

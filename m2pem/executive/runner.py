@@ -161,6 +161,11 @@ class Runner:
         self.post(item)
         return decided
 
+    @property
+    def undecided(self) -> "list[asyncio.Future[Step]]":
+        """What operators have asked for that is not decided and committed."""
+        return [decided for _, decided in self._submitted if not decided.done()]
+
     def submit_stop(self, item: StopRun, cancelled: frozenset[str]) -> "asyncio.Future[Step]":
         """As `submit`, ahead of what waits; `cancelled`: the behaviors whose cancel is under way.
 

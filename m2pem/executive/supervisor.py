@@ -7,6 +7,7 @@ they concern.
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,7 +41,7 @@ from m2pem.executive.behavior_lifecycle import (
 from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
 from m2pem.executive.dispatcher import Dispatcher
-from m2pem.executive.emergency import EmergencyCommands, StopMarks
+from m2pem.executive.emergency import WRITTEN_WITHIN_S, EmergencyCommands, StopMarks
 from m2pem.executive.fleet_connections import FleetArbiters
 from m2pem.executive.handover import Handover
 from m2pem.executive.interrupted_runs import InterruptedRuns
@@ -245,8 +246,16 @@ class Supervisor:
 
     async def leave_runs(self, why: StaleEpochError) -> None:
         """Drive no run any more, from now on, and leave their vehicles as they are: another
-        executive may take them up when this returns."""
+        executive may take them up when this returns.
+
+        What operators have asked for until then is recorded first, as the other executive knows of
+        a STOP or pause by the journal; one that hangs is waited for `WRITTEN_WITHIN_S` at most.
+        """
         self._left = why
+        with suppress(TimeoutError):
+            async with asyncio.timeout(WRITTEN_WITHIN_S):
+                while asked := [each for one in self.runners.values() for each in one.undecided]:
+                    await asyncio.wait(asked)
         for runner in self.runners.values():
             if not runner.done.is_set():
                 self.replaced(runner.id, why)

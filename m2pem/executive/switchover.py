@@ -7,6 +7,7 @@ those of an executive that was killed; this one commands nothing more before.
 
 import asyncio
 import logging
+from collections.abc import Callable
 
 from m2pem.api.health import ExecutiveAddress
 from m2pem.errors import JournalError, OperatorError, StaleEpochError
@@ -27,6 +28,8 @@ class Switchover:
     def __init__(self, supervisor: Supervisor, left: asyncio.Event) -> None:
         self._supervisor = supervisor
         self._left = left
+        self._deciding = asyncio.Lock()
+        self._taken_over_by: ExecutiveAddress | None = None
         self.by_operator = False
 
     async def ask(self, by: str) -> ExecutiveAddress:
@@ -37,20 +40,37 @@ class Switchover:
             JournalError: the journal cannot say it.
         """
         supervisor = self._supervisor
-        standbys = await standbys_of(supervisor.journal, supervisor.fleet.name)
-        if not standbys:
-            raise OperatorError(
-                f"no executive stands by for {supervisor.fleet.name}, and nothing has changed: "
-                "start one with m2pem serve --standby, on the same journal and with the same fleet"
-            )
-        self.by_operator = True
-        return await self._leave(standbys[0], f"{by or 'an operator'} asked for it")
+        async with self._deciding:
+            if self._taken_over_by is not None:
+                self.by_operator = True
+                return self._taken_over_by
+            standbys = await standbys_of(supervisor.journal, supervisor.fleet.name)
+            if not standbys:
+                raise OperatorError(
+                    f"no executive stands by for {supervisor.fleet.name}, and nothing has changed: "
+                    "start one with m2pem serve --standby, on the same journal and with the same "
+                    "fleet"
+                )
+            self.by_operator = True
+            return await self._leave(standbys[0], f"{by or 'an operator'} asked for it")
 
-    async def no_vehicle_received(self) -> bool:
-        """No vehicle is received any more. Returns whether the runs were left to another host."""
+    async def link_lost(self, receives_nothing: Callable[[], bool]) -> bool:
+        """A link is being lost. Returns whether the runs are left to another executive: to one of
+        another host, if no vehicle is received here any more.
+
+        `receives_nothing`: whether that is so. Of links that are lost together, each waits for what
+        is decided about the first: none is lost to the runs meanwhile.
+        """
+        async with self._deciding:
+            if self._left.is_set():
+                return True
+            # The standbys of a journal without a lease are on this host.
+            if self._supervisor.journal.lease_s is None or not receives_nothing():
+                return False
+            return await self._left_to_another_host()
+
+    async def _left_to_another_host(self) -> bool:
         supervisor = self._supervisor
-        if supervisor.journal.lease_s is None or self._left.is_set():
-            return self._left.is_set()  # a journal of this host: so are its standbys
         try:
             async with asyncio.timeout(ANSWERED_WITHIN_S):
                 standbys = await standbys_of(supervisor.journal, supervisor.fleet.name)
@@ -68,4 +88,5 @@ class Switchover:
             StaleEpochError(f"switchover: {why}; {standby} may drive the runs from now on")
         )
         self._left.set()
-        return ExecutiveAddress(standby.host, standby.pid, standby.page)
+        self._taken_over_by = ExecutiveAddress(standby.host, standby.pid, standby.page)
+        return self._taken_over_by

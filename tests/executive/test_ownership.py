@@ -174,7 +174,7 @@ def test_an_operators_stop_of_a_run_that_another_executive_drives_holds_its_vehi
         run = await driving(world)
         world.fake.report(f"{run}.b1", BehaviorState.RUNNING, epoch=7)
         await world.fake.until_called("disown", run)
-        with pytest.raises(OperatorError, match="its vehicles were commanded to hold, and it is"):
+        with pytest.raises(OperatorError, match="to hold, and the stop is not recorded"):
             await world.executive.control.stop(run, by="anna")
         assert world.fake.count("hold", "ugv1") == 1
         assert world.fake.count("cancel") == 0
