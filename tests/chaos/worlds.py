@@ -155,13 +155,21 @@ _MAVLINK_VEHICLE = """  {name}:
 _BY_SYSTEM = {1: "uav1", 2: "ugv1", 3: "ugv2"}
 
 _AUTOPILOTS = """
-import json, runpy, sys, time
+import json, math, runpy, sys, time
 from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
 
 notes = open({notes!r}, "a", buffering=1)
 log_event = Autopilot.log_event
 
+def stays(self, detail):
+    place = self.frame.to_location(self.position)
+    north, east = (float(each) for each in detail.split(","))
+    return math.hypot(north - place.latitude_deg, east - place.longitude_deg) * 111_000 < 2.5
+
 def noted(self, kind, detail=""):
+    # To be sent to the place where it is begins nothing: it does not move.
+    if kind == "motion" and "," in detail and stays(self, detail):
+        kind = "stays"
     notes.write(json.dumps([self.spec.system, kind, detail, time.monotonic()]) + "\\n")
     log_event(self, kind, detail)
 
