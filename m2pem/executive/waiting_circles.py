@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from m2pem.allocation.circles import Until, Waiting, circles
 from m2pem.allocation.needs import ConsideredRole
 from m2pem.api.runs import Alert, RunId
-from m2pem.engine.state import Behavior, BehaviorPhase
+from m2pem.engine.records import Trigger
+from m2pem.engine.state import AllocationRequest, Behavior, BehaviorPhase, Token
 from m2pem.executive.allocation_requests import ConsideredRequest
 from m2pem.executive.runner import Runner
 from m2pem.executive.waiting_tasks import holder_label
@@ -20,6 +21,7 @@ from m2pem.fleet.behaviors import ENDING_PARAMETERS
 from m2pem.fleet.graph import ResourceGraph
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.elements import BoundaryEvent, StartEvent
 
 if TYPE_CHECKING:
     from m2pem.deconfliction.conflicts import Refusal
@@ -58,6 +60,7 @@ class WaitingCircles:
             for each in left
             if not each.asked.chosen  # else vehicles are taken from other runs for it
             and (each.request.id in refusals or (each.waits and not each.request.deadline))
+            and not _is_ended_by_timer(each.request)
         }
         runners = {each.asked.runner.id: each.asked.runner for each in waiting.values()}
         idle = [each for each in runners.values() if self._is_idle(each, refusals)]
@@ -114,6 +117,22 @@ class WaitingCircles:
             for resource, by in found.items()
         ]
         return f"{who} waits for {', '.join(has)}"
+
+
+def _is_ended_by_timer(request: AllocationRequest) -> bool:
+    """Whether an interrupting timer runs on a task that asks, or on a scope around it."""
+    token: Token | None = request.token
+    while token is not None:
+        around = [*(token.waits or {}).values(), *(token.scope.waits or {}).values()]
+        for wait in around:
+            if (
+                wait.trigger is Trigger.TIMER
+                and isinstance(wait.node, BoundaryEvent | StartEvent)
+                and wait.node.interrupting
+            ):
+                return True
+        token = token.scope.owner
+    return False
 
 
 class _Needs:

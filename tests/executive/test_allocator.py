@@ -15,6 +15,7 @@ from m2pem.engine.records import (
     BehaviorRequested,
     ErrorThrown,
     ResourcesAllocated,
+    RunEnded,
 )
 from m2pem.engine.run import MissionRun
 from m2pem.errors import InternalError
@@ -407,6 +408,71 @@ def test_runs_that_wait_for_each_other_are_told_and_one_can_be_stopped(play):
     assert "`m2pem stop r2`" in alerts[0].text
     assert took_us < 1_000_000
     assert status is RunStatus.TERMINATED
+
+
+PAIR = "name='pair' requires='true' count='2' wait='unlimited'"
+
+
+def for_two(event: str = "", *roles: str) -> bytes:
+    """One team task that waits for two vehicles, with a boundary event."""
+    caught = f'<boundaryEvent id="X" attachedToRef="Two" {event}</boundaryEvent>' if event else ""
+    return mission(
+        '<process id="P" isExecutable="true"><startEvent id="S"/><scriptTask id="Two">'
+        '<extensionElements><m2pem:behavior type="team" name="escort"><m2pem:properties>'
+        f"{TO_GATE}</m2pem:properties><m2pem:resources>"
+        f"{''.join(f'<m2pem:role {role}/>' for role in roles or (PAIR,))}</m2pem:resources>"
+        f"</m2pem:behavior></extensionElements></scriptTask>{caught}{flow('S', 'Two')}</process>"
+    )
+
+
+async def keep_for_two_what_one_needs(world: World, source: bytes) -> tuple[str, str]:
+    """Start a run that holds ugv1 until it has ugv2, which is kept for the task of another run."""
+    control = world.executive.control
+    holder = await control.start(holding_and_waiting("ugv1", "ugv2"))
+    await world.fake.until_called("start", f"{holder}.b1")
+    waits = await control.start(source)
+    while not await control.waiting():
+        await world.clock.sleep(0.1)
+    await control.signal(GO, run=holder)
+    return holder, waits
+
+
+TIMER = "<timerEventDefinition><timeDuration>PT1M</timeDuration></timerEventDefinition>"
+
+
+@pytest.mark.parametrize("event", ["", f"cancelActivity='false'>{TIMER}"])
+def test_a_vehicle_kept_for_a_task_that_waits_for_several_closes_a_circle(play, event):
+    async def story(world: World):
+        control = world.executive.control
+        events = control.subscribe()
+        holder, waits = await keep_for_two_what_one_needs(world, for_two(event))
+        async with asyncio.timeout(2):
+            async for each in events:
+                if isinstance(each, Alert):
+                    break
+        await control.stop(waits)
+        await world.fake.until_called("start", f"{holder}.b2")
+        return each, world.clock.now_us() - START_US
+
+    alert, took_us = play(story, "ugv1", "ugv2")
+    assert alert.code == "WAITING_CIRCLE"
+    assert "Two of r2 (mission) waits for ugv1 (held by Hold of r1 (mission))" in alert.text
+    assert "Need of r1 (mission) waits for ugv2 (kept for Two of r2 (mission))" in alert.text
+    assert took_us < 2_000_000
+
+
+def test_a_task_that_a_timer_ends_is_in_no_circle(play):
+    async def story(world: World):
+        events = world.executive.control.subscribe()
+        holder, waits = await keep_for_two_what_one_needs(world, for_two(f">{TIMER}"))
+        await world.fake.until_called("start", f"{holder}.b2")
+        alerts = []
+        async for each in events:
+            alerts += [each.text] if isinstance(each, Alert) else []
+            if isinstance(getattr(each, "record", None), RunEnded):
+                return each.run == waits, alerts
+
+    assert play(story, "ugv1", "ugv2") == (True, [])
 
 
 def broken(*_: object, **__: object) -> None:
