@@ -116,7 +116,7 @@ class WaitingCircles:
             )
             for resource, by in found.items()
         ]
-        return f"{who} waits for {', '.join(has)}"
+        return f"{who} waits for {', '.join(dict.fromkeys(has))}"
 
 
 def _is_ended_by_timer(request: AllocationRequest) -> bool:
@@ -192,6 +192,8 @@ class _Needs:
         lacks = [self._lacks(each, role) for role in each.roles]
         number, refusal = each.request.id, self.refusal(each)
         if refusal is None:
+            if len(lacks) > 1:
+                lacks.append(self._lacks_together(each))
             return tuple((count, held) for count, held in lacks if count > 0)
         if refusal.wait_s is None:
             return ()  # it is refused
@@ -206,20 +208,38 @@ class _Needs:
     def _lacks(self, each: ConsideredRequest, role: ConsideredRole) -> tuple[int, Counter[Until]]:
         """Return how many more a role needs than are free, and who has how many. What its task has
         lost may return by itself; it shares its candidates with no other task."""
-        found, lost = role.candidacy, each.task.lost
+        found, options = role.candidacy, role.options
         if id(found) not in self._known:
-            self._known[id(found)] = Counter(
-                BY_ITSELF
-                if one in lost
-                else self._holders.get(found.occupied[one].holder, BY_ITSELF)
-                for one in found.resources
-                if one in lost or (one in found.occupied and one not in found.excluded)
-            )
-        held, options = self._known[id(found)], role.options
+            self._known[id(found)] = Counter(self._held(each, role).values())
+        held = self._known[id(found)]
         kept = self.kept_from(each, role)
         if kept:
             held = held + Counter(Until({by}) for by in kept.values())
         return options.least - len(options.costs_s) + len(kept), held
+
+    def _lacks_together(self, each: ConsideredRequest) -> tuple[int, Counter[Until]]:
+        """Return the same for all roles of a task, which may share candidates."""
+        free: set[ResourceId] = set()
+        held: dict[ResourceId, Until] = {}
+        kept: dict[ResourceId, str] = {}
+        for role in each.roles:
+            free |= role.options.costs_s.keys()
+            held |= self._held(each, role)
+            kept |= self.kept_from(each, role)
+        until = Counter([*held.values(), *(Until({by}) for by in kept.values())])
+        least = sum(role.options.least for role in each.roles)
+        return least - len(free) + len(kept), until
+
+    def _held(self, each: ConsideredRequest, role: ConsideredRole) -> dict[ResourceId, Until]:
+        """Return until when each candidate of a role is not free, that may be later."""
+        found, lost = role.candidacy, each.task.lost
+        return {
+            one: BY_ITSELF
+            if one in lost
+            else self._holders.get(found.occupied[one].holder, BY_ITSELF)
+            for one in found.resources
+            if one in lost or (one in found.occupied and one not in found.excluded)
+        }
 
     def _leave(self, number: str, refusal: "Refusal") -> Iterator[Until]:
         """Return when each of those goes that are in the way of a request."""

@@ -440,12 +440,15 @@ async def keep_for_two_what_one_needs(world: World, source: bytes) -> tuple[str,
 TIMER = "<timerEventDefinition><timeDuration>PT1M</timeDuration></timerEventDefinition>"
 
 
-@pytest.mark.parametrize("event", ["", f"cancelActivity='false'>{TIMER}"])
-def test_a_vehicle_kept_for_a_task_that_waits_for_several_closes_a_circle(play, event):
+EITHER = tuple(f"name='{name}' requires='true' wait='unlimited'" for name in ("left", "right"))
+
+
+@pytest.mark.parametrize("source", [(), (f"cancelActivity='false'>{TIMER}",), ("", *EITHER)])
+def test_a_vehicle_kept_for_a_task_that_waits_for_several_closes_a_circle(play, source):
     async def story(world: World):
         control = world.executive.control
         events = control.subscribe()
-        holder, waits = await keep_for_two_what_one_needs(world, for_two(event))
+        holder, waits = await keep_for_two_what_one_needs(world, for_two(*source))
         async with asyncio.timeout(2):
             async for each in events:
                 if isinstance(each, Alert):
