@@ -99,8 +99,22 @@ def reason(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, Occupancy
     `given`: resources that were given to other requests at the same moment, and to which.
     """
     said = [_why(each, given) for each in roles]
-    missing = [text for text in said if text]
-    return "; ".join(missing or ["what is free is kept for tasks that asked before"])
+    missing = [text for text in said if text] or [_why_together(roles, given)]
+    return "; ".join(missing)
+
+
+def _why_together(roles: Sequence[ConsideredRole], given: Mapping[ResourceId, Occupancy]) -> str:
+    """Say why roles are not filled of which each could be: they share candidates, or a task before
+    keeps some."""
+    free = {one for each in roles for one in each.options.costs_s if one not in given}
+    least = sum(each.options.least for each in roles)
+    if len(free) >= least:
+        return "what is free is kept for tasks that asked before"
+    states = {
+        one: _state(each, one, given) for each in roles for one in each.candidacy.able[:MAX_NAMED]
+    }
+    said = ", ".join(f"{one} {state}" for one, state in states.items())
+    return f"the roles together: {len(free)} of {least} free: {said}"
 
 
 def _why(considered: ConsideredRole, given: Mapping[ResourceId, Occupancy]) -> str:

@@ -443,6 +443,15 @@ TIMER = "<timerEventDefinition><timeDuration>PT1M</timeDuration></timerEventDefi
 EITHER = tuple(f"name='{name}' requires='true' wait='unlimited'" for name in ("left", "right"))
 
 
+def test_a_task_whose_roles_share_what_is_free_is_told_how_many_are_missing(play):
+    async def story(world: World):
+        await keep_for_two_what_one_needs(world, for_two("", *EITHER))
+        return (await world.executive.control.waiting())[0].reason
+
+    held = "ugv1 is held by Hold of r1 (r1.b1), ugv2 is free"
+    assert play(story, "ugv1", "ugv2") == f"the roles together: 1 of 2 free: {held}"
+
+
 @pytest.mark.parametrize("source", [(), (f"cancelActivity='false'>{TIMER}",), ("", *EITHER)])
 def test_a_vehicle_kept_for_a_task_that_waits_for_several_closes_a_circle(play, source):
     async def story(world: World):
