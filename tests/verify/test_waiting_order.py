@@ -184,6 +184,39 @@ def test_a_circle_is_found_where_there_is_one(
     assert verdict(report, "no-deadlock") is expected
 
 
+@pytest.mark.parametrize(
+    ("more", "expected"), [({}, Verdict.VIOLATED), ({"uav4": "red"}, Verdict.HOLDS)]
+)
+def test_three_tasks_of_several_that_each_keep_one_are_a_circle(
+    more: dict[str, str], expected: Verdict
+) -> None:
+    parts = [
+        subprocess(
+            name,
+            f'<scriptTask id="{name}1">{WAITING};vehicle=uav{n};keep=subprocess</scriptTask>',
+            f'<scriptTask id="{name}2">do drive_stop {TWO_OF};wait=unlimited</scriptTask>',
+        )
+        for n, name in enumerate("PQR", 1)
+    ]
+    assert verdict(ends(beside(*parts), uav3="red", **more), "no-deadlock") is expected
+
+
+def test_a_circle_through_what_two_tasks_of_several_keep_is_found() -> None:
+    """Later waits for what Y keeps, that for what X keeps, and that for what P keeps."""
+    pairs = {"X": "uav1 uav2", "Y": "uav2 uav3"}
+    tasks = [
+        f'<scriptTask id="{name}">do drive_stop '
+        f"{' '.join(f'need:vehicle={each};wait=unlimited' for each in both.split())}</scriptTask>"
+        for name, both in pairs.items()
+    ]
+    text = beside(KEEPS.replace("vehicle=uav2", "vehicle=uav3"), *tasks)
+    report = ends(text, uav3="red")
+    (message,) = messages_of(text, report, "no-deadlock")
+    assert "Later waits for uav3, what is free is kept by script task Y until" in message
+    assert "Y waits for uav2 or uav3, what is free is kept by script task X until" in message
+    assert not report.net.approximations
+
+
 def test_a_deadlock_names_the_task_that_keeps_what_is_free() -> None:
     text = beside(KEEPS, f'<scriptTask id="Two">do drive_stop {TWO_OF};wait=unlimited</scriptTask>')
     (message,) = messages_of(text, ends(text), "no-deadlock")
