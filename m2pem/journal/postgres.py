@@ -175,9 +175,10 @@ class PostgresStorage:
             (value,),
         ).fetchone()
         if ended is not None:
+            # Not this connection: the ended lease may have been this executive's own.
             self.connection.execute(
-                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
-                " WHERE application_name = ? AND usename = current_user",
+                "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ?"
+                " AND usename = current_user AND pid <> pg_backend_pid()",
                 ended,
             )
 

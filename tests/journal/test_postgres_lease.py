@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -222,3 +222,21 @@ async def test_who_has_lost_its_fleet_takes_no_run_before_it_serves_it_again(pos
                 assert boot_time_s() < end_s
                 await asyncio.sleep(0.02)
         assert await one.create(HEADER) == "r1"
+
+
+async def test_who_serves_its_fleet_again_ends_the_lease_that_was_its_own(postgres, url):
+    async with opened(lambda: open_journal(url)) as one:
+        await one.serve_fleet("north", ["ugv1"])
+        end_leases(postgres, url)
+        end_s = boot_time_s() + 60
+        while postgres.execute(_SERVED, url) == []:
+            with suppress(JournalError):  # its lease begins again
+                await one.serve_fleet("north", ["ugv1"])
+            assert boot_time_s() < end_s
+            await asyncio.sleep(0.02)
+
+
+_SERVED = (
+    "SELECT resource FROM fleets JOIN executives ON id = executive"
+    " WHERE lease_until > clock_timestamp()"
+)
