@@ -128,9 +128,8 @@ async def _serve_at(
         looking = asyncio.create_task(successor.found())
         try:
             await asyncio.wait((left, looking), return_when=asyncio.FIRST_COMPLETED)
-            if not left.done() and (following := looking.result()) is not None:
-                return following
-            await left
+            if not left.done():
+                return looking.result()
         finally:
             looking.cancel()
             await operators.end()
@@ -168,11 +167,10 @@ class Successor:
         self._repeats = repeats
         self.standbys: Sequence[ExecutiveAddress] = ()
 
-    async def found(self) -> Path | str | None:
-        """Wait until the executive has ended, or is silent while another one serves its fleet.
+    async def found(self) -> Path | str:
+        """Wait until another executive serves the fleet, as this one has ended or is silent.
 
-        Returns the socket of that one; for people, where it is, if that is another host; None: the
-        executive has ended, and no other one has taken over in time.
+        Returns the socket of that one; for people, where it is, if that is another host.
         """
         gone = asyncio.create_task(self._remote.gone())
         silent = False
@@ -190,11 +188,18 @@ class Successor:
             gone.cancel()
         loop = asyncio.get_running_loop()
         until_s = loop.time() + self._taken_over_within_s()
-        while loop.time() < until_s:
-            if (other := await self._other()) is not None:
-                return other
-            await asyncio.sleep(LOOK_EACH_S)
-        return None
+        each_s = LOOK_EACH_S
+        while (other := await self._other()) is None:
+            if each_s == LOOK_EACH_S and loop.time() >= until_s:
+                each_s = ASK_EACH_S
+                log.warning(
+                    "process %s, the executive, has ended, and no other one has taken over: STOP "
+                    "from here reaches no vehicle. Use the vehicles' own stop; `m2pem serve` takes "
+                    "up the runs that it has left",
+                    self._executive.stem,
+                )
+            await asyncio.sleep(each_s)
+        return other
 
     async def ask(self) -> bool:
         """Ask the executive who stands by; return whether it answers."""

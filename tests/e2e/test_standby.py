@@ -263,6 +263,22 @@ def test_an_attached_operator_reads_that_the_executive_is_silent(
     attached.until_said(f"process {standby.process.pid} has taken over")
 
 
+def test_an_attached_operator_reads_that_no_executive_has_taken_over(
+    m2pem: CommandLine, tmp_path: Path
+) -> None:
+    fleet, _ = fleet_with_state(tmp_path)
+    owner = serve(m2pem, fleet, "journal.db")
+    owner.until_said("serving")
+    start_mission(m2pem, "journal.db")
+    prompted(owner)
+    attached = m2pem.start("attach", "--ocu", "plain", "--journal", "journal.db")
+    attached.until_text("[p1] UserSendRoute")
+    owner.send(signal.SIGKILL)
+    assert "STOP from here reaches no vehicle" in attached.until_said("no other one has taken over")
+    next_one = serve(m2pem, fleet, "journal.db")
+    attached.until_said(f"process {next_one.process.pid} has taken over")
+
+
 def test_an_attached_operator_goes_on_at_the_executive_that_has_taken_over(
     m2pem: CommandLine, tmp_path: Path
 ) -> None:
