@@ -11,7 +11,7 @@ from typing import Protocol
 from m2pem.allocation.candidates import Facts
 from m2pem.api.clock import Clock
 from m2pem.api.runs import RunId
-from m2pem.errors import ExpressionError, JournalError, M2pemError
+from m2pem.errors import ExpressionError, JournalError, M2pemError, OperatorError
 from m2pem.fleet.allocation import resources_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.journal.base import Journal, RunHeader
@@ -46,8 +46,8 @@ class NotBegunError(M2pemError):
         super().__init__(reason)
 
 
-class LeftToOthersError(M2pemError):
-    """This executive cannot start an entry, and another one on the journal may."""
+class LeftToOthersError(OperatorError):
+    """This executive cannot start a mission, and another one on the journal may."""
 
 
 class Starter(Protocol):

@@ -53,6 +53,7 @@ from m2pem.executive.ownership import Ownership
 from m2pem.executive.recovery import look_again, replaced_by
 from m2pem.executive.returns import Returns, still_lost
 from m2pem.executive.runner import OnRecords, RunContext, RunLimit, Runner
+from m2pem.executive.scheduled_start import LeftToOthersError
 from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
@@ -224,10 +225,11 @@ class Supervisor:
         """Check that runs can be driven.
 
         Raises:
-            OperatorError: the arbiters are not connected yet, or the runs are left to a standby.
+            LeftToOthersError: the runs are left to a standby.
+            OperatorError: the arbiters are not connected yet.
         """
         if self._left is not None:
-            raise OperatorError(f"no run begins here any more: {self._left}")
+            raise LeftToOthersError(f"no run begins here any more: {self._left}")
         if self._group is None:
             raise OperatorError(
                 "no run begins: the executive is not connected to its vehicles yet; try again in a "

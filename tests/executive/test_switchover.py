@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.health import ExecutiveAddress
 from m2pem.engine.inputs import PauseRun, StopRun
 from m2pem.errors import OperatorError, StaleEpochError
@@ -12,7 +13,8 @@ from m2pem.journal import Entry, MemoryJournal
 from m2pem.journal.standbys import standby_of
 from m2pem.mission.catalogue import BehaviorState
 
-from .conftest import World, behavior, mission, sequence
+from .conftest import START_US, World, behavior, mission, sequence
+from .schedule_world import at, drive, serving, unattended_fleet
 
 DRIVE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
 
@@ -96,3 +98,24 @@ def test_two_operators_who_ask_at_once_read_the_same(play) -> None:
 
     first, second, third = play(story, "ugv1")
     assert first == second == third
+
+
+def test_the_schedule_leaves_its_next_start_to_the_standby(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def story(clock: VirtualClock) -> None:
+        journal = MemoryJournal()
+        async with serving(clock, journal, unattended_fleet("ugv1")) as world:
+            await journal.serve_fleet(standby_of("test"), ["1"])
+            entry = await world.schedule(drive("ugv1"), at=at(10))
+            await world.at(5)
+            await world.executive.control.switch_over(by="anna")
+            with pytest.raises(OperatorError, match="no run begins here any more: switchover"):
+                await world.executive.control.start(DRIVE)
+            await world.at(12)
+            assert "no run begins here any more" in world.told()[-1]
+            assert (await world.entry(entry)).due_us == START_US + 10_000_000
+            assert await world.begun() == {}
+
+    run_virtual(story, START_US)
+    assert "broke off" not in caplog.text
