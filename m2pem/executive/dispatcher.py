@@ -197,9 +197,14 @@ class Dispatcher:
                 self.hold(resource)
 
     async def _let_go(self, run: str) -> None:
-        for arbiter in self._arbiters.all.values():
-            if fences(arbiter):
-                await self._call(f"disown {run}", arbiter.disown(run))
+        # All at once: one that hangs must not have the vehicles of the others commanded from here.
+        await asyncio.gather(
+            *(
+                self._call(f"disown {run}", arbiter.disown(run))
+                for arbiter in self._arbiters.all.values()
+                if fences(arbiter)
+            )
+        )
 
     # --- STOP and pause, out of turn -------------------------------------------------------------
 

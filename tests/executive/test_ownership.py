@@ -1,19 +1,23 @@
 """An executive that was stopped for a while, or replaced, moves nothing that it does not drive."""
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from m2pem.api.arbiter import BehaviorReport
+from m2pem.api.clock import VirtualClock, run_virtual
 from m2pem.api.runs import Alert
 from m2pem.errors import JournalError, OperatorError, StaleCommandError, StaleEpochError
 from m2pem.executive import outages, ownership
+from m2pem.executive.executive import Executive
 from m2pem.journal import Entry, MemoryJournal
-from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
-from .conftest import World, behavior, mission, sequence
+from .conftest import START_US, FakePlugins, Fakes, World, behavior, fleet, mission, sequence
 
 DRIVE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
 STOPPED_S = 60.0
@@ -167,6 +171,31 @@ def test_a_vehicle_that_has_seen_a_newer_epoch_ends_the_commands_of_its_run(play
         assert world.fake.count("hold") == world.fake.count("cancel") == 0
 
     play(story, "ugv1")
+
+
+class TwoArbiters(FakePlugins):
+    """The arbiter `fake` under any name."""
+
+    def arbiter(self, _: str) -> Callable[..., Any]:
+        return super().arbiter("fake")
+
+
+def test_an_arbiter_that_hangs_keeps_no_other_one_from_letting_go_of_a_run() -> None:
+    async def story(clock: VirtualClock) -> None:
+        fakes, ugv1 = Fakes(), ResourceId("ugv1")
+        of = fleet("ugv2", "ugv1")
+        of = replace(of, vehicles={**of.vehicles, ugv1: replace(of.vehicles[ugv1], arbiter="b")})
+        executive = Executive(of, MemoryJournal(), TwoArbiters(fakes, []), clock, watch_links=False)
+        async with executive:
+            hanging, other = fakes.made
+            run = await executive.control.start(DRIVE)
+            await other.until_called("start")
+            hanging.hangs.add("disown")
+            other.report(f"{run}.b1", BehaviorState.RUNNING, epoch=7)
+            await other.until_called("disown", run)
+            assert clock.now_us() - START_US < 1_000_000
+
+    run_virtual(story, START_US)
 
 
 def test_an_operators_stop_of_a_run_that_another_executive_drives_holds_its_vehicles(play) -> None:
