@@ -51,12 +51,14 @@ LOOK_AGAIN_US = 500_000
 """Telemetry makes the allocator look again at what waits after that time, in microseconds."""
 
 _MAY_FREE = (
+    r.RunPaused,
     r.RunResumed,
     r.ResourceReturned,
     r.OperatorGaveControlBack,
     r.BehaviorCancelRequested,
 )
-"""Records after which a task of the run may get what it could not get before."""
+"""Records after which a task may get what it could not get before: of the run, or of another one
+where a task of the run keeps nothing more from it."""
 
 
 class Allocator:

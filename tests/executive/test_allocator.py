@@ -440,6 +440,18 @@ async def keep_for_two_what_one_needs(world: World, source: bytes) -> tuple[str,
 TIMER = "<timerEventDefinition><timeDuration>PT1M</timeDuration></timerEventDefinition>"
 
 
+def test_a_task_of_a_paused_run_keeps_nothing(play):
+    async def story(world: World):
+        holder, waits = await keep_for_two_what_one_needs(world, for_two())
+        while len(await world.executive.control.waiting()) < 2:
+            await world.clock.sleep(0.1)
+        await world.executive.control.pause(waits)
+        async with asyncio.timeout(1):
+            await world.fake.until_called("start", f"{holder}.b2")
+
+    play(story, "ugv1", "ugv2")
+
+
 EITHER = tuple(f"name='{name}' requires='true' wait='unlimited'" for name in ("left", "right"))
 
 
