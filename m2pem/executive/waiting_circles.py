@@ -163,6 +163,7 @@ class _Needs:
                 for vehicle in each.named_vehicles:
                     self._movers.setdefault(vehicle, []).append(number)
         self._known: dict[int, Counter[Until]] = {}
+        self._together: dict[tuple[int, ...], tuple[int, Counter[Until]]] = {}
 
     def refusal(self, each: ConsideredRequest) -> "Refusal | None":
         """Return why a request has no space; None: it waits for resources."""
@@ -219,16 +220,20 @@ class _Needs:
 
     def _lacks_together(self, each: ConsideredRequest) -> tuple[int, Counter[Until]]:
         """Return the same for all roles of a task, which may share candidates."""
-        free: set[ResourceId] = set()
-        held: dict[ResourceId, Until] = {}
-        kept: dict[ResourceId, str] = {}
-        for role in each.roles:
-            free |= role.options.costs_s.keys()
-            held |= self._held(each, role)
-            kept |= self.kept_from(each, role)
-        until = Counter([*held.values(), *(Until({by}) for by in kept.values())])
+        key = tuple(id(role.candidacy) for role in each.roles)
+        if key not in self._together:
+            free: set[ResourceId] = set()
+            until: dict[ResourceId, Until] = {}
+            for role in each.roles:
+                free |= role.options.costs_s.keys()
+                until |= self._held(each, role)
+            self._together[key] = len(free), Counter(until.values())
+        free_count, held = self._together[key]
+        kept = {k: by for role in each.roles for k, by in self.kept_from(each, role).items()}
+        if kept:
+            held = held + Counter(Until({by}) for by in kept.values())
         least = sum(role.options.least for role in each.roles)
-        return least - len(free) + len(kept), until
+        return least - free_count + len(kept), held
 
     def _held(self, each: ConsideredRequest, role: ConsideredRole) -> dict[ResourceId, Until]:
         """Return until when each candidate of a role is not free, that may be later."""
