@@ -245,11 +245,16 @@ class Executive:
             raise VehicleInUseError(f"{', '.join(commanded)}: {why}") from error
 
     async def _watch_fleet(self) -> None:
-        """Serve the fleet again after the lease had ended; end when another executive serves it."""
+        """Serve the fleet again after the lease had ended, or leave it to a standby if runs were
+        held meanwhile; end when another executive serves it."""
         assert self.journal.lease_s is not None
         while not self.superseded.is_set():
             await asyncio.sleep(self.journal.lease_s / 3)
-            await self._served_by_another()
+            if not await self._served_by_another():
+                try:
+                    await self.switchover.journal_is_back()
+                except JournalError as error:
+                    log.info("who stands by is not known: %s", error)
 
     async def _served_by_another(self) -> str:
         """Serve the fleet again, if its lease had ended; else return why it is not served here."""

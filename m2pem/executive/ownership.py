@@ -37,8 +37,8 @@ _NOT_RENEWED = (
     "{lease_s:g} s another one may"
 )
 _ENDED = (
-    "the journal did not renew the lease of this executive in time, so another one may drive {run} "
-    "from now on"
+    "the journal did not renew the lease of this executive in time, so {run} was held, and another "
+    "one may drive it from now on"
 )
 
 

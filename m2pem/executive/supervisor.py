@@ -259,7 +259,7 @@ class Supervisor:
                 while asked := [each for one in self.runners.values() for each in one.undecided]:
                     await asyncio.wait(asked)
         for runner in self.runners.values():
-            if not runner.done.is_set():
+            if not runner.done.is_set() or runner.failure is not None:  # that one is held
                 self.replaced(runner.id, why)
         await asyncio.gather(*self._tasks.values())
 

@@ -1,8 +1,9 @@
 """A switchover: an executive leaves its runs, as they are, to the one that stands by, and ends.
 
 An operator asks for it (maintenance of a host). It happens by itself when no vehicle is received
-any more and another host has a standby, which may reach them. The standby takes the runs up as
-those of an executive that was killed; this one commands nothing more before.
+any more and another host has a standby, which may reach them, and when runs are held as the journal
+failed, which a standby can use again. The standby takes the runs up as those of an executive that
+was killed; this one commands nothing more before.
 """
 
 import asyncio
@@ -81,6 +82,33 @@ class Switchover:
         if elsewhere:
             await self._leave(elsewhere[0], "no vehicle is received here any more")
         return bool(elsewhere)
+
+    async def journal_is_back(self) -> None:
+        """The journal can be used. Leave the runs to a standby, if some are held as the journal
+        failed: here only `m2pem resume` would go on with them.
+
+        Raises:
+            JournalError: the journal cannot say it.
+        """
+        supervisor = self._supervisor
+        failed = {
+            each.id
+            for each in supervisor.runners.values()
+            if each.done.is_set() and isinstance(each.failure, JournalError)
+        }
+        if not failed or self._left.is_set():
+            return
+        standbys = await standbys_of(supervisor.journal, supervisor.fleet.name)
+        if not standbys:
+            return
+        # Where entries are lost, only the host that had acknowledged them notices it.
+        held = [
+            line.run
+            for line in await supervisor.journal.runs()
+            if line.run in failed and line.outcome is None and line.loss is None and not line.driven
+        ]
+        if held:
+            await self._leave(standbys[0], f"{', '.join(held)} is held, as the journal had failed")
 
     async def _leave(self, standby: FleetServer, why: str) -> ExecutiveAddress:
         log.warning("switchover to %s: %s", standby, why)

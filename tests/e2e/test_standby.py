@@ -3,6 +3,7 @@
 import json
 import signal
 from collections import Counter
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,8 @@ from tests.command_line import (
     fleet_with_state,
     install_plugin,
 )
-from tests.postgres_server import postgres, postgres_url
+from tests.faults.tcp_proxy import TcpProxy
+from tests.postgres_server import PostgresServer, postgres, postgres_url
 from tests.terminal import Terminal
 
 __all__ = ["postgres", "postgres_url"]
@@ -39,7 +41,7 @@ def serve(
 ) -> Program:
     return m2pem.start(
         "serve", "--fleet", fleet, "--ocu", "none", "--format", "json", "--journal", journal,
-        *words, **LEASE, **environment,
+        *words, **{**LEASE, **environment},
     )  # fmt: skip
 
 
@@ -144,6 +146,47 @@ def test_an_executive_that_stood_still_moves_nothing_after_it_was_replaced(
     standby.until_record("RunEnded", outcome="stopped")
     status, out, _ = m2pem.run("replay", "r1", "--format", "json", "--journal", postgres_url)
     assert_each_behavior_began_once(state, [json.loads(line) for line in out.splitlines()])
+
+
+@pytest.mark.parametrize(("lease_s", "over"), [(2, True), (9, False)])
+def test_a_standby_takes_over_what_its_executive_holds_when_the_database_is_back(
+    m2pem: CommandLine, tmp_path: Path, postgres: PostgresServer, lease_s: int, over: bool
+) -> None:
+    """`over`: the whole lease has passed; the old executive then reaches the database first."""
+    fleet, state = fleet_with_state(tmp_path)
+    direct = postgres.new_database()
+    lease = {"M2PEM_LEASE_S": str(lease_s)}
+    elsewhere = {"M2PEM_RUNTIME_DIR": str(tmp_path / "elsewhere"), **lease}
+    with ExitStack() as stack:
+        proxies = [TcpProxy(postgres.folder / ".s.PGSQL.5432") for _ in range(2)]
+        for each in proxies:
+            stack.callback(each.close)
+        here, there = proxies
+        database = direct.partition("?")[0].rpartition("/")[2]
+        journal, other = (f"postgresql://m2pem@127.0.0.1:{p.port}/{database}" for p in proxies)
+        owner = serve(m2pem, fleet, journal, **lease)
+        owner.until_said("serving")
+        standby = serve(m2pem, fleet, other, "--standby", **elsewhere)
+        standby.until_said("standing by for")
+        start_mission(m2pem, journal)
+        answer(m2pem, journal, prompted(owner), "continue")
+        owner.until_record("BehaviorProgressed", state="RUNNING")
+        served = "SELECT executive FROM fleets WHERE fleet = 'mehds-vignette-1'"
+        before = postgres.execute(served, direct)
+        here.partitioned, there.partitioned = True, over
+        owner.until_said("did not renew the lease" if over else "held: ")
+        here.partitioned = False
+        if over:
+            while owner.process.poll() is None:
+                if postgres.execute(served, direct) not in ([], before):
+                    break
+        there.partitioned = False
+        status, errors = owner.rest()
+        assert status == 1, errors
+        assert f"process {standby.process.pid} on" in errors
+        standby.until_record("RunClaimed", epoch=2)
+        assert standby.until_record("PromptOpened")["prompt"]
+        assert recorded_effects(state)[-1].kind is EffectKind.HOLD
 
 
 def test_an_executive_that_a_plugin_blocks_leaves_its_missions_to_a_standby(

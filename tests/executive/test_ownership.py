@@ -317,7 +317,7 @@ def test_a_run_is_held_before_its_lease_ends_and_let_go_of_afterwards(
             assert world.fake.count("disown") == 0
             holds = world.fake.count("hold")
             await pass_by(world, awake, LEASE_S * 0.25)
-            assert "another one may drive r1 from now on" in (await replaced).text
+            assert "r1 was held, and another one may drive it" in (await replaced).text
             await world.fake.until_called("disown", run)
             assert world.fake.count("hold") == holds
 
