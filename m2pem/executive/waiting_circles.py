@@ -190,11 +190,12 @@ class _Needs:
 
     def of(self, each: ConsideredRequest) -> tuple[tuple[int, Mapping[Until, int]], ...]:
         """Return what a request lacks, as `Waiting` has it."""
-        lacks = [self._lacks(each, role) for role in each.roles]
+        kept = [self.kept_from(each, role) for role in each.roles]
+        lacks = [self._lacks(each, role, by) for role, by in zip(each.roles, kept, strict=True)]
         number, refusal = each.request.id, self.refusal(each)
         if refusal is None:
             if len(lacks) > 1:
-                lacks.append(self._lacks_together(each))
+                lacks.append(self._lacks_together(each, kept))
             return tuple((count, held) for count, held in lacks if count > 0)
         if refusal.wait_s is None:
             return ()  # it is refused
@@ -206,19 +207,21 @@ class _Needs:
             held.update(self._leave(number, other))
         return ((min(1, refusal.lacking), held),)
 
-    def _lacks(self, each: ConsideredRequest, role: ConsideredRole) -> tuple[int, Counter[Until]]:
+    def _lacks(
+        self, each: ConsideredRequest, role: ConsideredRole, kept: Mapping[ResourceId, str]
+    ) -> tuple[int, Counter[Until]]:
         """Return how many more a role needs than are free, and who has how many. What its task has
-        lost may return by itself; it shares its candidates with no other task."""
+        lost may return by itself; it shares its candidates with no other task. `kept`: what is
+        free for it, but kept for requests that come first."""
         found, options = role.candidacy, role.options
         if id(found) not in self._known:
             self._known[id(found)] = Counter(self._held(each, role).values())
-        held = self._known[id(found)]
-        kept = self.kept_from(each, role)
-        if kept:
-            held = held + Counter(Until({by}) for by in kept.values())
-        return options.least - len(options.costs_s) + len(kept), held
+        count = options.least - len(options.costs_s) + len(kept)
+        return count, _with_kept(self._known[id(found)], kept)
 
-    def _lacks_together(self, each: ConsideredRequest) -> tuple[int, Counter[Until]]:
+    def _lacks_together(
+        self, each: ConsideredRequest, kept: Sequence[Mapping[ResourceId, str]]
+    ) -> tuple[int, Counter[Until]]:
         """Return the same for all roles of a task, which may share candidates."""
         key = tuple(id(role.candidacy) for role in each.roles)
         if key not in self._together:
@@ -229,11 +232,9 @@ class _Needs:
                 until |= self._held(each, role)
             self._together[key] = len(free), Counter(until.values())
         free_count, held = self._together[key]
-        kept = {k: by for role in each.roles for k, by in self.kept_from(each, role).items()}
-        if kept:
-            held = held + Counter(Until({by}) for by in kept.values())
+        from_all = {one: by for of_role in kept for one, by in of_role.items()}
         least = sum(role.options.least for role in each.roles)
-        return least - free_count + len(kept), held
+        return least - free_count + len(from_all), _with_kept(held, from_all)
 
     def _held(self, each: ConsideredRequest, role: ConsideredRole) -> dict[ResourceId, Until]:
         """Return until when each candidate of a role is not free, that may be later."""
@@ -260,6 +261,13 @@ class _Needs:
                 mover = next(movers, None)
                 rests = self._at_rest.get(blocker.vehicle, BY_ITSELF)
                 yield rests if mover is None else Until({mover})
+
+
+def _with_kept(held: Counter[Until], kept: Mapping[ResourceId, str]) -> Counter[Until]:
+    if not kept:
+        return held
+    counts = Counter(kept.values())
+    return held + Counter({Until({by}): count for by, count in counts.items()})
 
 
 def _advice(asking: Sequence[ConsideredRequest], needs: _Needs) -> str:
