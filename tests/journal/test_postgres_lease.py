@@ -224,6 +224,22 @@ async def test_who_has_lost_its_fleet_takes_no_run_before_it_serves_it_again(pos
         assert await one.create(HEADER) == "r1"
 
 
+async def test_an_older_executive_that_drives_on_keeps_the_length_of_its_lease(
+    postgres, postgres_url, monkeypatch
+):
+    monkeypatch.setenv("M2PEM_LEASE_S", "60")
+    async with opened(lambda: open_journal(postgres_url)) as older:
+        await older.serve_fleet("north", ["ugv1"])
+        for statement in (
+            "ALTER TABLE executives DROP COLUMN lease, DROP COLUMN server_start",
+            "UPDATE m2pem_format SET version = version - 1",
+        ):
+            postgres.execute(statement, postgres_url)
+        async with opened(lambda: open_journal(postgres_url)):
+            kept = "SELECT lease >= interval '60 seconds' FROM executives"
+            assert postgres.execute(kept, postgres_url) == [(True,)]
+
+
 async def test_who_serves_its_fleet_again_ends_the_lease_that_was_its_own(postgres, url):
     async with opened(lambda: open_journal(url)) as one:
         await one.serve_fleet("north", ["ugv1"])
