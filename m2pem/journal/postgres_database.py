@@ -30,7 +30,7 @@ _RENEW_ALL = """DO $$ BEGIN
     EXCEPTION WHEN undefined_table OR undefined_column OR insufficient_privilege THEN NULL;
 END $$"""
 """A server that has taken over, or was started again, may have another clock than the one by which
-leases were renewed: whoever connects first lets each last its full length from then on. What is
+leases were renewed: the first that connects lets each last its full length from then on. What is
 excepted: a new database, an old one before `migrate`, and a role that may only read."""
 
 CHANNEL = "m2pem"

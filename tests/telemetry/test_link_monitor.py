@@ -152,7 +152,7 @@ def test_a_link_that_returns_is_received_though_it_still_counts_as_lost() -> Non
     assert rules.receives_nothing(8 * S)
 
 
-def test_after_a_stall_nobody_knows_whether_anything_is_received() -> None:
+def test_after_a_stall_it_is_not_known_whether_anything_is_received() -> None:
     rules = LinkMonitor({UGV: 3.0}, since_us=0)
     rules.received(vehicle(), 1 * S)
     assert run_checks(rules, 3 * S + 1) == []

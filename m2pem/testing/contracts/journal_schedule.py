@@ -165,7 +165,7 @@ class JournalSchedule(JournalFixtures):
             assert await journal.schedule_hold("north") is None
 
     async def test_what_is_held_starts_no_run(self, open_journal: OpenJournal) -> None:
-        """Whoever holds it; and what another fleet holds does not matter."""
+        """Also when another one holds it; what another fleet holds does not matter."""
         async with opened(open_journal) as journal:
             await journal.schedule(PLAN, EntryState(5))
             started = EntryChange("s1", EntryState(9, times=(STARTED,), revision=1))

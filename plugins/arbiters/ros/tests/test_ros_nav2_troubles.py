@@ -243,7 +243,7 @@ async def test_what_was_found_after_a_restart_can_be_held_and_ended(
         assert await after.state(order.goal) is BehaviorState.CANCELLED
 
 
-async def test_what_ended_while_nobody_looked_is_found_and_what_was_held_is_begun_again(
+async def test_what_ended_unseen_is_found_and_what_was_held_is_begun_again(
     domain: int, ugv1: Bench
 ) -> None:
     done = ugv1.order("goto", target=away(ugv1, 1.0))
