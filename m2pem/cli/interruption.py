@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GIVE_UP = 3
-PRINTING_S = 1.0
-"""What the last lines of a process are given to be printed."""
-
 AT_ONCE_S = 0.2
-"""The same of a process that ends at once: shorter than `m2pem.journal.lease.ABANDONED_S`."""
+"""What the last lines of a process that ends at once are given to be printed: shorter than
+`m2pem.journal.lease.ABANDONED_S`."""
 
 _LEAVE_SCREEN = b"\x1b[<u\x1b[?1004l\x1b[?2004l\x1b[?1049l\x1b[?25h\x1b[0m"
 """Ends what Textual asks of a terminal: keys and focus as events, another screen, no cursor."""

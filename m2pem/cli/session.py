@@ -16,7 +16,7 @@ import click
 from m2pem.api.clock import SystemClock
 from m2pem.api.runs import RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
-from m2pem.cli.interruption import PRINTING_S, Interruption
+from m2pem.cli.interruption import Interruption
 from m2pem.cli.journals import url_of
 from m2pem.cli.notes import note
 from m2pem.cli.ocus import PLAIN, Operators
@@ -42,6 +42,9 @@ log = logging.getLogger("m2pem.cli")
 
 BACKLOG = 1_000_000
 """The maximum number of records that wait to be printed."""
+
+PRINTING_S = 1.0
+"""What the last lines of a process are given to be printed."""
 
 EXIT_STATUS = {
     RunStatus.COMPLETED: 0,

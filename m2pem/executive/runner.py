@@ -230,7 +230,7 @@ class Runner:
                 if seen or batch:
                     await self._cycle([*seen, *batch])
         except StaleEpochError as error:
-            log.error("%s: another executive drives it now", self.id)
+            log.info("%s is not driven here any more", self.id)  # an alert says why
             self.failure = error
         except M2pemError as error:
             self._hold_everything(error)
