@@ -1,4 +1,4 @@
-"""MissionControl: the one face of the executive to operators, scripts and OCU plugins."""
+"""MissionControl: the one interface of the executive for operators, scripts and OCU plugins."""
 
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -74,6 +74,30 @@ class MissionControl(Protocol):
         Raises:
             MissionError: with every finding, when it is not well or does not fit the fleet.
             BusyError: they have some, and that was not confirmed; it says who has what.
+        """
+        ...
+
+    async def execute_behavior(
+        self,
+        resource: str,
+        behavior: str,
+        parameters: Mapping[str, Value] | None = None,
+        *,
+        by: str = "",
+    ) -> RunId:
+        """Command one behavior on one vehicle or payload, from outside of a mission.
+
+        It is a run of its own, with a mission of one task: `wait` and `subscribe` follow it, `stop`
+        ends it. A resource that `by` has taken (`take`) stays taken. In place of what `by` had it
+        do by an earlier call, which is stopped first. `parameters`: as in a mission file, texts
+        with units or names of geometries, numbers in SI, lists `[latitude, longitude]`; also
+        GeoJSON objects.
+
+        Raises:
+            MissionError: the resource cannot do it, or a parameter is wrong.
+            BusyError: a run, or another operator, has the resource.
+            OperatorError: the fleet has no such resource; or a later call for it came, while this
+                one waited until the resource had stopped.
         """
         ...
 

@@ -182,6 +182,15 @@ class Start(Params, frozen=True):
     even_if_busy: bool = False
 
 
+class ExecuteBehavior(Params, frozen=True):
+    """As `MissionControl.execute_behavior`."""
+
+    resource: str
+    behavior: str
+    parameters: dict[str, Value] = msgspec.field(default_factory=dict)
+    by: str = ""
+
+
 class ToSchedule(Params, frozen=True):
     """As `MissionControl.schedule`; the caller has read the mission's files."""
 
@@ -266,6 +275,7 @@ OPERATIONS: dict[str, Operation] = {
     for operation in (
         Operation("start", Start, RunId, alone=True),
         Operation("check", Check, list[Finding], alone=True, slow=True),
+        Operation("execute_behavior", ExecuteBehavior, RunId, alone=True),
         Operation("answer", Answer),
         Operation("incidents", Nothing, list[OpenIncident]),
         Operation("preview_incident", Choice, IncidentPreview, alone=True),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from lxml import etree
 
-from m2pem.bpmn.context import ReadingContext
+from m2pem.bpmn.context import MARK, ReadingContext
 from m2pem.bpmn.needs import NEED_ATTRIBUTES, NeedReader
 from m2pem.bpmn.rules.attributes import BAD_VALUE
 from m2pem.bpmn.rules.behaviors import (
@@ -186,7 +186,7 @@ class BehaviorReader:
                 'write <property name="speed" value="2 m/s"/>',
             )
             return []
-        if "{" not in text and not text.lstrip().startswith("="):
+        if not MARK.search(text) and not text.lstrip().startswith("="):
             return [Parameter(name, text, line)]
         value = self._context.template(line, self._task, text)
         return [] if value is None else [Parameter(name, value, line)]

@@ -47,6 +47,7 @@ from m2pem.errors import (
     OperatorError,
     StuckError,
 )
+from m2pem.executive.direct_behaviors import DirectBehaviors
 from m2pem.executive.ended_runs import explain_end, in_words, refuse_ended
 from m2pem.executive.health import ExecutiveHealth
 from m2pem.executive.incidents import Foresee, IncidentChoices, open_incidents
@@ -108,6 +109,7 @@ class Control:
         self._health = health
         self._rehearse = rehearse
         self._choices = IncidentChoices(supervisor, foresee)
+        self._direct = DirectBehaviors(supervisor, starter)
 
     # --- runs -----------------------------------------------------------------------------------
 
@@ -124,6 +126,17 @@ class Control:
         return await self._starter.start(
             mission, process, _bounded(data), by, even_if_busy=even_if_busy
         )
+
+    async def execute_behavior(
+        self,
+        resource: str,
+        behavior: str,
+        parameters: Mapping[str, Value] | None = None,
+        *,
+        by: str = "",
+    ) -> RunId:
+        """Command one behavior from outside of a mission."""
+        return await self._direct.execute(resource, behavior, _bounded(parameters) or {}, by)
 
     async def missions(self) -> Sequence[str]:
         """The mission files of the search path, the working folder and `missions` in it."""

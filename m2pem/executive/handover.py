@@ -3,7 +3,7 @@
 While an operator has a resource, no mission gets it; every run's journal says so.
 """
 
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from m2pem.api.allocation import TakeEffect
@@ -46,7 +46,7 @@ class Handover:
         Raises:
             OperatorError: there is no such resource, or an operator has it.
         """
-        resource = self._resource(name)
+        resource = self.known(name)
         holder = self.taken.get(resource)
         if holder is not None:
             raise OperatorError(f"{resource} is with {holder}")
@@ -62,7 +62,7 @@ class Handover:
         Raises:
             OperatorError: the fleet has no such resource.
         """
-        resource = self._resource(name)
+        resource = self.known(name)
         return [
             TakeEffect(
                 runner.id,
@@ -93,7 +93,7 @@ class Handover:
         Raises:
             OperatorError: no operator has it.
         """
-        resource = self._resource(name)
+        resource = self.known(name)
         if resource not in self.taken:
             raise OperatorError(f"{resource} is not with an operator")
         del self.taken[resource]
@@ -104,9 +104,11 @@ class Handover:
             if not runner.done.is_set():
                 await runner.submit(ControlReturned(resource, by or UNNAMED_OPERATOR))
 
-    def by_name(self) -> dict[str, str]:
-        """What is taken, and by whom: for a run that begins."""
-        return {str(resource): holder for resource, holder in self.taken.items()}
+    def by_name(self, lent: Collection[ResourceId] = ()) -> dict[str, str]:
+        """What is taken, and by whom: for a run that begins, without what is lent to that run."""
+        return {
+            str(resource): holder for resource, holder in self.taken.items() if resource not in lent
+        }
 
     def take_up(self, taken: Mapping[str, str]) -> None:
         """After a restart: who had what, by the journal of a run."""
@@ -132,7 +134,12 @@ class Handover:
     def _withdraw(self, resource: ResourceId) -> None:
         self._availability.withdraw(resource, f"with {self.taken[resource]}")
 
-    def _resource(self, name: str) -> ResourceId:
+    def known(self, name: str) -> ResourceId:
+        """Return a resource of the fleet by its name.
+
+        Raises:
+            OperatorError: the fleet has no such resource.
+        """
         resource = ResourceId(name)
         if resource not in self._known:
             hint = did_you_mean(name, self._known)

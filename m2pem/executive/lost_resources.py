@@ -99,7 +99,7 @@ class LostResources:
         stopping = self._stopping.pop(resource, None)
         if stopping is not None:
             stopping.cancel()
-        elif self._availability.reason(resource):
+        elif self._availability.reason(resource) and not self._availability.is_lent(resource):
             return  # an operator has it, or it is manned: what it does is theirs
         commands = self._is_commanded(resource)
         holder = self._availability.holder(resource)

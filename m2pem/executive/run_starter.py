@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from m2pem.allocation.assignment import load_solver
 from m2pem.api.allocation import RoleAssignment, StartPreview
@@ -27,6 +27,7 @@ from m2pem.fleet.allocation import resources_of, roles_of_mission
 from m2pem.fleet.fleet import dump
 from m2pem.fleet.space import waits_for_space
 from m2pem.journal.base import RunHeader
+from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 from m2pem.scheduling.entry import EntryChange
@@ -160,6 +161,7 @@ class RunStarter:
         *,
         started: EntryChange | None = None,
         still: Callable[[], bool] = lambda: True,
+        lent: Collection[ResourceId] = (),
     ) -> RunId:
         """Begin a run if all that its mission names is free; the rest as for `begin`.
 
@@ -167,11 +169,13 @@ class RunStarter:
             BusyError: other runs or operators have some of it.
         """
         async with self._starting:
-            self.refuse_busy(loaded)
-            return await self.begin(loaded, process_id, data, by, started=started, still=still)
+            self.refuse_busy(loaded, lent)
+            return await self.begin(
+                loaded, process_id, data, by, started=started, still=still, lent=lent
+            )
 
-    def refuse_busy(self, loaded: Mission) -> None:
-        """Check that everything that a mission names is free now.
+    def refuse_busy(self, loaded: Mission, lent: Collection[ResourceId] = ()) -> None:
+        """Check that everything that a mission names is free now, or lent to it.
 
         Raises:
             BusyError: other runs or operators have some of it.
@@ -179,7 +183,12 @@ class RunStarter:
         supervisor = self._supervisor
         ended = RunStatus.ENDED
         over = {run for run, one in supervisor.runners.items() if one.run.state.status is ended}
-        taken, holder = supervisor.handover.taken, supervisor.availability.holder
+        holder = supervisor.availability.holder
+        taken = {
+            resource: operator
+            for resource, operator in supervisor.handover.taken.items()
+            if resource not in lent
+        }
         refuse_busy_resources(loaded, supervisor.fleet, taken, holder, over)
 
     async def begin(
@@ -191,11 +200,13 @@ class RunStarter:
         *,
         started: EntryChange | None = None,
         still: Callable[[], bool] = lambda: True,
+        lent: Collection[ResourceId] = (),
     ) -> RunId:
         """Begin a run of a mission that was admitted. Returns when its beginning is durable.
 
         `started`: the new state of the entry of the schedule that starts it. `still`: whether it
-        may begin, asked when the journal has created it.
+        may begin, asked when the journal has created it. `lent`: what the operator who starts it
+        has taken, and lets it command.
 
         Raises:
             OperatorError: the arbiters are not connected yet, or interrupted runs do not have their
@@ -222,10 +233,12 @@ class RunStarter:
         if not still():
             await supervisor.journal.release(number)
             raise NotBegunError(number, "it was held as it was to begin")
+        for resource in lent:
+            supervisor.availability.lend(resource, number)
         run = MissionRun(loaded, supervisor.fleet, number, supervisor.settings.steps_at_once)
         runner = supervisor.add(run, 1)
         begun = runner.submit(
-            StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name())
+            StartRun(process_id, dict(data or {}), by, supervisor.handover.by_name(lent))
         )
         for geometry in supervisor.geometries_given():
             runner.post(geometry)

@@ -106,6 +106,7 @@ class Availability:
     def __init__(self, fleet: Fleet) -> None:
         self._resources = frozenset({*fleet.vehicles, *fleet.payloads})
         self._unavailable = {v.id: MANNED for v in fleet.vehicles.values() if v.manned}
+        self._lent: dict[ResourceId, str] = {}
         self._holders: dict[ResourceId, list[str]] = {}  # the last one holds it
         self.on_change: Callable[[], None] = lambda: None
 
@@ -118,11 +119,23 @@ class Availability:
         if resource not in self._resources:
             raise KeyError(resource)
         self._unavailable[resource] = reason
+        self._lent.pop(resource, None)
         self.on_change()
+
+    def lend(self, resource: ResourceId, run: str) -> None:
+        """Let behaviors of one run get a resource that is unavailable: the operator who has it
+        commands it by that run. It lasts until `withdraw` or `restore`."""
+        self._lent[resource] = run
+
+    def is_lent(self, resource: ResourceId) -> bool:
+        """Whether a run commands a resource now for the operator who has it."""
+        holder = self.holder(resource)
+        return holder is not None and holder.partition(".")[0] == self._lent.get(resource)
 
     def restore(self, resource: ResourceId) -> None:
         """Behaviors may get the resource again; a manned vehicle, too, once it is handed over."""
         self._unavailable.pop(resource, None)
+        self._lent.pop(resource, None)
         self.on_change()
 
     def reason(self, resource: ResourceId) -> str:
@@ -184,7 +197,7 @@ class Availability:
 
     def _refusal(self, resource: ResourceId, behavior: str, preempts: Collection[str]) -> str:
         reason = self.reason(resource)
-        if reason:
+        if reason and self._lent.get(resource) != behavior.partition(".")[0]:
             return f"{resource} is unavailable: {reason}"
         holder = self.holder(resource)
         if holder not in (None, behavior) and holder not in preempts:

@@ -88,7 +88,8 @@ def resolve(
 
     A null counts as not given. A position is the name of a point or vehicle, `[latitude,
     longitude, altitude]` as a list or as text, or the text `enu [east, north, up]`: metres in the
-    ENU frame (REP-103) at `origin`, the fleet's. Data may also hold a geometry itself, as GeoJSON.
+    ENU frame (REP-103) at `origin`, the fleet's. In place of the name of a geometry there may be
+    GeoJSON, as an object or as text.
 
     Raises:
         ParameterError: with all problems.
@@ -182,6 +183,8 @@ class _Reader:
                 return _bounded(spec, _number(spec.kind, value))
 
     def _named(self, kind: str, value: Value) -> Geometry:
+        if isinstance(value, str) and value.lstrip().startswith("{"):
+            value = _json(value, "no GeoJSON object", 'write {"type": "Point", "coordinates": ...}')
         if isinstance(value, dict):
             return self._inline(kind, value)
         if not isinstance(value, str):
@@ -209,17 +212,9 @@ class _Reader:
         if isinstance(value, str) and is_local(value):
             return self._local(value)
         if isinstance(value, str) and value.lstrip().startswith("["):
-            try:
-                value = json.loads(value)
-            except (ValueError, RecursionError):
-                message = f"{value!r} is not a position"
-                raise _ProblemError(
-                    "bad-value", message, "write [latitude, longitude, altitude]"
-                ) from None
+            value = _json(value, "not a position", "write [latitude, longitude, altitude]")
         if isinstance(value, list):
             return self._coordinates(value)
-        if isinstance(value, dict):
-            return self._inline("point", value)
         if isinstance(value, str) and value in self.vehicles and self.geometry(value) is None:
             return VehiclePosition(value)
         try:
@@ -260,6 +255,14 @@ class _Reader:
             return VehiclePosition(value)
         hint = suggest(str(value), self.vehicles, "vehicles")
         raise _ProblemError("unknown-vehicle", f"no vehicle is named {value!r}", hint)
+
+
+def _json(text: str, what: str, remedy: str) -> Value:
+    try:
+        read: Value = json.loads(text)
+    except (ValueError, RecursionError):
+        raise _ProblemError("bad-value", f"{text!r} is {what}", remedy) from None
+    return read
 
 
 def _text(spec: ParameterSpec, value: Value) -> str:

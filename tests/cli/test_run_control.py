@@ -65,6 +65,7 @@ OTHERWISE = {
     "switch_over": "m2pem switchover, which tests/e2e/test_switchover.py tries",
 }
 NO_COMMAND = {
+    "execute_behavior": "programs command vehicles through faces; an operator starts missions",
     "message": "programs send messages: over the control socket, REST or ROS",
     "simulated": "the fleet file says it, and m2pem run --simulate",
     "speed": "the person who starts an executive sets it: m2pem run --speed",

@@ -68,7 +68,7 @@ async def test_a_notification_is_carried_out_and_not_answered(served: Served) ->
         (call("set_geometry", name="a", geometry={"b": nested(500)}), -32000, "nested deeper"),
         (b"[]", -32600, "object"),
         (b'{"jsonrpc": "2.0"}', -32600, "method"),
-        (call("jump"), -32601, "known: start, check, answer"),
+        (call("jump"), -32601, "known: start, check, execute_behavior"),
         (call("pause"), -32602, "run"),
         (call("pause", run=3), -32602, "str"),
         (call("pause", run="r1", force=True), -32602, "force"),

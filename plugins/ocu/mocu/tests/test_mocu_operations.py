@@ -71,6 +71,7 @@ SERVED_OTHERWISE = {
     "fleet": "/diagnostics names its vehicles and payloads",
 }
 NOT_SERVED = {
+    "execute_behavior": "the ROS face has an action for each vehicle",
     "preview_incident": "answer_prompt refuses a choice after which the mission cannot complete",
     "check": "start_mission answers with the findings",
     "schedule": "the command line and the page schedule missions",

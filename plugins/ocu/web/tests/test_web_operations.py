@@ -92,6 +92,7 @@ QUERIES = {
     "standbys": "/api/standbys",
 }
 NOT_SERVED = {
+    "execute_behavior": "programs command vehicles through faces; the page starts missions",
     "switch_over": "m2pem switchover asks for it on the executive's machine",
     "preview_incident": "POST .../incidents/{incident}/preview",
     "start": "POST /api/runs names a mission of the server's folder, or brings its BPMN",
