@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import click
 
     from m2pem.api.arbiter import Arbiter
+    from m2pem.api.face import Face
     from m2pem.api.health import HealthCheck
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service
@@ -40,6 +41,11 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
 @hookspec
 def m2pem_register_ocus(register: "Callable[[str, Callable[..., Ocu]], None]") -> None:
     """Register operator control units: `register("terminal", TerminalOcu)`."""
+
+
+@hookspec
+def m2pem_register_faces(register: "Callable[[str, Callable[..., Face]], None]") -> None:
+    """Register faces for programs of other protocols: `register("mavlink", MavlinkFace)`."""
 
 
 @hookspec

@@ -1,4 +1,4 @@
-"""What the plugins offer: arbiters, OCUs, services, commands, checks, observers (docs/plugins.md).
+"""What plugins offer: arbiters, OCUs, faces, services, commands, checks and observers.
 
 Plugins are looked for when something is first asked for. One that breaks is kept in `failures`,
 with what broke, and stops neither the others nor the rest of itself.
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from m2pem.api.capabilities import arbiter_problem, ocu_problem
+from m2pem.api.capabilities import arbiter_problem, face_problem, ocu_problem
 from m2pem.api.health import HealthCheck, HealthStatus
 from m2pem.errors import InternalError, PluginError
 from m2pem.findings import Finding, Severity
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import click
 
     from m2pem.api.arbiter import Arbiter
+    from m2pem.api.face import Face
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service
     from m2pem.engine.records import Record
@@ -50,12 +51,14 @@ BLOCK_VARIABLE = "M2PEM_BLOCK_PLUGINS"
 _HOOKS = {
     "arbiter": "m2pem_register_arbiters",
     "ocu": "m2pem_register_ocus",
+    "face": "m2pem_register_faces",
     "service": "m2pem_register_services",
     "command": "m2pem_register_commands",
 }
 _PROBLEM_OF: Mapping[str, Callable[[object], str]] = {
     "arbiter": arbiter_problem,
     "ocu": ocu_problem,
+    "face": face_problem,
     "service": lambda _: "",
 }
 """What is wrong in the capabilities that a factory declares, by the kind of what it makes."""
@@ -141,6 +144,10 @@ class PluginManager:
         """Every operator control unit by its name."""
         return self._factories("ocu")
 
+    def faces(self) -> "Mapping[str, Callable[..., Face]]":
+        """Every face by its name."""
+        return self._factories("face")
+
     def services(self) -> "Mapping[str, Callable[[], Service]]":
         """Every service by its name."""
         return self._factories("service")
@@ -156,6 +163,10 @@ class PluginManager:
     def ocu(self, name: str) -> "Callable[..., Ocu]":
         """The operator control unit of that name; errors as for `arbiter`."""
         return self._one("ocu", self.ocus(), name)
+
+    def face(self, name: str) -> "Callable[..., Face]":
+        """The face of that name; errors as for `arbiter`."""
+        return self._one("face", self.faces(), name)
 
     def service(self, name: str) -> "Callable[[], Service]":
         """The service of that name; errors as for `arbiter`."""
@@ -246,14 +257,14 @@ class PluginManager:
             import click  # noqa: PLC0415  # see `commands`
 
             self.commands(click.Group())
-        for kind in ("arbiter", "ocu", "service"):
+        for kind in ("arbiter", "ocu", "face", "service"):
             self._factories(kind)
         loaded = [plugin.origin for plugin in self._found.loaded]
         broken = [origin for origin, _ in self._found.failed]
         return [self._info(origin) for origin in (*loaded, *broken, *self._found.blocked)]
 
     def unknown(self, kind: str, name: str) -> PluginError:
-        """Return the error for an unknown name. `kind`: arbiter, ocu, service or command."""
+        """Return the error for an unknown name. `kind`: arbiter, ocu, face, service or command."""
         hook = _HOOKS[kind]
         blocked = [_blocked(origin) for origin in self._found.blocked]
         broken = [each for each in self.failures if each.hook in ("", hook)] + blocked

@@ -45,13 +45,14 @@ if TYPE_CHECKING:
     )
     from m2pem.api.behavior_tracker import BehaviorTracker
     from m2pem.api.bus import FleetBus
-    from m2pem.api.capabilities import ArbiterCapabilities, OcuCapabilities
+    from m2pem.api.capabilities import ArbiterCapabilities, FaceCapabilities, OcuCapabilities
     from m2pem.api.clock import Clock, SystemClock
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.connection_reader import ConnectionReader
     from m2pem.api.control import ControlEvent, MissionControl
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.epoch_fence import EpochFence
+    from m2pem.api.face import Face, FaceSettings
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
     from m2pem.api.health import ExecutiveAddress, HealthCheck, HealthStatus, listening_check
@@ -153,7 +154,7 @@ _MODULES = {
         " OutlineProcess OutlineTrigger SearchLimits SearchProgress"
     ),
     "m2pem.api.bus": "FleetBus",
-    "m2pem.api.capabilities": "ArbiterCapabilities OcuCapabilities",
+    "m2pem.api.capabilities": "ArbiterCapabilities FaceCapabilities OcuCapabilities",
     "m2pem.api.clock": "Clock SystemClock",
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
@@ -168,6 +169,7 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
+    "m2pem.api.face": "Face FaceSettings",
     "m2pem.api.ocu": "Ocu StandbyOcu",
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
@@ -250,6 +252,9 @@ __all__ = [
     "Clock",
     "Connection",
     "ConnectionReader",
+    "Face",
+    "FaceCapabilities",
+    "FaceSettings",
     "CutOffPolicy",
     "DataName",
     "Decision",

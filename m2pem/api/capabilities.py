@@ -1,4 +1,4 @@
-"""What an arbiter or an operator control unit can do beyond its protocol, as its class declares it.
+"""What an arbiter, operator control unit or face can do beyond its protocol: its class declares it.
 
 A class declares it in its attribute `capabilities`; one without that attribute has none. It is
 checked when the plugin registers the class, and again on the object of a factory that is no class.
@@ -58,6 +58,13 @@ class OcuCapabilities:
     stands_by: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class FaceCapabilities:
+    """What the command line must know of a face before it makes one. `imports`: as above."""
+
+    imports: tuple[str, ...] = ()
+
+
 def arbiter_capabilities(arbiter: object) -> ArbiterCapabilities:
     """Return what an arbiter, or its class, declares; nothing if it declares nothing."""
     declared = getattr(arbiter, "capabilities", None)
@@ -68,6 +75,12 @@ def ocu_capabilities(factory: object) -> OcuCapabilities:
     """Return what an operator control unit's class declares; nothing if it declares nothing."""
     declared = getattr(factory, "capabilities", None)
     return declared if isinstance(declared, OcuCapabilities) else OcuCapabilities()
+
+
+def face_capabilities(factory: object) -> FaceCapabilities:
+    """Return what a face's class declares; nothing if it declares nothing."""
+    declared = getattr(factory, "capabilities", None)
+    return declared if isinstance(declared, FaceCapabilities) else FaceCapabilities()
 
 
 def arbiter_problem(arbiter: object) -> str:
@@ -97,6 +110,11 @@ def ocu_problem(factory: object) -> str:
         if ocu_capabilities(factory).stands_by and not hasattr(factory, member):
             return f"its `capabilities` say stands_by=True, but it has no `{member}`"
     return ""
+
+
+def face_problem(factory: object) -> str:
+    """Return what is wrong in the declaration of a face; "" if nothing is."""
+    return _problem(factory, FaceCapabilities, {})
 
 
 def _problem(declaring: object, kind: type, replaced: Mapping[str, str]) -> str:

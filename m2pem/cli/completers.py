@@ -7,7 +7,7 @@ to complete: a shell has no place for messages.
 import os
 import re
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -119,9 +119,21 @@ def operator_units(_: click.Context, __: click.Parameter, incomplete: str) -> li
     from m2pem.cli.ocus import NO_UNIT
     from m2pem.plugins import PluginManager
 
+    return _last_of_several(PluginManager().ocus(), NO_UNIT, incomplete)
+
+
+def faces(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the last one of several names of faces."""
+    from m2pem.cli.faces import NO_FACE
+    from m2pem.plugins import PluginManager
+
+    return _last_of_several(PluginManager().faces(), NO_FACE, incomplete)
+
+
+def _last_of_several(names: Iterable[str], none: str, incomplete: str) -> list[CompletionItem]:
     before, comma, last = incomplete.rpartition(",")
     named = before.split(",")
-    known = [*PluginManager().ocus(), *([] if comma else [NO_UNIT])]
+    known = [*names, *([] if comma else [none])]
     return [
         CompletionItem(f"{before}{comma}{name}")
         for name in sorted(known)

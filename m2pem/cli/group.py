@@ -26,6 +26,7 @@ COMMANDS = {
     "demo": "Show missions on simulated vehicles.",
     "run": "Run a mission to its end.",
     "serve": "Serve operators, who start missions, until stopped.",
+    "gateway": "Show a fleet to programs of other protocols, without operators.",
     "arbiter-host": "Run the arbiters of vehicles on this host, for an executive elsewhere.",
     "start": "Start a mission in an executive that is running on this host.",
     "schedule": "Show the missions that start later; cancel, hold or release them.",

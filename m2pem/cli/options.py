@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from m2pem.cli.completers import file_or, operator_units, processes_of_mission, runs_of_journal
+from m2pem.cli.completers import (
+    faces,
+    file_or,
+    operator_units,
+    processes_of_mission,
+    runs_of_journal,
+)
 from m2pem.errors import M2pemError
 
 if TYPE_CHECKING:
@@ -130,6 +136,15 @@ ocu_option = click.option(
     shell_complete=operator_units,
     help="Operator control units, separated by commas; none for no unit  "
     "[default: terminal if it is installed and this is one, else plain]",
+)
+
+face_option = click.option(
+    "--face",
+    "face_names",
+    metavar="NAMES",
+    shell_complete=faces,
+    help="Faces for programs of other protocols, separated by commas; none for no face  "
+    "[default: those of the fleet file]",
 )
 
 speed_option = click.option(

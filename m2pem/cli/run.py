@@ -10,6 +10,7 @@ from m2pem.cli.options import (
     answers_option,
     data_option,
     example,
+    face_option,
     fleet_option,
     format_option,
     journal_option,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 @data_option
 @journal_option
 @ocu_option
+@face_option
 @answers_option
 @simulate_option
 @speed_option
@@ -51,6 +53,7 @@ def run(
     data: "dict[str, Value]",
     journal: str | None,
     ocu_names: str | None,
+    face_names: str | None,
     answers: Path | None,
     simulate: bool,
     speed: float,
@@ -75,6 +78,7 @@ def run(
                 data=data,
                 journal_url=journal,
                 ocu_names=ocu_names,
+                face_names=face_names,
                 answers_file=answers,
                 simulated=simulate,
                 speed=speed,
@@ -93,6 +97,7 @@ async def _run(
     data: "dict[str, Value]",
     journal_url: str | None,
     ocu_names: str | None,
+    face_names: str | None,
     answers_file: Path | None,
     simulated: bool,
     speed: float,
@@ -100,6 +105,7 @@ async def _run(
 ) -> int:
     from m2pem.api.clock import SystemClock
     from m2pem.cli.arguments import get_answers
+    from m2pem.cli.faces import Faces
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.notes import note
     from m2pem.cli.ocus import Operators, chosen
@@ -121,6 +127,7 @@ async def _run(
     fleet = fleet_of(fleet_name, mission)
     fleet = with_own_state(simulated_fleet(fleet) if simulated else fleet, file_of(url))
     refuse_speed(fleet, speed)
+    faces = Faces(face_names, fleet, plugins)
     interruption.begin()
     async with journal_at(url) as journal:
         clock = SystemClock(speed)
@@ -132,6 +139,7 @@ async def _run(
             answers=answers,
             search_path=search_path,
         )
+        faces.make(executive.control)
         process_id, warnings = executive.admit(mission, process, data)
         for line in lines(warnings):
             note(line)
@@ -144,6 +152,7 @@ async def _run(
                 file_of(url),
                 interruption,
                 lambda: executive.begin(mission, process_id, data, ""),
+                faces,
             )
         tidy_up(executive, file_of(url))
     return status

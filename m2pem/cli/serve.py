@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from m2pem.cli.options import (
     example,
+    face_option,
     fleet_option,
     format_option,
     journal_option,
@@ -52,6 +53,7 @@ class DaysOption(click.ParamType):  # type: ignore[type-arg]  # older clicks hav
 @fleet_option(required=True)
 @journal_option
 @ocu_option
+@face_option
 @path_option
 @simulate_option
 @speed_option
@@ -90,6 +92,7 @@ def serve(
     fleet_file: str,
     journal: str | None,
     ocu_names: str | None,
+    face_names: str | None,
     search_path: tuple[Path, ...],
     simulate: bool,
     speed: float,
@@ -111,10 +114,11 @@ def serve(
         raise click.UsageError("--backup-every needs --backup-to FOLDER")
     with Interruption() as interruption:
         return asyncio.run(
-            _serve(
+            serve_fleet(
                 fleet_file,
                 journal,
                 ocu_names,
+                face_names,
                 search_path,
                 simulate,
                 speed,
@@ -128,10 +132,11 @@ def serve(
         )
 
 
-async def _serve(
+async def serve_fleet(
     fleet_file: str,
     journal_url: str | None,
     ocu_names: str | None,
+    face_names: str | None,
     search_path: tuple[Path, ...],
     simulated: bool,
     speed: float,
@@ -139,34 +144,37 @@ async def _serve(
     output: str,
     interruption: "Interruption",
     *,
-    standby: bool,
-    backup_to: Path | None,
-    backup_every_s: float,
+    standby: bool = False,
+    backup_to: Path | None = None,
+    backup_every_s: float = 3600.0,
+    needs_face: bool = False,
 ) -> int:
+    """Serve a fleet until stopped; returns the exit status. `needs_face`: faces are what it is for.
+
+    Raises:
+        UsageError: an option is wrong, or there is no face where one is needed.
+        M2pemError: the fleet cannot be served.
+    """
     from m2pem.api.clock import SystemClock
+    from m2pem.cli.faces import Faces
     from m2pem.cli.journals import journal_at, url_of
     from m2pem.cli.notes import note
     from m2pem.cli.ocus import Operators, chosen
     from m2pem.cli.output import output_of
-    from m2pem.cli.session import driving, make_executive, refuse_speed
-    from m2pem.executive.simulated_state import tidy_up, with_shared_state
-    from m2pem.fleet.fleet import simulated_fleet
-    from m2pem.fleet.fleet_file import load_fleet
+    from m2pem.cli.session import driving, make_executive
+    from m2pem.executive.simulated_state import tidy_up
     from m2pem.journal import file_of
     from m2pem.plugins import PluginManager
-    from m2pem.scripting.sources import DEFAULT_FLEET
 
-    if fleet_file == DEFAULT_FLEET:
-        raise click.UsageError(
-            f"--fleet {DEFAULT_FLEET}: a fleet is made up from a mission; name a file"
-        )
     plugins = PluginManager()
     operators = Operators(chosen(ocu_names, plugins), plugins)
     url = url_of(journal_url)
-    written = load_fleet(fleet_file)
-    fleet = simulated_fleet(written) if simulated else written
-    fleet = with_shared_state(fleet, file_of(url), written)
-    refuse_speed(fleet, speed)
+    fleet = _fleet_of(fleet_file, url, speed, simulated=simulated)
+    faces = Faces(face_names, fleet, plugins)
+    if needs_face and not faces.names:
+        raise click.UsageError(
+            f"{fleet_file} has no `faces`: add them there, or name one with --face"
+        )
     _refuse_memory(url, standby=standby)
     if backup_to is not None:
         _refuse_other_than_file(url)
@@ -181,11 +189,15 @@ async def _serve(
         executive = make_executive(
             fleet, journal, plugins, clock, search_path=search_path, page=operators.page
         )
+        faces.make(executive.control)
         executive.expect_interrupted([line.run for line in mine])
         with output_of(output) as out:
-            async with driving(executive, out, operators, file_of(url), interruption, one=False):
+            async with driving(
+                executive, out, operators, file_of(url), interruption, one=False, faces=faces
+            ):
                 who = ", ".join(operators.names) or "none"
-                note(f"m2pem: serving {fleet.name}; operators: {who}")
+                seen = f"; faces: {', '.join(faces.names)}" if faces.names else ""
+                note(f"m2pem: serving {fleet.name}; operators: {who}{seen}")
                 await executive.load_schedule()
                 # Again: runs that were created for the schedule and never began are gone.
                 mine, others = await interrupted_runs(journal, fleet, speed)
@@ -209,6 +221,25 @@ async def _serve(
         tidy_up(executive, file_of(url))
         left = executive.superseded.is_set() and not executive.switchover.by_operator
         return 1 if left else 0
+
+
+def _fleet_of(fleet_file: str, url: str, speed: float, *, simulated: bool) -> "Fleet":
+    from m2pem.cli.session import refuse_speed
+    from m2pem.executive.simulated_state import with_shared_state
+    from m2pem.fleet.fleet import simulated_fleet
+    from m2pem.fleet.fleet_file import load_fleet
+    from m2pem.journal import file_of
+    from m2pem.scripting.sources import DEFAULT_FLEET
+
+    if fleet_file == DEFAULT_FLEET:
+        raise click.UsageError(
+            f"--fleet {DEFAULT_FLEET}: a fleet is made up from a mission; name a file"
+        )
+    written = load_fleet(fleet_file)
+    fleet = simulated_fleet(written) if simulated else written
+    fleet = with_shared_state(fleet, file_of(url), written)
+    refuse_speed(fleet, speed)
+    return fleet
 
 
 def _refuse_memory(url: str, *, standby: bool) -> None:

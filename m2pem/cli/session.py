@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from m2pem.api.clock import SystemClock
-from m2pem.api.runs import RunId, RunStatus, SimulationResult
+from m2pem.api.runs import FACE, Alert, RunId, RunStatus, SimulationResult
 from m2pem.cli.group import STOPPED, ignore_closed_stdout, log_from_a_thread
 from m2pem.cli.interruption import Interruption
 from m2pem.cli.journals import url_of
@@ -36,6 +36,7 @@ from m2pem.mission.mission import Mission
 from m2pem.plugins import PluginManager, Plugins
 
 if TYPE_CHECKING:
+    from m2pem.cli.faces import Faces
     from m2pem.rehearsal.answers import Answers
 
 log = logging.getLogger("m2pem.cli")
@@ -63,6 +64,7 @@ async def driving(
     interruption: Interruption,
     *,
     one: bool,
+    faces: "Faces | None" = None,
 ) -> AsyncIterator[None]:
     """Connect, print and serve within the block; at its end, stop what still runs and close.
 
@@ -115,9 +117,13 @@ async def driving(
 
         try:
             operators.begin(executive.control, left)
+            if faces is not None:
+                faces.begin(lambda text: executive.events.publish(Alert("", FACE, text)))
             yield
         finally:
             superseded.cancel()
+            if faces is not None:
+                await faces.end()
             await operators.end()
             output.uncover()
     await printing
@@ -157,6 +163,7 @@ async def drive_run(
     journal: Path | None,
     interruption: Interruption,
     begin: Callable[[], Awaitable[RunId]],
+    faces: "Faces | None" = None,
 ) -> int:
     """Begin a run, see it to its end, and return the exit status.
 
@@ -165,7 +172,7 @@ async def drive_run(
     Raises:
         M2pemError: it cannot begin, or its executive can drive it no further.
     """
-    async with driving(executive, output, operators, journal, interruption, one=True):
+    async with driving(executive, output, operators, journal, interruption, one=True, faces=faces):
         if interruption.asked.is_set():
             return STOPPED
         run = await begin()

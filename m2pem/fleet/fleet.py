@@ -136,6 +136,7 @@ class Fleet:
     other runs with a lower priority. `incident_role`: which operators decide about incidents, where
     the mission does not say; "": all. `operators`: the names of those who have each role; none:
     every operator has every role. `hosts`: the other computers that arbiters run on, by name.
+    `faces`: the settings of each face; no run depends on them, and no journal has them.
     """
 
     name: str
@@ -165,6 +166,7 @@ class Fleet:
     incident_role: str = ""
     operators: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     hosts: Mapping[str, Host] = field(default_factory=dict)
+    faces: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def detectors(self) -> tuple[ResourceId, ...]:
@@ -223,8 +225,10 @@ _TYPES: dict[str, type[Geometry]] = {
 
 
 def dump(fleet: Fleet) -> bytes:
-    """The whole fleet, with its geometries."""
-    content = {field: getattr(fleet, field) for field in fleet.__dataclass_fields__}
+    """The whole fleet, with its geometries, without its faces."""
+    content = {
+        field: getattr(fleet, field) for field in fleet.__dataclass_fields__ if field != "faces"
+    }
     content["geometries"] = {
         name: {"kind": kind_of(geometry), "geometry": geometry}
         for name, geometry in fleet.geometries.items()

@@ -289,6 +289,7 @@ def _build(source: YamlSource, model: FleetModel, geometries: dict[str, Geometry
         incident_role=model.incident_role or "",
         operators={role: tuple(names) for role, names in model.operators.items()},
         hosts={name: _host(source, name, each) for name, each in model.hosts.items()},
+        faces={name: settings or {} for name, settings in model.faces.items()},
     )
 
 

@@ -356,6 +356,13 @@ class FleetModel(_Model):
             "for her on every host, anna@gcs1 on one. If left out, every operator has every role."
         ),
     ] = {}
+    faces: Annotated[
+        dict[Name, dict[str, Any] | None],
+        Field(
+            description="Programs of other protocols that see the fleet, by the name of the face "
+            "that serves them, with its settings."
+        ),
+    ] = {}
     vehicles: dict[Name, VehicleModel] = {}
     hosts: Annotated[
         dict[Name, HostModel], Field(description="Other computers that run arbiters.")

@@ -1,0 +1,49 @@
+"""A face: shows the fleet and its runs to programs that speak another protocol."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+from m2pem.api.connection_reader import ConnectionReader
+from m2pem.errors import PluginError
+from m2pem.mission.catalogue import ResourceId
+
+if TYPE_CHECKING:
+    from m2pem.api.control import MissionControl
+
+
+class FaceSettings(ConnectionReader):
+    """Reads what a fleet file says at `faces: {NAME: ...}`; errors name `faces.NAME.KEY`."""
+
+    def __init__(self, face: str, values: Mapping[str, Any], path: str = "") -> None:
+        super().__init__(ResourceId(face), values, path or f"faces.{face}")
+
+    def error(self, key: str, problem: str) -> PluginError:
+        """Return the error for the value of a key."""
+        return PluginError(f"{self.path}.{key}: {problem}")
+
+
+class Face(Protocol):
+    """Constructed as `Face(control, settings)`; several may serve at once.
+
+    A face uses `MissionControl` alone. What it commands on request of others goes through
+    `execute_behavior`, `start`, `take` and `give_back`, with `by` naming who asked. A program on
+    its other side that is slow, or gone, loses what it was to be sent; it delays nothing here.
+
+    The class may declare `capabilities`, an `m2pem.api.FaceCapabilities`.
+    """
+
+    def __init__(self, control: "MissionControl", settings: FaceSettings) -> None:
+        """Read the settings; nothing is opened yet.
+
+        Raises:
+            PluginError: a setting is wrong.
+        """
+        ...
+
+    async def serve(self) -> None:
+        """Serve until cancelled.
+
+        Raises:
+            PluginError: what it needs cannot be opened, such as a port.
+        """
+        ...

@@ -1,0 +1,97 @@
+"""Chooses faces, and serves them beside the runs."""
+
+import asyncio
+import importlib
+import logging
+from collections.abc import Callable
+
+import click
+
+from m2pem.api.capabilities import face_capabilities
+from m2pem.api.control import MissionControl
+from m2pem.api.face import Face, FaceSettings
+from m2pem.cli.options import UnusableError
+from m2pem.errors import PluginError
+from m2pem.fleet.fleet import Fleet
+from m2pem.plugins import PluginManager
+
+log = logging.getLogger("m2pem.face")
+
+NO_FACE = "none"
+
+
+def chosen_faces(names: str | None, fleet: Fleet) -> tuple[str, ...]:
+    """The faces that `--face` names, or the default: those of the fleet file.
+
+    Raises:
+        UsageError: `none` beside others.
+    """
+    if names is None:
+        return tuple(fleet.faces)
+    wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
+    if wanted == (NO_FACE,):
+        return ()
+    if not wanted or NO_FACE in wanted:
+        raise click.UsageError(f"--face {names!r}: name faces, or `{NO_FACE}` alone")
+    return wanted
+
+
+class Faces:
+    """The faces that serve. One that breaks is reported, and stops nothing."""
+
+    def __init__(self, names: str | None, fleet: Fleet, plugins: PluginManager) -> None:
+        """Find the faces, and import what they need.
+
+        Raises:
+            UsageError: `--face` names one that there is not.
+            UnusableError: the fleet file does.
+        """
+        self.names = chosen_faces(names, fleet)
+        self._fleet = fleet
+        try:
+            self._factories = {name: plugins.face(name) for name in self.names}
+        except PluginError as error:
+            if names is not None:
+                raise click.UsageError(str(error)) from error
+            raise UnusableError(f"{fleet.file}: faces: {error}") from error
+        for factory in self._factories.values():
+            for module in face_capabilities(factory).imports:
+                importlib.import_module(module)
+        self._made: dict[str, Face] = {}
+        self._tasks: list[asyncio.Task[None]] = []
+
+    def make(self, control: MissionControl) -> None:
+        """Make them, before anything begins: they read their settings.
+
+        Raises:
+            UnusableError: a setting is wrong.
+        """
+        for name, factory in self._factories.items():
+            try:
+                settings = FaceSettings(name, self._fleet.faces.get(name, {}))
+                self._made[name] = factory(control, settings)
+            except PluginError as error:
+                raise UnusableError(f"{self._fleet.file}: {error}") from error
+
+    def begin(self, broke: Callable[[str], None]) -> None:
+        """Let them serve. `broke` is called with a text for operators when one has ended."""
+        for name, face in self._made.items():
+            self._tasks.append(asyncio.create_task(_serve(name, face, broke), name=name))
+
+    async def end(self) -> None:
+        """Cancel them, and wait until they have ended."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+
+async def _serve(name: str, face: Face, broke: Callable[[str], None]) -> None:
+    try:
+        await face.serve()
+        why = "it ended by itself"
+    except PluginError as error:
+        why = str(error)
+    except Exception as error:
+        log.exception("the face %s broke", name)
+        why = f"{type(error).__name__}: {error}"
+    broke(f"the face {name} does not serve any more: {why}; missions go on without it")
