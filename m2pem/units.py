@@ -27,6 +27,7 @@ class Dimension(StrEnum):
     ACCELERATION = "acceleration"
     ANGLE = "angle"
     ANGULAR_SPEED = "angular speed"
+    FREQUENCY = "frequency"
 
 
 UNITS: Mapping[Dimension, Mapping[str, float]] = {
@@ -49,6 +50,7 @@ UNITS: Mapping[Dimension, Mapping[str, float]] = {
     Dimension.ACCELERATION: {"m/s2": 1.0, "m/s²": 1.0, "m/s^2": 1.0},
     Dimension.ANGLE: {"rad": 1.0, "deg": math.pi / 180.0},
     Dimension.ANGULAR_SPEED: {"rad/s": 1.0, "deg/s": math.pi / 180.0},
+    Dimension.FREQUENCY: {"Hz": 1.0},
 }
 """Factor to SI of every unit that is understood."""
 
@@ -73,7 +75,7 @@ def _expected(dimension: Dimension) -> str:
 
 
 def quantity(value: object, dimension: Dimension) -> float:
-    """Read a quantity of `dimension`, in SI: seconds, metres, m/s, m/s², radians, rad/s.
+    """Read a quantity of `dimension`, in SI: seconds, metres, m/s, m/s², radians, rad/s, Hz.
 
     `value` is a text ("5 km/h", also "5km/h"; units are case-sensitive) or a number. A number
     without a unit is SI; an angle needs one.

@@ -26,6 +26,7 @@ from m2pem.units import UNITS, Dimension, UnitError, plain_number, quantity
         ("45 deg", Dimension.ANGLE, math.pi / 4),
         ("1.57 rad", Dimension.ANGLE, 1.57),
         ("10 deg/s", Dimension.ANGULAR_SPEED, math.radians(10)),
+        ("10 Hz", Dimension.FREQUENCY, 10.0),
         (" -1e2 m ", Dimension.DISTANCE, -100.0),
         ("80", Dimension.DISTANCE, 80.0),
         (80, Dimension.DISTANCE, 80.0),
