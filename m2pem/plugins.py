@@ -69,6 +69,7 @@ _OBSERVE = "m2pem_records_committed"
 PUBLISHED: Mapping[str, Sequence[str]] = {
     "arbiter": ("mavlink", "ptz", "ros", "zenoh"),
     "ocu": ("mocu", "terminal", "web"),
+    "face": ("cot",),
 }
 """What the plugins of m2pem itself provide, installed or not. Plugin NAME provides NAME alone."""
 

@@ -647,7 +647,7 @@ def test_a_plugin_that_does_not_exist_is_not_recommended(name: str, hint: str) -
 
 def test_the_plugins_that_are_recommended_are_those_of_the_repository() -> None:
     folders = DOCS.parent.parent / "plugins"
-    for kind, folder in (("arbiter", "arbiters"), ("ocu", "ocu")):
+    for kind, folder in (("arbiter", "arbiters"), ("ocu", "ocu"), ("face", "faces")):
         there = {path.parent.name for path in (folders / folder).glob("*/pyproject.toml")}
         assert set(PUBLISHED[kind]) == there
         for name in there:

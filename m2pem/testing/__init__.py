@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from m2pem.testing.contracts.journal import JournalContract
     from m2pem.testing.contracts.ocu import OcuContract, Operator
     from m2pem.testing.contracts.service import ServiceCase, ServiceContract
+    from m2pem.testing.faces import serve_face
     from m2pem.testing.fake_arbiter import FakeArbiter
     from m2pem.testing.harness import MissionResult, run_executive, run_mission
 
@@ -27,6 +28,7 @@ __all__ = [
     "ServiceContract",
     "run_mission",
     "run_executive",
+    "serve_face",
 ]
 
 # Imported on first use: pytest imports this package wherever m2pem is installed, and rewrites the
@@ -43,6 +45,7 @@ _LAZY = {
     "ServiceContract": "contracts.service",
     "run_mission": "harness",
     "run_executive": "harness",
+    "serve_face": "faces",
 }
 
 

@@ -1,0 +1,147 @@
+"""Events of Cursor on Target (version 2.0) that the face sends.
+
+Positions are WGS-84. `hae` is a height above the ellipsoid; m2pem knows altitudes above mean sea
+level alone, which differ from it by up to 107 m: `le`, the error of `hae`, says so.
+"""
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from lxml import etree
+
+from m2pem.api import US_PER_S, Area, Detection, GeoPosition, Point, Route, VehicleState
+
+UNKNOWN = "9999999.0"
+"""Of `hae`, `ce` and `le`: not known."""
+GEOID_ERROR_M = "110.0"
+TYPES = {"air": "a-f-A-M-H-Q", "ground": "a-f-G-E-V", "surface": "a-f-S-C-U", "subsurface": "a-f-U"}
+"""By the domain of a vehicle, friendly: an unmanned rotary-wing aircraft, a ground vehicle, an
+unmanned surface vehicle, something under water."""
+SPOT, ROUTE, SHAPE, WAYPOINT = "b-m-p-s-m", "b-m-r", "u-d-f", "b-m-p-w"
+MACHINE, ENTERED = "m-g", "h-e"
+"""How: by a machine with GPS; entered by a human."""
+
+Coordinate = tuple[float, float, float | None]
+
+
+def vehicle_event(
+    uid: str, type_: str, state: VehicleState, stale_s: float, remarks: str
+) -> bytes | None:
+    """Return the event of a vehicle; None while its position is not known."""
+    if state.position is None:
+        return None
+    event, detail = _event(uid, type_, MACHINE, state.time_us, stale_s, state.position)
+    _add(detail, "contact", callsign=str(state.resource))
+    track = {}
+    if state.velocity_enu_m_s is not None:
+        east, north, _ = state.velocity_enu_m_s
+        track["speed"] = f"{math.hypot(east, north):.2f}"
+        track["course"] = _course(math.degrees(math.atan2(east, north)))
+    if state.yaw_rad is not None:
+        track["course"] = _course(90 - math.degrees(state.yaw_rad))
+    if track:
+        _add(detail, "track", **track)
+    if state.battery_fraction is not None:
+        _add(detail, "status", battery=f"{100 * state.battery_fraction:.0f}")
+    _add(detail, "remarks").text = _printable(remarks)
+    return etree.tostring(event)
+
+
+def detection_event(uid: str, found: Detection, stale_s: float) -> bytes:
+    """Return the event of something that a payload has detected."""
+    event, detail = _event(uid, SPOT, MACHINE, found.time_us, stale_s, found.position)
+    _add(detail, "contact", callsign=_printable(found.type))
+    _add(detail, "remarks").text = _printable(f"{found.type}, detected by {found.source}")
+    return etree.tostring(event)
+
+
+def geometry_event(
+    uid: str, name: str, geometry: Point | Route | Area, now_us: int, stale_s: float
+) -> bytes:
+    """Return the event of a point, a route or an area (its outer ring) of the fleet."""
+    match geometry:
+        case Point(position):
+            return _shape(uid, SPOT, name, (position,), position, now_us, stale_s)
+        case Route(waypoints):
+            return _shape(uid, ROUTE, name, waypoints, waypoints[0], now_us, stale_s)
+        case Area(rings):
+            return _shape(uid, SHAPE, name, rings[0], _middle(rings[0]), now_us, stale_s)
+
+
+def _shape(
+    uid: str,
+    type_: str,
+    name: str,
+    corners: Sequence[Coordinate],
+    at: Coordinate,
+    now_us: int,
+    stale_s: float,
+) -> bytes:
+    event, detail = _event(uid, type_, ENTERED, now_us, stale_s, at)
+    for number, (lat, lon, *_) in enumerate(corners if len(corners) > 1 else ()):
+        place = f"{lat:.7f},{lon:.7f}"
+        if type_ == ROUTE:
+            link = {"uid": f"{uid}.{number}", "type": WAYPOINT, "relation": "c"}
+            _add(detail, "link", **link, point=f"{place},0.0", callsign=f"{name} {number + 1}")
+        else:
+            _add(detail, "link", point=place)
+    if type_ == ROUTE:
+        _add(
+            detail,
+            "link_attr",
+            method="Driving",
+            routetype="Primary",
+            order="Ascending Check Points",
+        )
+    _add(detail, "contact", callsign=_printable(name))
+    _add(detail, "remarks")
+    return etree.tostring(event)
+
+
+def _middle(ring: Sequence[Coordinate]) -> Coordinate:
+    corners = ring[:-1] or ring
+    lats, lons = [each[0] for each in corners], [each[1] for each in corners]
+    return sum(lats) / len(lats), sum(lons) / len(lons), None
+
+
+def _event(
+    uid: str,
+    type_: str,
+    how: str,
+    time_us: int,
+    stale_s: float,
+    at: GeoPosition | Coordinate,
+) -> tuple[etree._Element, etree._Element]:
+    event = etree.Element("event", version="2.0", uid=_printable(uid), type=type_, how=how)
+    event.set("time", _written(time_us))
+    event.set("start", _written(time_us))
+    event.set("stale", _written(time_us + round(stale_s * US_PER_S)))
+    if isinstance(at, GeoPosition):
+        lat, lon, altitude_m = at.latitude_deg, at.longitude_deg, at.altitude_m
+        height = {"hae": f"{altitude_m:.1f}", "le": GEOID_ERROR_M}
+    else:
+        lat, lon = at[:2]
+        height = {"hae": UNKNOWN, "le": UNKNOWN}
+    _add(event, "point", lat=f"{lat:.7f}", lon=f"{lon:.7f}", ce=UNKNOWN, **height)
+    return event, _add(event, "detail")
+
+
+def _add(parent: etree._Element, name: str, **attributes: str) -> etree._Element:
+    return etree.SubElement(parent, name, attributes)
+
+
+def _course(degrees: float) -> str:
+    """Degrees from true north, clockwise: 0.0 to 359.9."""
+    return f"{round(degrees, 1) % 360:.1f}"
+
+
+def _written(time_us: int) -> str:
+    """A moment as xs:dateTime, UTC, in milliseconds."""
+    moment = datetime.fromtimestamp(time_us / US_PER_S, UTC)
+    return f"{moment:%Y-%m-%dT%H:%M:%S}.{moment.microsecond // 1000:03d}Z"
+
+
+def _printable(text: str) -> str:
+    """A text without the characters that XML cannot hold."""
+    return "".join(each if each.isprintable() else " " for each in text)

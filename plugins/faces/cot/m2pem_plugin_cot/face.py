@@ -1,0 +1,206 @@
+"""The face `cot`: the fleet as events of Cursor on Target, and their markers as geometries."""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from typing import ClassVar
+
+from m2pem.api import (
+    Area,
+    FaceCapabilities,
+    FaceSettings,
+    LinkState,
+    MissionControl,
+    PayloadState,
+    Point,
+    ResourceId,
+    Route,
+    Value,
+    VehicleState,
+    as_geojson,
+    parse_geojson,
+)
+from m2pem.errors import M2pemError
+from m2pem_plugin_cot.events import TYPES, detection_event, geometry_event, vehicle_event
+from m2pem_plugin_cot.link import Link
+from m2pem_plugin_cot.received import EventError, Received, read_event
+from m2pem_plugin_cot.settings import read_settings
+
+log = logging.getLogger("m2pem.cot")
+
+GEOMETRY_STALE_S = 600.0
+GEOMETRIES_EVERY_S = 60.0
+"""Geometries are sent again, as a map that was just opened has none."""
+MAX_WAITING = 100
+"""Received events that wait; more are dropped."""
+RECEIVED_PER_S = 20
+SAY_EVERY_S = 60.0
+
+
+class CotFace:
+    """Implements `m2pem.api.Face`."""
+
+    capabilities: ClassVar[FaceCapabilities] = FaceCapabilities(imports=("lxml.etree",))
+
+    def __init__(self, control: MissionControl, settings: FaceSettings) -> None:
+        self._control = control
+        self._fleet = control.fleet()
+        self._settings = read_settings(settings, self._fleet)
+        self._link = Link(self._settings, self._received)
+        self._states: dict[str, VehicleState] = {}
+        self._holders: Mapping[ResourceId, str] = {}
+        self._waiting: asyncio.Queue[tuple[bytes, str]] = asyncio.Queue(MAX_WAITING)
+        self._given: dict[str, Point | Route | Area] = {}
+        self._refused: dict[str, int] = {}
+
+    async def serve(self) -> None:
+        """Send and receive until cancelled.
+
+        Raises:
+            PluginError: an address of this host cannot be used.
+        """
+        works = [self._link.run(), self._follow(), self._send(), self._send_geometries()]
+        if self._settings.receive:
+            works.append(self._take_in())
+        works.append(self._say())
+        tasks = [asyncio.create_task(work) for work in works]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    # --- out ------------------------------------------------------------------------------------
+
+    async def _follow(self) -> None:
+        number = 0
+        async for state in self._control.telemetry(size=1000):
+            if isinstance(state, VehicleState):
+                self._states[state.resource] = state
+            elif isinstance(state, PayloadState):
+                for found in state.detections:
+                    number += 1
+                    uid = self._uid("detection", f"{found.source}.{found.time_us}.{number}")
+                    self._link.send(detection_event(uid, found, GEOMETRY_STALE_S))
+
+    async def _send(self) -> None:
+        """Send the vehicles that were received since the last time; others become stale."""
+        sent: dict[str, VehicleState] = {}
+        while True:
+            self._holders = await self._control.holders()
+            labels = await self._control.holder_labels()
+            for name, state in list(self._states.items()):
+                if sent.get(name) is state or state.link is LinkState.LOST:
+                    continue
+                sent[name] = state
+                domain = self._fleet.vehicles[state.resource].domain
+                event = vehicle_event(
+                    self._uid("vehicle", name),
+                    self._settings.types.get(name, TYPES[domain]),
+                    state,
+                    self._settings.stale_s,
+                    self._remarks(state, labels),
+                )
+                if event is not None:
+                    self._link.send(event)
+            await asyncio.sleep(self._settings.period_s)
+
+    def _remarks(self, state: VehicleState, labels: Mapping[str, str]) -> str:
+        holder = self._holders.get(state.resource, "")
+        parts = [state.mode, labels.get(holder, f"with {holder}" if holder else "free")]
+        if state.ready is False:
+            parts.append(f"not ready: {'; '.join(state.not_ready_reasons)}")
+        return ", ".join(part for part in parts if part)
+
+    async def _send_geometries(self) -> None:
+        sent: dict[str, Point | Route | Area] = {}
+        left_s = 0.0
+        while True:
+            geometries = self._geometries()
+            again = left_s <= 0
+            now_us = max((state.time_us for state in self._states.values()), default=0)
+            if now_us:  # the clock of the executive, which may be faster than that of the wall
+                for name, geometry in geometries.items():
+                    if again or sent.get(name) != geometry:
+                        uid = self._uid("geometry", name)
+                        event = geometry_event(uid, name, geometry, now_us, GEOMETRY_STALE_S)
+                        self._link.send(event)
+                sent, left_s = geometries, GEOMETRIES_EVERY_S if again else left_s
+            await asyncio.sleep(self._settings.period_s)
+            left_s -= self._settings.period_s
+
+    def _geometries(self) -> dict[str, Point | Route | Area]:
+        """The geometries of the fleet file, and those that operators have handed over."""
+        known = {
+            name: geometry
+            for name, geometry in self._fleet.geometries.items()
+            if isinstance(geometry, Point | Route | Area)
+        }
+        for name, given in self._control.geometries().items():
+            known[name] = parse_geojson(given.geometry)
+        return known
+
+    # --- in -------------------------------------------------------------------------------------
+
+    def _received(self, content: bytes, source: str) -> None:
+        """Let an event wait; drop it if too many do. It never blocks."""
+        if not self._settings.receive:
+            return
+        if self._waiting.full():
+            self._refuse("too many at once")
+        else:
+            self._waiting.put_nowait((content, source))
+
+    async def _take_in(self) -> None:
+        while True:
+            content, source = await self._waiting.get()
+            try:
+                received = read_event(content)
+            except EventError as error:
+                self._refuse(str(error))
+                received = None
+            if received is not None and not received.uid.startswith(self._uid("", "")):
+                await self._hand_over(received, source)
+            await asyncio.sleep(1 / RECEIVED_PER_S)
+
+    async def _hand_over(self, received: Received, source: str) -> None:
+        name = received.name
+        if name not in self._fleet.handed_over:
+            self._refuse(f"{name!r} is not among the fleet's handed_over")
+            return
+        if self._given.get(name) == received.geometry:
+            return
+        by = f"cot {received.uid} at {source}"
+        geometry: dict[str, Value] = as_geojson(received.geometry)
+        try:
+            await self._control.set_geometry(name, geometry, by=by)
+        except M2pemError as error:
+            self._refuse(str(error))
+        else:
+            self._given[name] = received.geometry
+            log.warning("%s was handed over by %s", name, by)
+
+    def _refuse(self, why: str) -> None:
+        if why in self._refused or len(self._refused) < MAX_WAITING:
+            self._refused[why] = self._refused.get(why, 0) + 1
+
+    # --- both -----------------------------------------------------------------------------------
+
+    def _uid(self, kind: str, name: str) -> str:
+        start = f"m2pem.{self._fleet.name}."
+        return f"{start}{kind}.{name}" if kind else start
+
+    async def _say(self) -> None:
+        """Log now and then what was dropped and refused."""
+        said = 0
+        while True:
+            await asyncio.sleep(SAY_EVERY_S)
+            if self._link.dropped > said:
+                log.warning("%d events were not sent", self._link.dropped - said)
+                said = self._link.dropped
+            for why, times in self._refused.items():
+                log.warning("%d received events were not used: %s", times, why)
+            self._refused.clear()

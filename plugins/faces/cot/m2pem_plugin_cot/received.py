@@ -1,0 +1,122 @@
+"""Events of Cursor on Target that come in: what of them is a geometry.
+
+They come from a network, and nothing in them is trusted.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from lxml import etree
+
+from m2pem.api import Area, Point, Route
+
+MAX_EVENT_BYTES = 65_536
+MAX_CORNERS = 1000
+MAX_NAME = 100
+END = b"</event>"
+
+
+class EventError(ValueError):
+    """Bytes are no event, or one that cannot be used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A marker, route or shape. `name`: its callsign on the map. `uid`: of the event."""
+
+    uid: str
+    name: str
+    geometry: Point | Route | Area
+
+
+def read_event(content: bytes) -> Received | None:
+    """Return what an event draws; None if it draws nothing, such as where somebody is.
+
+    Raises:
+        EventError: it is too long, no XML, or its positions make no sense.
+    """
+    if len(content) > MAX_EVENT_BYTES:
+        raise EventError(f"it has {len(content):,} bytes, more than {MAX_EVENT_BYTES:,}")
+    # Before the parser: a document type could declare entities, and those could be huge.
+    if b"<!" in content or b"\0" in content:
+        raise EventError("it has a document type, a comment or a null byte")
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
+    try:
+        event = etree.fromstring(content, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        raise EventError(f"no XML: {error}") from None
+    if event.tag != "event":
+        raise EventError("its root is no event")
+    type_, uid = event.get("type", ""), event.get("uid", "")[:MAX_NAME]
+    contact = event.find("detail/contact")
+    name = "" if contact is None else contact.get("callsign", "")[:MAX_NAME]
+    geometry = _geometry(type_, event)
+    return None if geometry is None else Received(uid, name, geometry)
+
+
+def _geometry(type_: str, event: etree._Element) -> Point | Route | Area | None:
+    if type_.startswith("b-m-p"):
+        point = event.find("point")
+        if point is None:
+            raise EventError("it has no point")
+        return Point((*_place(point.get("lat", ""), point.get("lon", "")), None))
+    if type_ == "b-m-r":
+        return Route(_corners(event, 2))
+    if type_ in ("u-d-f", "u-d-r"):
+        corners = _corners(event, 3)
+        if corners[0] != corners[-1]:
+            corners = (*corners, corners[0])
+        if len(set(corners)) < 3:
+            raise EventError("an area has three corners or more")
+        return Area((corners,))
+    return None
+
+
+def _corners(event: etree._Element, least: int) -> tuple[tuple[float, float, None], ...]:
+    texts = [point for link in event.findall("detail/link") if (point := link.get("point"))]
+    if not least <= len(texts) <= MAX_CORNERS:
+        raise EventError(f"it has {len(texts)} corners, not {least} to {MAX_CORNERS}")
+    split = [[*text.split(","), "", ""] for text in texts]
+    return tuple((*_place(lat, lon), None) for lat, lon, *_ in split)
+
+
+def _place(latitude: str, longitude: str) -> tuple[float, float]:
+    try:
+        lat, lon = float(latitude), float(longitude)
+    except ValueError:
+        raise EventError(f"{latitude[:20]!r}, {longitude[:20]!r} is no place") from None
+    if not (math.isfinite(lat) and math.isfinite(lon) and abs(lat) <= 90 and abs(lon) <= 180):
+        raise EventError(f"{lat:g}, {lon:g} is no place on Earth")
+    return lat, lon
+
+
+class EventStream:
+    """Finds the events in a stream of bytes; one that is too long is left out, and counted."""
+
+    def __init__(self) -> None:
+        self.too_long = 0
+        self._waiting = b""
+        self._skips = False
+
+    def feed(self, content: bytes) -> Iterator[bytes]:
+        """Yield the events that are whole now."""
+        self._waiting += content
+        while (end := self._waiting.find(END)) >= 0:
+            event, self._waiting = self._waiting[: end + len(END)], self._waiting[end + len(END) :]
+            if self._skips:
+                self._skips = False
+            elif len(event) > MAX_EVENT_BYTES:
+                self.too_long += 1
+            else:
+                yield _without_prologue(event)
+        if len(self._waiting) > MAX_EVENT_BYTES:
+            self.too_long += not self._skips
+            self._skips = True
+            # What may be the begin of its end stays.
+            self._waiting = self._waiting[-len(END) :]
+
+
+def _without_prologue(event: bytes) -> bytes:
+    """An event of a stream may have an XML declaration, and line ends between it and the last."""
+    return event.strip()

@@ -1,0 +1,108 @@
+"""What is sent, and what of received bytes is used."""
+
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lxml import etree
+from m2pem_plugin_cot.events import geometry_event, vehicle_event
+from m2pem_plugin_cot.received import MAX_EVENT_BYTES, EventError, EventStream, read_event
+
+from m2pem.api import Area, GeoPosition, Point, Route, VehicleState
+
+AT_US = 1_767_225_600_123_456
+STATE = VehicleState(
+    "rover1",
+    AT_US,
+    GeoPosition(38.1075001, -77.3192002, 60.0),
+    velocity_enu_m_s=(3.0, 4.0, 0.0),
+    yaw_rad=0.0,
+    battery_fraction=0.5,
+)
+PLACE = (38.1075, -77.3192, None)
+RING = (PLACE, (38.1075, -77.31, None), (38.11, -77.31, None), PLACE)
+
+
+def event(**changes: str) -> bytes:
+    values = {"type": "b-m-p-s-m", "point": 'lat="38.1" lon="-77.3"', "detail": ""}
+    values |= changes
+    return (
+        f'<event version="2.0" uid="m1" type="{values["type"]}"><point {values["point"]}/>'
+        f'<detail><contact callsign="lz"/>{values["detail"]}</detail></event>'
+    ).encode()
+
+
+def test_a_vehicle_is_where_its_telemetry_says() -> None:
+    sent = etree.fromstring(vehicle_event("u1", "a-f-G", STATE, 30.0, "AUTO\x07"))
+    point = sent.find("point")
+    assert (point.get("lat"), point.get("lon")) == ("38.1075001", "-77.3192002")
+    assert sent.get("time") == "2026-01-01T00:00:00.123Z"
+    assert sent.get("stale") == "2026-01-01T00:00:30.123Z"
+    assert dict(sent.find("detail/track").attrib) == {"speed": "5.00", "course": "90.0"}
+    assert sent.find("detail/status").get("battery") == "50"
+    assert sent.findtext("detail/remarks") == "AUTO "
+
+
+def test_a_vehicle_without_a_position_is_not_sent() -> None:
+    assert vehicle_event("u1", "a-f-G", VehicleState("rover1", AT_US), 30.0, "") is None
+
+
+@pytest.mark.parametrize(
+    "geometry", [Point(PLACE), Route((PLACE, (38.11, -77.3, None))), Area((RING,))]
+)
+def test_a_geometry_that_is_sent_is_read_back(geometry: Point | Route | Area) -> None:
+    received = read_event(geometry_event("u1", "lz", geometry, AT_US, 60.0))
+    assert received is not None
+    assert (received.name, received.geometry) == ("lz", geometry)
+
+
+def test_where_somebody_is_draws_nothing() -> None:
+    assert read_event(vehicle_event("u1", "a-f-G", STATE, 30.0, "") or b"") is None
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "no XML"),
+        (b"\xff\xfe<event/>", "no XML"),
+        (b"<event", "no XML"),
+        (b"<other/>", "its root is no event"),
+        (event(point='lat="nan" lon="0"'), "no place"),
+        (event(point='lat="91" lon="0"'), "no place"),
+        (event(point='lon="0"'), "no place"),
+        (event(type="b-m-r"), "0 corners"),
+        (event(type="u-d-f", detail='<link point="1,1"/>' * 3), "three corners"),
+        (event(type="u-d-f", detail='<link point="1,1"/>' * 1001), "1001 corners"),
+        (event(detail="x" * MAX_EVENT_BYTES), "more than"),
+        (b'<!DOCTYPE e [<!ENTITY a "aaaa">]>' + event(detail="&a;"), "document type"),
+        (event(detail="&a;"), "no XML"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(content: bytes, says: str) -> None:
+    with pytest.raises(EventError, match=says):
+        read_event(content)
+
+
+@given(st.binary(max_size=2000))
+def test_no_bytes_do_more_than_be_refused(content: bytes) -> None:
+    with contextlib.suppress(EventError):
+        assert read_event(content) is None
+
+
+@given(
+    st.lists(st.sampled_from([event(), b"<event/>noise", b"x" * 70_000]), max_size=6),
+    st.integers(1, 5000),
+)
+def test_a_stream_is_split_into_its_events_wherever_it_is_cut(
+    parts: list[bytes], size: int
+) -> None:
+    whole = b"\n".join(parts) + b"\n"
+    stream, found = EventStream(), []
+    for start in range(0, len(whole), size):
+        found += stream.feed(whole[start : start + size])
+    at_once = list(EventStream().feed(whole))
+    assert all(each.endswith(b"</event>") for each in found)
+    assert len(found) <= sum(part == event() for part in parts)
+    if all(part == event() for part in parts):
+        assert found == at_once == [event()] * len(parts)
