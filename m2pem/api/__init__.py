@@ -52,6 +52,13 @@ if TYPE_CHECKING:
     from m2pem.api.control import ControlEvent, MissionControl
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.epoch_fence import EpochFence
+    from m2pem.api.event_rules import (
+        Fields,
+        ReceiveRule,
+        SendRule,
+        Thrown,
+        thrown_by_missions,
+    )
     from m2pem.api.face import Face, FaceSettings
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
@@ -169,6 +176,7 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
+    "m2pem.api.event_rules": "Fields ReceiveRule SendRule Thrown thrown_by_missions",
     "m2pem.api.face": "Face FaceSettings",
     "m2pem.api.ocu": "Ocu StandbyOcu",
     "m2pem.api.operations": (
@@ -255,6 +263,11 @@ __all__ = [
     "Face",
     "FaceCapabilities",
     "FaceSettings",
+    "Fields",
+    "ReceiveRule",
+    "SendRule",
+    "Thrown",
+    "thrown_by_missions",
     "CutOffPolicy",
     "DataName",
     "Decision",

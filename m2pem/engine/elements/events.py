@@ -98,7 +98,8 @@ def signal(x: Execution, token: Token, signal_id: str) -> None:
     data = payload(x, token)
     if data is None:
         return
-    x.emit(r.SignalThrown(signal_id, token.id, x.process_of(node), node.id, token.scope.id))
+    place = (x.process_of(node), node.id, token.scope.id)
+    x.emit(r.SignalThrown(signal_id, token.id, *place, data=data))
     throw_signal(x, signal_id, data)
 
 

@@ -67,7 +67,7 @@ class ConditionReset(BaseRecord, frozen=True):
 
 
 class SignalThrown(BaseRecord, frozen=True):
-    """A signal was thrown by an element, or by an operator (`by`)."""
+    """A signal was thrown by an element with `data`, or by an operator (`by`)."""
 
     signal: str
     token: int = 0
@@ -75,6 +75,7 @@ class SignalThrown(BaseRecord, frozen=True):
     element: str = ""
     scope: int = 0
     by: str = ""
+    data: dict[str, Value] = msgspec.field(default_factory=dict)
 
 
 class MessageThrown(BaseRecord, frozen=True):
