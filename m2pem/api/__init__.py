@@ -111,6 +111,12 @@ if TYPE_CHECKING:
         When,
     )
     from m2pem.api.service import Service, ServiceContext, ServiceError
+    from m2pem.api.statistics import (
+        DurationCounts,
+        ExecutiveStatistics,
+        LinkStatistics,
+        SubscriptionStatistics,
+    )
     from m2pem.api.telemetry import (
         Detection,
         GeoPosition,
@@ -189,6 +195,9 @@ _MODULES = {
     "m2pem.api.runs": (
         "SCHEDULE Alert HandedOver IncidentPreview IncidentVerdict OpenIncident OpenPrompt"
         " PromptClosed RunId RunStatus RunSummary SimulationResult StampedRecord TelemetrySample"
+    ),
+    "m2pem.api.statistics": (
+        "DurationCounts ExecutiveStatistics LinkStatistics SubscriptionStatistics"
     ),
     "m2pem.api.schedule": (
         "WHEN_FREE Concurrency EntryId Missed Schedule ScheduleChanged ScheduledMission"
@@ -276,11 +285,13 @@ __all__ = [
     "Detection",
     "Dimension",
     "Draft",
+    "DurationCounts",
     "EastNorth",
     "Editable",
     "EpochFence",
     "Fence",
     "ExecutiveAddress",
+    "ExecutiveStatistics",
     "FencingArbiter",
     "Finding",
     "Fleet",
@@ -302,6 +313,7 @@ __all__ = [
     "LazyCommand",
     "Limits",
     "LinkState",
+    "LinkStatistics",
     "Listener",
     "LocalFrame",
     "AsyncQueue",
@@ -352,6 +364,7 @@ __all__ = [
     "SimulationResult",
     "StandbyOcu",
     "StampedRecord",
+    "SubscriptionStatistics",
     "SurveyTracks",
     "SystemClock",
     "TeamMemberState",

@@ -34,6 +34,7 @@ from m2pem.api.runs import (
     StampedRecord,
 )
 from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, ScheduleChanged, When
+from m2pem.api.statistics import ExecutiveStatistics
 from m2pem.api.telemetry import Telemetry
 from m2pem.findings import Finding
 from m2pem.mission.catalogue import BehaviorSpec, ResourceId
@@ -404,6 +405,10 @@ class MissionControl(Protocol):
         It answers within two seconds, whatever hangs. Vehicles do not count: their links are in
         the telemetry.
         """
+        ...
+
+    async def statistics(self) -> ExecutiveStatistics:
+        """What this executive has counted since it began, and how long its queues are now."""
         ...
 
     async def standbys(self) -> Sequence[ExecutiveAddress]:

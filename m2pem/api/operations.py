@@ -36,6 +36,7 @@ from m2pem.api.runs import (
     StampedRecord,
 )
 from m2pem.api.schedule import EntryId, Schedule, ScheduleChanged, When
+from m2pem.api.statistics import ExecutiveStatistics
 from m2pem.api.telemetry import PayloadState, TeamState, VehicleState
 from m2pem.findings import Finding
 from m2pem.fleet.fleet import dump, restore
@@ -322,6 +323,7 @@ OPERATIONS: dict[str, Operation] = {
         Operation("simulated", Nothing, bool, kept=True),
         Operation("speed", Nothing, float, kept=True),
         Operation("health", Nothing, list[HealthCheck], alone=True),
+        Operation("statistics", Nothing, ExecutiveStatistics),
         Operation("standbys", Nothing, list[ExecutiveAddress], alone=True),
         Operation(
             "journal_file",

@@ -35,6 +35,7 @@ from m2pem.api.runs import (
     StampedRecord,
 )
 from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When
+from m2pem.api.statistics import ExecutiveStatistics
 from m2pem.api.telemetry import Telemetry
 from m2pem.bpmn.search_path import mission_files_in
 from m2pem.editing.editable import editable
@@ -59,6 +60,7 @@ from m2pem.executive.run_summary import summary
 from m2pem.executive.schedule_admission import planned
 from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduler import Scheduler
+from m2pem.executive.statistics import StatisticsReader
 from m2pem.executive.supervisor import Supervisor
 from m2pem.executive.switchover import Switchover
 from m2pem.executive.verification_worker import verify_in_subprocess
@@ -97,6 +99,7 @@ class Control:
         schedule: ScheduleEntries,
         scheduler: Scheduler,
         switchover: Switchover,
+        statistics: StatisticsReader,
         rehearse: Rehearse | None = None,
         foresee: Foresee | None = None,
     ) -> None:
@@ -107,6 +110,7 @@ class Control:
         self._switchover = switchover
         self._bus = bus
         self._health = health
+        self._statistics = statistics
         self._rehearse = rehearse
         self._choices = IncidentChoices(supervisor, foresee)
         self._direct = DirectBehaviors(supervisor, starter)
@@ -514,6 +518,10 @@ class Control:
     async def health(self) -> Sequence[HealthCheck]:
         """Whether this executive can do its work now."""
         return await self._health.checks()
+
+    async def statistics(self) -> ExecutiveStatistics:
+        """What the executive has counted since it began, and what there is now."""
+        return self._statistics.read()
 
     async def standbys(self) -> Sequence[ExecutiveAddress]:
         """The executives that stand by for the fleet of this one."""

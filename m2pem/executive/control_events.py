@@ -31,16 +31,22 @@ class Subscription:
         self._overrun = False
         self._ended = False
 
-    def put(self, events: Sequence[ControlEvent]) -> None:
-        """Add events, but those of another run."""
+    @property
+    def waiting(self) -> int:
+        """How many events its reader has not taken."""
+        return len(self._waiting)
+
+    def put(self, events: Sequence[ControlEvent]) -> bool:
+        """Add events, but those of another run. Returns whether the reader is cut off now."""
         if self._overrun:
-            return
+            return False
         if self._run is not None:
             events = [notice for notice in events if notice.run in ("", self._run)]
         room = self._size - len(self._waiting)
         self._overrun = len(events) > room
         self._waiting.extend(events[:room])
         self._wake.set()
+        return self._overrun
 
     def end(self) -> None:
         """Let the reader end after the events that wait."""
@@ -70,9 +76,13 @@ class Subscription:
 
 
 class ControlEvents:
-    """All subscriptions of an executive, held weakly: a reader that is gone leaves nothing."""
+    """All subscriptions of an executive, held weakly: a reader that is gone leaves nothing.
+
+    `cut_off`: how many readers were too slow.
+    """
 
     def __init__(self) -> None:
+        self.cut_off = 0
         self._subscriptions: list[weakref.ref[Subscription]] = []
         self._ended = False
 
@@ -80,6 +90,12 @@ class ControlEvents:
     def has_subscribers(self) -> bool:
         """Whether there is a subscription."""
         return bool(self._subscriptions)
+
+    @property
+    def waiting(self) -> int:
+        """How many events the reader has not taken that is furthest behind."""
+        alive = [subscription() for subscription in self._subscriptions]
+        return max((each.waiting for each in alive if each is not None), default=0)
 
     def subscribe(self, run: RunId | None, size: int) -> Subscription:
         """Subscribe to every event from now on, or to those of one run."""
@@ -98,8 +114,8 @@ class ControlEvents:
         """Send events to all subscriptions."""
         for reference in self._subscriptions:
             subscription = reference()
-            if subscription is not None:
-                subscription.put(events)
+            if subscription is not None and subscription.put(events):
+                self.cut_off += 1
 
     def end(self) -> None:
         """Let every reader come to its end, after what waits for it."""
@@ -127,7 +143,7 @@ class RecordObservers:
     """`observe` is called with each batch of committed records, in order.
 
     From `start` to `close` it is called from a thread; before, and where `start` is never called
-    (in virtual time nothing is late), from `put` itself.
+    (in virtual time nothing is late), from `put` itself. `dropped`: batches that were not observed.
     """
 
     def __init__(
@@ -138,6 +154,12 @@ class RecordObservers:
         self._waiting: Queue[_Batch | None] = Queue(MAX_WAITING)
         self._ended: asyncio.Event | None = None
         self._behind = False
+        self.dropped = 0
+
+    @property
+    def waiting(self) -> int:
+        """How many batches wait."""
+        return self._waiting.qsize()
 
     def start(self) -> None:
         """Observe from a thread. A daemon: an observer that hangs must not keep the program."""
@@ -161,6 +183,7 @@ class RecordObservers:
             self._waiting.put_nowait((run, records))
             self._behind = False
         except Full:
+            self.dropped += 1
             if not self._behind:
                 text = (
                     f"plugins that observe records are more than {MAX_WAITING:,} inputs behind: "

@@ -296,6 +296,16 @@ class Dispatcher:
 
     # --- what is known of behaviors -------------------------------------------------------------
 
+    @property
+    def under_way(self) -> int:
+        """How many behaviors are commanded and have not ended."""
+        return len(self._active)
+
+    @property
+    def calls_waiting(self) -> int:
+        """How many calls of arbiters are under way or wait for their turn."""
+        return len(self._tasks)
+
     def reported(self, report: BehaviorReport) -> None:
         """An arbiter's report passes through here, so that numbers go on rising; that of a team's
         part goes to its team."""

@@ -34,6 +34,7 @@ from m2pem.executive.schedule_entries import ScheduleEntries
 from m2pem.executive.scheduled_runs import ScheduledRuns
 from m2pem.executive.scheduler import Scheduler
 from m2pem.executive.shared_space_watch import watch_shared_space
+from m2pem.executive.statistics import StatisticsReader
 from m2pem.executive.supervisor import RunSettings, Supervisor
 from m2pem.executive.switchover import Switchover
 from m2pem.executive.vehicle_locks import VehicleInUseError, VehicleLocks, addresses_of, refusal
@@ -141,6 +142,9 @@ class Executive:
             self._schedule,
             self._scheduler,
             self.switchover,
+            StatisticsReader(
+                self._supervisor, self.bus, self._observers, clock, lambda: self._links
+            ),
             rehearse,
             foresee,
         )

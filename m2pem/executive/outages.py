@@ -13,6 +13,7 @@ from collections.abc import Callable
 from m2pem.api.runs import Alert
 from m2pem.boot_time import boot_time_s
 from m2pem.executive.control_events import ControlEvents
+from m2pem.executive.counts import LATE_BOUNDS_S, Durations
 
 TICK_S = 0.25
 
@@ -29,6 +30,8 @@ class StallMonitor:
         self._actions: list[tuple[float, Callable[[float], None]]] = []
         self._tick_s = TICK_S
         self._seen_s: float | None = None
+        self.lateness = Durations(LATE_BOUNDS_S)
+        """How late the event loop was, at each look of `watch`."""
 
     def after(self, shortest_s: float, act: Callable[[float], None]) -> None:
         """Have `act` called with the length of each stall of `shortest_s` or more, in real
@@ -41,7 +44,9 @@ class StallMonitor:
         self._seen_s = boot_time_s()
         try:
             while True:
+                due_s = boot_time_s() + self._tick_s
                 await asyncio.sleep(self._tick_s)
+                self.lateness.add(max(0.0, boot_time_s() - due_s))
                 self.look()
         finally:
             self._seen_s = None

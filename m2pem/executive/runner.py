@@ -7,6 +7,7 @@ together and share a commit.
 
 import asyncio
 import logging
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -30,6 +31,7 @@ from m2pem.engine.run import MissionRun, Step
 from m2pem.engine.state import BehaviorPhase, RunStatus
 from m2pem.errors import InternalError, M2pemError, OperatorError, StaleEpochError
 from m2pem.executive.control_events import ControlEvents
+from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.outages import Outages, StallMonitor
 from m2pem.executive.services import Services
@@ -99,6 +101,7 @@ class RunContext:
     stalls: StallMonitor
     outages: Outages
     look_again: LookAgain
+    counts: RunCounts
     limit: RunLimit | None = None
 
 
@@ -165,6 +168,11 @@ class Runner:
     def undecided(self) -> "list[asyncio.Future[Step]]":
         """What operators have asked for that is not decided and committed."""
         return [decided for _, decided in self._submitted if not decided.done()]
+
+    @property
+    def waiting(self) -> int:
+        """How many inputs it has not decided."""
+        return len(self._inbox)
 
     def submit_stop(self, item: StopRun, cancelled: frozenset[str]) -> "asyncio.Future[Step]":
         """As `submit`, ahead of what waits; `cancelled`: the behaviors whose cancel is under way.
@@ -366,6 +374,7 @@ class Runner:
         loop = asyncio.get_running_loop()
         stalled = loop.call_later(STALLED_AFTER_S, self._alert_of_stall)
         self._committing = task = asyncio.current_task()
+        begun_s = time.perf_counter()
         try:
             await self._context.journal.append(
                 [
@@ -389,6 +398,8 @@ class Runner:
         finally:
             self._committing = None
             stalled.cancel()
+        records = steps[-1].seq + len(steps[-1].records) - steps[0].seq
+        self._context.counts.committed(len(steps), records, time.perf_counter() - begun_s)
 
     def _alert_of_stall(self) -> None:
         text = (

@@ -40,6 +40,7 @@ from m2pem.executive.behavior_lifecycle import (
 )
 from m2pem.executive.behavior_reports import reported
 from m2pem.executive.control_events import ControlEvents, RecordObservers
+from m2pem.executive.counts import RunCounts
 from m2pem.executive.dispatcher import Dispatcher
 from m2pem.executive.emergency import WRITTEN_WITHIN_S, EmergencyCommands, StopMarks
 from m2pem.executive.fleet_connections import FleetArbiters
@@ -128,6 +129,7 @@ class Supervisor:
         self.runners: dict[RunId, Runner] = {}
         self.handed_over: dict[str, HandedOver] = {}
         self.availability = Availability(self.fleet)
+        self.counts = RunCounts()
         self._bus = bus
         self._observers = observers
         self.stalls = StallMonitor()
@@ -301,6 +303,7 @@ class Supervisor:
             self.stalls,
             self.outages,
             self._look_again,
+            self.counts,
             self.settings.limit,
         )
         runner = Runner(run, epoch, context, self.fleet.steps_between_waits)
@@ -379,8 +382,10 @@ class Supervisor:
             self.settings.on_records(run, records)
         if self._observers is not None:
             self._observers.put(run, records)
-        if any(isinstance(record, RunEnded) for record in records[-3:]):
-            self.marks.remove(run)
+        for record in records[-3:]:
+            if isinstance(record, RunEnded):
+                self.counts.ended[record.outcome.value] += 1
+                self.marks.remove(run)
 
     # --- what happens outside of the runs -------------------------------------------------------
 

@@ -5,6 +5,7 @@ import weakref
 from collections import deque
 from typing import TypeAlias, Union
 
+from m2pem.api.statistics import SubscriptionStatistics
 from m2pem.api.telemetry import PayloadState, TeamState, Telemetry, VehicleState
 from m2pem.mission.catalogue import ResourceId
 
@@ -47,14 +48,20 @@ class Subscription:
         self._waiting.clear()
         self.end()
 
-    def put(self, state: Telemetry) -> None:
-        """Hand a state to the reader; for the bus alone."""
+    def put(self, state: Telemetry) -> bool:
+        """Hand a state to the reader; for the bus alone. Returns whether another was dropped."""
         if self._closed:
-            return
-        if len(self._waiting) == self._waiting.maxlen:
+            return False
+        drops = len(self._waiting) == self._waiting.maxlen
+        if drops:
             self.dropped += 1
         self._waiting.append(state)
         self._wake()
+        return drops
+
+    def statistics(self) -> SubscriptionStatistics:
+        """How far its reader is behind."""
+        return SubscriptionStatistics(self._waiting.maxlen or 0, len(self._waiting), self.dropped)
 
     def end(self) -> None:
         """Let nothing more in; for the bus alone."""
@@ -70,10 +77,11 @@ class Bus:
     """Implements `m2pem.api.bus.FleetBus`. Used from the event loop's thread only.
 
     Subscriptions are served in the order in which they were made, and held weakly: a reader that
-    was cancelled leaves nothing behind.
+    was cancelled leaves nothing behind. `dropped`: states that slow readers did not get, in all.
     """
 
     def __init__(self) -> None:
+        self.dropped = 0
         self._latest: dict[ResourceId, State] = {}
         self._subscriptions: list[weakref.ref[Subscription]] = []
         self._closed = False
@@ -90,8 +98,8 @@ class Bus:
             self._latest[state.resource] = state
         for reference in self._subscriptions:
             subscription = reference()
-            if subscription is not None:
-                subscription.put(state)
+            if subscription is not None and subscription.put(state):
+                self.dropped += 1
 
     def subscribe(self, size: int = 100) -> Subscription:
         """States from now on, for one reader; `size` of them wait at most."""
@@ -105,6 +113,11 @@ class Bus:
                 weakref.ref(subscription, self._forget),
             ]
         return subscription
+
+    def readers(self) -> tuple[SubscriptionStatistics, ...]:
+        """How far each reader is behind."""
+        alive = [subscription() for subscription in self._subscriptions]
+        return tuple(each.statistics() for each in alive if each is not None)
 
     def close(self) -> None:
         """End every subscription, after what waits in it; `latest` stays."""

@@ -98,6 +98,16 @@ class LinkMonitor:
             faults += self._battery(state.resource, state.battery_fraction)
         return faults
 
+    def received_us(self, resource: ResourceId) -> int | None:
+        """When a state of a resource was last received; None: its link is not watched."""
+        link = self._links.get(resource)
+        return None if link is None else link.received_us
+
+    def is_lost(self, resource: ResourceId) -> bool:
+        """Whether the link to a resource counts as lost."""
+        link = self._links.get(resource)
+        return link is not None and link.lost
+
     def receives_nothing(self, now_us: int) -> bool:
         """Whether nothing is received any more of all that was received since connecting: each link
         is lost, or silent for two fifths of its bound. False also while states may still wait, as

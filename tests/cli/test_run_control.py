@@ -62,6 +62,7 @@ OTHERWISE = {
     "journal_file": "--journal names it",
     "health": "m2pem doctor --running",
     "standbys": "m2pem doctor --running",
+    "statistics": "face prometheus of m2pem serve and m2pem run",
     "switch_over": "m2pem switchover, which tests/e2e/test_switchover.py tries",
 }
 NO_COMMAND = {

@@ -88,6 +88,7 @@ NOT_SERVED = {
     "simulated": "settings of DDS depend on it; operators do not see it",
     "speed": "missions with operators over ROS run in real time",
     "health": "m2pem doctor --running asks it on the executive's machine",
+    "statistics": "faces prometheus and otlp have it",
     "standbys": "m2pem doctor --running asks it on the executive's machine",
     "switch_over": "m2pem switchover asks for it on the executive's machine",
     "journal_file": "a path of the executive's machine",

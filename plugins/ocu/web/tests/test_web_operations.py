@@ -108,6 +108,7 @@ NOT_SERVED = {
     "speed": "a field of the session",
     "health": "GET /readyz says whether all is well, without a session",
     "journal_file": "a path of the executive's machine",
+    "statistics": "face prometheus has it, as /metrics",
 }
 
 
