@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from m2pem.api.health import ExecutiveAddress, HealthCheck, HealthStatus, listening_check
     from m2pem.api.hosting import CutOffPolicy, Host, HostedArbiter, HostLink, WhenCutOff
     from m2pem.api.latest_task import LatestTask
+    from m2pem.api.log_context import current_run, trace_ids
     from m2pem.api.ocu import Ocu, StandbyOcu
     from m2pem.api.operations import (
         MAX_DATA_VALUES,
@@ -184,6 +185,7 @@ _MODULES = {
     "m2pem.api.latest_task": "LatestTask",
     "m2pem.api.event_rules": "Fields ReceiveRule SendRule Thrown thrown_by_missions",
     "m2pem.api.face": "Face FaceSettings",
+    "m2pem.api.log_context": "current_run trace_ids",
     "m2pem.api.ocu": "Ocu StandbyOcu",
     "m2pem.api.operations": (
         "MAX_DATA_VALUES MAX_NAME_CHARACTERS MAX_REASON_CHARACTERS OPERATIONS Operation"
@@ -379,6 +381,7 @@ __all__ = [
     "adjusts",
     "as_geojson",
     "command_group",
+    "current_run",
     "decode_parameters",
     "describe",
     "did_you_mean",
@@ -399,6 +402,7 @@ __all__ = [
     "restored_work",
     "simulator_group",
     "strip_width_m",
+    "trace_ids",
 ]
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 import m2pem
+from m2pem.cli.notes import say
 from m2pem.errors import M2pemError
 from m2pem.findings import escaped
 from m2pem.suggestions import did_you_mean
@@ -142,15 +143,27 @@ class _Names(click.Group):
 @click.version_option(m2pem.__version__, prog_name="m2pem")
 @click.option("--debug", is_flag=True, help="Log everything, and show tracebacks.")
 @click.option("--quiet", is_flag=True, help="Print no notes, no progress and no warnings of files.")
-def cli(debug: bool, quiet: bool) -> None:  # `quiet` is read by m2pem.cli.notes
+@click.option(
+    "--log-format",
+    type=click.Choice(["plain", "json"]),
+    default="plain",
+    show_default=True,
+    help="How log, notes and errors look at standard error; json: an object a line.",
+)
+def cli(debug: bool, quiet: bool, log_format: str) -> None:  # `quiet` is read by m2pem.cli.notes
     """Plan, check, rehearse and run missions of unmanned vehicles, drawn in BPMN 2.0."""
-    _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
+    _log_to_stderr(logging.DEBUG if debug else logging.WARNING, log_format)
 
 
-def _log_to_stderr(level: int) -> None:
+def _log_to_stderr(level: int, log_format: str) -> None:
     handler = logging.StreamHandler()
-    formatter = logging.Formatter if level == logging.DEBUG else _WithoutTracebacks
-    handler.setFormatter(formatter("%(levelname)s %(name)s: %(message)s"))
+    if log_format == "json":
+        from m2pem.cli.log_format import JsonFormatter
+
+        handler.setFormatter(JsonFormatter(tracebacks=level == logging.DEBUG))
+    else:
+        formatter = logging.Formatter if level == logging.DEBUG else _WithoutTracebacks
+        handler.setFormatter(formatter("%(levelname)s %(name)s: %(message)s"))
     logger = logging.getLogger("m2pem")
     logger.handlers[:] = [handler]
     logger.propagate = False
@@ -206,7 +219,7 @@ def run_command_line(arguments: Sequence[str] | None = None) -> int:
     except M2pemError as error:
         if _debugging():
             logging.getLogger("m2pem").exception("it ended with this error")
-        click.echo(f"m2pem: {escaped(str(error), keep=chr(10))}", err=True)
+        say(f"m2pem: {escaped(str(error), keep=chr(10))}")
         return error.exit_status
     except Exception as error:
         if _debugging():

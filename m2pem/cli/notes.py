@@ -3,6 +3,7 @@
 Errors, alerts and all that concerns vehicles are no notes: they are printed in any case.
 """
 
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -29,6 +30,16 @@ def is_quiet() -> bool:
 def note(text: str) -> None:
     """Print a note, unless the command line has `--quiet`."""
     if not is_quiet():
+        say(text, logging.INFO)
+
+
+def say(text: str, level: int = logging.ERROR) -> None:
+    """Print a text of m2pem to standard error; a line of the log if that is JSON."""
+    handlers = logging.getLogger("m2pem").handlers
+    if handlers and getattr(handlers[0].formatter, "makes_json", False):
+        text = text.removeprefix("m2pem: ")
+        handlers[0].handle(logging.LogRecord("m2pem", level, "", 0, "%s", (text,), None))
+    else:
         print(text, file=sys.stderr, flush=True)
 
 

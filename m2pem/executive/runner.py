@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from m2pem.api.clock import Clock
+from m2pem.api.log_context import current_run
 from m2pem.api.runs import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
 from m2pem.engine import commands as c
 from m2pem.engine import records as r
@@ -227,6 +228,7 @@ class Runner:
         A failure of the journal or of m2pem itself holds the run's vehicles and ends the task; the
         rest of the executive goes on.
         """
+        current_run.set(self.id)
         try:
             while not self._is_over():
                 batch = await self._next_inputs()

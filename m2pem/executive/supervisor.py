@@ -439,7 +439,8 @@ class Supervisor:
 
     def fault(self, fault: ResourceFault) -> None:
         """Post the fault of a vehicle or payload, or its lost link, to the runs that command it."""
-        log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason)
+        about = {"resource": fault.resource}
+        log.warning("%s: %s: %s", fault.resource, fault.code, fault.reason, extra=about)
         resource = ResourceId(fault.resource)
         if not fault.reachable:
             self.lost(resource, fault.reason)
