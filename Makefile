@@ -125,8 +125,9 @@ ROS_PLUGINS := $(wildcard plugins/arbiters/ros plugins/ocu/mocu)
 ROS_TESTS := $(ROS_PLUGINS:%=%/tests) $(wildcard plugins/arbiters/ptz/tests/test_ptz_ros_*.py)
 ROS_PIP := PIP_CONSTRAINT=ros/constraints.txt PIP_BUILD_CONSTRAINT=ros/constraints.txt \
   $(ROS_PYTHON) -m pip --quiet --disable-pip-version-check
-# Of Nav2, the tests have a double: its own interfaces are in no registry of wheels.
-ROS_PACKAGES := ros/m2pem_interfaces plugins/arbiters/ros/tests/nav2_testdouble
+# Of Nav2, the tests have a double: its own interfaces are in no registry of wheels, nor are those of ros/wheels.
+ROS_PACKAGES := ros/m2pem_interfaces ros/wheels/geographic_msgs ros/wheels/tf2_msgs \
+  plugins/arbiters/ros/tests/nav2_testdouble
 ROS_INTERFACES := $(sort $(shell find $(ROS_PACKAGES) -type f -not -name '*.pyc'))
 ROS_CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/m2pem/ros
 ROS_IDENTITY := $(strip $(CURDIR) $(shell $(PYTHON) -V 2>&1))
