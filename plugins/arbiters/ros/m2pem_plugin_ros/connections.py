@@ -24,7 +24,8 @@ from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.sensors.health import Battery, Diagnostics
 from m2pem_plugin_ros.sensors.localization import Localization, TopicLocalization
 from m2pem_plugin_ros.sensors.payload import PayloadSensors, PayloadStatusTopic
-from m2pem_plugin_ros.settings import DetectorSettings, DriverName, Settings
+from m2pem_plugin_ros.sensors.tf_topics import TfTopics
+from m2pem_plugin_ros.settings import DetectorSettings, DriverName, Settings, Topics
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
@@ -165,6 +166,7 @@ class DdsConnections:
         self._setup = installation
         self._runtimes: dict[int, RosRuntime] = {}
         self._diagnostics: dict[tuple[int, str], Diagnostics] = {}
+        self._tf: dict[tuple[int, str, str], TfTopics] = {}
         self._localizations: dict[ResourceId, TopicLocalization] = {}
         self._detectors: list[DetectorTopic] = []
 
@@ -180,9 +182,10 @@ class DdsConnections:
             for resource, settings in known.detectors.items():
                 vehicle_position = self._vehicle_position(resource)
                 ros = self._runtime(settings.domain_id)
+                tf = self._tf_of(resource, settings.domain_id)
                 self._detectors.append(
                     DetectorTopic(
-                        ros, resource, settings, known.context, vehicle_position, known.hear
+                        ros, resource, settings, known.context, vehicle_position, known.hear, tf
                     )
                 )
         except BaseException:
@@ -213,7 +216,8 @@ class DdsConnections:
             return VehicleConnection(
                 ros, sensors, TargetPublisher(ros, settings).show, payload_status
             )
-        localization = TopicLocalization(ros, resource, settings, context)
+        tf = self._tf_of(resource, settings.domain_id)
+        localization = TopicLocalization(ros, resource, settings, context, tf)
         self._localizations[resource] = localization
         topic = settings.topic(settings.topics.diagnostics)
         key = (_domain(settings.domain_id), topic)
@@ -240,6 +244,20 @@ class DdsConnections:
             name = f"m2pem_{self._setup.context.journal.hex[:8]}"
             self._runtimes[domain] = RosRuntime(name, domain_id=domain)
         return self._runtimes[domain]
+
+    def _tf_of(self, resource: ResourceId, domain_id: int | None) -> TfTopics:
+        """Return the transforms of a vehicle, or of the vehicle of a payload. Most share them."""
+        vehicle = self._setup.vehicles.get(ResourceId(resource.partition("/")[0]))
+        names = Topics()
+        topic, static_topic = names.tf, names.tf_static
+        if vehicle is not None:
+            topic = vehicle.topic(vehicle.topics.tf)
+            static_topic = vehicle.topic(vehicle.topics.tf_static)
+        key = (_domain(domain_id), topic, static_topic)
+        if key not in self._tf:
+            ros = self._runtime(domain_id)
+            self._tf[key] = TfTopics(ros, topic, static_topic, self._setup.context)
+        return self._tf[key]
 
     def _vehicle_position(self, payload: ResourceId) -> Callable[[], GeoPosition | None]:
         vehicle = ResourceId(payload.partition("/")[0])

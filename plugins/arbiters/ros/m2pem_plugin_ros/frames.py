@@ -63,3 +63,15 @@ def yaw_of_quaternion(q: AnyQuaternion) -> float:
 def quaternion_of_yaw(yaw_rad: float) -> Quaternion:
     """Return the quaternion of a yaw."""
     return Quaternion(0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0))
+
+
+def rotated(place: tuple[float, float, float], q: Quaternion) -> tuple[float, float, float]:
+    """Return a place turned by a quaternion of length 1."""
+    x, y, z = place
+    # Twice the vector product of the quaternion's axis and the place.
+    tx, ty, tz = 2.0 * (q.y * z - q.z * y), 2.0 * (q.z * x - q.x * z), 2.0 * (q.x * y - q.y * x)
+    return (
+        x + q.w * tx + q.y * tz - q.z * ty,
+        y + q.w * ty + q.z * tx - q.x * tz,
+        z + q.w * tz + q.x * ty - q.y * tx,
+    )

@@ -18,6 +18,9 @@ OWN_INSTALLATION = (
     "with the wheels: pip install ./ros/m2pem_interfaces of m2pem's sources; "
     "with a sourced ROS: colcon build that folder, and source the result"
 )
+BUILT_FOR_WHEELS = ("geographic_msgs", "tf2_msgs")
+"""Packages of ROS that its wheels lack."""
+
 NEWEST_MESSAGE = "CommandRefusal"
 """The message that was added last."""
 
@@ -70,6 +73,8 @@ def require_interfaces(package: str) -> ModuleType:
                 importlib.import_module(f"{package}.{part}")
     except ImportError as error:
         how = f"apt-get install ros-jazzy-{package.replace('_', '-')}, then source ROS again"
+        if package in BUILT_FOR_WHEELS:
+            how += f"; with the wheels: pip install ./ros/wheels/{package} of m2pem's sources"
         if package == OWN_INTERFACES:
             how = OWN_INSTALLATION
         raise RosError(f"the ROS package {package} is not installed ({error}); {how}") from error

@@ -95,10 +95,12 @@ class RouteAction(StrEnum):
 
 
 class OdomFrame(StrEnum):
-    """The frame of a vehicle's odometry (REP-105)."""
+    """Where the pose of a vehicle comes from (REP-105): its odometry in `map`, its odometry in
+    `odom` with fixes, or tf."""
 
     MAP = "map"
     ODOM = "odom"
+    TF = "tf"
 
 
 class DetectorMessage(StrEnum):
@@ -118,6 +120,8 @@ class Topics:
     diagnostics: str = "/diagnostics"
     cmd_vel: str = "cmd_vel"
     teleop: str = "cmd_vel_teleop"
+    tf: str = "/tf"
+    tf_static: str = "/tf_static"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +140,10 @@ class Bounds:
 class Settings:
     """The connection of a vehicle, or of a payload with an m2pem node. `namespace` has its leading
     "/"; "" is the root. `odom_frame`: with "map", odometry is in the local frame of the fleet; with
-    "odom", it begins anywhere, and NavSatFix gives the position (REP-105). `stamped`: cmd_vel is a
-    TwistStamped. `hardware_id`: in /diagnostics; by default the name in the fleet."""
+    "odom", it begins anywhere, and NavSatFix gives the position (REP-105); with "tf", the pose is
+    that of `base_frame` in `map` on /tf. `base_frame`: "" means the `child_frame_id` of odometry.
+    `stamped`: cmd_vel is a TwistStamped. `hardware_id`: in /diagnostics; by default the name in the
+    fleet."""
 
     namespace: str
     domain_id: int | None = None
@@ -150,6 +156,7 @@ class Settings:
     hardware_id: str = ""
     route_action: RouteAction = RouteAction.THROUGH
     own_behaviors: tuple[BehaviorSpec, ...] = ()
+    base_frame: str = ""
 
     def topic(self, name: str) -> str:
         """Return the full name of a topic, action or service of the vehicle."""
@@ -260,7 +267,14 @@ def _read_vehicle(connection: Connection) -> Settings:
         reader.text("hardware_id", resource),
         reader.choice("route_action", RouteAction, RouteAction.THROUGH),
         read_declared_behaviors(resource, connection.settings.get("own_behaviors")),
+        _base_frame(reader),
     )
+
+
+def _base_frame(reader: RosConnectionReader) -> str:
+    if "base_frame" in reader.values and reader.values.get("odom_frame") != OdomFrame.TF:
+        raise reader.error("base_frame", "the key is for 'odom_frame: tf' only")
+    return reader.text("base_frame", "")
 
 
 def _topics(reader: RosConnectionReader) -> Topics:

@@ -28,6 +28,8 @@ TOPICS = (
     "diagnostic_msgs/DiagnosticArray@/diagnostics",
     "m2pem_interfaces/Detection@/evsg1/detections",
     "std_msgs/String@/evsg1/words",
+    "tf2_msgs/TFMessage@/tf",
+    "tf2_msgs/TFMessage@/tf_static",
 )
 
 
@@ -47,9 +49,11 @@ def odometry(
     forward: float = 0.0,
     stamp: int = 0,
     frame: str = "map",
+    child: str = "",
 ):
     fields = {
         "header": {"stamp": {"sec": stamp}, "frame_id": frame},
+        "child_frame_id": child,
         "pose": {
             "pose": {
                 "position": {"x": east, "y": north},
@@ -59,6 +63,26 @@ def odometry(
         "twist": {"twist": {"linear": {"x": forward}, "angular": {"z": 0.0}}},
     }
     return ("/evsg1/odom", fields)
+
+
+def transform(
+    parent: str,
+    child: str,
+    east: float,
+    north: float,
+    yaw: float = 0.0,
+    stamp: int = 0,
+    topic: str = "/tf",
+):
+    fields = {
+        "header": {"stamp": {"sec": stamp}, "frame_id": parent},
+        "child_frame_id": child,
+        "transform": {
+            "translation": {"x": east, "y": north},
+            "rotation": {"z": math.sin(yaw / 2), "w": math.cos(yaw / 2)},
+        },
+    }
+    return (topic, {"transforms": [fields]})
 
 
 def fix(latitude: float, longitude: float, altitude: float = 60.0, status: int = 0):

@@ -13,7 +13,7 @@ from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 WITHIN_S = 30.0
@@ -31,6 +31,9 @@ def fill(message: Any, fields: dict[str, Any]) -> Any:
         elif name == "status" and isinstance(value, list):
             part = message_type("diagnostic_msgs/DiagnosticStatus")
             message.status = [fill(part(), each) for each in value]
+        elif name == "transforms":
+            part = message_type("geometry_msgs/TransformStamped")
+            message.transforms = [fill(part(), each) for each in value]
         elif name == "level":
             message.level = bytes([value])
         else:
@@ -44,9 +47,12 @@ def main() -> None:
     publishers = {}
     for argument in sys.argv[1:]:
         kind, topic = argument.split("@")
+        qos = QoSProfile(depth=1000)
+        if topic.endswith("tf_static"):
+            qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
         publishers[topic] = (
             message_type(kind),
-            node.create_publisher(message_type(kind), topic, QoSProfile(depth=1000)),
+            node.create_publisher(message_type(kind), topic, qos),
         )
     said = node.create_publisher(String, "/said", QoSProfile(depth=10))
 

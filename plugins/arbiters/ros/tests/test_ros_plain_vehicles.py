@@ -39,6 +39,7 @@ ORIGIN = (38.1075, -77.3192, 60.0)
 JOURNAL = UUID("0f5d1c7e-35b1-4b67-9f0d-6b3a2f7b1c55")
 UGV1 = ResourceId("ugv1")
 AMPLE_S = 40.0
+NO_TRANSFORM = "is in 'rover1/odom'; no transform from 'map' to 'rover1/odom' was received on /tf"
 
 
 class Truth:
@@ -206,17 +207,25 @@ async def test_a_vehicle_that_appears_later_is_told_of_and_was_not_restarted(
 @pytest.mark.parametrize(
     ("settings", "frame", "says"),
     [
-        ({}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
+        (
+            {},
+            "rover1/odom",
+            "is in 'rover1/odom'; no transform from 'map' to 'rover1/odom' was",
+        ),
         *(
             pytest.param({"driver": "base", **more}, frame, says, marks=pytest.mark.long)
             for more, frame, says in (
-                ({}, "rover1/odom", "is in the frame 'rover1/odom', declared is 'map'"),
-                ({}, "", "is in the frame '', declared is 'map'"),
-                ({}, "ugv1/map", "is in the frame 'ugv1/map', declared is 'map'"),
+                (
+                    {},
+                    "rover1/odom",
+                    "is in 'rover1/odom'; no transform from 'map' to 'rover1/odom' was",
+                ),
+                ({}, "", "is in ''; a frame without a name cannot be looked up"),
+                ({}, "ugv1/map", "is in 'ugv1/map'; no transform from 'map' to 'ugv1/map'"),
                 (
                     {"odom_frame": "odom"},
                     "map",
-                    "declared is 'odom', and tf is not read: write 'odom_frame: map'",
+                    "declared is 'odom': write 'odom_frame: map'",
                 ),
             )
         ),

@@ -25,6 +25,16 @@ EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 TELEMETRY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 """For sensors. A reliable reader never matches a best-effort writer; this one matches both."""
 
+TRANSFORMS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""For /tf. A reliable reader never matches a best-effort writer; this one matches both."""
+
+STATIC_TRANSFORMS = QoSProfile(
+    depth=100,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""For /tf_static: a late subscriber gets the last message of each publisher."""
+
 SERVICES = QoSProfile(depth=2000, reliability=ReliabilityPolicy.RELIABLE)
 """For clients and servers. Of more simultaneous calls, DDS loses the oldest silently. Waiting calls
 are refused in turn, so that only a client's own flood comes this far."""

@@ -16,6 +16,8 @@ from m2pem.api import (
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.sensors.localization import FARTHEST_M
+from m2pem_plugin_ros.sensors.tf_buffer import TransformError
+from m2pem_plugin_ros.sensors.tf_topics import MAP, TfTopics
 from m2pem_plugin_ros.settings import DetectorMessage, DetectorSettings
 
 if TYPE_CHECKING:
@@ -30,7 +32,6 @@ LATE_S = 60.0
 
 _GEOGRAPHIC = 1
 _LOCAL = 2
-_MAP = "map"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,7 @@ class DetectorTopic:
         context: ArbiterContext,
         vehicle_position: Callable[[], GeoPosition | None],
         hear: Callable[[PayloadState], None],
+        tf: TfTopics,
     ) -> None:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # it needs rclpy
 
@@ -65,6 +67,7 @@ class DetectorTopic:
         self._context = context
         self._vehicle_position = vehicle_position
         self._on_message = hear
+        self._tf = tf
         self._log_throttle = LogThrottle(context.logger, resource)
         self._waiting: deque[_Found] = deque(maxlen=WAITING)
         if settings.message is DetectorMessage.STRING:
@@ -102,16 +105,32 @@ class DetectorTopic:
             cause = "an invalid position of a detection"
             self._log_throttle.log(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
         elif message.position_kind == _LOCAL:
-            place, frame = message.position_local, message.header.frame_id
-            if frame.removeprefix("/") != _MAP:
-                cause = "the position of a detection in a frame other than map"
-                self._log_throttle.log(cause, f"'{frame}'")
-            elif all(abs(number) <= FARTHEST_M for number in (place.x, place.y, place.z)):
-                return to_geodetic(place.x, place.y, place.z, self._context.origin)
-            else:
+            place = message.position_local
+            numbers = (place.x, place.y, place.z)
+            if not all(abs(number) <= FARTHEST_M for number in numbers):
                 cause = "an invalid position of a detection"
                 self._log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
+                return None
+            try:
+                east_m, north_m, up_m = self._in_map(message.header, numbers)
+            except TransformError as error:
+                cause = "the position of a detection in a frame of which the pose is not known"
+                self._log_throttle.log(cause, f"'{message.header.frame_id}': {error}")
+                return None
+            return to_geodetic(east_m, north_m, up_m, self._context.origin)
         return None
+
+    def _in_map(self, header: Any, place: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return a place of the header's frame in `map`.
+
+        Raises:
+            TransformError: tf does not tell where the frame is.
+        """
+        frame = header.frame_id.removeprefix("/")
+        if frame == MAP:
+            return place
+        stamp_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+        return self._tf.find(frame, stamp_ns or None).transform.apply(place)
 
     def _take(self, type_: str, time_us: int, position: GeoPosition | None) -> None:
         type_ = type_.strip() or self._settings.type

@@ -1,4 +1,4 @@
-"""The pose of a vehicle from its odometry and its satellite receiver, and whether it stands."""
+"""The pose of a vehicle from its odometry, its satellite receiver and tf, and whether it stands."""
 
 import math
 from dataclasses import replace
@@ -8,6 +8,8 @@ from m2pem.api import ArbiterContext, Clock, GeoPosition, ResourceId
 from m2pem_plugin_ros.frames import Origin, to_geodetic, to_local, yaw_of_quaternion
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.pose import Pose, Twist
+from m2pem_plugin_ros.sensors.tf_buffer import Transform, TransformError, transform_of
+from m2pem_plugin_ros.sensors.tf_topics import MAP, TfTopics
 from m2pem_plugin_ros.settings import OdomFrame, Settings
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 FASTEST_M_S = 1_000.0
 FASTEST_RAD_S = 1_000.0
 FIX_IS_OLD_S = 5.0
+BASE_LINK = "base_link"
+"""The frame of a vehicle (REP-105), if neither the fleet nor its odometry names another one."""
 
 _NO_FIX = -1
 _STATUS_NOT_SET = -2
@@ -47,10 +51,11 @@ class Localization(Protocol):
 
 
 class TopicLocalization:
-    """Implements `Localization` with nav_msgs/Odometry and sensor_msgs/NavSatFix.
+    """Implements `Localization` with nav_msgs/Odometry, sensor_msgs/NavSatFix and tf.
 
     It is subscribed until the runtime is closed. Invalid messages (NaN, a latitude of 91 degrees, a
-    repeated stamp) are dropped, and counted by their cause.
+    repeated stamp) are dropped, and counted by their cause. `tf` is shared with other vehicles; it
+    is read only if the pose comes from it, or odometry is in a frame other than the declared one.
     """
 
     def __init__(
@@ -59,29 +64,48 @@ class TopicLocalization:
         resource: ResourceId,
         settings: Settings,
         context: ArbiterContext,
+        tf: TfTopics | None = None,
     ) -> None:
         from nav_msgs.msg import Odometry  # noqa: PLC0415  # it is loaded where ROS is only
         from sensor_msgs.msg import NavSatFix  # noqa: PLC0415
 
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415
 
-        self.changes = 0
+        topics = settings.topics
         self.log_throttle = LogThrottle(context.logger, resource)
         self._clock = context.clock
         self._frame = settings.odom_frame
         self._where = PoseEstimator(settings.odom_frame, context.origin)
         self._resource = resource
-        self._odom = settings.topic(settings.topics.odom)
-        self.wrong_frame = ""
+        self._odom = settings.topic(topics.odom)
+        self._tf = tf or TfTopics(
+            ros, settings.topic(topics.tf), settings.topic(topics.tf_static), context
+        )
+        self._base_frame = settings.base_frame
+        self._changes = 0
+        self._wrong_frame = ""
         self._stamp = (0, 0)
         self._posed_us: int | None = None
         self._fixed_us: int | None = None
-        topics = settings.topics
-        ros.subscribe(Odometry, settings.topic(topics.odom), self._on_odometry, qos.TELEMETRY)
+        if self._frame is OdomFrame.TF:
+            self._tf.open()
+        ros.subscribe(Odometry, self._odom, self._on_odometry, qos.TELEMETRY)
         ros.subscribe(NavSatFix, settings.topic(topics.fix), self._on_fix, qos.TELEMETRY)
 
     @property
+    def changes(self) -> int:
+        """A counter that changes with each message."""
+        return self._changes + (self._tf.version if self._frame is OdomFrame.TF else 0)
+
+    @property
+    def wrong_frame(self) -> str:
+        """Why the pose cannot be known in the local frame of the fleet; "" if it can."""
+        self._look_up()
+        return self._wrong_frame
+
+    @property
     def pose(self) -> Pose | None:
+        self._look_up()
         return self._where.pose
 
     @property
@@ -91,10 +115,12 @@ class TopicLocalization:
     @property
     def position(self) -> GeoPosition | None:
         """WGS-84: from the pose, or from the last fix if there is no pose."""
+        self._look_up()
         return self._where.position
 
     @property
     def age_s(self) -> float:
+        self._look_up()
         if self._posed_us is None or self._where.pose is None:
             return math.inf
         return (self._clock.now_us() - self._posed_us) / 1e6
@@ -103,7 +129,9 @@ class TopicLocalization:
     def problems(self) -> tuple[str, ...]:
         """Data that is missing, as text."""
         problems = []
-        if self._posed_us is None and not self.wrong_frame:
+        if self._frame is OdomFrame.TF and self._where.twist is None:
+            problems.append(f"no odometry yet on {self._odom}, for the speed")
+        elif self._posed_us is None and not self._wrong_frame:
             problems.append(f"no odometry yet on {self._odom}")
         if self._frame is OdomFrame.ODOM:
             if self._fixed_us is None:
@@ -118,15 +146,10 @@ class TopicLocalization:
             detail = f"stamp {stamp[0]}.{stamp[1]:09}"
             self.log_throttle.log("odometry with a repeated stamp", detail)
             return
-        frame = message.header.frame_id
-        self.wrong_frame = self._strange(frame)
-        if self.wrong_frame:
-            self.log_throttle.log("odometry in another frame than the declared one", f"'{frame}'")
-            self.changes += 1
-            return
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
-        if not _within(FARTHEST_M, place.x, place.y, place.z):
+        is_pose = self._frame is not OdomFrame.TF
+        if is_pose and not _within(FARTHEST_M, place.x, place.y, place.z):
             cause = "odometry with an invalid position"
             self.log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
             return
@@ -135,36 +158,85 @@ class TopicLocalization:
             cause = "odometry with an invalid speed"
             self.log_throttle.log(cause, f"({linear.x:g}, {linear.y:g}) m/s, {angular.z:g} rad/s")
             return
+        twist = Twist(linear.x, angular.z, linear.y)
+        if not is_pose:
+            self._stamp = stamp
+            self._base_frame = self._base_frame or message.child_frame_id
+            self._where.twist = twist
+            self._changes += 1
+            return
         try:
-            yaw_rad = yaw_of_quaternion(turn)
+            in_frame = transform_of(place, turn)
         except ValueError as error:
             self.log_throttle.log("odometry with an invalid orientation", str(error))
             return
+        try:
+            pose = self._in_declared(message.header.frame_id, stamp, in_frame)
+        except TransformError as error:
+            self._wrong_frame = str(error)
+            cause = "odometry in a frame of which the pose is not known"
+            self.log_throttle.log(cause, f"'{message.header.frame_id}'")
+            self._changes += 1
+            return
+        self._wrong_frame = ""
         self._stamp = stamp
         self._posed_us = self._clock.now_us()
-        self.changes += 1
-        self._where.odometry(
-            Pose(place.x, place.y, yaw_rad, place.z), Twist(linear.x, angular.z, linear.y)
-        )
+        self._changes += 1
+        self._where.odometry(pose, twist)
 
-    def _strange(self, frame: str) -> str:
-        """Return why odometry in a frame cannot be used; "" if it can. Each of several robots may
-        have its own `odom` (`ugv1/odom`, REP-105); `map` is that of the fleet."""
+    def _in_declared(self, frame: str, stamp: tuple[int, int], in_frame: Transform) -> Pose:
+        """Return the pose of odometry in the declared frame. Each of several robots may have its
+        own `odom` (`ugv1/odom`, REP-105); `map` is that of the fleet.
+
+        Raises:
+            TransformError: it cannot be known there; the text says what would be right.
+        """
         name = frame.removeprefix("/")
-        declared = self._frame.value
-        if name == declared:
-            return ""
-        if self._frame is OdomFrame.ODOM and name.rpartition("/")[2] == declared:
-            return ""
-        right = f"publish odometry in '{declared}', the fleet's local frame"
-        if name.rpartition("/")[2] == OdomFrame.ODOM:
-            right += ", or write 'odom_frame: odom' in its connection, with satellite fixes"
-        elif self._frame is OdomFrame.ODOM and name == OdomFrame.MAP:
+        if name == self._frame.value:
+            return _pose(in_frame)
+        is_odom = name.rpartition("/")[2] == OdomFrame.ODOM
+        if self._frame is OdomFrame.ODOM:
+            if is_odom:
+                return _pose(in_frame)
             right = "write 'odom_frame: map' in its connection"
-        return (
-            f"odometry on {self._odom} is in the frame '{frame}', declared is '{declared}', and tf"
-            f" is not read: {right}"
-        )
+            raise TransformError(
+                f"odometry of {self._resource} on {self._odom} is in '{frame}', declared is"
+                f" 'odom': {right}"
+            )
+        try:
+            if not name:
+                raise TransformError("a frame without a name cannot be looked up on tf")
+            stamp_ns = stamp[0] * 1_000_000_000 + stamp[1] or None
+            pose = _pose(self._tf.find(name, stamp_ns).transform.of(in_frame))
+        except TransformError as error:
+            right = f"publish odometry in '{MAP}', or that transform"
+            if is_odom:
+                right += ", or write 'odom_frame: odom' in its connection, with satellite fixes"
+            raise TransformError(
+                f"odometry of {self._resource} on {self._odom} is in '{frame}'; {error}: {right}"
+            ) from None
+        if not _within(FARTHEST_M, pose.east_m, pose.north_m, pose.up_m):
+            raise TransformError(
+                f"odometry of {self._resource} on {self._odom} is in '{frame}', and farther than"
+                f" {FARTHEST_M / 1000:g} km from '{MAP}'"
+            )
+        return pose
+
+    def _look_up(self) -> None:
+        """Take the pose from tf, if it is declared to come from there, and has changed."""
+        if self._frame is not OdomFrame.TF:
+            return
+        frame = self._base_frame or BASE_LINK
+        try:
+            found = self._tf.find(frame)
+        except TransformError as error:
+            self._wrong_frame = f"{self._resource}: its pose is not known: {error}"
+            return
+        self._wrong_frame = ""
+        pose = _pose(found.transform)
+        self._posed_us = self._clock.now_us() - round(found.age_s * 1e6)
+        if _within(FARTHEST_M, pose.east_m, pose.north_m, pose.up_m):
+            self._where.pose_in_map(pose)
 
     def _on_fix(self, message: Any) -> None:
         status = message.status.status
@@ -177,8 +249,13 @@ class TopicLocalization:
             return
         altitude = message.altitude if _within(FARTHEST_M, message.altitude) else math.nan
         self._fixed_us = self._clock.now_us()
-        self.changes += 1
+        self._changes += 1
         self._where.fix(GeoPosition(latitude, longitude, altitude))
+
+
+def _pose(transform: Transform) -> Pose:
+    east_m, north_m, up_m = transform.place
+    return Pose(east_m, north_m, yaw_of_quaternion(transform.turn), up_m)
 
 
 def _within(bound: float, *numbers: float) -> bool:
@@ -193,9 +270,9 @@ FARTHEST_M = 1_000_000.0
 class PoseEstimator:
     """Combines odometry and satellite fixes.
 
-    Odometry in the frame `map` is the pose. In the frame `odom` it begins anywhere: each fix gives
-    the position, and odometry the motion since then. Yaw is from east in both (REP-103), as robots
-    with a compass report it.
+    Odometry in the frame `map` is the pose, as that of tf is. In the frame `odom` it begins
+    anywhere: each fix gives the position, and odometry the motion since then. Yaw is from east in
+    both (REP-103), as robots with a compass report it.
     """
 
     def __init__(self, frame: OdomFrame, origin: Origin) -> None:
@@ -212,6 +289,10 @@ class PoseEstimator:
         if self._frame is OdomFrame.ODOM and self._anchor is None and self._fix is not None:
             self._drop_anchor(pose, self._fix)
 
+    def pose_in_map(self, pose: Pose) -> None:
+        """Process a pose from tf."""
+        self._odometry = pose
+
     def fix(self, position: GeoPosition) -> None:
         """Process a satellite fix. Its altitude may be NaN."""
         self._fix = position
@@ -223,7 +304,7 @@ class PoseEstimator:
         """The pose in the local frame; None if odometry is missing, or in the frame `odom` a
         fix."""
         pose = self._odometry
-        if pose is None or self._frame is OdomFrame.MAP:
+        if pose is None or self._frame is not OdomFrame.ODOM:
             return pose
         if self._anchor is None:
             return None

@@ -16,9 +16,11 @@ from m2pem_plugin_ros.frames import quaternion_of_yaw, to_geodetic
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import qos
+from m2pem_plugin_ros.settings import OdomFrame
 from m2pem_plugin_ros.simulator.faults import TrafficFaults
 from m2pem_plugin_ros.simulator.sensors import Detector, Found, Reading
 from m2pem_plugin_ros.simulator.traffic import FilteredRuntime
+from m2pem_plugin_ros.simulator.transforms import Transforms
 from m2pem_plugin_ros.simulator.vehicle import Vehicle
 
 ODOMETRY_HZ, FIX_HZ, BATTERY_HZ, DIAGNOSTICS_HZ = 20.0, 5.0, 1.0, 1.0
@@ -61,6 +63,14 @@ class BaseTopics:
         self._published_motions = -1
         frame = settings.namespace.strip("/")
         self._base_frame = f"{frame}/base_link" if frame else "base_link"
+        self._odom_frame = str(settings.odom_frame)
+        self._transforms: Transforms | None = None
+        if settings.odom_frame is OdomFrame.TF:
+            self._odom_frame = f"{frame}/odom" if frame else "odom"
+            self._base_frame = settings.base_frame or self._base_frame
+            self._transforms = Transforms(
+                ros.node, settings, self._odom_frame, self._base_frame, vehicle.spec.start
+            )
         self._odometry_message = self._make_odometry()
 
     def publish(self) -> None:
@@ -82,7 +92,7 @@ class BaseTopics:
 
     def _make_odometry(self) -> Any:
         message = Odometry(child_frame_id=self._base_frame)
-        message.header.frame_id = self._vehicle.spec.settings.odom_frame
+        message.header.frame_id = self._odom_frame
         for index in (0, 7):
             message.pose.covariance[index] = message.twist.covariance[index] = POSITION_M2
         message.pose.covariance[35] = message.twist.covariance[35] = YAW_RAD2
@@ -92,7 +102,10 @@ class BaseTopics:
         if self._traffic_faults.no_odometry:
             return
         reading = self._vehicle.odometer.read(self._clock.now_us())
-        self._odometry.publish(_odometry(self._odometry_message, reading))
+        message = _odometry(self._odometry_message, reading)
+        self._odometry.publish(message)
+        if self._transforms is not None:
+            self._transforms.publish(message)
 
     def _publish_fix(self) -> None:
         lost, place = self._vehicle.gps_lost, self._vehicle.position
