@@ -97,7 +97,7 @@ async def test_what_the_camera_itself_refuses_fails_with_its_reason(
         assert (await it.bench.ended("r1.b2", AMPLE_S)).state.terminal, "it goes on to serve"
 
 
-async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(
+async def test_a_payload_that_is_not_there_is_lost_and_is_not_commanded(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("m2pem_plugin_ros.arbiter.FIRST_CONTACT_WITHIN_S", 0.5)
@@ -112,7 +112,8 @@ async def test_a_payload_that_nobody_has_heard_is_lost_and_says_nothing(
         assert await bench.until(is_lost, AMPLE_S)
         await bench.start("r1.b1", "zoom", CAMERA, level=2.0)
         report = await bench.ended("r1.b1", AMPLE_S)
-        assert report.state is BehaviorState.LOST
+        assert report.state is BehaviorState.REJECTED
+        assert "no message ever" in report.reason
 
 
 def test_a_mission_gets_the_pictures_that_a_payload_with_a_node_took(

@@ -42,6 +42,14 @@ FIRST_CONTACT_WITHIN_S = 5.0
 """`connect` waits no longer than this for vehicles, in real time. DDS needs some of it for
 discovery."""
 
+NAMED_WITHIN_S = 2.5
+"""It waits no longer than this for vehicles that are not there, or cannot be commanded."""
+
+SEARCH_AFTER_S = 1.0
+"""Vehicles that are not there by then are searched in other ROS domains."""
+
+LOOK_EVERY_S = 0.1
+
 ATTEND_EVERY_S = 0.2
 PAYLOADS_EVERY = 5
 """The state of payloads is published in every fifth round of `_attend`."""
@@ -146,7 +154,8 @@ class RosArbiter:
     # --- life -----------------------------------------------------------------------------------
 
     async def connect(self) -> None:
-        """Subscribe to all vehicles. Return when each was received once, or after
+        """Subscribe to all vehicles. Return when each was received once and can be commanded. For
+        those that are not there or cannot, wait for `NAMED_WITHIN_S`, for silent ones for
         `FIRST_CONTACT_WITHIN_S`.
 
         Raises:
@@ -276,21 +285,42 @@ class RosArbiter:
     # --- inside ---------------------------------------------------------------------------------
 
     async def _until_first_contact(self) -> None:
+        loop = asyncio.get_running_loop()
+        began_s = loop.time()
+        await self._until_received(min(SEARCH_AFTER_S, FIRST_CONTACT_WITHIN_S))
+        absent = [
+            resource
+            for resource, vehicle in self._vehicles.items()
+            if not vehicle.first_contact.is_set() and not vehicle.is_listed
+        ]
+        left_s = min(NAMED_WITHIN_S, FIRST_CONTACT_WITHIN_S) - (loop.time() - began_s)
+        if absent and left_s > 0 and self._vehicle_connections is not None:
+            await self._vehicle_connections.search(absent, left_s)
+        while True:
+            passed_s = loop.time() - began_s
+            wrong = [vehicle for vehicle in self._vehicles.values() if vehicle.problem]
+            silent = [v for v in self._vehicles.values() if not v.first_contact.is_set()]
+            if not (wrong or silent) or passed_s >= FIRST_CONTACT_WITHIN_S:
+                break
+            if passed_s >= NAMED_WITHIN_S and all(vehicle in wrong for vehicle in silent):
+                break
+            await asyncio.sleep(LOOK_EVERY_S)
+        for resource, vehicle in self._vehicles.items():
+            if not vehicle.first_contact.is_set():
+                self._context.logger.warning(
+                    "%s: no message from the vehicle yet: %s", resource, vehicle.absence
+                )
+
+    async def _until_received(self, within_s: float) -> None:
         waits = [asyncio.ensure_future(v.first_contact.wait()) for v in self._vehicles.values()]
         if not waits:
             return
         try:
-            await asyncio.wait(waits, timeout=FIRST_CONTACT_WITHIN_S)
+            await asyncio.wait(waits, timeout=within_s)
         finally:
             for wait in waits:
                 wait.cancel()
             await asyncio.gather(*waits, return_exceptions=True)
-        for resource, vehicle in self._vehicles.items():
-            if not vehicle.first_contact.is_set():
-                where = vehicle.absence
-                self._context.logger.warning(
-                    "%s: no message from the vehicle yet: %s", resource, where
-                )
 
     async def _disconnect(self) -> None:
         attending, self._attending = self._attending, None

@@ -4,7 +4,7 @@ vehicle."""
 import asyncio
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -20,6 +20,7 @@ from m2pem_plugin_ros import loopback
 from m2pem_plugin_ros.interfaces import set_stamp
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.sensors.detectors import DetectorTopic
+from m2pem_plugin_ros.sensors.domain_search import search_domains
 from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.sensors.health import Battery, Diagnostics
 from m2pem_plugin_ros.sensors.localization import Localization, TopicLocalization
@@ -56,7 +57,13 @@ class VehicleSensors(Protocol):
 
     @property
     def absence(self) -> str:
-        """The expected topic of the vehicle and its publishers, as text."""
+        """The expected topic of the vehicle, its publishers, and what is there instead, as
+        text."""
+        ...
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether DDS lists a publisher of the expected topic of the vehicle."""
         ...
 
     @property
@@ -91,6 +98,10 @@ class VehicleConnections(Protocol):
         Raises:
             RosError: ROS cannot be used; the text gives the remedy.
         """
+        ...
+
+    async def search(self, absent: Collection[ResourceId], within_s: float) -> None:
+        """Search other ROS domains for absent vehicles. `absence` of those says what was found."""
         ...
 
     def retry(self) -> None:
@@ -150,6 +161,10 @@ class TopicSensors:
         return self._endpoints.absence
 
     @property
+    def is_listed(self) -> bool:
+        return self._endpoints.is_listed
+
+    @property
     def problems(self) -> tuple[str, ...]:
         return self.localization.problems
 
@@ -168,6 +183,7 @@ class DdsConnections:
         self._diagnostics: dict[tuple[int, str], Diagnostics] = {}
         self._tf: dict[tuple[int, str, str], TfTopics] = {}
         self._localizations: dict[ResourceId, TopicLocalization] = {}
+        self._endpoints: dict[ResourceId, Endpoints] = {}
         self._detectors: list[DetectorTopic] = []
 
     async def open(self) -> Mapping[ResourceId, VehicleConnection]:
@@ -193,6 +209,11 @@ class DdsConnections:
             raise
         return vehicles
 
+    async def search(self, absent: Collection[ResourceId], within_s: float) -> None:
+        domains = {0, *self._runtimes, _domain(None)}
+        endpoints = [self._endpoints[resource] for resource in absent]
+        await search_domains(endpoints, domains, self._runtimes, within_s)
+
     def retry(self) -> None:
         for detector in self._detectors:
             detector.retry()
@@ -209,10 +230,9 @@ class DdsConnections:
             payload_status = PayloadStatusTopic(
                 ros, resource, settings, LogThrottle(context.logger, resource)
             )
-            domain = _domain(settings.domain_id)
-            sensors = PayloadSensors(
-                payload_status, Endpoints(ros, settings, domain, is_payload=True)
-            )
+            endpoints = Endpoints(ros, settings, _domain(settings.domain_id), is_payload=True)
+            self._endpoints[resource] = endpoints
+            sensors = PayloadSensors(payload_status, endpoints)
             return VehicleConnection(
                 ros, sensors, TargetPublisher(ros, settings).show, payload_status
             )
@@ -223,12 +243,14 @@ class DdsConnections:
         key = (_domain(settings.domain_id), topic)
         if key not in self._diagnostics:
             self._diagnostics[key] = Diagnostics(ros, topic, context.clock)
+        endpoints = Endpoints(ros, settings, _domain(settings.domain_id))
+        self._endpoints[resource] = endpoints
         topics = TopicSensors(
             localization,
             Battery(ros, resource, settings, context),
             self._diagnostics[key],
             settings.hardware_id,
-            Endpoints(ros, settings, _domain(settings.domain_id)),
+            endpoints,
         )
         # Other drivers read targets from the fleet's bus.
         is_node = settings.driver is DriverName.NODE

@@ -204,15 +204,30 @@ class Vehicle:
 
     @property
     def absence(self) -> str:
-        """The expected topic of the vehicle and its publishers, as text."""
+        """The expected topic of the vehicle, its publishers, and what is there instead, as
+        text."""
         return self._ros_connection.sensors.absence
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether DDS lists a publisher of the expected topic of the vehicle."""
+        return self._ros_connection.sensors.is_listed
+
+    @property
+    def problem(self) -> str:
+        """Why it must not be commanded, of what its topics show; "" if it may. A vehicle that was
+        never received, and that DDS does not list, is not there."""
+        if wrong := self._ros_connection.sensors.refusal:
+            return wrong
+        is_there = self._contacts or self.is_listed
+        return "" if is_there else f"no message ever: {self.absence}"
 
     def refusal(self, request: BehaviorRequest) -> str:
         """Return why a request cannot be done now; "" if it can."""
         if self._broken:
             return self._broken
         try:
-            if wrong := self._ros_connection.sensors.refusal:
+            if wrong := self.problem:
                 return wrong
             return self.driver.refusal(request) or self._breach(request)
         except Exception as error:
@@ -372,7 +387,8 @@ class Vehicle:
             holder,
             self._refusal,
         )
-        still_lost = self.link is LinkState.LOST and self._reported[2:3] == (self.link,)
+        unchanged = (self.link, self._refusal)
+        still_lost = self.link is LinkState.LOST and self._reported[2::2] == unchanged
         if still_lost or news == self._reported:
             return None
         self._reported = news
@@ -394,11 +410,11 @@ class Vehicle:
         if now_s - self._checked_s < OTHERS_EVERY_S:
             return
         self._checked_s = now_s
-        wrong = self._ros_connection.sensors.refusal
-        if wrong and wrong != self._refusal:
-            self._context.logger.error("%s: not commanded any longer: %s", self.resource, wrong)
+        wrong = self.problem
+        if wrong and wrong != self._refusal and self._contacts:
+            self._context.logger.error("%s: it is not commanded: %s", self.resource, wrong)
         elif self._refusal and not wrong:
-            self._context.logger.warning("%s: can be commanded again", self.resource)
+            self._context.logger.warning("%s: it can be commanded now", self.resource)
         self._refusal = wrong
 
     def _report_left(self, behavior: BehaviorId, least_m: float | None = None) -> None:

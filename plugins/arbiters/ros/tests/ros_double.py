@@ -6,7 +6,7 @@ kept in `calls`.
 
 import asyncio
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from uuid import UUID
 
@@ -207,6 +207,7 @@ class DoubleSenses:
         self.age_s = 0.0
         self.problems = ()
         self.refusal = self.absence = ""
+        self.is_listed = True
 
     @property
     def pose(self) -> Pose:
@@ -249,6 +250,9 @@ class DoubleStation:
             resource: VehicleConnection(None, DoubleSenses(body), body.shown.append)
             for resource, body in self.bodies.items()
         }
+
+    async def search(self, absent: Collection[ResourceId], within_s: float) -> None:
+        pass
 
     def retry(self) -> None:
         pass

@@ -2,12 +2,12 @@
 
     ros_plain_peer.py NAMESPACE node|base|nav2 FRAME [TYPE]
 
-`node` keeps to docs/ros-nodes.md; `base` takes `cmd_vel`, and goes on with
-the last command that it got; `nav2` drives as long as it has a goal of `navigate_to_pose`. FRAME:
-of its odometry; TYPE: of `cmd_vel`, Twist or TwistStamped, or `pose`, which publishes odometry as a
-PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and "" lets it speak again: it drives on
-meanwhile. On /truth it says what it does, whatever its link: name, speed, behaviors begun, and the
-epochs of the CANCELs that it has heard.
+`node` keeps to docs/ros-nodes.md; `base` takes `cmd_vel`, and goes on with the last command that it
+got; `nav2` drives as long as it has a goal of `navigate_to_pose`. FRAME: of its odometry; TYPE: of
+`cmd_vel`, Twist or TwistStamped, `latched`, which subscribes to a latched Twist only, or `pose`,
+which publishes odometry as a PoseStamped. On /link, NAMESPACE makes it deaf and dumb, and "" lets
+it speak again: it drives on meanwhile. On /truth it says what it does, whatever its link: name,
+speed, behaviors begun, and the epochs of the CANCELs that it has heard.
 """
 
 import contextlib
@@ -29,6 +29,7 @@ from std_msgs.msg import String
 
 PERIOD_S = 0.05
 SPEED_M_S = 1.0
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Plain:
@@ -53,15 +54,14 @@ class Plain:
                 TwistStamped if stamped else Twist,
                 "cmd_vel",
                 lambda message: self.hear_velocity(message.twist if stamped else message),
-                10,
+                LATCHED if type_ == "latched" else 10,
             )
         elif kind == "nav2":
             self.serve_goals()
         else:
             latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self.says = node.create_publisher(BehaviorStatus, "behavior_status", latched)
-            latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-            self.status = node.create_publisher(VehicleStatus, "vehicle_status", latched)
+            self.status = node.create_publisher(VehicleStatus, "vehicle_status", LATCHED)
             node.create_subscription(BehaviorCommand, "command", self.hear_command, 10)
         node.create_timer(PERIOD_S, self.step)
 

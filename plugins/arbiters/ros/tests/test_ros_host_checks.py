@@ -28,10 +28,13 @@ def test_ros_and_the_interfaces_of_the_fleet_are_found(
     ros_fleet: Fleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "17")
-    ros, domain = check_host(ros_fleet)
+    ros, domain, *vehicles = check_host(ros_fleet)
     assert (ros.name, ros.status) == ("ros", HealthStatus.OK)
     assert "wheels in " in ros.message or "sourced from " in ros.message
     assert domain.message == "17, by ROS_DOMAIN_ID"
+    assert {vehicle.name for vehicle in vehicles} == {
+        f"ros {vehicle.id}" for vehicle in ros_fleet.vehicles.values() if vehicle.arbiter == "ros"
+    }
 
 
 def test_wheels_and_a_sourced_ros_are_an_error(

@@ -19,6 +19,9 @@ BEHAVIOR_STATUS = QoSProfile(
 COMMANDS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Volatile: a late subscriber must not execute an old command."""
 
+VELOCITIES = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+"""For cmd_vel: only the latest command counts."""
+
 EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """Reliable, with a long queue: no event may be lost."""
 

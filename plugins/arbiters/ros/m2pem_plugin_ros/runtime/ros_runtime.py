@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from typing import Any, Generic, Self, TypeVar
 from uuid import UUID
+from weakref import WeakSet
 
 import rclpy
 from rclpy.action import ActionClient, ActionServer
@@ -28,6 +29,14 @@ JOIN_S = 5.0
 WAITING = 1000
 
 logger = logging.getLogger(__name__)
+
+
+_live: "WeakSet[RosRuntime]" = WeakSet()
+
+
+def own_nodes() -> frozenset[str]:
+    """Return the full names of the nodes of this process."""
+    return frozenset(name for runtime in _live for name in runtime.node_names)
 
 
 class RosRuntime:
@@ -74,6 +83,12 @@ class RosRuntime:
             self._let_go()
             raise
         self._thread.start()
+        _live.add(self)
+
+    @property
+    def node_names(self) -> Sequence[str]:
+        """The full names of its nodes."""
+        return [node.get_fully_qualified_name() for node in self._nodes]
 
     async def __aenter__(self) -> Self:
         return self

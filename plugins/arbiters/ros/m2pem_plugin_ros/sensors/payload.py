@@ -112,6 +112,10 @@ class PayloadSensors:
         return self._endpoints.absence
 
     @property
+    def is_listed(self) -> bool:
+        return self._endpoints.is_listed
+
+    @property
     def localization(self) -> Localization:
         return self
 

@@ -6,14 +6,10 @@ from typing import Any
 
 import geometry_msgs.msg
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from m2pem_plugin_ros.pose import Twist
 from m2pem_plugin_ros.runtime import RosRuntime, qos
 from m2pem_plugin_ros.settings import Settings
-
-LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
-"""Only the latest command counts."""
 
 ARRIVED_WITHIN_S = 0.5
 
@@ -27,7 +23,7 @@ class CommandTopic:
         self._node = ros.node
         self._stamped = settings.stamped
         name = settings.topic(settings.topics.cmd_vel)
-        self._publisher = self._node.create_publisher(_message_type(settings), name, LATEST)
+        self._publisher = self._node.create_publisher(_message_type(settings), name, qos.VELOCITIES)
 
     @property
     def name(self) -> str:
