@@ -14,6 +14,7 @@ import click
 
 import m2pem
 from m2pem.cli.notes import say
+from m2pem.cli.ros_arguments import ros_arguments
 from m2pem.errors import M2pemError
 from m2pem.findings import escaped
 from m2pem.suggestions import did_you_mean
@@ -206,7 +207,8 @@ def run_command_line(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        result = cli.main(words, prog_name="m2pem", standalone_mode=False)
+        with ros_arguments(words) as rest:
+            result = cli.main(rest, prog_name="m2pem", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:
         error.show()

@@ -6,12 +6,11 @@ from typing import Any
 
 import click
 
-from m2pem.api import ArbiterContext, Connection, EpochFence, GeoPosition, ResourceId, SystemClock
+from m2pem.api import Connection, EpochFence, GeoPosition, ResourceId
 from m2pem.api.command_options import PositionOption
-from m2pem.api.foreground import interrupted
 from m2pem.errors import PluginError
 from m2pem_plugin_ros.loopback import keep_on_loopback
-from m2pem_plugin_ros.settings import DriverName, Settings, read_settings
+from m2pem_plugin_ros.settings import DriverName, read_settings
 
 _FLAGS = {"true": True, "false": False}
 
@@ -70,6 +69,12 @@ class Setting(click.ParamType):  # type: ignore[type-arg]  # older clicks have i
     help="Keep in this file which executive has driven each run, so that an earlier one is refused "
     "after a restart of the node, too.",
 )
+@click.option(
+    "--autostart/--no-autostart",
+    default=True,
+    show_default=True,
+    help="Configure and activate the managed node at once, or leave that to ROS.",
+)
 @click.option("--loopback", is_flag=True, help="Keep DDS on 127.0.0.1.")
 def onboard(
     vehicle: str,
@@ -80,9 +85,12 @@ def onboard(
     domain_id: int | None,
     words: tuple[tuple[tuple[str, ...], str | bool], ...],
     epochs: Path | None,
+    autostart: bool,
     loopback: bool,
 ) -> None:
     """Run the m2pem node of a vehicle on board until Ctrl-C, which stops the vehicle.
+
+    It is a managed node of ROS. What follows --ros-args is for ROS: -r, -p, --params-file.
 
     Example: m2pem ros onboard --vehicle evsg1 --origin 38.1075,-77.3192,60
     """
@@ -100,8 +108,11 @@ def onboard(
         raise click.UsageError("this is the m2pem node; its driver must be base or nav2")
     if loopback:
         keep_on_loopback()
+    from m2pem_plugin_ros.onboard.program import OnboardSetup, serve  # noqa: PLC0415  # rclpy
+
     at = (origin.latitude_deg, origin.longitude_deg, origin.altitude_m)
-    asyncio.run(_serve(connection, settings, at, EpochFence(epochs)))
+    setup = OnboardSetup(connection, settings, at, EpochFence(epochs), autostart)
+    asyncio.run(serve(setup, click.echo))
 
 
 def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> None:
@@ -109,41 +120,3 @@ def _put(given: dict[str, Any], path: tuple[str, ...], value: str | bool) -> Non
     if not isinstance(inner, dict):
         raise click.UsageError(f"--set {'.'.join(path)}: '{path[0]}' has a value of its own")
     inner[path[-1]] = value
-
-
-async def _serve(
-    connection: Connection,
-    settings: Settings,
-    origin: tuple[float, float, float],
-    epochs: EpochFence,
-) -> None:
-    from m2pem_plugin_ros.drivers.driver import (  # noqa: PLC0415
-        Driver,
-        DriverEvents,
-        DriverSetup,
-        make_driver,  # they need rclpy
-    )
-    from m2pem_plugin_ros.onboard.node import LOGGER, OnboardNode  # noqa: PLC0415
-    from m2pem_plugin_ros.onboard.target_bus import TargetBus  # noqa: PLC0415
-    from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415
-    from m2pem_plugin_ros.sensors.localization import TopicLocalization  # noqa: PLC0415
-
-    ended = interrupted()
-    clock, targets = SystemClock(), TargetBus()
-    context = ArbiterContext(clock, targets, LOGGER, origin)
-    name = connection.resource
-    async with RosRuntime(f"m2pem_{name}", domain_id=settings.domain_id) as ros:
-        localization = TopicLocalization(ros, name, settings, context)
-
-        def make(events: DriverEvents) -> Driver:
-            return make_driver(
-                DriverSetup(connection, settings, context, ros, localization, events)
-            )
-
-        namespace = settings.namespace
-        node = OnboardNode(ros, name, namespace, make, clock=clock, bus=targets, epochs=epochs)
-        await node.open()
-        click.echo(f"{name}: {namespace or '/'}, an m2pem node that drives by {settings.driver}")
-        click.echo("ready")
-        await ended.wait()
-        await node.close()

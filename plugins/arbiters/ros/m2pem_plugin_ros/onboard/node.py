@@ -55,6 +55,7 @@ SILENT_LEAST_S = 2.0
 """The same in real time, as a busy computer may be silent for longer on a fast clock."""
 
 ENDED = "the node on the vehicle was stopped"
+DEACTIVATED = "the node on the vehicle was deactivated"
 STOP_WITHIN_S = 5.0
 SENT_WITHIN_S = 1.0
 
@@ -68,6 +69,8 @@ class OnboardNode:
     of this node. `bus` receives the states on `target`; it must be the bus of the driver's context.
     `catalogue`: the behaviors of the driver. `payload_state` returns the state of the payload.
     `epochs`: those of the runs; with a file, past executives are refused after a restart, too.
+    `node`: serves on this node, which stays at the end; else on one of its own. `inactive`: why it
+    obeys no START; "" if it does. `standstill` returns why the clock stands, "" if it does not.
     """
 
     def __init__(
@@ -83,6 +86,9 @@ class OnboardNode:
         payload_state: Callable[[], PayloadState | None] | None = None,
         epochs: EpochFence | None = None,
         logger: logging.Logger = LOGGER,
+        node: Any = None,
+        inactive: str = "",
+        standstill: Callable[[], str] = str,
     ) -> None:
         self._ros = ros
         self._name = vehicle
@@ -95,14 +101,17 @@ class OnboardNode:
         self._journal = BehaviorJournal(self._publish_status, epochs)
         self._publisher = StatusPublisher(clock, self._about_vehicle, payload_state)
         self._held = False
-        self._ending = False
+        self._inactive = inactive
+        self._end_reason = ""
+        self._standstill = standstill
         self._contact_us: int | None = None
         self._contact_s = 0.0
         self._request: BehaviorRequest | None = None
         self._ids: dict[UUID, str] = {}
         self._ended_event = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
-        self._node: Any = None
+        self._node: Any = node
+        self._owns_node = node is None
         self._goals: BehaviorActionServer | None = None
         self._driver = make_driver(_Events(self))
 
@@ -116,12 +125,14 @@ class OnboardNode:
         """
         require_interfaces("m2pem_interfaces")
         await self._driver.open()
-        node = self._node = self._ros.make_node(
-            "m2pem_onboard",
-            self._namespace,
-            start_parameter_services=False,
-            enable_rosout=False,
-        )
+        if self._owns_node:
+            self._node = self._ros.make_node(
+                "m2pem_onboard",
+                self._namespace,
+                start_parameter_services=False,
+                enable_rosout=False,
+            )
+        node = self._node
         self._publisher.open(node)
         self._goals = BehaviorActionServer(self._ros, node, self)
         subscribe = self._ros.subscribe
@@ -135,7 +146,7 @@ class OnboardNode:
 
     async def close(self) -> None:
         """Stop the vehicle, publish the end of its behavior, and close."""
-        self._ending = True
+        self._inactive = self._end_reason = ENDED
         try:
             if id_ := self._journal.current:
                 self._ended_event.clear()
@@ -160,8 +171,32 @@ class OnboardNode:
             await self._driver.close()
         finally:
             node, self._node = self._node, None
-            if node is not None:
+            if node is not None and self._owns_node:
                 self._ros.drop_node(node)
+
+    # --- whether it obeys -----------------------------------------------------------------------
+
+    @property
+    def busy(self) -> bool:
+        """Whether the vehicle has a behavior, or is still stopping."""
+        return bool(self._journal.current)
+
+    def activate(self) -> None:
+        """Obey commands from now on."""
+        self._inactive = ""
+        self._publisher.vehicle()
+
+    def deactivate(self, reason: str) -> None:
+        """Obey no START from now on, for that reason, and stop the vehicle."""
+        self._inactive = reason
+        self.stop(DEACTIVATED)
+        self._publisher.vehicle()
+
+    def stop(self, reason: str) -> None:
+        """Stop the vehicle; its behavior ends as CANCELLED with that reason."""
+        if id_ := self._journal.current:
+            self._end_reason = reason
+            self._driver.end(_goal(id_))
 
     # --- commands -------------------------------------------------------------------------------
 
@@ -236,8 +271,8 @@ class OnboardNode:
             self._journal.repeat(id_)
 
     def _refusal(self, request: BehaviorRequest) -> str:
-        if self._ending:
-            return ENDED
+        if reason := self._inactive or self._standstill():
+            return reason
         catalogue, parameters = self._catalogue, request.parameters
         if reason := mismatch(catalogue, self._name, request.behavior, parameters):
             return reason
@@ -251,6 +286,7 @@ class OnboardNode:
         self._ids = {order.goal: request.id}
         self._request = request
         self._held = False
+        self._end_reason = ""
         self._journal.accept(request.id)
         try:
             self._driver.begin(order)
@@ -303,7 +339,7 @@ class OnboardNode:
 
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         if goal in self._ids:
-            reason = outcome.reason or (ENDED if self._ending else "")
+            reason = outcome.reason or self._end_reason
             self._journal.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
 
     def superseded(self, run: str, newest: int) -> None:
@@ -321,8 +357,9 @@ class OnboardNode:
 
     def _about_vehicle(self) -> VehicleStatus:
         health, silence = self._driver.health, self._lost_reason()
-        if silence:
-            reasons = (*health.not_ready_reasons, silence)
+        why_not = [each for each in (self._inactive, self._standstill(), silence) if each]
+        if why_not:
+            reasons = (*health.not_ready_reasons, *why_not)
             health = replace(health, ready=False, not_ready_reasons=reasons)
         return VehicleStatus(self._name, self._journal.current, self._held, health)
 
@@ -353,13 +390,14 @@ class OnboardNode:
             self._bus.publish(target)
 
     async def _within(self, happens: Any, seconds: float) -> None:
-        """Wait for an awaitable, or for so many seconds of the clock."""
-        waited = asyncio.ensure_future(happens)
-        late = asyncio.ensure_future(self._clock.sleep(seconds))
-        await asyncio.wait([waited, late], return_when=asyncio.FIRST_COMPLETED)
-        for task in (waited, late):
+        """Wait for an awaitable, or for so many seconds of the clock, which may stand, or real
+        ones."""
+        waits = (happens, self._clock.sleep(seconds), asyncio.sleep(seconds))
+        tasks = [asyncio.ensure_future(each) for each in waits]
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in tasks:
             task.cancel()
-        await asyncio.gather(waited, late, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
 
 
 class _Events:

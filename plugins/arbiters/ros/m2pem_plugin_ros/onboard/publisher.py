@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from m2pem_interfaces import msg as interfaces
@@ -98,13 +99,15 @@ class StatusPublisher:
         publisher.publish(message)
 
     async def keep_publishing(self) -> None:
-        """Publish the status of the vehicle or payload periodically."""
+        """Publish the status of the vehicle or payload periodically, also while the clock
+        stands."""
         while True:
             self.vehicle()
             self.payload()
-            async with asyncio.TaskGroup() as both:
-                both.create_task(self._clock.sleep(STATUS_EVERY_S))
-                both.create_task(asyncio.sleep(FASTEST_S))
+            await asyncio.sleep(FASTEST_S)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(STATUS_EVERY_S):
+                    await self._clock.sleep(STATUS_EVERY_S)
 
     async def wait_until_received(self, within_s: float) -> None:
         """Wait until all subscribers have the statuses, or for so many real seconds."""

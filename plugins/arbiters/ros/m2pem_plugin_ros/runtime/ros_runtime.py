@@ -5,7 +5,7 @@ import logging
 import os
 import threading
 from collections import deque
-from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Sequence
 from typing import Any, Generic, Self, TypeVar
 from uuid import UUID
 from weakref import WeakSet
@@ -23,10 +23,14 @@ from unique_identifier_msgs import msg as unique_identifier
 
 from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.runtime import qos as qualities
+from m2pem_plugin_ros.runtime.arguments import process_arguments, refused
 from m2pem_plugin_ros.runtime.calls import Calls, Responses
 
 JOIN_S = 5.0
 WAITING = 1000
+
+SILENT = ("--ros-args", "--disable-stdout-logs", "--")
+"""The console belongs to m2pem; what is logged with ROS is on /rosout."""
 
 logger = logging.getLogger(__name__)
 
@@ -46,7 +50,9 @@ class RosRuntime:
     publishing and creating entities is done from it directly. `async with` closes it.
 
     `domain_id` None takes ROS_DOMAIN_ID. `arguments` are those of ROS, such as `["--ros-args",
-    "--remap", "a:=b"]`.
+    "--remap", "a:=b"]`; those of the process (runtime/arguments.py) come before them. `kind` is the
+    class of the first node, and `options` are its keywords. `console`: what is logged with ROS is
+    printed at standard error, too.
 
     Raises:
         RosError: ROS cannot be started like that, for example with DDS security and no keys.
@@ -59,6 +65,9 @@ class RosRuntime:
         namespace: str = "",
         domain_id: int | None = None,
         arguments: Sequence[str] = (),
+        kind: Callable[..., Node] = Node,
+        console: bool = False,
+        **options: Any,
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._calls = Calls(self._loop)
@@ -70,15 +79,19 @@ class RosRuntime:
             rclpy.init(
                 context=self.context,
                 domain_id=domain_id,
-                args=list(arguments),
+                args=[
+                    *([] if console else SILENT),
+                    *process_arguments(),
+                    *arguments,
+                ],
                 signal_handler_options=SignalHandlerOptions.NO,
             )
         except Exception as error:  # rclpy has no base class for what it raises
-            raise RosError(f"ROS cannot be started: {error}{_security()}") from error
+            raise RosError(f"ROS cannot be started: {refused(error)}{_security()}") from error
         self.executor = SingleThreadedExecutor(context=self.context)
         self._thread = threading.Thread(target=self._spin, name=f"ros-{name}", daemon=True)
         try:
-            self.node = self.make_node(name, namespace)
+            self.node = self.make_node(name, namespace, kind=kind, **options)
         except RosError:
             self._let_go()
             raise
@@ -98,17 +111,19 @@ class RosRuntime:
 
     # --- nodes and topics -----------------------------------------------------------------------
 
-    def make_node(self, name: str, namespace: str = "", **options: Any) -> Node:
-        """Make another node of the same connection. Options are those of `rclpy.create_node`.
+    def make_node(
+        self, name: str, namespace: str = "", *, kind: Callable[..., Node] = Node, **options: Any
+    ) -> Node:
+        """Make another node of the same connection. Options are those of `rclpy.node.Node`.
 
         Raises:
             RosError: the name is not valid in ROS, or DDS refuses.
         """
         try:
-            node = rclpy.create_node(name, context=self.context, namespace=namespace, **options)
+            node = kind(name, context=self.context, namespace=namespace, **options)
         except Exception as error:  # rclpy has no base class for what it raises
             what = f"the node '{namespace}/{name}' cannot be created"
-            raise RosError(f"{what}: {error}{_security()}") from error
+            raise RosError(f"{what}: {refused(error)}{_security()}") from error
         self.executor.add_node(node)
         self._nodes.append(node)
         return node
@@ -118,6 +133,33 @@ class RosRuntime:
         self.executor.remove_node(node)
         self._nodes.remove(node)
         _destroy(node)
+
+    def entities(self, node: Node | None = None) -> frozenset[Any]:
+        """Return all that a node has now, for `destroy_since`."""
+        one = node or self.node
+        kinds = (one.publishers, one.subscriptions, one.clients, one.services, one.waitables)
+        return frozenset(entity for kind in kinds for entity in kind)
+
+    def destroy_since(self, before: Collection[Any], node: Node | None = None) -> None:
+        """Destroy all that a node has got since `entities` returned `before`."""
+        one = node or self.node
+        for waitable in list(one.waitables):
+            if waitable not in before and isinstance(waitable, ActionClient | ActionServer):
+                waitable.destroy()
+        for entities, destroy in (
+            (one.publishers, one.destroy_publisher),
+            (one.subscriptions, one.destroy_subscription),
+            (one.clients, one.destroy_client),
+            (one.services, one.destroy_service),
+        ):
+            for entity in [each for each in entities if each not in before]:
+                destroy(entity)
+
+    def stamp_us(self, time_us: int) -> int:
+        """Return the time for the header of a message: that of /clock with `use_sim_time`, else
+        `time_us`. Microseconds since the Unix epoch."""
+        clock = self.node.get_clock()
+        return int(clock.now().nanoseconds) // 1000 if clock.ros_time_is_active else time_us
 
     def subscribe(
         self,
