@@ -185,6 +185,7 @@ class DdsConnections:
         self._localizations: dict[ResourceId, TopicLocalization] = {}
         self._endpoints: dict[ResourceId, Endpoints] = {}
         self._detectors: list[DetectorTopic] = []
+        self._watching: list[asyncio.Task[None]] = []
 
     async def open(self) -> Mapping[ResourceId, VehicleConnection]:
         known = self._setup
@@ -219,6 +220,10 @@ class DdsConnections:
             detector.retry()
 
     async def close(self) -> None:
+        watching, self._watching = self._watching, []
+        for task in watching:
+            task.cancel()
+        await asyncio.gather(*watching, return_exceptions=True)
         runtimes = list(self._runtimes.values())
         self._runtimes.clear()
         await asyncio.gather(*(runtime.close() for runtime in runtimes))
@@ -264,7 +269,9 @@ class DdsConnections:
         if domain not in self._runtimes:
             # The name of the journal distinguishes executives on one network.
             name = f"m2pem_{self._setup.context.journal.hex[:8]}"
-            self._runtimes[domain] = RosRuntime(name, domain_id=domain)
+            ros = self._runtimes[domain] = RosRuntime(name, domain_id=domain)
+            if ros.uses_sim_time:
+                self._watch_clock(ros)
         return self._runtimes[domain]
 
     def _tf_of(self, resource: ResourceId, domain_id: int | None) -> TfTopics:
@@ -280,6 +287,13 @@ class DdsConnections:
             ros = self._runtime(domain_id)
             self._tf[key] = TfTopics(ros, topic, static_topic, self._setup.context)
         return self._tf[key]
+
+    def _watch_clock(self, ros: "RosRuntime") -> None:
+        from m2pem_plugin_ros.runtime.clock_watch import ClockWatch  # noqa: PLC0415  # rclpy
+
+        context = self._setup.context
+        watch = ClockWatch(ros, context.clock, context.logger)
+        self._watching.append(asyncio.get_running_loop().create_task(watch.run()))
 
     def _vehicle_position(self, payload: ResourceId) -> Callable[[], GeoPosition | None]:
         vehicle = ResourceId(payload.partition("/")[0])
@@ -321,6 +335,7 @@ class TargetPublisher:
         from m2pem_plugin_ros.runtime import qos  # noqa: PLC0415  # it needs rclpy
 
         self._messages = require_interfaces("m2pem_interfaces").msg
+        self._stamp_us = ros.stamp_us
         self._publisher = ros.node.create_publisher(
             self._messages.TargetState, settings.topic(TOPIC), qos.TELEMETRY
         )
@@ -330,7 +345,7 @@ class TargetPublisher:
         if state.position is None:
             return
         message = self._messages.TargetState(vehicle=state.resource)
-        set_stamp(message.stamp, state.time_us)
+        set_stamp(message.stamp, self._stamp_us(state.time_us))
         message.position.latitude_deg = state.position.latitude_deg
         message.position.longitude_deg = state.position.longitude_deg
         message.position.altitude_m = state.position.altitude_m

@@ -26,7 +26,7 @@ from m2pem.errors import M2pemError
 from m2pem_plugin_mocu import messages
 from m2pem_plugin_mocu.services import Services
 from m2pem_plugin_mocu.texts import one_line
-from m2pem_plugin_mocu.topics import Topics, now_us
+from m2pem_plugin_mocu.topics import Topics
 
 SILENT_AFTER_S = 5.0
 """For a vehicle of a fleet that does not say `lost_after`."""
@@ -220,7 +220,7 @@ class DiagnosticsPublisher:
         while True:
             try:
                 health = await self._measure(late_s)
-                self._publisher.publish(diagnostics(health, self._vehicles, now_us()))
+                self._publisher.publish(diagnostics(health, self._vehicles, self._topics.now_us()))
             except Exception:  # what cannot be measured now may be the next time
                 log.exception("/diagnostics cannot be published")
             began_s = time.monotonic()

@@ -70,14 +70,14 @@ class MocuOcu:
         from m2pem_plugin_mocu.diagnostics import DiagnosticsPublisher  # noqa: PLC0415
         from m2pem_plugin_mocu.fleet_view import FleetView  # noqa: PLC0415
         from m2pem_plugin_mocu.services import Services  # noqa: PLC0415
-        from m2pem_plugin_mocu.topics import Topics, now_us  # noqa: PLC0415
+        from m2pem_plugin_mocu.topics import Topics  # noqa: PLC0415
 
         async with RosRuntime(NODE, namespace=self.namespace, domain_id=self._domain_id) as ros:
             topics = Topics(ros, self._control, self._follower)
             self._follower.listener = topics
             services = Services(ros, self._control, topics)
             diagnostics = DiagnosticsPublisher(ros, self._control, self._follower, topics, services)
-            fleet = FleetView(ros, self._control, now_us)
+            fleet = FleetView(ros, self._control, topics.now_us)
             following = asyncio.create_task(self._follower.run())
             publishing = [
                 asyncio.create_task(topics.run()),
@@ -86,7 +86,7 @@ class MocuOcu:
                 asyncio.create_task(fleet.run()),
                 asyncio.create_task(fleet.listen()),
             ]
-            log.info("operators are served over ROS in %s", self.namespace)
+            log.info("operators are served over ROS in %s", ros.node.get_namespace())
             try:
                 await asyncio.wait([following])
                 self._say_why(following)

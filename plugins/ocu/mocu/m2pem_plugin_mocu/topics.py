@@ -65,6 +65,7 @@ class Topics(Listener):
     """Publishes what a follower reports."""
 
     def __init__(self, ros: RosRuntime, control: MissionControl, follower: Follower) -> None:
+        self._ros = ros
         publisher = ros.node.create_publisher
         self._ros_log = ros.node.get_logger()
         self._control = control
@@ -78,14 +79,18 @@ class Topics(Listener):
         self._status = publisher(msg.MissionStatus, "status", qos.STATUS)
         self._active = publisher(msg.ActiveElements, "active_elements", qos.STATUS)
         self._events = publisher(msg.MissionEvent, "events", qos.EVENTS)
-        self.schedule = ScheduleTopics(ros, control, now_us)
-        self.shared_space = SharedSpaceTopic(ros, control, now_us)
+        self.schedule = ScheduleTopics(ros, control, self.now_us)
+        self.shared_space = SharedSpaceTopic(ros, control, self.now_us)
         self._waiting: deque[tuple[RunView, StampedRecord, int]] = deque()
         self._some_wait = asyncio.Event()
         self.left_out = 0
         self._prompts_throttle = PublishThrottle(self._publish_prompts)
         self._status_throttle = PublishThrottle(self._publish_status)
         self._active_throttle = PublishThrottle(self._publish_active)
+
+    def now_us(self) -> int:
+        """Return the time for stamps: that of this machine, or of /clock with `use_sim_time`."""
+        return self._ros.stamp_us(now_us())
 
     def listeners(self) -> int:
         """How many clients receive events, and prompts as they come."""
@@ -148,7 +153,7 @@ class Topics(Listener):
         match record:
             case r.IncidentOpened():
                 prompt = self._incidents[record.incident] = incidents.prompt_of(view, record)
-                opened_us = self._opened_us[view.run, record.incident] = now_us()
+                opened_us = self._opened_us[view.run, record.incident] = self.now_us()
                 self._prompt_events.publish(messages.open_prompt(prompt, opened_us))
             case r.IncidentResolved(incident=incident, choice=choice, by=by):
                 self._close_incident(view.run, incident, choice.value, by)
@@ -162,7 +167,7 @@ class Topics(Listener):
         prompt = self._incidents.pop(incident, None)
         self._opened_us.pop((run, incident), None)
         if prompt is not None:
-            closed = messages.closed_prompt(prompt, choice, by, now_us())
+            closed = messages.closed_prompt(prompt, choice, by, self.now_us())
             self._prompt_events.publish(closed)
 
     def status_changed(self, view: RunView) -> None:
@@ -172,7 +177,7 @@ class Topics(Listener):
 
     def prompt_opened(self, prompt: OpenPrompt) -> None:
         """Publish it at once as an event, and soon among all open prompts."""
-        opened_us = self._opened_us[prompt.run, prompt.prompt] = now_us()
+        opened_us = self._opened_us[prompt.run, prompt.prompt] = self.now_us()
         self._prompt_events.publish(messages.open_prompt(prompt, opened_us))
         self._prompts_throttle.mark_changed()
 
@@ -184,7 +189,7 @@ class Topics(Listener):
         if len(self.closed_prompts) > CLOSED_PROMPTS:
             del self.closed_prompts[next(iter(self.closed_prompts))]
         self._prompt_events.publish(
-            messages.closed_prompt(prompt, closed.decision, closed.by, now_us())
+            messages.closed_prompt(prompt, closed.decision, closed.by, self.now_us())
         )
         self._prompts_throttle.mark_changed()
 
@@ -220,17 +225,19 @@ class Topics(Listener):
             for view in self._follower.views.values()
             for number, record in view.incidents.items()
         ]
-        self._prompts.publish(msg.OpenPrompts(stamp=messages.time_of(now_us()), prompts=prompts))
+        self._prompts.publish(
+            msg.OpenPrompts(stamp=messages.time_of(self.now_us()), prompts=prompts)
+        )
 
     async def _publish_active(self) -> None:
-        self._active.publish(messages.active_elements(self._follower.views.values(), now_us()))
+        self._active.publish(messages.active_elements(self._follower.views.values(), self.now_us()))
 
     async def _publish_status(self) -> None:
         runs: list[Any] = []
         for view in list(self._follower.views.values()):
             summary = view.summary
             runs.append(messages.run_status(summary, await self.mission_time_s(summary)))
-        self._status.publish(msg.MissionStatus(stamp=messages.time_of(now_us()), runs=runs))
+        self._status.publish(msg.MissionStatus(stamp=messages.time_of(self.now_us()), runs=runs))
 
     async def mission_time_s(self, summary: RunSummary) -> float:
         """Of a run that goes on; NaN of others."""

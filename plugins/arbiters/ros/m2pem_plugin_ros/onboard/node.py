@@ -99,7 +99,7 @@ class OnboardNode:
         self._logger = logger
         self._log_throttle = LogThrottle(logger, vehicle)
         self._journal = BehaviorJournal(self._publish_status, epochs)
-        self._publisher = StatusPublisher(clock, self._about_vehicle, payload_state)
+        self._publisher = StatusPublisher(clock, self._about_vehicle, payload_state, ros.stamp_us)
         self._held = False
         self._inactive = inactive
         self._end_reason = ""

@@ -187,11 +187,6 @@ def _refuse_changes(parameters: Any) -> SetParametersResult:
     return SetParametersResult(successful=True)
 
 
-def uses_sim_time(node: Node) -> bool:
-    """Whether the node is to follow /clock."""
-    return bool(node.get_parameter(SIM_TIME).value)
-
-
 def merged(given: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a connection with the overrides, also those of inner maps."""
     together = dict(given)

@@ -13,7 +13,7 @@ from m2pem_plugin_ros.drivers.driver import Driver, DriverEvents, DriverSetup, m
 from m2pem_plugin_ros.installation import RosError
 from m2pem_plugin_ros.onboard.managed_node import ManagedNode, TransitionRefusedError
 from m2pem_plugin_ros.onboard.node import LOGGER, OnboardNode
-from m2pem_plugin_ros.onboard.parameters import declare_parameters, merged, uses_sim_time
+from m2pem_plugin_ros.onboard.parameters import declare_parameters, merged
 from m2pem_plugin_ros.onboard.target_bus import TargetBus
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.runtime.node_log import logging_with
@@ -144,7 +144,7 @@ async def serve(setup: OnboardSetup, say: Callable[[str], None]) -> None:
             node: Any = ros.node
             log.enter_context(logging_with(node.get_logger(), alone=True))
             setup = _with_parameters(node, setup)
-            clock = RosClock(ros) if uses_sim_time(node) else SystemClock()
+            clock = RosClock(ros) if ros.uses_sim_time else SystemClock()
             program = OnboardProgram(ros, setup, clock, ended)
             node.manage(program)
             where, driver = setup.settings.namespace or "/", setup.settings.driver

@@ -30,16 +30,19 @@ _READINESS = {
 
 
 class StatusPublisher:
-    """Publishes between `open` and `close`."""
+    """Publishes between `open` and `close`. `stamp_us` returns the stamp of a message for a time of
+    the clock."""
 
     def __init__(
         self,
         clock: Clock,
         look: Callable[[], VehicleStatus],
         payload_state: Callable[[], PayloadState | None] | None = None,
+        stamp_us: Callable[[int], int] = int,
     ) -> None:
         self._clock = clock
         self._vehicle_status = look
+        self._stamp_us = stamp_us
         self._payload_state = payload_state
         self._behaviors: Any = None
         self._vehicle: Any = None
@@ -95,7 +98,7 @@ class StatusPublisher:
             self._publish(self._payload, write_payload_status(interfaces, state))
 
     def _publish(self, publisher: Any, message: Any) -> None:
-        set_stamp(message.stamp, self._clock.now_us())
+        set_stamp(message.stamp, self._stamp_us(self._clock.now_us()))
         publisher.publish(message)
 
     async def keep_publishing(self) -> None:

@@ -36,6 +36,7 @@ class RosClock:
         self._changed_s = self._loop.time()
         self._sleepers: list[tuple[int, int, asyncio.Future[None]]] = []
         self._numbers = itertools.count()
+        self._begun = asyncio.Event()
         ros.subscribe(ClockMessage, TOPIC, self._hear, LATEST)
 
     @property
@@ -52,6 +53,10 @@ class RosClock:
         if silent_s <= STANDS_AFTER_S:
             return ""
         return f"use_sim_time is set, and {TOPIC} has stood still for {silent_s:.0f} s"
+
+    async def wait_until_begun(self) -> None:
+        """Wait for the first message of /clock."""
+        await self._begun.wait()
 
     def now_us(self) -> int:
         """Microseconds; 0 before the first message. It never goes back."""
@@ -75,6 +80,7 @@ class RosClock:
         shown_us = message.clock.sec * 1_000_000 + message.clock.nanosec // 1000
         if self._offset_us is None:
             self._offset_us = 0
+            self._begun.set()
             self._sleepers = [(at + shown_us, n, wakes) for at, n, wakes in self._sleepers]
             self._now_us = shown_us - 1
         now_us = shown_us + self._offset_us

@@ -158,8 +158,14 @@ class RosRuntime:
     def stamp_us(self, time_us: int) -> int:
         """Return the time for the header of a message: that of /clock with `use_sim_time`, else
         `time_us`. Microseconds since the Unix epoch."""
-        clock = self.node.get_clock()
-        return int(clock.now().nanoseconds) // 1000 if clock.ros_time_is_active else time_us
+        if not self.uses_sim_time:
+            return time_us
+        return int(self.node.get_clock().now().nanoseconds) // 1000
+
+    @property
+    def uses_sim_time(self) -> bool:
+        """Whether the time of the first node is that of /clock."""
+        return bool(self.node.get_clock().ros_time_is_active)
 
     def subscribe(
         self,

@@ -9,11 +9,12 @@ from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 
 from m2pem.api import US_PER_S, SystemClock
 from m2pem.api.faults import FaultError, FaultSchedule, PlannedFault
 from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.runtime.ros_clock import RosClock
 from m2pem_plugin_ros.simulator.faults import GRAMMAR, FaultTarget, check
 from m2pem_plugin_ros.simulator.host import SimulatedVehicle
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
@@ -36,7 +37,8 @@ class Simulation:
     """The simulated vehicles. `speed`: simulated seconds in a real second. `async with` opens and
     closes it.
 
-    `domain_id`: for vehicles whose settings have none; None takes ROS_DOMAIN_ID.
+    `domain_id`: for vehicles whose settings have none; None takes ROS_DOMAIN_ID. If the node has
+    `use_sim_time`, simulated time is that of /clock: it stands until the first message.
 
     Raises:
         ValueError: there is none, or two have the same name or namespace.
@@ -53,7 +55,7 @@ class Simulation:
         seed: int = 0,
     ) -> None:
         _check(specs)
-        self.clock = SystemClock(speed)
+        self.clock: SystemClock | RosClock = SystemClock(speed)
         self._start_us = self.clock.now_us()
         self._specs, self._domain_id, self._seed = specs, domain_id, seed
         self._hosts: dict[str, SimulatedVehicle] = {}
@@ -74,6 +76,7 @@ class Simulation:
 
     async def __aenter__(self) -> Self:
         try:
+            self._take_clock(self._runtime(self._specs[0]))
             for spec in self._specs:
                 vehicle = Vehicle(_patient(spec, self.clock.speed), self._seed)
                 simulated = SimulatedVehicle(self._runtime(spec), vehicle, self.clock)
@@ -143,7 +146,21 @@ class Simulation:
         """Simulated seconds since the simulation was made."""
         return (self.clock.now_us() - self._start_us) / US_PER_S
 
+    def _take_clock(self, ros: RosRuntime) -> None:
+        """Let simulated time follow /clock, if the node is to."""
+        if not ros.uses_sim_time:
+            return
+        if self.clock.speed != 1.0:
+            raise ValueError(
+                "with use_sim_time, the vehicles are as fast as /clock: leave --speed out"
+            )
+        self.clock = RosClock(ros)
+        self._start_us = 0
+
     async def _run(self) -> None:
+        if isinstance(self.clock, RosClock):
+            await self.clock.wait_until_begun()
+            self._start_us = self.clock.now_us()
         loop = asyncio.get_running_loop()
         last_s = due_s = loop.time()
         while True:
@@ -195,6 +212,7 @@ def _check(specs: Sequence[VehicleSpec]) -> None:
 
 
 PARAMETER = "fault"
+EXAMPLE = "evsg1: silent at 20 s for 5 s"
 WITHIN_S = 2.0
 
 logger = logging.getLogger(__name__)
@@ -206,7 +224,8 @@ class FaultParameter:
     def __init__(self, node: Any, plan: Callable[[PlannedFault[FaultTarget]], None]) -> None:
         self._loop = asyncio.get_running_loop()
         self._plan = plan
-        node.declare_parameter(PARAMETER, "")
+        said = f"What goes wrong, such as {EXAMPLE!r}; setting it plans it."
+        node.declare_parameter(PARAMETER, "", ParameterDescriptor(description=said))
         node.add_on_set_parameters_callback(self._set)
 
     def _set(self, parameters: Any) -> Any:

@@ -199,7 +199,8 @@ class ActionLink:
     # --- one goal -------------------------------------------------------------------------------
 
     async def _give(self, pending: _PendingGoal, order: Order) -> None:
-        command = start_command(order, self._setup.context.clock.now_us())
+        now_us = self._setup.context.clock.now_us()
+        command = start_command(order, self._setup.ros.stamp_us(now_us))
         attempts = 0
         while not (pending.acknowledged or pending.over):
             if pending.cancelled and attempts:

@@ -108,7 +108,7 @@ class NodeDriver:
         if order is None or order.goal != goal:
             return
         try:
-            self._send(adjust_command(order, parameters, self._clock.now_us()))
+            self._send(adjust_command(order, parameters, self._stamp_us()))
         except WireError as error:
             self._log_throttle.log("a change of parameters that cannot be sent", str(error))
 
@@ -131,7 +131,7 @@ class NodeDriver:
         self._claims.move_to_end(run)
         if len(self._claims) > REMEMBERED:
             self._claims.popitem(last=False)
-        self._send(vehicle_command(Verb.CLAIM, run, epoch, self._clock.now_us()))
+        self._send(vehicle_command(Verb.CLAIM, run, epoch, self._stamp_us()))
 
     def abandon(self) -> None:
         self._holding.stop_all()
@@ -146,7 +146,7 @@ class NodeDriver:
         self._received_us = self._clock.now_us()
         if was_silent:
             for run, epoch in self._claims.items():
-                self._send(vehicle_command(Verb.CLAIM, run, epoch, self._received_us))
+                self._send(vehicle_command(Verb.CLAIM, run, epoch, self._stamp_us()))
         if sent.vehicle != self._resource:
             self._log_throttle.log(
                 f"the node in {self._name('')} belongs to another vehicle", sent.vehicle
@@ -178,6 +178,9 @@ class NodeDriver:
     def _name(self, leaf: str) -> str:
         return self._setup.settings.topic(leaf)
 
+    def _stamp_us(self) -> int:
+        return self._setup.ros.stamp_us(self._clock.now_us())
+
     def _send(self, message: object) -> None:
         self._publisher.publish(message)
 
@@ -197,7 +200,7 @@ class NodeDriver:
                 return True
             agrees = self._status is not None and self._status.held is held
             if not (sent and agrees):
-                self._send(vehicle_command(verb, run, epoch, self._clock.now_us()))
+                self._send(vehicle_command(verb, run, epoch, self._stamp_us()))
             sent += self._clock.now_us() - self._received_us < STILL_S * 1e6
             return sent < HOLD_REPEATS
 

@@ -83,7 +83,7 @@ class TopicLink:
                 self._send(self._about(Verb.CANCEL, pending))
                 self._over(pending, Outcome(BehaviorState.FAILED, "TIMEOUT", reason))
                 return False
-            self._send(start_command(order, self._now_us()))
+            self._send(start_command(order, self._stamp_us()))
             return True
 
         self._retries.start("start", send_again)
@@ -231,6 +231,9 @@ class TopicLink:
     def _now_us(self) -> int:
         return self._setup.context.clock.now_us()
 
+    def _stamp_us(self) -> int:
+        return self._setup.ros.stamp_us(self._now_us())
+
     def _waited_since_s(self, then_us: int) -> float:
         return (self._now_us() - then_us) / 1e6
 
@@ -243,9 +246,9 @@ class TopicLink:
     def _about(self, verb: int, pending: _PendingGoal) -> Any:
         order = pending.order or self._orders.get(pending.goal)
         if order is None:
-            return goal_command(verb, pending.goal, self._now_us())
+            return goal_command(verb, pending.goal, self._stamp_us())
         epoch = self._setup.context.epoch_of(order.request.id)
-        return behavior_command(verb, order, self._now_us(), epoch)
+        return behavior_command(verb, order, self._stamp_us(), epoch)
 
     def _know(self, order: Order) -> None:
         """Keep an order, so that later messages about its goal name its run."""
