@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from m2pem_plugin_ros import RosRuntime
+from m2pem_plugin_ros import RosRuntime, messages, one_line
 
 from m2pem.api import (
     Fleet,
@@ -23,10 +23,9 @@ from m2pem.api import (
     VehicleState,
 )
 from m2pem.errors import M2pemError
-from m2pem_plugin_mocu import messages
 from m2pem_plugin_mocu.services import Services
 from m2pem_plugin_mocu.texts import one_line
-from m2pem_plugin_mocu.topics import Topics
+from m2pem_plugin_mocu.topics import Topics, now_us
 
 SILENT_AFTER_S = 5.0
 """For a vehicle of a fleet that does not say `lost_after`."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from geometry_msgs.msg import Point32, PolygonStamped
 from m2pem_interfaces import msg
-from m2pem_plugin_ros import RosRuntime, qos, to_local, write_payload_status
+from m2pem_plugin_ros import RosRuntime, messages, qos, to_local, write_payload_status
 
 from m2pem.api import (
     GeoPosition,
@@ -19,7 +19,6 @@ from m2pem.api import (
     TeamState,
     Telemetry,
 )
-from m2pem_plugin_mocu import messages
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
 
 MARCH_FOR_S = 2.0

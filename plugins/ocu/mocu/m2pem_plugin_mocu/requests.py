@@ -7,12 +7,14 @@ from typing import Any
 
 import msgspec
 from m2pem_interfaces import srv
+from m2pem_plugin_ros import asker, bounded, decode_data, named
 
 from m2pem.api import MAX_NAME_CHARACTERS, MAX_REASON_CHARACTERS, OPERATIONS, MissionControl, Value
 from m2pem.errors import OperatorError
 from m2pem_plugin_mocu import geometries
-from m2pem_plugin_mocu.texts import asker, bounded, named
-from m2pem_plugin_mocu.values import decode_data
+
+NAMELESS = "mocu"
+"""Who asked, where a request does not say."""
 
 FIELDS = {"message": "message_id", "resource": "vehicle"}
 """The fields of requests that are not called as the parameters of operations are."""
@@ -46,7 +48,7 @@ async def carry_out(
 def _read(field: str, sent: Any, *, is_required: bool) -> Any:
     match field:
         case "by":
-            return asker(sent)
+            return asker(sent, NAMELESS)
         case "data":
             return decode_data(sent)
         case "decision" | "reason":

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from m2pem_interfaces import msg
-from m2pem_plugin_ros import RosRuntime, qos
+from m2pem_plugin_ros import RosRuntime, messages, qos, sendable
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from m2pem.api import (
@@ -16,9 +16,7 @@ from m2pem.api import (
     SettledTime,
     Settlement,
 )
-from m2pem_plugin_mocu.messages import time_of
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
-from m2pem_plugin_mocu.texts import sendable
 
 EVENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -53,11 +51,11 @@ class ScheduleTopics:
         found = await self._control.scheduled()
         stamp_us = self._now_us()
         message = schedule(found)
-        message.stamp = time_of(stamp_us)
+        message.stamp = messages.time_of(stamp_us)
         self._publisher.publish(message)
         entries = {each.entry: each for each in found.entries}
         for event in self._changes(entries, found.hold):
-            event.stamp = time_of(stamp_us)
+            event.stamp = messages.time_of(stamp_us)
             self._events.publish(event)
         self._known, self._hold = entries, found.hold
 
@@ -121,11 +119,11 @@ def entry(mission: ScheduledMission) -> Any:
         concurrency=when.concurrency.value,
         priority=max(-INT32_MAX, min(INT32_MAX, mission.priority)),
         by=sendable(mission.by),
-        scheduled=time_of(mission.scheduled_us),
-        next=time_of(mission.next_us),
-        due=time_of(mission.due_us),
-        deadline=time_of(mission.deadline_us),
-        starts=time_of(mission.starts_us),
+        scheduled=messages.time_of(mission.scheduled_us),
+        next=messages.time_of(mission.next_us),
+        due=messages.time_of(mission.due_us),
+        deadline=messages.time_of(mission.deadline_us),
+        starts=messages.time_of(mission.starts_us),
         reason=sendable(mission.reason),
         run=mission.run,
         times=[settled_time(each) for each in mission.times],
@@ -135,8 +133,8 @@ def entry(mission: ScheduledMission) -> Any:
 def settled_time(settled: SettledTime) -> Any:
     """Return what became of a time as a message."""
     return msg.SettledTime(
-        due=time_of(settled.due_us),
-        at=time_of(settled.at_us),
+        due=messages.time_of(settled.due_us),
+        at=messages.time_of(settled.at_us),
         settlement=_SETTLEMENT[settled.settlement],
         run=settled.run,
         text=sendable(settled.text),

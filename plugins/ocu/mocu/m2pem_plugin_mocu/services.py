@@ -5,14 +5,13 @@ from contextlib import contextmanager
 from typing import Any
 
 from m2pem_interfaces import srv
-from m2pem_plugin_ros import RosRuntime
+from m2pem_plugin_ros import RosRuntime, messages, sendable
 
 from m2pem.api import MissionControl
 from m2pem.errors import M2pemError, OperatorError
-from m2pem_plugin_mocu import incidents, messages, requests
+from m2pem_plugin_mocu import incidents, requests
 from m2pem_plugin_mocu.schedule import list_schedule
 from m2pem_plugin_mocu.starting import start_mission
-from m2pem_plugin_mocu.texts import sendable
 from m2pem_plugin_mocu.topics import Topics
 
 Handler = Callable[[MissionControl, Any, Any], Awaitable[None]]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from m2pem_interfaces import msg
-from m2pem_plugin_ros import RosRuntime, qos
+from m2pem_plugin_ros import RosRuntime, messages, qos, sendable
 
 from m2pem.api import MissionControl
 from m2pem.api.allocation import SharedSpaceState, WaitingTask
@@ -13,9 +13,7 @@ from m2pem.fleet.fleet import Fleet
 from m2pem.geo.geojson import as_geojson
 from m2pem.mission.geometry import Area, Route
 from m2pem.units import US_PER_S
-from m2pem_plugin_mocu.messages import time_of
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
-from m2pem_plugin_mocu.texts import sendable
 
 
 class SharedSpaceTopic:
@@ -42,7 +40,7 @@ class SharedSpaceTopic:
         spaces = [
             shared_space(self._fleet, each, now_us) for each in await self._control.shared_space()
         ]
-        self._publisher.publish(msg.SharedSpaces(stamp=time_of(now_us), spaces=spaces))
+        self._publisher.publish(msg.SharedSpaces(stamp=messages.time_of(now_us), spaces=spaces))
 
 
 def shared_space(fleet: Fleet, state: SharedSpaceState, now_us: int) -> Any:
@@ -79,7 +77,7 @@ def waiting_task(task: WaitingTask, now_us: int) -> Any:
         element=sendable(task.element),
         task=sendable(task.task),
         behavior=sendable(task.behavior),
-        since=time_of(now_us - round(task.waited_s * US_PER_S)),
+        since=messages.time_of(now_us - round(task.waited_s * US_PER_S)),
         left_s=math.nan if task.left_s is None else task.left_s,
         priority=task.priority,
         reason=sendable(task.reason),

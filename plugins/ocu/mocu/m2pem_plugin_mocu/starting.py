@@ -3,11 +3,11 @@
 import asyncio
 from typing import Any
 
+from m2pem_plugin_ros import asker, bounded, decode_data, messages
+
 from m2pem.api import Finding, MissionControl, Value
 from m2pem.errors import M2pemError, MissionError, OperatorError
-from m2pem_plugin_mocu import messages
-from m2pem_plugin_mocu.texts import asker, bounded
-from m2pem_plugin_mocu.values import decode_data
+from m2pem_plugin_mocu.requests import NAMELESS
 
 MOST_BYTES = 10_000_000
 """Of a mission that comes in a request; a bigger one comes as a URL."""
@@ -27,7 +27,7 @@ async def start_mission(control: MissionControl, request: Any, response: Any) ->
     mission = _mission(request)
     data = decode_data(request.data)
     process = bounded(request.process.strip(), "process", URL_CHARACTERS) or None
-    by = asker(request.by)
+    by = asker(request.by, NAMELESS)
     try:
         response.run = await control.start(mission, process=process, data=data, by=by)
     except MissionError as error:

@@ -8,7 +8,7 @@ from collections import deque
 from typing import Any
 
 from m2pem_interfaces import msg
-from m2pem_plugin_ros import RosRuntime, qos
+from m2pem_plugin_ros import RosRuntime, messages, qos
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
@@ -28,7 +28,7 @@ from m2pem.api import (
 from m2pem.api import records as r
 from m2pem.api.runs import SCHEDULE, STARTS_SOON
 from m2pem.errors import M2pemError
-from m2pem_plugin_mocu import incidents, messages
+from m2pem_plugin_mocu import incidents
 from m2pem_plugin_mocu.publish_throttle import PublishThrottle
 from m2pem_plugin_mocu.schedule import ScheduleTopics
 from m2pem_plugin_mocu.shared_space import SharedSpaceTopic

@@ -104,7 +104,7 @@ async def test_signals_and_messages_that_nobody_knows_are_refused(
 def test_data_that_no_journal_could_keep_is_refused(data: list[dict[str, str]], says: str) -> None:
     from types import SimpleNamespace
 
-    from m2pem_plugin_mocu.values import decode_data
+    from m2pem_plugin_ros import decode_data
 
     from m2pem.errors import OperatorError
 

@@ -3,9 +3,6 @@
 from m2pem.api import MAX_NAME_CHARACTERS
 from m2pem.errors import OperatorError
 
-NAMELESS = "mocu"
-"""Who asked, where a request does not say."""
-
 
 def sendable(text: str) -> str:
     """The text as a message can carry it: without NUL, at which it would end for its reader, and
@@ -43,10 +40,10 @@ def bounded(text: str, field: str, characters: int) -> str:
     return text
 
 
-def asker(by: str) -> str:
-    """Who asks, for the journal.
+def asker(by: str, nameless: str) -> str:
+    """Who asks, for the journal; `nameless` if the request does not say.
 
     Raises:
         OperatorError: the name is too long.
     """
-    return one_line(bounded(by, "by", MAX_NAME_CHARACTERS)) or NAMELESS
+    return one_line(bounded(by, "by", MAX_NAME_CHARACTERS)) or nameless

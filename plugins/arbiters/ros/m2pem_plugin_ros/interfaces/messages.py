@@ -18,7 +18,7 @@ from m2pem.api import (
     StampedRecord,
     describe,
 )
-from m2pem_plugin_mocu.texts import sendable
+from m2pem_plugin_ros.interfaces.texts import sendable
 
 _STATUS = {
     RunStatus.RUNNING: msg.RunStatus.RUNNING,
