@@ -95,6 +95,11 @@ class LocalFrame:
             self._centre[2] + self._sin_lat * up_m + self._cos_lat * north_m,
         )
 
+    @property
+    def geocentric(self) -> tuple[float, float, float]:
+        """The origin as x, y and z from the Earth's centre, in metres (ECEF, EPSG:4978)."""
+        return self._centre
+
     def _ground_up_m(self, east_m: float, north_m: float) -> float:
         """Return how high the ground is there: below 0, as the Earth is round.
 

@@ -11,6 +11,7 @@ from m2pem_plugin_ros.hooks import (
     m2pem_check_host,
     m2pem_register_arbiters,
     m2pem_register_commands,
+    m2pem_register_faces,
 )
 
 if TYPE_CHECKING:
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
     from m2pem_plugin_ros.frames import to_local
     from m2pem_plugin_ros.installation import RosError, require_interfaces
     from m2pem_plugin_ros.interfaces import messages, set_stamp
-    from m2pem_plugin_ros.interfaces.data_values import decode_data
+    from m2pem_plugin_ros.interfaces.data_values import decode_data, mission_of
     from m2pem_plugin_ros.interfaces.texts import asker, bounded, named, one_line, sendable
     from m2pem_plugin_ros.interfaces.vehicle_status import write_payload_status
-    from m2pem_plugin_ros.loopback import keep_on_loopback
+    from m2pem_plugin_ros.loopback import keep_on_loopback, stays_on_loopback
     from m2pem_plugin_ros.onboard.arbiter_driver import ArbiterDriver
     from m2pem_plugin_ros.onboard.node import OnboardNode
     from m2pem_plugin_ros.onboard.target_bus import TargetBus
@@ -42,7 +43,9 @@ __all__ = [
     "m2pem_check_host",
     "m2pem_register_arbiters",
     "m2pem_register_commands",
+    "m2pem_register_faces",
     "messages",
+    "mission_of",
     "named",
     "one_line",
     "qos",
@@ -51,6 +54,7 @@ __all__ = [
     "require_interfaces",
     "sendable",
     "set_stamp",
+    "stays_on_loopback",
     "to_local",
     "write_payload_status",
 ]
@@ -60,10 +64,10 @@ _MODULES = {
     "frames": "to_local",
     "installation": "RosError require_interfaces",
     "interfaces": "set_stamp",
-    "interfaces.data_values": "decode_data",
+    "interfaces.data_values": "decode_data mission_of",
     "interfaces.texts": "asker bounded named one_line sendable",
     "interfaces.vehicle_status": "write_payload_status",
-    "loopback": "keep_on_loopback",
+    "loopback": "keep_on_loopback stays_on_loopback",
     "onboard.arbiter_driver": "ArbiterDriver",
     "onboard.node": "OnboardNode",
     "onboard.target_bus": "TargetBus",

@@ -1,4 +1,4 @@
-"""The hooks of this plugin: the arbiter `ros`, and the commands `sim ros` and `ros onboard`."""
+"""The hooks of this plugin: arbiter and face `ros`, commands `sim ros` and `ros onboard`."""
 
 from collections.abc import Callable, MutableMapping, Sequence
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ from m2pem import hookimpl
 if TYPE_CHECKING:
     import click
 
-    from m2pem.api import Arbiter, Fleet, HealthCheck
+    from m2pem.api import Arbiter, Face, Fleet, HealthCheck
 
 
 @hookimpl
@@ -17,6 +17,14 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
     from m2pem_plugin_ros.arbiter import RosArbiter  # noqa: PLC0415  # starting up must be fast
 
     register("ros", RosArbiter)
+
+
+@hookimpl
+def m2pem_register_faces(register: "Callable[[str, Callable[..., Face]], None]") -> None:
+    """Register the face `ros`."""
+    from m2pem_plugin_ros.face.face import RosFace  # noqa: PLC0415  # starting up must be fast
+
+    register("ros", RosFace)
 
 
 @hookimpl

@@ -21,7 +21,7 @@ OWN_INSTALLATION = (
 BUILT_FOR_WHEELS = ("geographic_msgs", "tf2_msgs")
 """Packages of ROS that its wheels lack."""
 
-NEWEST_MESSAGE = "CommandRefusal"
+NEWEST_MESSAGE = "FleetState"
 """The message that was added last."""
 
 

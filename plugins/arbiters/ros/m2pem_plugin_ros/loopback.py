@@ -15,6 +15,9 @@ from pathlib import Path
 
 from m2pem_plugin_ros.installation import RosError
 
+LOOPBACK = "M2PEM_ROS_LOOPBACK"
+"""1: DDS stays on 127.0.0.1. 0: it does not. Otherwise it does where nothing real moves."""
+
 PROFILE = Path(__file__).with_name("loopback.xml")
 
 
@@ -54,6 +57,23 @@ def keep_on_loopback() -> None:
 def is_kept() -> bool:
     """Whether this process is kept on 127.0.0.1."""
     return all(os.environ.get(name) == value for name, value in environment().items())
+
+
+def stays_on_loopback(environment: Mapping[str, str], *, simulated: bool) -> bool:
+    """Whether DDS is to stay on 127.0.0.1; `simulated`: nothing real moves.
+
+    Raises:
+        RosError: the variable has another value than 0, 1 or none.
+    """
+    match environment.get(LOOPBACK, "").strip():
+        case "":
+            return simulated
+        case "0":
+            return False
+        case "1":
+            return True
+        case other:
+            raise RosError(f"{LOOPBACK}={other!r}: 1 keeps DDS on 127.0.0.1, and 0 does not")
 
 
 def _export() -> None:

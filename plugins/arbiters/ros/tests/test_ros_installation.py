@@ -56,8 +56,6 @@ def test_interfaces_that_are_missing_are_named() -> None:
 
 
 def test_interfaces_of_an_earlier_m2pem_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(require_interfaces("m2pem_interfaces").msg, "CommandRefusal")
-    with pytest.raises(
-        RosError, match=r"earlier m2pem: it has no CommandRefusal; install it again"
-    ):
+    monkeypatch.delattr(require_interfaces("m2pem_interfaces").msg, "FleetState")
+    with pytest.raises(RosError, match=r"earlier m2pem: it has no FleetState; install it again"):
         require_interfaces("m2pem_interfaces")

@@ -24,8 +24,7 @@ from m2pem.api import (
 )
 from m2pem.errors import M2pemError
 from m2pem_plugin_mocu.services import Services
-from m2pem_plugin_mocu.texts import one_line
-from m2pem_plugin_mocu.topics import Topics, now_us
+from m2pem_plugin_mocu.topics import Topics
 
 SILENT_AFTER_S = 5.0
 """For a vehicle of a fleet that does not say `lost_after`."""

@@ -8,7 +8,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from m2pem_plugin_ros import keep_on_loopback, require_interfaces
+from m2pem_plugin_ros import keep_on_loopback, require_interfaces, stays_on_loopback
 
 from m2pem.api import follow
 from m2pem.errors import M2pemError
@@ -37,7 +37,8 @@ def _load_rclpy() -> None:
 class MocuOcu:
     """All its operators see the same and may do the same, wherever in the ROS domain they are.
 
-    `environment`: the variables of `settings`. `domain_id`: None takes ROS_DOMAIN_ID.
+    `environment`: the variables of `settings`, and M2PEM_ROS_LOOPBACK. `domain_id`: None takes
+    ROS_DOMAIN_ID.
 
     Raises:
         PluginError: ROS 2, or m2pem_interfaces, is not there or not usable, or a variable has a
@@ -54,7 +55,7 @@ class MocuOcu:
         self.namespace = settings.namespace(environment)
         self._control = control
         self._domain_id = domain_id
-        if settings.stays_on_loopback(environment, simulated=control.simulated()):
+        if stays_on_loopback(environment, simulated=control.simulated()):
             keep_on_loopback()
         require_interfaces("m2pem_interfaces")
         self._follower = follow(control)

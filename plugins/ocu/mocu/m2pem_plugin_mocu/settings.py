@@ -1,4 +1,4 @@
-"""What the environment says of this unit: its namespace, and whether it stays on this machine."""
+"""What the environment says of this unit: its namespace."""
 
 import os
 import re
@@ -8,9 +8,6 @@ from m2pem.errors import PluginError
 
 NAMESPACE = "M2PEM_ROS_NAMESPACE"
 """Where services and topics are: /m2pem, unless this variable says otherwise."""
-
-LOOPBACK = "M2PEM_ROS_LOOPBACK"
-"""1: DDS stays on 127.0.0.1. 0: it does not. Otherwise it does where nothing real moves."""
 
 DEFAULT_NAMESPACE = "/m2pem"
 
@@ -37,20 +34,3 @@ def namespace(environment: Mapping[str, str] = os.environ) -> str:
             "in parts that begin with a letter, such as /team_a/m2pem"
         )
     return absolute
-
-
-def stays_on_loopback(environment: Mapping[str, str], *, simulated: bool) -> bool:
-    """Whether DDS is to stay on 127.0.0.1; `simulated`: nothing real moves.
-
-    Raises:
-        SettingError: the variable has another value than 0, 1 or none.
-    """
-    match environment.get(LOOPBACK, "").strip():
-        case "":
-            return simulated
-        case "0":
-            return False
-        case "1":
-            return True
-        case other:
-            raise SettingError(f"{LOOPBACK}={other!r}: 1 keeps DDS on 127.0.0.1, and 0 does not")

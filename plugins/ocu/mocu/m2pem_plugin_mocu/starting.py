@@ -3,19 +3,16 @@
 import asyncio
 from typing import Any
 
-from m2pem_plugin_ros import asker, bounded, decode_data, messages
+from m2pem_plugin_ros import asker, bounded, decode_data, messages, mission_of
 
 from m2pem.api import Finding, MissionControl, Value
 from m2pem.errors import M2pemError, MissionError, OperatorError
 from m2pem_plugin_mocu.requests import NAMELESS
 
-MOST_BYTES = 10_000_000
-"""Of a mission that comes in a request; a bigger one comes as a URL."""
-
 MOST_FINDINGS = 200
 """In a response; the text says how many there are."""
 
-URL_CHARACTERS = 2000
+PROCESS_CHARACTERS = 2000
 
 
 async def start_mission(control: MissionControl, request: Any, response: Any) -> None:
@@ -24,9 +21,9 @@ async def start_mission(control: MissionControl, request: Any, response: Any) ->
     Raises:
         M2pemError: it is refused; if for what is wrong in it, the response has the findings.
     """
-    mission = _mission(request)
+    mission = mission_of(request)
     data = decode_data(request.data)
-    process = bounded(request.process.strip(), "process", URL_CHARACTERS) or None
+    process = bounded(request.process.strip(), "process", PROCESS_CHARACTERS) or None
     by = asker(request.by, NAMELESS)
     try:
         response.run = await control.start(mission, process=process, data=data, by=by)
@@ -34,21 +31,6 @@ async def start_mission(control: MissionControl, request: Any, response: Any) ->
         _tell(response, error.findings)
         raise OperatorError(_summary(error)) from error
     _tell(response, await _warnings(control, response.run, mission, process, data))
-
-
-def _mission(request: Any) -> str | bytes:
-    size = len(request.bpmn)
-    if bool(size) == bool(request.url.strip()):
-        raise OperatorError(
-            "give a mission either as url or as bpmn, and not as "
-            + ("both" if size else "neither: both are empty")
-        )
-    if size > MOST_BYTES:
-        raise OperatorError(
-            f"bpmn has {size:,} bytes; {MOST_BYTES:,} are the most that are taken over ROS: put "
-            "the file where the executive can read it, and give its url"
-        )
-    return bytes(request.bpmn) if size else bounded(request.url.strip(), "url", URL_CHARACTERS)
 
 
 async def _warnings(

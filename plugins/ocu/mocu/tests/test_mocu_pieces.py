@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from m2pem_plugin_mocu.diagnostics import SILENT_AFTER_S, Health, Vehicles, diagnostics
 from m2pem_plugin_mocu.publish_throttle import MAX_PERIOD_S, MIN_PERIOD_S, PublishThrottle
-from m2pem_plugin_mocu.settings import SettingError, namespace, stays_on_loopback
-from m2pem_plugin_ros import one_line, sendable
+from m2pem_plugin_mocu.settings import SettingError, namespace
+from m2pem_plugin_ros import one_line, sendable, stays_on_loopback
 from mocu_world import fleet
 
 from m2pem.api import (

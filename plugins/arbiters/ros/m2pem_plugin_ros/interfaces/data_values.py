@@ -1,4 +1,4 @@
-"""Data in requests: named values, each of them JSON."""
+"""Missions in requests, and data: named values, each of them JSON."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,6 +7,7 @@ import msgspec
 
 from m2pem.api import MAX_DATA_VALUES, MAX_NAME_CHARACTERS, Value
 from m2pem.errors import OperatorError
+from m2pem_plugin_ros.interfaces.texts import bounded
 
 MOST_CHARACTERS = 1_000_000
 """Of all values of a request together."""
@@ -16,48 +17,73 @@ DEEPEST = 32
 
 LARGEST_INTEGER = 2**63 - 1
 
+MOST_BYTES = 10_000_000
+"""Of a mission that comes in a request; a bigger one comes as a URL."""
 
-def decode_data(pairs: Sequence[Any]) -> dict[str, Value]:
-    """The values of m2pem_interfaces/msg/KeyValue messages, by their keys.
+URL_CHARACTERS = 2000
+
+
+def mission_of(request: Any) -> str | bytes:
+    """Return the mission of a request, which has a `url` or the file itself as `bpmn`.
+
+    Raises:
+        OperatorError: neither or both are given, or it is too large.
+    """
+    size = len(request.bpmn)
+    if bool(size) == bool(request.url.strip()):
+        raise OperatorError(
+            "give a mission either as url or as bpmn, and not as "
+            + ("both" if size else "neither: both are empty")
+        )
+    if size > MOST_BYTES:
+        raise OperatorError(
+            f"bpmn has {size:,} bytes; {MOST_BYTES:,} are the most that are taken over ROS: put "
+            "the file where the executive can read it, and give its url"
+        )
+    return bytes(request.bpmn) if size else bounded(request.url.strip(), "url", URL_CHARACTERS)
+
+
+def decode_data(pairs: Sequence[Any], what: str = "data") -> dict[str, Value]:
+    """The values of m2pem_interfaces/msg/KeyValue messages, by their keys. `what`: for errors.
 
     Raises:
         OperatorError: one is not JSON, or not what a journal could keep; the text names its key.
     """
     if len(pairs) > MAX_DATA_VALUES:
         raise OperatorError(
-            f"data has {len(pairs):,} values; {MAX_DATA_VALUES:,} are the most that it may have"
+            f"{what} has {len(pairs):,} values; {MAX_DATA_VALUES:,} are the most that it may have"
         )
     size = sum(len(pair.value) for pair in pairs)
     if size > MOST_CHARACTERS:
-        raise OperatorError(f"data has {size:,} characters; it may have {MOST_CHARACTERS:,}")
+        raise OperatorError(f"{what} has {size:,} characters; it may have {MOST_CHARACTERS:,}")
     data: dict[str, Value] = {}
     for pair in pairs:
         if not pair.key.strip():
-            raise OperatorError("data has a value without a key, such as mission.speed")
+            raise OperatorError(f"{what} has a value without a key, such as mission.speed")
         if len(pair.key) > MAX_NAME_CHARACTERS:
-            raise OperatorError(f"data has a key of more than {MAX_NAME_CHARACTERS} characters")
+            raise OperatorError(f"{what} has a key of more than {MAX_NAME_CHARACTERS} characters")
         if pair.key in data:
-            raise OperatorError(f"data[{pair.key!r}] is there twice: give each key once")
-        data[pair.key] = _decode(pair.key, pair.value)
+            raise OperatorError(f"{what}[{pair.key!r}] is there twice: give each key once")
+        data[pair.key] = _decode(f"{what}[{pair.key!r}]", pair.value)
     return data
 
 
-def _decode(key: str, text: str) -> Value:
+def _decode(place: str, text: str) -> Value:
     try:
         value: Value = msgspec.json.decode(text)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise OperatorError(
-            f'data[{key!r}] is not JSON ({error}); a text needs its quotes: "red"'
+            f'{place} is not JSON ({error}); a text needs its quotes: "red"'
         ) from error
-    _check(key, value, 1)
+    _check(place, value, 1)
     return value
 
 
-def _check(key: str, value: Value, depth: int) -> None:
+def _check(place: str, value: Value, depth: int) -> None:
     if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
-        raise OperatorError(f"data[{key!r}] has an integer of more than 64 bits: write {value}.0")
+        raise OperatorError(f"{place} has an integer of more than 64 bits: write {value}.0")
     if isinstance(value, list | dict):
         if depth > DEEPEST:
-            raise OperatorError(f"data[{key!r}] is nested more than {DEEPEST} deep")
+            raise OperatorError(f"{place} is nested more than {DEEPEST} deep")
         for each in value.values() if isinstance(value, dict) else value:
-            _check(key, each, depth + 1)
+            _check(place, each, depth + 1)

@@ -1,0 +1,131 @@
+"""The latched state of the fleet: who has each vehicle, what it does, and the runs."""
+
+import logging
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from m2pem_interfaces import msg
+from rclpy.node import Node
+
+from m2pem.api import (
+    Fleet,
+    Follower,
+    LinkState,
+    MissionControl,
+    PayloadState,
+    ResourceId,
+    VehicleState,
+)
+from m2pem_plugin_ros.face.names import Names
+from m2pem_plugin_ros.face.settings import Options
+from m2pem_plugin_ros.interfaces.messages import run_status, time_of
+from m2pem_plugin_ros.interfaces.texts import sendable
+from m2pem_plugin_ros.runtime import qos
+
+log = logging.getLogger("m2pem.face.ros")
+
+_LINKS = {
+    LinkState.CONNECTED: msg.FleetResource.CONNECTED,
+    LinkState.DEGRADED: msg.FleetResource.DEGRADED,
+    LinkState.LOST: msg.FleetResource.LOST,
+}
+_READINESS = {
+    None: msg.FleetResource.NOT_KNOWN,
+    False: msg.FleetResource.NOT_READY,
+    True: msg.FleetResource.READY,
+}
+
+
+class FleetStatePublisher:
+    """`publish` is called twice a second, and publishes if something has changed."""
+
+    def __init__(
+        self,
+        node: Node,
+        control: MissionControl,
+        follower: Follower,
+        names: Names,
+        options: Options,
+    ) -> None:
+        self._control = control
+        self._follower = follower
+        fleet = control.fleet()
+        self._fleet_name = sendable(fleet.name)
+        self._resources = _in_order(fleet)
+        self._fixed = {
+            each: {
+                "resource": sendable(each),
+                "domain": _domain(fleet, each),
+                "arbiter": sendable(_arbiter(fleet, each)),
+                "action": names.action(each),
+                "behaviors": [sendable(spec.name) for spec in control.catalogue().get(each, ())],
+                "takes_commands": options.takes_commands(each),
+            }
+            for each in self._resources
+        }
+        self._publisher = node.create_publisher(msg.FleetState, "~/fleet_state", qos.STATUS)
+        self._last: Any = None
+
+    async def publish(
+        self, states: Mapping[ResourceId, VehicleState | PayloadState], now_us: int
+    ) -> None:
+        """Publish the state, if it is not that which was published last."""
+        holders = await self._control.holders()
+        labels = await self._control.holder_labels()
+        message = msg.FleetState(
+            fleet=self._fleet_name,
+            resources=[
+                self._resource(each, states.get(each), holders.get(each, ""), labels)
+                for each in self._resources
+            ],
+            runs=[run_status(view.summary) for view in self._follower.views.values()],
+        )
+        content = repr(message)  # NaN is not equal to itself
+        if content == self._last:
+            return
+        self._last = content
+        message.stamp = time_of(now_us)
+        self._publisher.publish(message)
+
+    def _resource(
+        self,
+        resource: ResourceId,
+        state: VehicleState | PayloadState | None,
+        holder: str,
+        labels: Mapping[str, str],
+    ) -> Any:
+        message = msg.FleetResource(
+            holder=sendable(holder),
+            holder_label=sendable(labels.get(holder, "")),
+            battery=math.nan,
+            **self._fixed[resource],
+        )
+        if state is not None:
+            message.link = _LINKS[state.link]
+            message.behavior = sendable(state.behavior)
+        if isinstance(state, VehicleState):
+            message.readiness = _READINESS[state.ready]
+            message.not_ready_reasons = [sendable(each) for each in state.not_ready_reasons]
+            message.mode = sendable(state.mode)
+            if state.battery_fraction is not None:
+                message.battery = round(state.battery_fraction, 2)
+        return message
+
+
+def _in_order(fleet: Fleet) -> list[ResourceId]:
+    return [
+        resource
+        for vehicle in fleet.vehicles.values()
+        for resource in (vehicle.id, *vehicle.payloads)
+    ]
+
+
+def _domain(fleet: Fleet, resource: ResourceId) -> str:
+    vehicle = fleet.vehicles.get(resource)
+    return vehicle.domain.value if vehicle is not None else ""
+
+
+def _arbiter(fleet: Fleet, resource: ResourceId) -> str:
+    vehicle = fleet.vehicles.get(resource)
+    return vehicle.arbiter if vehicle is not None else fleet.payloads[resource].arbiter

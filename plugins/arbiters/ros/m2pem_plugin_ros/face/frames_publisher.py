@@ -1,0 +1,157 @@
+"""tf: earth -> map -> VEHICLE/odom -> VEHICLE/base_link (REP-105).
+
+The local frame of the fleet is `map`. m2pem knows one position of a vehicle, so that its `odom` is
+the same as `map`. Frames that another node publishes are left to it.
+"""
+
+import logging
+from collections import deque
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from tf2_msgs.msg import TFMessage
+
+from m2pem.api import LocalFrame, ResourceId, VehicleState
+from m2pem_plugin_ros.face import telemetry_messages as messages
+from m2pem_plugin_ros.face.geometry import Vector, earth_from_enu
+from m2pem_plugin_ros.face.names import BASE, EARTH, ODOM, Names
+from m2pem_plugin_ros.face.rate_limiter import RateLimiter
+from m2pem_plugin_ros.face.vehicle_topics import VehicleTopics
+from m2pem_plugin_ros.frames import Quaternion
+from m2pem_plugin_ros.runtime import RosRuntime
+
+TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+TF_STATIC = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+OF_OTHERS = QoSProfile(
+    depth=100,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""As listeners of tf subscribe to /tf_static: several nodes latch one message each."""
+
+SENT = 100
+"""Stamps that were sent of each frame are remembered, to tell our own transforms from those of
+others."""
+
+NO_ROTATION = Quaternion(0.0, 0.0, 0.0, 1.0)
+NO_WAY = (0.0, 0.0, 0.0)
+
+log = logging.getLogger("m2pem.face.ros")
+
+
+class FramesPublisher:
+    """Publishes the frames of a fleet. `put` and `watch` are called on the event loop."""
+
+    def __init__(
+        self, ros: RosRuntime, frame: LocalFrame, names: Names, rate_hz: float, now_us: int
+    ) -> None:
+        self._ros = ros
+        self._node: Node = ros.node
+        self._names = names
+        self._now_us = now_us
+        self._publisher = self._node.create_publisher(TFMessage, "/tf", TF)
+        self._static = self._node.create_publisher(TFMessage, "/tf_static", TF_STATIC)
+        self._topics: dict[ResourceId, VehicleTopics] = {}
+        self._children: set[str] = set()
+        """The frames `base_link` of the vehicles."""
+        self._left: set[str] = set()
+        """Frames that are left to other nodes."""
+        self._latest: dict[ResourceId, VehicleState] = {}
+        self._sent: dict[str, deque[tuple[int, int]]] = {}
+        self._limiter: RateLimiter[None] = RateLimiter(rate_hz, self._publish)
+        self._is_wanted = False
+        self._subscriptions: dict[str, Any] = {}
+        self._statics: dict[str, Any] = {}
+        """The transforms that stay, by the frame that they lead to."""
+        latitude_deg, longitude_deg, _ = frame.origin
+        rotation = earth_from_enu(latitude_deg, longitude_deg)
+        self._add_static(EARTH, names.map_frame, frame.geocentric, rotation)
+
+    def add(self, vehicle: ResourceId, topics: VehicleTopics) -> None:
+        """Publish the frames of a vehicle from now on; `publish_static` when all are added."""
+        self._topics[vehicle] = topics
+        base = self._names.frame(vehicle, BASE)
+        self._children.add(base)
+        self._sent[base] = deque(maxlen=SENT)
+        self._add_static(
+            self._names.map_frame, self._names.frame(vehicle, ODOM), NO_WAY, NO_ROTATION
+        )
+
+    def publish_static(self) -> None:
+        """Publish the transforms that stay, latched."""
+        self._static.publish(TFMessage(transforms=list(self._statics.values())))
+
+    def put(self, state: VehicleState) -> None:
+        """Publish where a vehicle is, soon and with others."""
+        if self._is_wanted and state.position is not None:
+            self._latest[state.resource] = state
+            self._limiter.put(None)
+
+    def watch(self) -> None:
+        """Look who subscribes, and listen to other publishers if there are any."""
+        own = "/tf" in self._subscriptions
+        self._is_wanted = self._publisher.get_subscription_count() > own
+        for topic, hear, qos in (
+            ("/tf", self._hear, TF),
+            ("/tf_static", self._hear_static, OF_OTHERS),
+        ):
+            if topic not in self._subscriptions and self._node.count_publishers(topic) > 1:
+                self._subscriptions[topic] = self._ros.subscribe(TFMessage, topic, hear, qos)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _publish(self, _: None) -> None:
+        transforms = []
+        for vehicle, state in self._latest.items():
+            transform = self._topics[vehicle].transform(state)
+            if transform is not None and transform.child_frame_id not in self._left:
+                transforms.append(transform)
+                self._sent[transform.child_frame_id].append(_stamp(transform))
+        self._latest.clear()
+        if transforms:
+            self._publisher.publish(TFMessage(transforms=transforms))
+
+    def _add_static(self, parent: str, child: str, place: Vector, rotation: Quaternion) -> None:
+        transform = messages.transform(self._now_us, parent, child, place, rotation)
+        self._statics[child] = transform
+
+    def _hear(self, message: Any) -> None:
+        """Messages of our own come, too: they have stamps that were sent."""
+        for transform in message.transforms:
+            child = transform.child_frame_id.removeprefix("/")
+            if child in self._left:
+                continue
+            sent = self._sent.get(child)
+            if child in self._statics or (sent is not None and _stamp(transform) not in sent):
+                self._leave(child, transform.header.frame_id)
+
+    def _hear_static(self, message: Any) -> None:
+        for transform in message.transforms:
+            child = transform.child_frame_id.removeprefix("/")
+            if child in self._left:
+                continue
+            ours = self._statics.get(child)
+            differs = ours is not None and (
+                transform.transform != ours.transform
+                or transform.header.frame_id != ours.header.frame_id
+            )
+            if differs or child in self._children:
+                self._leave(child, transform.header.frame_id)
+
+    def _leave(self, child: str, parent: str) -> None:
+        self._left.add(child)
+        log.warning(
+            "another node publishes the transform %r -> %r: it is left to that node", parent, child
+        )
+        if self._statics.pop(child, None) is not None:
+            self.publish_static()
+
+
+def _stamp(transform: Any) -> tuple[int, int]:
+    stamp = transform.header.stamp
+    return stamp.sec, stamp.nanosec

@@ -1,0 +1,168 @@
+"""Routes, areas, the fence, footprints of payloads and labels, for RViz and Foxglove.
+
+Both topics are latched, and published when something has changed: `~/markers` has what stays, and
+`~/footprints` what payloads see of the ground.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point as PointMessage
+from rclpy.node import Node
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from m2pem.api import (
+    Area,
+    Fleet,
+    GeoPosition,
+    HandedOver,
+    LinkState,
+    LocalFrame,
+    PayloadState,
+    Point,
+    ResourceId,
+    Route,
+    parse_geojson,
+)
+from m2pem.errors import M2pemError
+from m2pem_plugin_ros.face.geometry import Vector
+from m2pem_plugin_ros.face.names import BASE, Names
+from m2pem_plugin_ros.face.telemetry_messages import written
+from m2pem_plugin_ros.frames import Quaternion
+from m2pem_plugin_ros.interfaces.texts import sendable
+from m2pem_plugin_ros.runtime import qos
+
+LINE_M = 0.5
+POINT_M = 2.0
+TEXT_M = 3.0
+LABEL_ABOVE_M = 3.0
+MOST_POINTS = 10_000
+"""Of a geometry. A longer one is drawn up to there."""
+
+ROUTE_COLOR = (0.2, 0.6, 1.0, 1.0)
+AREA_COLOR = (1.0, 0.8, 0.2, 1.0)
+FENCE_COLOR = (1.0, 0.2, 0.2, 1.0)
+POINT_COLOR = (0.9, 0.9, 0.9, 1.0)
+FOOTPRINT_COLOR = (0.3, 1.0, 0.5, 0.8)
+TEXT_COLOR = (1.0, 1.0, 1.0, 1.0)
+
+Coordinate = tuple[float, float, float | None]
+
+
+class MarkersPublisher:
+    """Publishes markers. `look` is called about once a second."""
+
+    def __init__(self, node: Node, fleet: Fleet, frame: LocalFrame, names: Names) -> None:
+        self._fleet = fleet
+        self._frame = frame
+        self._names = names
+        self._markers = node.create_publisher(MarkerArray, "~/markers", qos.STATUS)
+        self._footprints = node.create_publisher(MarkerArray, "~/footprints", qos.STATUS)
+        self._handed_over: Mapping[str, HandedOver] | None = None
+        self._seen: dict[ResourceId, tuple[GeoPosition, ...]] = {}
+        self._shown: dict[ResourceId, tuple[GeoPosition, ...]] | None = None
+
+    def put(self, state: PayloadState) -> None:
+        """Note what a payload sees; of one that is lost, nothing is shown."""
+        self._seen[state.resource] = () if state.link is LinkState.LOST else state.footprint
+
+    def look(self, handed_over: Mapping[str, HandedOver]) -> None:
+        """Publish what has changed. `handed_over`: the geometries of operators."""
+        if handed_over != self._handed_over:
+            self._handed_over = dict(handed_over)
+            self._markers.publish(_whole(self._lasting(handed_over)))
+        if self._seen != self._shown:
+            self._shown = dict(self._seen)
+            self._footprints.publish(_whole(self._outlines()))
+
+    def _lasting(self, handed_over: Mapping[str, HandedOver]) -> list[Any]:
+        geometries: dict[str, Any] = dict(self._fleet.geometries)
+        for name, each in handed_over.items():
+            try:
+                geometries[name] = parse_geojson(each.geometry)
+            except M2pemError:  # it was checked when it was handed over
+                continue
+        markers: list[Any] = []
+        for name, geometry in geometries.items():
+            markers += self._of_geometry(name, geometry)
+        for vehicle in self._fleet.vehicles:
+            label = self._marker("labels", Marker.TEXT_VIEW_FACING, TEXT_COLOR, TEXT_M)
+            label.header.frame_id = self._names.frame(vehicle, BASE)
+            label.frame_locked = True
+            label.pose.position.z = LABEL_ABOVE_M
+            label.text = sendable(vehicle)
+            markers.append(label)
+        return markers
+
+    def _of_geometry(self, name: str, geometry: Any) -> list[Any]:
+        match geometry:
+            case Route(waypoints, altitude_frame):
+                lines = [self._line("routes", ROUTE_COLOR, waypoints, altitude_frame)]
+            case Area(rings, altitude_frame):
+                fence = name == self._fleet.fence
+                namespace, color = ("fence", FENCE_COLOR) if fence else ("areas", AREA_COLOR)
+                lines = [self._line(namespace, color, ring, altitude_frame) for ring in rings]
+            case Point(position, altitude_frame):
+                sphere = self._marker("points", Marker.SPHERE, POINT_COLOR, POINT_M)
+                sphere.pose.position = _point(self._place(position, altitude_frame))
+                return [sphere, self._label(name, sphere.pose.position)]
+            case _:
+                return []
+        return [*lines, self._label(name, lines[0].points[0])] if lines[0].points else []
+
+    def _outlines(self) -> list[Any]:
+        markers = []
+        for corners in self._seen.values():
+            if corners:
+                line = self._marker("footprints", Marker.LINE_STRIP, FOOTPRINT_COLOR, LINE_M)
+                places = [(*each.latlon, each.altitude_m) for each in (*corners, corners[0])]
+                line.points = [_point(self._frame.to_enu(*place)) for place in places]
+                markers.append(line)
+        return markers
+
+    def _line(
+        self, namespace: str, color: Any, places: Sequence[Coordinate], altitude_frame: str
+    ) -> Any:
+        line = self._marker(namespace, Marker.LINE_STRIP, color, LINE_M)
+        line.points = [_point(self._place(each, altitude_frame)) for each in places[:MOST_POINTS]]
+        return line
+
+    def _label(self, name: str, at: Any) -> Any:
+        label = self._marker("names", Marker.TEXT_VIEW_FACING, TEXT_COLOR, TEXT_M)
+        label.pose.position = PointMessage(x=at.x, y=at.y, z=at.z + LABEL_ABOVE_M)
+        label.text = sendable(name)
+        return label
+
+    def _place(self, place: Coordinate, altitude_frame: str) -> Vector:
+        """Altitudes that do not count from mean sea level are drawn above the origin."""
+        latitude_deg, longitude_deg, altitude_m = place
+        origin_m = self._frame.origin[2]
+        if altitude_m is None:
+            altitude_m = origin_m
+        elif altitude_frame != "amsl":
+            altitude_m += origin_m
+        return self._frame.to_enu(latitude_deg, longitude_deg, altitude_m)
+
+    def _marker(self, namespace: str, kind: int, color: Any, size_m: float) -> Any:
+        red, green, blue, alpha = color
+        marker = Marker(ns=namespace, type=kind, action=Marker.ADD)
+        marker.header.frame_id = self._names.map_frame
+        marker.header.stamp = Time()  # the latest transform
+        marker.pose.orientation = written(Quaternion(0.0, 0.0, 0.0, 1.0))
+        marker.color = ColorRGBA(r=red, g=green, b=blue, a=alpha)
+        marker.scale.x = marker.scale.y = marker.scale.z = size_m
+        return marker
+
+
+def _whole(markers: Sequence[Any]) -> Any:
+    """Return an array that replaces the last one, also for who joins late."""
+    for number, marker in enumerate(markers):
+        marker.id = number
+    return MarkerArray(markers=[Marker(action=Marker.DELETEALL), *markers])
+
+
+def _point(place: Vector) -> Any:
+    x, y, z = place
+    return PointMessage(x=x, y=y, z=z)

@@ -1,0 +1,83 @@
+"""Publishers of the face: none where another node publishes the same topic, no work where nobody
+subscribes."""
+
+import logging
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from m2pem_plugin_ros.face.rate_limiter import RateLimiter
+
+TELEMETRY = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""Reliable, as the displays of RViz and the nodes of Nav2 subscribe by default; a subscriber of
+sensor data, which is best-effort, gets it, too. It never waits for a reader: the oldest message is
+dropped."""
+
+T = TypeVar("T")
+
+log = logging.getLogger("m2pem.face.ros")
+
+
+class TelemetryPublisher(Generic[T]):
+    """Publishes a topic of a vehicle at a bounded rate while somebody subscribes.
+
+    `make`: returns the message for an item, or None for none. `watch` is to be called now and then.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        message_type: Any,
+        topic: str,
+        rate_hz: float,
+        make: Callable[[T], Any],
+    ) -> None:
+        self.topic = topic
+        self._node = node
+        self._type = message_type
+        self._make = make
+        self._publisher: Any = node.create_publisher(message_type, topic, TELEMETRY)
+        self._limiter = RateLimiter(rate_hz, self._publish)
+        self._is_wanted = False
+        self._failed = False
+
+    def put(self, item: T) -> None:
+        """Publish an item, or a newer one soon."""
+        if self._is_wanted:
+            self._limiter.put(item)
+
+    def watch(self) -> None:
+        """Look who subscribes, and who else publishes; to another publisher the topic is left."""
+        other = self._other()
+        if self._publisher is not None and other:
+            log.info("%s is left to the node %s, which publishes it", self.topic, other)
+            self._limiter.close()
+            self._node.destroy_publisher(self._publisher)
+            self._publisher, self._is_wanted = None, False
+        elif self._publisher is not None:
+            self._is_wanted = self._publisher.get_subscription_count() > 0
+
+    def _other(self) -> str:
+        """Return another node that publishes the topic; "" if there is none."""
+        ours = self._node.get_fully_qualified_name()
+        if self._node.count_publishers(self.topic) <= (self._publisher is not None):
+            return ""
+        for endpoint in self._node.get_publishers_info_by_topic(self.topic):
+            name = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+            if name != ours:
+                return name
+        return ""
+
+    def _publish(self, item: T) -> None:
+        if self._publisher is None:
+            return
+        try:
+            message = self._make(item)
+            if message is not None:
+                self._publisher.publish(message)
+        except Exception:  # a state that no message can carry must not end the telemetry
+            if not self._failed:
+                self._failed = True
+                log.exception("%r cannot be published on %s", item, self.topic)

@@ -1,0 +1,332 @@
+"""The topics of the face, as a client in plain rclpy receives them."""
+
+import asyncio
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pymap3d
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geographic_msgs.msg import GeoPointStamped
+from geometry_msgs.msg import TransformStamped
+from m2pem_interfaces.msg import FleetState
+from nav_msgs.msg import Odometry
+from ros_face_client import LATCHED, STATIC, World, faced, point, two_vehicles, until
+from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStatus
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from m2pem.api import Area, GeoPosition, LinkState, PayloadState, ResourceId, Route, VehicleState
+from m2pem.testing import scenarios
+
+UGV1, CAMERA = ResourceId("ugv1"), ResourceId("ugv2/camera")
+LATITUDE, LONGITUDE, ALTITUDE = scenarios.ORIGIN
+TIME_US = 1_700_000_000_123_456
+PLACE = GeoPosition(LATITUDE + 0.01, LONGITUDE - 0.02, ALTITUDE + 42.0)
+STATE = VehicleState(
+    UGV1,
+    TIME_US,
+    PLACE,
+    velocity_enu_m_s=(1.0, 2.0, 0.5),
+    roll_rad=0.1,
+    pitch_rad=-0.2,
+    yaw_rad=math.pi / 2,
+    battery_fraction=0.75,
+    mode="GUIDED",
+)
+
+
+async def said(world: World, state: Any, heard: Any) -> None:
+    """Say a state until it was heard: of what changes quickly only the latest is published."""
+    while not heard.done():
+        world.bus.publish(state)
+        await asyncio.sleep(0.02)
+
+
+async def hears(
+    world: World, state: Any, topic: str, kind: Any, wanted: Any = lambda _: True
+) -> Any:
+    heard = asyncio.create_task(world.client.hears(topic, kind, wanted=wanted))
+    await said(world, state, heard)
+    return heard.result()
+
+
+def of_state(message: Any) -> bool:
+    """Whether a message is of `STATE`, and not of the simulation."""
+    stamp = message.header.stamp
+    return bool((stamp.sec, stamp.nanosec) == (1_700_000_000, 123_456_000))
+
+
+def rotation(q: Any) -> Any:
+    """The matrix of a quaternion."""
+    x, y, z, w = q.x, q.y, q.z, q.w
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def vector(v: Any) -> Any:
+    return np.array([v.x, v.y, v.z])
+
+
+def matrix(transform: Any) -> Any:
+    """The homogeneous matrix of a transform."""
+    whole = np.eye(4)
+    whole[:3, :3] = rotation(transform.rotation)
+    whole[:3, 3] = vector(transform.translation)
+    return whole
+
+
+async def test_tf_leads_from_the_earth_to_where_the_fix_says(ros_domain: int) -> None:
+    async with faced(ros_domain) as world:
+        static = world.client.hear("/tf_static", TFMessage, STATIC)
+        await until(lambda: static)
+        fix = await hears(world, STATE, "/ugv1/fix", NavSatFix, of_state)
+
+        def moves(message: Any) -> bool:
+            return any(
+                each.child_frame_id == "ugv1/base_link" and of_state(each)
+                for each in message.transforms
+            )
+
+        moving = await hears(world, STATE, "/tf", TFMessage, moves)
+    tree = {each.child_frame_id: each for each in (*static[0].transforms, *moving.transforms)}
+    chain, frame = [], "ugv1/base_link"
+    while frame != "earth":
+        chain.insert(0, tree[frame])
+        frame = tree[frame].header.frame_id
+    assert [each.child_frame_id for each in chain] == ["map", "ugv1/odom", "ugv1/base_link"]
+    whole = np.linalg.multi_dot([matrix(each.transform) for each in chain])
+    expected = pymap3d.geodetic2ecef(fix.latitude, fix.longitude, fix.altitude)
+    assert np.linalg.norm(whole[:3, 3] - np.array(expected)) < 0.001
+    # Its x axis points north, as its yaw says, and 0.2 rad up, as it pitches.
+    forward = whole[:3, :3] @ np.array([1.0, 0.0, 0.0])
+    east, north, up = pymap3d.ecef2enuv(*forward, LATITUDE, LONGITUDE)
+    assert (east, north, up) == pytest.approx((0.0, math.cos(0.2), math.sin(0.2)), abs=1e-9)
+
+
+async def test_odometry_has_the_place_in_the_fleets_frame_and_the_twist_in_the_vehicles(
+    ros_domain: int,
+) -> None:
+    async with faced(ros_domain) as world:
+        odom = await hears(world, STATE, "/ugv1/odom", Odometry, of_state)
+    assert (odom.header.frame_id, odom.child_frame_id) == ("ugv1/odom", "ugv1/base_link")
+    expected = pymap3d.geodetic2enu(
+        PLACE.latitude_deg, PLACE.longitude_deg, PLACE.altitude_m, *scenarios.ORIGIN
+    )
+    assert vector(odom.pose.pose.position) == pytest.approx(expected, abs=1e-3)
+    # Turned back into ENU, the twist is the velocity of the vehicle.
+    turned = rotation(odom.pose.pose.orientation) @ vector(odom.twist.twist.linear)
+    assert turned == pytest.approx((1.0, 2.0, 0.5))
+    assert odom.pose.covariance[35] == 0.0
+    assert [odom.twist.covariance[index] for index in (0, 21, 28, 35)] == [0.0, -1.0, -1.0, -1.0]
+
+
+async def test_the_other_topics_say_what_is_known_and_what_is_not(ros_domain: int) -> None:
+    bare = VehicleState(UGV1, TIME_US)
+    async with faced(ros_domain) as world:
+        fix = await hears(world, STATE, "/ugv1/fix", NavSatFix, of_state)
+        battery = await hears(world, STATE, "/ugv1/battery_state", BatteryState, of_state)
+        imu = await hears(world, STATE, "/ugv1/imu", Imu, of_state)
+        no_fix = await hears(
+            world,
+            bare,
+            "/ugv1/fix",
+            NavSatFix,
+            lambda each: each.status.status == NavSatStatus.STATUS_NO_FIX,
+        )
+        no_imu = await hears(
+            world, bare, "/ugv1/imu", Imu, lambda each: each.orientation_covariance[0] == -1.0
+        )
+        look = PayloadState(CAMERA, TIME_US, pan_rad=0.5, tilt_rad=-0.25)
+        joints = await hears(
+            world,
+            look,
+            "/ugv2/joint_states",
+            JointState,
+            lambda each: list(each.position) == [-0.5, 0.25],
+        )
+    assert (fix.latitude, fix.longitude) == PLACE.latlon
+    assert fix.altitude == PLACE.altitude_m
+    assert fix.header.frame_id == "ugv1/base_link"
+    assert battery.percentage == pytest.approx(0.75)
+    assert battery.present
+    assert math.isnan(battery.voltage)
+    assert imu.angular_velocity_covariance[0] == imu.linear_acceleration_covariance[0] == -1.0
+    assert imu.orientation_covariance[0] == 0.0
+    assert math.isnan(no_fix.latitude)
+    assert no_imu.angular_velocity_covariance[0] == -1.0
+    assert list(joints.name) == ["ugv2_camera_pan", "ugv2_camera_tilt"]
+
+
+async def test_diagnostics_say_link_readiness_with_reasons_and_mode(ros_domain: int) -> None:
+    state = VehicleState(
+        UGV1, TIME_US, mode="GUIDED", ready=False, not_ready_reasons=("no fix", "low battery")
+    )
+
+    def status(message: Any) -> Any:
+        return next((each for each in message.status if each.name == "/face: ugv1"), None)
+
+    async with faced(ros_domain) as world:
+        array = await hears(
+            world,
+            state,
+            "/diagnostics",
+            DiagnosticArray,
+            lambda each: status(each) and "no fix" in status(each).message,
+        )
+    found = status(array)
+    assert found.level == DiagnosticStatus.WARN
+    assert found.message == "not ready: no fix; low battery"
+    values = {each.key: each.value for each in found.values}
+    assert (values["mode"], values["link"]) == ("GUIDED", "connected")
+
+
+async def test_topics_keep_their_rate(ros_domain: int) -> None:
+    async with faced(ros_domain, {"rate": {"odom": "5 Hz"}}) as world:
+        odom = world.client.hear("/ugv1/odom", Odometry)
+        await hears(world, STATE, "/ugv1/odom", Odometry)
+        loop, count = asyncio.get_running_loop(), len(odom)
+        began_s = loop.time()
+        heard = asyncio.create_task(until(lambda: len(odom) >= count + 10))
+        await said(world, STATE, heard)
+        took_s = loop.time() - began_s
+    assert took_s > 10 / 5.0 * 0.85
+
+
+async def test_names_have_the_namespace_and_frames_too(ros_domain: int) -> None:
+    async with faced(ros_domain, {"namespace": "/site_a"}) as world:
+        static = world.client.hear("/tf_static", TFMessage, STATIC)
+        odom = await hears(world, STATE, "/site_a/ugv1/odom", Odometry, of_state)
+        fleet = await world.client.hears("/site_a/face/fleet_state", FleetState, LATCHED)
+        await until(lambda: static)
+    assert odom.header.frame_id == "site_a/ugv1/odom"
+    assert fleet.resources[0].action == "/site_a/ugv1/execute_behavior"
+    assert {(e.header.frame_id, e.child_frame_id) for e in static[0].transforms} >= {
+        ("earth", "site_a/map"),
+        ("site_a/map", "site_a/ugv1/odom"),
+    }
+
+
+async def test_the_origin_of_the_fleet_is_latched(ros_domain: int) -> None:
+    async with faced(ros_domain) as world:
+        origin = await world.client.hears("/face/origin", GeoPointStamped, LATCHED)
+    position = origin.position
+    assert (position.latitude, position.longitude, position.altitude) == scenarios.ORIGIN
+    assert origin.header.frame_id == "map"
+
+
+async def test_the_state_of_the_fleet_is_published_on_change(ros_domain: int) -> None:
+    async with faced(ros_domain, {"commands": ["ugv1"]}) as world:
+        states = world.client.hear("/face/fleet_state", FleetState, LATCHED)
+        first = await until(lambda: states and states[-1])
+        assert [each.resource for each in first.resources] == ["ugv1", "ugv2", "ugv2/camera"]
+        assert [each.takes_commands for each in first.resources] == [True, False, False]
+        assert "goto" in first.resources[0].behaviors
+        await world.control.take("ugv2", by="anna")
+        await until(lambda: states[-1].resources[1].holder == "anna")
+        run = await world.control.start(
+            scenarios.one_behavior("goto", "ugv1", target=f"[{LATITUDE + 0.1}, {LONGITUDE}]")
+        )
+        moving = await until(
+            lambda: next((each for each in states if each.resources[0].behavior), None),
+            lambda: states[-1],
+        )
+        assert moving.resources[0].holder.startswith(f"{run}.")
+        assert moving.resources[0].holder_label == f"Task of {run}"
+        assert moving.resources[0].link == moving.resources[0].CONNECTED
+        await world.control.stop(run)
+        await until(lambda: states[-1].runs[0].status == states[-1].runs[0].STOPPED)
+
+
+async def test_markers_show_geometries_and_footprints_and_come_again_on_change_only(
+    ros_domain: int,
+) -> None:
+    corner = (LATITUDE, LONGITUDE, None)
+    ring = (corner, (LATITUDE + 0.01, LONGITUDE, None), (LATITUDE, LONGITUDE + 0.01, None), corner)
+    geometries = {
+        "road": Route((corner, (LATITUDE + 0.001, LONGITUDE, 5.0))),
+        "zone": Area((ring,)),
+        "limits": Area((ring,)),
+    }
+
+    fleet = replace(two_vehicles(), geometries=geometries, fence="limits")
+    async with faced(ros_domain, of=fleet) as world:
+        arrays = world.client.hear("/face/markers", MarkerArray, LATCHED)
+        await until(lambda: arrays)
+        shown = arrays[0].markers
+        assert shown[0].action == Marker.DELETEALL
+        kinds = {each.ns for each in shown[1:]}
+        assert kinds == {"routes", "areas", "fence", "names", "labels"}
+        road = next(each for each in shown if each.ns == "routes")
+        assert vector(road.points[1]) == pytest.approx((0.0, 111.0, 5.0), abs=0.5)
+        label = next(each for each in shown if each.text == "ugv1")
+        assert (label.header.frame_id, label.frame_locked) == ("ugv1/base_link", True)
+        diagnostics = world.client.hear("/diagnostics", DiagnosticArray)
+        seen = len(diagnostics)
+        await until(lambda: len(diagnostics) >= seen + 3)
+        assert len(arrays) == 1
+        await world.control.set_geometry("rally", point(0.002), by="anna")
+        await until(lambda: len(arrays) == 2)
+        assert any(each.text == "rally" for each in arrays[1].markers)
+        corners = (PLACE, GeoPosition(LATITUDE, LONGITUDE, ALTITUDE), PLACE)
+        sees = PayloadState(CAMERA, TIME_US, footprint=corners)
+        footprints = world.client.hear("/face/footprints", MarkerArray, LATCHED)
+        drawn = asyncio.create_task(until(lambda: any(len(e.markers) == 2 for e in footprints)))
+        await said(world, sees, drawn)
+        gone = PayloadState(CAMERA, TIME_US, footprint=corners, link=LinkState.LOST)
+        hidden = asyncio.create_task(until(lambda: len(footprints[-1].markers) == 1))
+        await said(world, gone, hidden)
+
+
+async def test_a_topic_that_another_node_publishes_is_left_to_it(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    async with faced(ros_domain) as world:
+        node = world.client.node
+        await hears(world, STATE, "/ugv1/odom", Odometry, of_state)
+        node.create_publisher(Odometry, "/ugv1/odom", 10)
+        await until(lambda: node.count_publishers("/ugv1/odom") == 1)
+        assert [each.node_name for each in node.get_publishers_info_by_topic("/ugv1/odom")] == [
+            "client"
+        ]
+        await hears(world, STATE, "/ugv1/imu", Imu, of_state)
+    assert "/ugv1/odom is left to the node /client, which publishes it" in caplog.text
+
+
+async def test_frames_that_another_node_publishes_are_left_to_it_and_said_once(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+
+    async with faced(ros_domain) as world:
+        theirs = TransformStamped(child_frame_id="ugv1/base_link")
+        theirs.header.frame_id = "map"
+        publisher = world.client.node.create_publisher(TFMessage, "/tf", 100)
+        frames = world.client.hear("/tf", TFMessage)
+        number = 0
+        while "is left to that node" not in caplog.text:
+            number += 1
+            theirs.header.stamp.sec = number
+            publisher.publish(TFMessage(transforms=[theirs]))
+            world.bus.publish(STATE)
+            await asyncio.sleep(0.05)
+            assert number < 400
+        del frames[:]
+        second = VehicleState(ResourceId("ugv2"), TIME_US, PLACE)
+        ours = asyncio.create_task(
+            until(lambda: [e for each in list(frames) for e in each.transforms if of_state(e)])
+        )
+        await said(world, second, ours)
+        publisher.publish(TFMessage(transforms=[theirs]))
+        children = {e.child_frame_id for each in list(frames) for e in each.transforms}
+        assert "ugv2/base_link" in children
+    assert caplog.text.count("is left to that node") == 1
+    ours_too = [e for each in frames for e in each.transforms if e.header.stamp.sec > number]
+    assert not [e for e in ours_too if e.child_frame_id == "ugv1/base_link"]
