@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from m2pem.api.commands import LazyCommand, command_group, simulator_group
     from m2pem.api.connection_reader import ConnectionReader
     from m2pem.api.control import ControlEvent, MissionControl
+    from m2pem.api.declared_behaviors import read_declared_behaviors
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.epoch_fence import EpochFence
     from m2pem.api.event_rules import (
@@ -173,6 +174,7 @@ _MODULES = {
     "m2pem.api.commands": "LazyCommand command_group simulator_group",
     "m2pem.api.connection_reader": "ConnectionReader",
     "m2pem.api.control": "ControlEvent MissionControl",
+    "m2pem.api.declared_behaviors": "read_declared_behaviors",
     "m2pem.api.description": "Description Importance Kind describe",
     "m2pem.api.epoch_fence": "EpochFence",
     "m2pem.api.follower": "Follower Listener follow",
@@ -399,6 +401,7 @@ __all__ = [
     "parse_mission",
     "quantity",
     "raw_parameters",
+    "read_declared_behaviors",
     "restored_work",
     "simulator_group",
     "strip_width_m",

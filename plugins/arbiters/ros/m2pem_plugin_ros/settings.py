@@ -19,9 +19,9 @@ from m2pem.api import (
     ConnectionReader,
     Dimension,
     ResourceId,
+    read_declared_behaviors,
 )
 from m2pem.errors import PluginError
-from m2pem_plugin_ros.catalogue import read_declared_behaviors
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")

@@ -3,7 +3,6 @@
 from typing import Any
 
 import pytest
-from m2pem_plugin_ros.catalogue import read_declared_behaviors
 
 from m2pem.api import (
     SHARED,
@@ -13,6 +12,7 @@ from m2pem.api import (
     ParameterSpec,
     ResourceId,
     ResumePolicy,
+    read_declared_behaviors,
 )
 from m2pem.errors import PluginError
 
