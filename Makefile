@@ -16,7 +16,7 @@ UI := plugins/ocu/web/ui
 UI_SOURCES := $(shell find $(UI) -path $(UI)/node_modules -prune -o -type f -print)
 PAGE := plugins/ocu/web/m2pem_plugin_web/static/index.html
 # a/b: b where the distribution has no a. Chromium without windows takes the tests less time.
-DEBIAN_PACKAGES := chromium-headless-shell/chromium curl iproute2 nodejs npm openssl postgresql spin systemd tcc tmux
+DEBIAN_PACKAGES := chromium-headless-shell/chromium curl iproute2 mosquitto nodejs npm openssl postgresql spin systemd tcc tmux
 
 # An environment holds absolute paths: one made elsewhere, or by another Python, is made anew. Which Python the
 # shell has counts only where it was asked for (PYTHON=...). One that make has not made is left alone.

@@ -67,7 +67,7 @@ _CHECK = "m2pem_check_mission"
 _CHECK_HOST = "m2pem_check_host"
 _OBSERVE = "m2pem_records_committed"
 PUBLISHED: Mapping[str, Sequence[str]] = {
-    "arbiter": ("mavlink", "ptz", "ros", "zenoh"),
+    "arbiter": ("mavlink", "ptz", "ros", "vda5050", "zenoh"),
     "ocu": ("mocu", "terminal", "web"),
     "face": ("cot",),
 }

@@ -1,0 +1,338 @@
+"""The arbiter of vehicles that speak VDA 5050. Its catalogue needs no connection."""
+
+import asyncio
+import uuid
+from collections.abc import AsyncIterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from m2pem.api import (
+    ArbiterCapabilities,
+    ArbiterContext,
+    AsyncQueue,
+    BehaviorId,
+    BehaviorReport,
+    BehaviorRequest,
+    BehaviorSpec,
+    BehaviorState,
+    BehaviorTracker,
+    Connection,
+    Limits,
+    ResourceId,
+    VehicleState,
+)
+from m2pem_plugin_vda5050.broker import Broker
+from m2pem_plugin_vda5050.catalogue import STOPS, USUAL
+from m2pem_plugin_vda5050.checkpoint import (
+    Checkpoint,
+    decode_checkpoint,
+    encode_checkpoint,
+    order_id,
+)
+from m2pem_plugin_vda5050.messages import FROM_VEHICLE, QOS, State
+from m2pem_plugin_vda5050.reading import action_state, is_executing
+from m2pem_plugin_vda5050.settings import BrokerSettings, Settings, read_settings
+from m2pem_plugin_vda5050.vehicle import Vehicle, VehicleSetup
+
+LOST_AFTER_S = 35.0
+"""The standard's vehicles send a state every 30 s at the latest."""
+
+HOLD_WITHIN_S = 6.0
+FIRST_CONTACT_WITHIN_S = 3.0
+"""`connect` waits no longer than this for vehicles, in real time."""
+
+ATTEND_EVERY_S = 0.2
+LATE_FACTOR = 2.0
+"""A round that comes more than twice as late as planned means that this process was suspended."""
+
+STATES_WAITING = 1000
+
+
+class Vda5050Arbiter:
+    """The arbiter `vda5050` (docs/vda5050.md).
+
+    Raises:
+        PluginError: a connection cannot be used; the text names the resource and the key.
+    """
+
+    capabilities = ArbiterCapabilities(one_vehicle=True, addresses=True, reclaims=True, fences=True)
+
+    def __init__(
+        self, connections: Mapping[ResourceId, Connection], context: ArbiterContext
+    ) -> None:
+        self._connections = connections
+        self._context = context
+        self._settings = read_settings(connections)
+        self._tracker = BehaviorTracker(self.catalogue, context.logger)
+        self._states: AsyncQueue[VehicleState] = AsyncQueue(STATES_WAITING)
+        self._vehicles: dict[ResourceId, Vehicle] = {}
+        self._brokers: dict[BrokerSettings, Broker] = {}
+        self._topics: dict[str, tuple[Vehicle, str]] = {}
+        self._attending: asyncio.Task[None] | None = None
+
+    # --- catalogue ------------------------------------------------------------------------------
+
+    def catalogue(self, resource: ResourceId) -> Sequence[BehaviorSpec]:
+        """Return the behaviors of a vehicle. Payloads have none of their own."""
+        settings = self._settings.get(resource)
+        if settings is None:
+            return ()
+        return (*USUAL, *(own.spec for own in settings.own_behaviors))
+
+    def limits(self, resource: ResourceId) -> Limits:
+        settings = self._settings.get(resource)
+        if settings is None:
+            return Limits(LOST_AFTER_S, HOLD_WITHIN_S)
+        own = self._connections[resource].lost_after_s
+        lost_after_s = LOST_AFTER_S if own is None else own
+        return Limits(lost_after_s, HOLD_WITHIN_S, settings.cancel_timeout_s)
+
+    def addresses(self, resource: ResourceId) -> Sequence[str]:
+        """Return the broker and the topics of a vehicle, as text."""
+        settings = self._settings.get(resource)
+        return [] if settings is None else [settings.address]
+
+    # --- life -----------------------------------------------------------------------------------
+
+    async def connect(self) -> None:
+        """Connect to all brokers. Return when each vehicle was received, or soon.
+
+        Raises:
+            PluginError: a password or a certificate cannot be used.
+        """
+        for resource, settings in self._settings.items():
+            setup = VehicleSetup(
+                self._connections[resource],
+                settings,
+                self._context,
+                self._tracker,
+                self.limits(resource),
+                partial(self._publish, settings),
+            )
+            vehicle = self._vehicles[resource] = Vehicle(setup)
+            for topic in FROM_VEHICLE:
+                self._topics[f"{settings.broker.url} {settings.prefix}/{topic}"] = vehicle, topic
+        try:
+            for broker in {each.broker for each in self._settings.values()}:
+                self._brokers[broker] = self._broker(broker)
+        except BaseException:
+            self._brokers.clear()
+            raise
+        for made in self._brokers.values():
+            made.open()
+        waits = [asyncio.ensure_future(v.first_contact.wait()) for v in self._vehicles.values()]
+        if waits:
+            await asyncio.wait(waits, timeout=FIRST_CONTACT_WITHIN_S)
+            for wait in waits:
+                wait.cancel()
+            await asyncio.gather(*waits, return_exceptions=True)
+        for resource, vehicle in self._vehicles.items():
+            vehicle.listen_from_now()
+            if not vehicle.first_contact.is_set():
+                self._context.logger.warning("%s: %s", resource, vehicle.absence)
+        self._attending = asyncio.get_running_loop().create_task(self._attend())
+
+    async def close(self) -> None:
+        """Close all connections. The vehicles go on to the last node that was released."""
+        attending, self._attending = self._attending, None
+        if attending is not None:
+            attending.cancel()
+            await asyncio.gather(attending, return_exceptions=True)
+        await asyncio.gather(*(broker.close() for broker in self._brokers.values()))
+        self._states.close()
+        self._tracker.close()
+
+    # --- behaviors ------------------------------------------------------------------------------
+
+    async def start(self, request: BehaviorRequest) -> None:
+        def reference() -> str:
+            resource = request.resources[0]
+            before = self._vehicles[resource].order if resource in self._vehicles else ""
+            return encode_checkpoint(
+                Checkpoint(resource, request.behavior, request.parameters, before)
+            )
+
+        if self._tracker.admit(request, reference, self._refusal):
+            self._vehicles[request.resources[0]].take(request)
+
+    async def cancel(self, behavior: BehaviorId, epoch: int) -> None:
+        if self._tracker.may_cancel(behavior, epoch):
+            for vehicle in self._vehicles.values():
+                if vehicle.doing == behavior:
+                    vehicle.cancel()
+
+    async def hold(self, resource: ResourceId) -> None:
+        if resource in self._vehicles:
+            self._vehicles[resource].hold()
+
+    async def resume(self, resource: ResourceId) -> None:
+        if resource in self._vehicles:
+            self._vehicles[resource].resume()
+
+    async def reclaim(self, resource: ResourceId) -> str:
+        """Cancel what a vehicle still does that was lost and is received again."""
+        return await self._vehicles[resource].reclaim() if resource in self._vehicles else ""
+
+    async def fence(self, run: str, epoch: int) -> None:
+        """Refuse lower epochs of the run here. VDA 5050 knows no epochs."""
+        self._tracker.fence(run, epoch)
+
+    async def disown(self, run: str) -> None:
+        """Send no more updates of the orders of a run. Vehicles go on to the last released node."""
+        behaviors = self._tracker.disown(run)
+        for vehicle in self._vehicles.values():
+            vehicle.forget(behaviors)
+
+    async def query(self, behavior: BehaviorId, native_ref: str | None) -> BehaviorReport:
+        """Return the last report, or after a restart, what the state of the vehicle shows."""
+        self._tracker.fence(behavior, self._context.epoch_of(behavior))
+        known = self._tracker.last(behavior)
+        if known.state is not BehaviorState.UNKNOWN:
+            return known if known.state.terminal else replace(known, held=self._is_held(behavior))
+        checkpoint = decode_checkpoint(native_ref) if native_ref else None
+        if checkpoint is None:
+            return await self._search(behavior, known)
+        vehicle = self._vehicles.get(checkpoint.resource)
+        if vehicle is None:
+            return replace(known, reason=f"the vehicle '{checkpoint.resource}' no longer exists")
+        return await self._query(vehicle, behavior, checkpoint, native_ref)
+
+    # --- streams --------------------------------------------------------------------------------
+
+    def reports(self) -> AsyncIterator[BehaviorReport]:
+        return self._tracker.reports()
+
+    def telemetry(self) -> AsyncIterator[VehicleState]:
+        """Yield states until `close`, for one reader. A slow reader misses old states."""
+        return self._states.read()
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _broker(self, settings: BrokerSettings) -> Broker:
+        vehicles = [
+            self._vehicles[resource]
+            for resource, each in self._settings.items()
+            if each.broker == settings
+        ]
+        topics = [
+            (f"{vehicle.settings.prefix}/{topic}", QOS.get(topic, 0))
+            for vehicle in vehicles
+            for topic in FROM_VEHICLE
+        ]
+        # A random part: of two clients with one name, a broker disconnects the first one.
+        identifier = f"m2pem-{self._context.journal.hex[:8]}-{uuid.uuid4().hex[:8]}"
+
+        def connected() -> None:
+            for vehicle in vehicles:
+                vehicle.listen()
+
+        return Broker(
+            settings,
+            identifier,
+            topics,
+            partial(self._received, settings.url),
+            connected,
+            self._context.logger,
+        )
+
+    def _publish(self, settings: Settings, topic: str, payload: bytes, qos: int) -> bool:
+        broker = self._brokers.get(settings.broker)
+        return broker is not None and broker.publish(f"{settings.prefix}/{topic}", payload, qos)
+
+    def _received(self, url: str, topic: str, payload: bytes) -> None:
+        vehicle, name = self._topics.get(f"{url} {topic}", (None, ""))
+        if vehicle is None:
+            return
+        try:
+            state = vehicle.receive(name, payload)
+        except Exception:  # an error of one vehicle must not stop the others
+            self._context.logger.exception("%s: %s", vehicle.resource, topic)
+        else:
+            if state is not None:
+                self._states.put(state)
+
+    def _refusal(self, request: BehaviorRequest) -> str:
+        if len(request.resources) != 1:
+            return f"{request.behavior} takes one vehicle, not {len(request.resources)}"
+        resource = request.resources[0]
+        allowed = self._connections[resource].behaviors
+        if allowed is not None and request.behavior not in allowed:
+            return f"the fleet does not allow {resource} the behavior '{request.behavior}'"
+        if resource not in self._vehicles:
+            return "the arbiter is not connected"
+        return self._vehicles[resource].refusal(request)
+
+    def _is_held(self, behavior: BehaviorId) -> bool:
+        return any(v.is_held for v in self._vehicles.values() if v.doing == behavior)
+
+    async def _search(self, behavior: BehaviorId, unknown: BehaviorReport) -> BehaviorReport:
+        """Look for a behavior of which there is no checkpoint: an executive may have died between
+        sending it and storing its report."""
+        wanted = order_id(self._context.journal, behavior)
+        states = await asyncio.gather(*(v.known_state() for v in self._vehicles.values()))
+        for vehicle, state in zip(self._vehicles.values(), states, strict=True):
+            if state is None:
+                continue
+            if state.order_id == wanted and is_executing(state):
+                vehicle.leave_behind(behavior)
+        return unknown
+
+    async def _query(
+        self,
+        vehicle: Vehicle,
+        behavior: BehaviorId,
+        checkpoint: Checkpoint,
+        reference: str | None,
+    ) -> BehaviorReport:
+        """Ask the state of the vehicle. There is no `await` between it and `adopt`, so that no end
+        of the behavior is missed."""
+        state = await vehicle.known_state()
+        known = self._tracker.last(behavior)
+        if known.state is not BehaviorState.UNKNOWN:
+            return known  # a query at the same time has adopted it
+        if state is None:
+            vehicle.leave_behind(behavior)
+            return replace(known, native_ref=reference, reason=vehicle.absence)
+        if not self._has_it(state, behavior):
+            return self._unknown(known, state, checkpoint, reference)
+        self._tracker.adopt(behavior, (checkpoint.resource,), reference)
+        request = BehaviorRequest(
+            behavior, 0, checkpoint.behavior, checkpoint.parameters, (checkpoint.resource,)
+        )
+        vehicle.adopt(request)
+        last = self._tracker.last(behavior)
+        return last if last.state.terminal else replace(last, held=vehicle.is_held)
+
+    def _has_it(self, state: State, behavior: BehaviorId) -> bool:
+        wanted = order_id(self._context.journal, behavior)
+        return state.order_id == wanted or action_state(state, wanted) is not None
+
+    def _unknown(
+        self, known: BehaviorReport, state: State, checkpoint: Checkpoint, reference: str | None
+    ) -> BehaviorReport:
+        """The vehicle does not have the order. If it still has the one from before, it has not
+        begun; without any, it may have been restarted, and has forgotten all."""
+        before = checkpoint.order_before
+        not_begun = checkpoint.behavior in STOPS or (before != "" and state.order_id == before)
+        reason = f"the vehicle has the order {state.order_id!r}"
+        return replace(known, native_ref=reference, not_begun=not_begun, reason=reason)
+
+    async def _attend(self) -> None:
+        """Look after all vehicles every 0.2 s."""
+        clock = self._context.clock
+        last_us, was_late = clock.now_us(), False
+        while True:
+            now_us = clock.now_us()
+            # After a suspension of this process, messages of vehicles are still to be read.
+            late = not was_late and now_us - last_us > LATE_FACTOR * ATTEND_EVERY_S * 1e6
+            last_us, was_late = now_us, late
+            for vehicle in self._vehicles.values():
+                broker = self._brokers[vehicle.settings.broker]
+                try:
+                    state = vehicle.attend(may_lose=not late, problem=broker.problem)
+                except Exception:  # an error of one vehicle must not stop the others
+                    self._context.logger.exception("%s: its state", vehicle.resource)
+                else:
+                    if state is not None:
+                        self._states.put(state)
+            await clock.sleep(ATTEND_EVERY_S)

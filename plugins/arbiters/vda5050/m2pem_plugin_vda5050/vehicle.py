@@ -1,0 +1,617 @@
+"""One vehicle of the arbiter: its link, its state, and the task that it does."""
+
+import asyncio
+import logging
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from msgspec import UNSET
+
+from m2pem.api import (
+    ArbiterContext,
+    BehaviorId,
+    BehaviorRequest,
+    BehaviorState,
+    BehaviorTracker,
+    Connection,
+    Fence,
+    GeoPosition,
+    LatLon,
+    Limits,
+    LinkState,
+    ParameterKind,
+    Point,
+    ResolvedValue,
+    Route,
+    VehicleState,
+)
+from m2pem_plugin_vda5050.catalogue import (
+    DRIVING_PARAMETERS,
+    REVERSE_M,
+    STOPS,
+    USUAL,
+    OwnBehavior,
+    Scope,
+)
+from m2pem_plugin_vda5050.checkpoint import order_id
+from m2pem_plugin_vda5050.commander import (
+    CancelControl,
+    Commander,
+    PauseControl,
+    Publish,
+    action_of,
+)
+from m2pem_plugin_vda5050.map_frame import MapFrame, MapPoint
+from m2pem_plugin_vda5050.messages import (
+    Action,
+    AgvPosition,
+    ConnectionMessage,
+    Factsheet,
+    Headers,
+    MessageError,
+    State,
+    Velocity,
+    Visualization,
+    decode,
+)
+from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
+from m2pem_plugin_vda5050.reading import (
+    COMMANDED,
+    describe,
+    is_executing,
+    is_paused,
+    is_paused_by_us,
+    not_ready_reasons,
+    text_of,
+    wrong_position,
+)
+from m2pem_plugin_vda5050.settings import Settings
+from m2pem_plugin_vda5050.tasks import InstantTask, OrderTask, StopTask, Task, TaskSetup
+
+BROKEN_AFTER_S = 5.0
+"""A vehicle whose connection to the broker has broken has so long to come back."""
+
+DEGRADED_SHARE = 0.5
+RECLAIM_WITHIN_S = 5.0
+"""In real time."""
+
+QUERY_WITHIN_S = 3.0
+"""In real time: so long a query waits for the first state of the vehicle."""
+
+LOG_AGAIN_AFTER_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleSetup:
+    """The arguments of a vehicle."""
+
+    connection: Connection
+    settings: Settings
+    context: ArbiterContext
+    tracker: BehaviorTracker
+    limits: Limits
+    publish: Publish
+
+
+class Vehicle:
+    """Gets the messages of one vehicle, and sends it what its task needs."""
+
+    def __init__(self, setup: VehicleSetup) -> None:
+        self.resource = setup.connection.resource
+        self.settings = settings = setup.settings
+        self.link = LinkState.LOST
+        self.first_contact = asyncio.Event()
+        self._context, self._tracker, self._limits = setup.context, setup.tracker, setup.limits
+        self._clock = setup.context.clock
+        self._logger: logging.Logger = setup.context.logger
+        origin = setup.context.origin
+        place = settings.map.origin or origin[:2]
+        self._frame = MapFrame((*place, origin[2]), settings.map.rotation_rad)
+        headers = Headers(settings.manufacturer, settings.serial_number, settings.version)
+        self._commander = Commander(headers, self._clock, setup.publish)
+        self._pause = PauseControl(self._commander, self._clock)
+        self._cancel = CancelControl(self._commander, self._clock)
+        self._own = {own.spec.name: own for own in settings.own_behaviors}
+        fence = setup.connection.fence
+        self._fence = None if fence is None else Fence(fence)
+        self._factsheet: Factsheet | None = None
+        self._state: State | None = None
+        self._state_us = 0
+        self._place: AgvPosition | None = None
+        self._velocity: Velocity | None = None
+        self._contact_us = self._clock.now_us()
+        self._has_contact = False
+        self._broken_us: int | None = None
+        self._is_offline = False
+        self._task: Task | None = None
+        self._left: dict[str, bool] = {}
+        self._left_us = 0
+        self._resolved = asyncio.Event()
+        self._is_held = False
+        self._logged: dict[str, int] = {}
+        self._invalid = ""
+
+    # --- messages of the vehicle ----------------------------------------------------------------
+
+    def receive(self, topic: str, payload: bytes) -> VehicleState | None:
+        """Process a message. Return the new state for the fleet; None: nothing new is known."""
+        try:
+            match topic:
+                case "state":
+                    return self._receive_state(payload)
+                case "visualization":
+                    return self._receive_visualization(payload)
+                case "connection":
+                    self._receive_connection(decode(payload, ConnectionMessage))
+                case "factsheet" if payload:
+                    self._factsheet = decode(payload, Factsheet)
+        except MessageError as error:
+            self._invalid = f"its last message on {topic} was invalid: {text_of(error)}"
+            self._log(f"{topic}: {text_of(error)}")
+        return None
+
+    def _receive_state(self, payload: bytes) -> VehicleState:
+        state = decode(payload, State)
+        if not state.version.startswith("2."):
+            raise MessageError(f"its version is {text_of(state.version, 20)}, not 2.x")
+        if state.serial_number != self.settings.serial_number:
+            raise MessageError(f"it is of the vehicle {text_of(state.serial_number, 60)!r}")
+        self._state, self._state_us = state, self._clock.now_us()
+        self._place = None if state.agv_position is UNSET else state.agv_position
+        if state.velocity is not UNSET:
+            self._velocity = state.velocity
+        elif not state.driving:
+            self._velocity = Velocity(vx=0.0, vy=0.0)
+        else:
+            self._velocity = None
+        self._heard()
+        self.step()
+        return self.state()
+
+    def _receive_visualization(self, payload: bytes) -> VehicleState | None:
+        message = decode(payload, Visualization)
+        if message.agv_position is UNSET or self._state is None:
+            return None
+        self._place = message.agv_position
+        if message.velocity is not UNSET:
+            self._velocity = message.velocity
+        self._heard()
+        return self.state()
+
+    def _receive_connection(self, message: ConnectionMessage) -> None:
+        match message.connection_state:
+            case "ONLINE":
+                self._broken_us, self._is_offline = None, False
+            case "OFFLINE":
+                self._is_offline = True
+            case _ if self._broken_us is None:
+                self._broken_us = self._clock.now_us()
+
+    def _heard(self) -> None:
+        self._contact_us = self._clock.now_us()
+        self._has_contact, self._invalid = True, ""
+        if self._broken_us is not None and self._contact_us > self._broken_us:
+            self._broken_us = None  # its ONLINE is on the way: it has come back
+        self._is_offline = False
+        self.first_contact.set()
+
+    # --- calls of the arbiter -------------------------------------------------------------------
+
+    @property
+    def doing(self) -> BehaviorId | None:
+        """The behavior that goes on."""
+        return None if self._task is None or self._task.over else self._task.request.id
+
+    @property
+    def order(self) -> str:
+        """The order that the vehicle has, or had last; "" if it is not known."""
+        return "" if self._state is None else self._state.order_id
+
+    def listen(self) -> None:
+        """The broker is connected: ask the vehicle for its state, which is not retained."""
+        self._commander.control("stateRequest")
+        if self._factsheet is None:
+            self._commander.control("factsheetRequest")
+
+    def listen_from_now(self) -> None:
+        """Count the silence of the vehicle from now on."""
+        self._contact_us = self._clock.now_us()
+
+    def refusal(self, request: BehaviorRequest) -> str:
+        """Return why a request cannot be done now; "" if it can. A vehicle that was never received
+        refuses nothing: its behavior will be LOST."""
+        target = request.parameters.get("target")
+        if target is not None and not isinstance(target, Point):
+            return "target: a VDA 5050 vehicle drives to places, not after vehicles"
+        own = self._own.get(request.behavior)
+        if own is not None and (missing := self._not_in_factsheet(own)):
+            return missing
+        state = self._state
+        if state is None or not self._has_contact:
+            return ""
+        if state.operating_mode not in COMMANDED:
+            return f"its operating mode is {text_of(state.operating_mode, 30)}"
+        if request.behavior in STOPS:
+            return ""
+        if state.safety_state.e_stop != "NONE":
+            return "its emergency stop is active"
+        fatal = [describe(each) for each in state.errors if each.error_level == "FATAL"]
+        if fatal:
+            return f"it has a fatal error: {'; '.join(fatal)}"
+        if own is not None and own.scope is Scope.INSTANT:
+            return ""
+        if is_paused(state) and not (is_paused_by_us(state) or self._pause.wanted):
+            return "it is paused, and not by m2pem: let it go on where it was paused"
+        known = {*self._left, self._id(request.id), *map(self._id, request.preempts)}
+        if self._task is not None:
+            known.add(self._task.id)
+        if is_executing(state) and state.order_id not in known:
+            return (
+                f"it executes the order {text_of(state.order_id, 60)!r} of another master control"
+            )
+        return wrong_position(state, self.settings.map.id) or self._breach(request)
+
+    def take(self, request: BehaviorRequest) -> None:
+        """Begin a behavior. What the vehicle still does is cancelled first."""
+        if self._task is not None and not self._task.over:
+            self._leave_behind(self._task.id, cancel=True)
+        for order in self._left:
+            self._left[order] = True
+        self._is_held = False
+        if request.behavior not in STOPS and self._is_paused_by_us():
+            self._pause.want(False)
+        self._task = self._task_for(request)
+        self.step()
+
+    def adopt(self, request: BehaviorRequest) -> None:
+        """Take up a behavior that the vehicle was found doing, after a restart."""
+        self._task = self._task_for(request)
+        self.step()
+
+    def cancel(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+
+    def hold(self) -> None:
+        """Pause the vehicle. It keeps its order."""
+        self._is_held = True
+        self._pause.want(True)
+
+    def resume(self) -> None:
+        self._is_held = False
+        if self._pause.wanted or self._state is None or is_paused(self._state):
+            self._pause.want(False)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the vehicle is paused, by whomever."""
+        return self._state is not None and is_paused(self._state)
+
+    def forget(self, behaviors: Collection[BehaviorId]) -> None:
+        """Send nothing more for these behaviors: the vehicle goes on with what was released."""
+        if self._task is not None and self._task.request.id in behaviors:
+            self._task = None
+        for behavior in behaviors:
+            self._left.pop(self._id(behavior), None)
+
+    async def reclaim(self) -> str:
+        """End the orders that a lost vehicle may still execute, now that it is received again.
+        Return "" when its state shows that they have ended; otherwise what it may still do."""
+        if self.doing is not None:
+            self._lose((self._clock.now_us() - self._contact_us) / 1e6)
+        for order in self._left:
+            self._left[order] = True
+        self.step()
+        try:
+            async with asyncio.timeout(RECLAIM_WITHIN_S):
+                while self._left:
+                    self._resolved.clear()
+                    await self._resolved.wait()
+        except TimeoutError:
+            self.hold()
+            return f"it has not ended its order {next(iter(self._left), '')!r}, and is paused"
+        return ""
+
+    async def known_state(self) -> State | None:
+        """Return the last state; None: none arrives soon."""
+        try:
+            async with asyncio.timeout(QUERY_WITHIN_S):
+                await self.first_contact.wait()
+        except TimeoutError:
+            return None
+        return self._state
+
+    def leave_behind(self, behavior: BehaviorId) -> None:
+        """The vehicle may still execute the order of a behavior that is not known here."""
+        self._leave_behind(self._id(behavior), cancel=False)
+
+    @property
+    def absence(self) -> str:
+        """Where the vehicle is expected, and what was received from there, for people."""
+        what = self._invalid or "no state was received"
+        return f"{what}; it is expected at {self.settings.address}"
+
+    # --- time -----------------------------------------------------------------------------------
+
+    def attend(self, *, may_lose: bool, problem: str) -> VehicleState | None:
+        """Look after the link and the task. Return the new state if the link has changed.
+
+        `may_lose`: all messages until now were processed. `problem`: why the broker is not
+        connected, or "".
+        """
+        silent_s = (self._clock.now_us() - self._contact_us) / 1e6
+        before = self.link
+        self.link = self._link_state(silent_s, may_lose=may_lose)
+        if self.link is LinkState.LOST and may_lose and self._is_silent(silent_s):
+            if self.doing is not None:
+                self._lose(silent_s, problem)
+        elif self._state is not None:
+            self.step()
+        return self.state() if self.link is not before else None
+
+    def step(self) -> None:
+        """Send what is due, and report what the state shows."""
+        state = self._state
+        if state is None:
+            return
+        may_send = self._context.may_send()
+        self._pause.step(state, may_send=may_send)
+        self._step_left(state, may_send=may_send)
+        task = self._task
+        if task is None or task.over:
+            return
+        try:
+            task.step(state)
+        except Exception as error:
+            self._logger.exception("%s: %s", self.resource, task.request.id)
+            reason = f"internal error of m2pem: {type(error).__name__}: {error}"
+            self._leave_behind(task.id, cancel=True)
+            task.over = True
+            self._tracker.end(task.request.id, BehaviorState.FAILED, reason=reason)
+
+    def state(self) -> VehicleState:
+        """Return the state of the vehicle for the fleet."""
+        state, now_us = self._state, self._clock.now_us()
+        behavior = ""
+        if self._task is not None and not self._task.over:
+            behavior = self._task.request.behavior
+        if state is None:
+            return VehicleState(self.resource, now_us, link=self.link, behavior=behavior)
+        reasons = not_ready_reasons(state, self.settings.map.id)
+        if is_executing(state) and state.order_id not in self._known_orders():
+            order = text_of(state.order_id, 60)
+            reasons = (*reasons, f"it executes the order {order!r} of another master control")
+        place = self._place
+        return VehicleState(
+            self.resource,
+            now_us,
+            self.position(),
+            velocity_enu_m_s=self._velocity_enu(),
+            yaw_rad=None if place is None else self._frame.to_yaw(place.theta),
+            battery_fraction=min(1.0, max(0.0, state.battery_state.battery_charge / 100)),
+            mode=text_of(state.operating_mode, 30),
+            ready=not reasons,
+            not_ready_reasons=reasons,
+            link=self.link,
+            behavior=behavior,
+        )
+
+    def position(self) -> GeoPosition | None:
+        """Return the place of the vehicle; None: it is not known."""
+        place = self._place
+        if place is None or not place.position_initialized or place.map_id != self.settings.map.id:
+            return None
+        return self._frame.to_position(place.x, place.y)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _link_state(self, silent_s: float, *, may_lose: bool) -> LinkState:
+        if not self._has_contact:
+            return LinkState.LOST
+        if self._is_silent(silent_s):
+            return LinkState.LOST if may_lose else self.link
+        if self._broken_us is not None or silent_s >= DEGRADED_SHARE * self._limits.lost_after_s:
+            return LinkState.DEGRADED
+        return LinkState.CONNECTED
+
+    def _is_silent(self, silent_s: float) -> bool:
+        bound_s = self._limits.lost_after_s
+        if self._is_offline or silent_s >= bound_s:
+            return True
+        broken_us = self._broken_us
+        if broken_us is None:
+            return False
+        return self._clock.now_us() - broken_us >= min(bound_s, BROKEN_AFTER_S) * 1e6
+
+    def _lose(self, silent_s: float, problem: str = "") -> None:
+        if self._task is not None:
+            self._task.lost()
+        reason = f"no message for {silent_s:.1f} s"
+        if problem:
+            reason += f", as the broker {self.settings.broker.url} is not connected: {problem}"
+        elif self._is_offline:
+            reason = "it has disconnected from the broker (OFFLINE)"
+        elif self._broken_us is not None:
+            reason = "its connection to the broker has broken (CONNECTIONBROKEN)"
+        elif not self._has_contact or self._invalid:
+            reason += f": {self.absence}"
+        self._tracker.lose(self.resource, reason)
+
+    def _step_left(self, state: State, *, may_send: bool) -> None:
+        """Forget orders that have ended; cancel those that should not go on."""
+        for order, cancels in list(self._left.items()):
+            if self._state_us <= self._left_us:
+                return  # the state is older
+            has_ended = state.order_id != order or not (is_executing(state) or state.driving)
+            if has_ended:
+                del self._left[order]
+                self._resolved.set()
+            elif cancels:
+                self._cancel.step(state, may_send=may_send)
+
+    def _leave_behind(self, order: str, cancel: bool) -> None:
+        self._left[order] = cancel or self._left.get(order, False)
+        self._left_us = self._clock.now_us()
+
+    def _known_orders(self) -> set[str]:
+        task = set() if self._task is None else {self._task.id}
+        return {*self._left, *task}
+
+    def _is_paused_by_us(self) -> bool:
+        state = self._state
+        return bool(self._pause.wanted) or (state is not None and is_paused_by_us(state))
+
+    def _id(self, behavior: BehaviorId) -> str:
+        return order_id(self._context.journal, behavior)
+
+    def _task_for(self, request: BehaviorRequest) -> Task:
+        own = self._own.get(request.behavior)
+        usual = {spec.name: spec for spec in USUAL}
+        setup = TaskSetup(
+            request,
+            usual[request.behavior] if own is None else own.spec,
+            self._id(request.id),
+            self._context,
+            self._tracker,
+            self._commander,
+            self._pause,
+            self._limits.cancel_timeout_s,
+            self._leave_behind,
+            self.position,
+        )
+        if request.behavior in STOPS:
+            return StopTask(setup, lambda: not self._is_held)
+        if own is not None and own.scope is Scope.INSTANT:
+            return InstantTask(setup, _action(own, setup.id, request.parameters))
+        return OrderTask(setup, lambda state: self._plan(setup, own, state), self._progress_of)
+
+    def _progress_of(self, plan: OrderPlan) -> OrderProgress:
+        factsheet = self._factsheet or self.settings.factsheet
+        most = None if factsheet is None else factsheet.most_nodes
+        return OrderProgress(plan, self.settings.released_nodes, most)
+
+    def _plan(
+        self, setup: TaskSetup, own: OwnBehavior | None, state: State | None
+    ) -> OrderPlan | None:
+        """Return the plan of an order. `state`: where the vehicle is; None: it has the order
+        already. Then None is returned if the parameters do not say all of it any more.
+
+        Raises:
+            ValueError: the place of the vehicle is not known.
+        """
+        request, settings = setup.request, self.settings
+        start: MapPoint | None = None
+        if state is not None:
+            if wrong := wrong_position(state, settings.map.id):
+                raise ValueError(f"the order cannot begin: {wrong}")
+            assert state.agv_position is not UNSET
+            start = MapPoint(state.agv_position.x, state.agv_position.y)
+        points, loop = self._points(request, state)
+        if points is None:
+            return None
+        parameters = request.parameters
+        speed, heading = parameters.get("speed"), parameters.get("heading")
+        tolerance = parameters.get("tolerance")
+        actions = () if own is None else (_action(own, f"{setup.id}.action", parameters),)
+        return OrderPlan(
+            setup.id,
+            settings.map.id,
+            start,
+            points,
+            loop,
+            float(speed) if isinstance(speed, int | float) else None,
+            self._frame.to_theta(float(heading)) if isinstance(heading, int | float) else None,
+            request.behavior == "reverse",
+            settings.deviation_m,
+            float(tolerance) if isinstance(tolerance, int | float) else settings.deviation_m,
+            settings.start_deviation_m,
+            actions,
+        )
+
+    def _points(
+        self, request: BehaviorRequest, state: State | None
+    ) -> tuple[tuple[MapPoint, ...] | None, bool]:
+        """Return the waypoints, and whether they are a loop. None: they are not known."""
+        route, target = request.parameters.get("route"), request.parameters.get("target")
+        if isinstance(route, Route):
+            points = tuple(self._frame.to_map(each[:2]) for each in route.waypoints)
+            return points, request.parameters.get("loop") is True
+        if isinstance(target, Point):
+            return (self._frame.to_map(target.position[:2]),), False
+        if request.behavior == "reverse":
+            if state is None or state.agv_position is UNSET:
+                return None, False
+            back = request.parameters.get("distance")
+            back_m = float(back) if isinstance(back, int | float) else REVERSE_M
+            place = state.agv_position
+            x, y = (
+                place.x - back_m * math.cos(place.theta),
+                place.y - back_m * math.sin(place.theta),
+            )
+            return (MapPoint(x, y),), False
+        is_whole = request.behavior in self._own and not any(
+            each.required and each.kind is ParameterKind.ROUTE
+            for each in self._own[request.behavior].spec.parameters
+        )
+        return (() if is_whole else None), False
+
+    def _not_in_factsheet(self, own: OwnBehavior) -> str:
+        if self._factsheet is None:
+            return ""
+        actions = {each.action_type: each for each in self._factsheet.protocol_features.agv_actions}
+        if own.action not in actions:
+            return f"the vehicle's factsheet has no action {own.action}"
+        if own.scope.value.upper() not in actions[own.action].action_scopes:
+            return f"the vehicle's factsheet has no {own.scope} action {own.action}"
+        return ""
+
+    def _breach(self, request: BehaviorRequest) -> str:
+        """Return where the request would leave the fence of the fleet; "" if it does not."""
+        if self._fence is None:
+            return ""
+        position = self.position()
+        start = None if position is None else position.latlon
+        route, target = request.parameters.get("route"), request.parameters.get("target")
+        way: list[LatLon] = []
+        if isinstance(route, Route):
+            way = [each[:2] for each in route.waypoints]
+            if request.parameters.get("loop") is True:
+                way.append(way[0])
+        elif isinstance(target, Point):
+            way = [target.position[:2]]
+        elif request.behavior == "reverse" and self._state is not None:
+            points, _ = self._points(request, self._state)
+            way = [self._frame.to_position(*point).latlon for point in points or ()]
+        return self._fence.breach(way, start)
+
+    def _velocity_enu(self) -> tuple[float, float, float] | None:
+        place, velocity = self._place, self._velocity
+        if place is None or velocity is None:
+            return None
+        ahead = 0.0 if velocity.vx is UNSET else velocity.vx
+        left = 0.0 if velocity.vy is UNSET else velocity.vy
+        cos, sin = math.cos(place.theta), math.sin(place.theta)
+        return (*self._frame.to_enu(ahead * cos - left * sin, ahead * sin + left * cos), 0.0)
+
+    def _log(self, text: str) -> None:
+        """Log a warning, the same one once in a while."""
+        now_us = self._clock.now_us()
+        key = text[:80]
+        if now_us - self._logged.get(key, -(10**18)) >= LOG_AGAIN_AFTER_S * 1e6:
+            if len(self._logged) > 100:
+                self._logged.clear()
+            self._logged[key] = now_us
+            self._logger.warning("%s: invalid message: %s", self.resource, text)
+
+
+def _action(own: OwnBehavior, action_id: str, parameters: Mapping[str, ResolvedValue]) -> Action:
+    """Return the action of a behavior."""
+    values: dict[str, object] = {}
+    for spec in own.spec.parameters:
+        value = parameters.get(spec.name, spec.default)
+        if spec.name in DRIVING_PARAMETERS or value is None:
+            continue
+        is_count = spec.kind is ParameterKind.COUNT and isinstance(value, int | float)
+        values[spec.name] = int(value) if is_count and isinstance(value, int | float) else value
+    return action_of(own.action, action_id, own.blocking, values)
