@@ -18,6 +18,7 @@ from m2pem.mission.values import Value
 
 if TYPE_CHECKING:
     import logging
+    from pathlib import Path
 
     from m2pem.api.bus import FleetBus
     from m2pem.api.clock import Clock
@@ -64,7 +65,9 @@ class ArbiterContext:
     Commands whose call has no epoch, such as a query, carry it. `may_send`: whether an arbiter may
     send on its own account: commands that it repeats, streams, the next step of a behavior. False
     after this process was stopped for a while, until the journal has said that it still drives its
-    runs. What the executive calls is sent all the same, a hold above all.
+    runs. What the executive calls is sent all the same, a hold above all. `state_folder`: the
+    folder of the journal's file, for what an arbiter must keep over restarts; None: the journal is
+    in memory.
     """
 
     clock: "Clock"
@@ -75,6 +78,7 @@ class ArbiterContext:
     journal: UUID = field(default_factory=uuid4)
     epoch_of: Callable[[BehaviorId], int] = field(default=lambda _: 0)
     may_send: Callable[[], bool] = field(default=lambda: True)
+    state_folder: "Path | None" = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,9 @@ async def _serve(
     plugins = PluginManager()
     teams = {team.name: spelled_out(team) for team in fleet.teams.values()}
     bus, logger = Bus(), logging.getLogger("m2pem.host")
-    context = ArbiterContext(SystemClock(), bus, logger, fleet.origin, teams, uuid4())
+    context = ArbiterContext(
+        SystemClock(), bus, logger, fleet.origin, teams, uuid4(), state_folder=folder
+    )
     link = plugins.arbiter(HOST_LINK)
     # As an executive here would have them: what is wrong with a setting is said at once, and no
     # executive of this host may command the same vehicles meanwhile.

@@ -99,6 +99,7 @@ class Executive:
                 journal.identity,
                 self._epoch_of,
                 self._may_send,
+                None if journal.file is None else journal.file.parent,
             ),
         )
         self._observers = (

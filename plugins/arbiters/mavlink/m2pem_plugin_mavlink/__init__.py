@@ -3,7 +3,8 @@
 The package is the entry point of the plugin: it has the hooks of `hooks`. Plugins that command a
 payload import the other names from here: `open_link` opens a link to a vehicle over the sockets of
 its arbiter, and `camera`, `camera_images`, `gimbal` and `gimbal_status` are the modules with the
-transactions to perform on it. A name is loaded when it is first used.
+transactions to perform on it. `signing_of` reads how the vehicle's frames are signed. A name is
+loaded when it is first used.
 """
 
 from importlib import import_module
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
         NoAnswerError,
         RefusedError,
     )
+    from m2pem_plugin_mavlink.signing.policy import signing_of
 
 __all__ = [
     "Address",
@@ -45,6 +47,7 @@ __all__ = [
     "m2pem_register_commands",
     "message_type",
     "open_link",
+    "signing_of",
 ]
 
 _MODULES = {
@@ -53,6 +56,7 @@ _MODULES = {
     "microservices.message_requests": "SetMessageInterval",
     "protocol.messages": "Address Message message_type",
     "protocol.transaction": "ExchangeError NoAnswerError RefusedError",
+    "signing.policy": "signing_of",
 }
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 _SERVICES = ("camera", "camera_images", "gimbal", "gimbal_status")

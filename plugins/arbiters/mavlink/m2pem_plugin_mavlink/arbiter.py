@@ -113,7 +113,7 @@ class MavlinkArbiter:
     ) -> None:
         self._connections = connections
         self._context = context
-        self._settings = read_settings(connections)
+        self._settings = read_settings(connections, context.state_folder)
         self._make_vehicle_connections = make_vehicle_connections
         self._vehicle_connections: VehicleConnections | None = None
         self._tracker = BehaviorTracker(self._behaviors_of, context.logger)
@@ -415,20 +415,24 @@ class MavlinkArbiter:
             if silent_s >= bound_s and not late and self._tracker.holder(resource) is not None:
                 controller.release()
                 reason = (
-                    self._never_received(resource)
+                    self._never_received(controller.vehicle)
                     if never_received
                     else f"no message for {silent_s:.1f} s"
                 )
-                self._tracker.lose(resource, reason)
-            if vehicle.state.changes != published or vehicle.link_state != link:
+                refused = vehicle.refused_frames()
+                self._tracker.lose(resource, f"{reason}; {refused}" if refused else reason)
+            new_refusal = vehicle.warn_of_refused_frames()
+            if new_refusal or vehicle.state.changes != published or vehicle.link_state != link:
                 published, link = vehicle.state.changes, vehicle.link_state
                 self._states.put(replace(vehicle.telemetry(), behavior=controller.behavior))
             left_s = bound_s - silent_s
             await clock.sleep(min(TELEMETRY_EVERY_S, left_s) if left_s > 0 else TELEMETRY_EVERY_S)
 
-    def _never_received(self, resource: ResourceId) -> str:
-        settings = self._settings[resource]
+    def _never_received(self, vehicle: "Vehicle") -> str:
+        settings = self._settings[vehicle.resource]
         where = ", ".join(map(str, settings.urls))
+        if vehicle.refused_frames():
+            return f"no message of system {settings.system_id} was accepted"
         return (
             f"no message of system {settings.system_id} has ever arrived on {where}: is its "
             "autopilot, or the simulation of it, running, and does it send there?"

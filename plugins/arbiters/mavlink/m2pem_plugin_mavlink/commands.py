@@ -4,11 +4,17 @@ from collections.abc import MutableMapping
 
 import click
 
-from m2pem.api import LazyCommand, simulator_group
+from m2pem.api import LazyCommand, command_group, simulator_group
+
+_SIGNING = {
+    "setup": "Give a vehicle the signing key that its fleet file names.",
+    "remove": "Turn the signing of a vehicle off.",
+    "keygen": "Write a new signing key.",
+}
 
 
 def add_to(commands: MutableMapping[str, click.Command]) -> None:
-    """Add `sitl` and `sim mavlink`."""
+    """Add `sitl`, `sim mavlink` and `mavlink signing`."""
     commands["sitl"] = LazyCommand(
         "sitl",
         "m2pem_plugin_mavlink.sitl.command_line",
@@ -21,3 +27,8 @@ def add_to(commands: MutableMapping[str, click.Command]) -> None:
             "Simulate MAVLink vehicles over UDP.",
         )
     )
+    mavlink = command_group(commands, "mavlink", "Set up MAVLink vehicles.")
+    signing = command_group(mavlink.commands, "signing", "Set up the signing of messages.")
+    for name, summary in _SIGNING.items():
+        module = "m2pem_plugin_mavlink.signing.command_line"
+        signing.add_command(LazyCommand(name, module, summary))

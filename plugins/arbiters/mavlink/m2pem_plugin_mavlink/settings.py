@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from m2pem.api import Connection, ConnectionReader, ResourceId
+from m2pem_plugin_mavlink.signing.policy import SigningPolicy, read_signing
 
 DRIVERS = ("pymavlink", "mavsdk")
 SCHEMES = ("udpin", "udpout", "tcpin", "tcpout", "serial")
@@ -14,7 +16,7 @@ GCS_SYSTEM_ID = 255
 @dataclass(frozen=True, slots=True)
 class Settings:
     """`urls`: the endpoints on which the vehicle may be reached. `actuators`: the names in the
-    fleet file for actuators ("servo 9")."""
+    fleet file for actuators ("servo 9"). `signing` None: frames are neither signed nor checked."""
 
     urls: tuple[str, ...]
     system_id: int
@@ -22,22 +24,35 @@ class Settings:
     driver: str = "pymavlink"
     gcs_system_id: int = GCS_SYSTEM_ID
     actuators: Mapping[str, str] = field(default_factory=dict)
+    signing: SigningPolicy | None = None
 
 
 SITL = "sitl"
 """The keys that only `m2pem sitl` reads."""
 
-_KEYS = ("url", "system_id", "component_id", "driver", "gcs_system_id", "actuators", SITL)
+_KEYS = (
+    "url",
+    "system_id",
+    "component_id",
+    "driver",
+    "gcs_system_id",
+    "actuators",
+    "signing",
+    SITL,
+)
 
 
-def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[ResourceId, Settings]:
-    """Read the settings of all vehicles; payloads have none of their own.
+def read_settings(
+    connections: Mapping[ResourceId, Connection], state_folder: Path | None = None
+) -> dict[ResourceId, Settings]:
+    """Read the settings of all vehicles; payloads have none of their own. `state_folder`: where the
+    timestamps of signatures are kept.
 
     Raises:
         PluginError: something is missing or wrong; the text names the resource and the key.
     """
     read = {
-        resource: _read(resource, connection.settings)
+        resource: _read(resource, connection.settings, state_folder)
         for resource, connection in connections.items()
         if "/" not in resource
     }
@@ -60,19 +75,26 @@ def read_settings(connections: Mapping[ResourceId, Connection]) -> dict[Resource
     return read
 
 
-def _read(resource: ResourceId, settings: Mapping[str, Any]) -> Settings:
+def _read(resource: ResourceId, settings: Mapping[str, Any], state_folder: Path | None) -> Settings:
     reader = ConnectionReader(resource, settings)
     reader.refuse_others(_KEYS)
     driver = settings.get("driver", DRIVERS[0])
     if driver not in DRIVERS:
         raise reader.error("driver", f"{driver!r} is none of {', '.join(DRIVERS)}")
+    urls, component_id = _urls(reader), reader.whole("component_id", 1, 1, 255)
+    signing = read_signing(reader, component_id, len(urls), state_folder)
+    if signing is not None and driver == "mavsdk":
+        raise reader.error(
+            "signing", "MAVSDK has no interface for signing; leave out `driver: mavsdk`"
+        )
     return Settings(
-        _urls(reader),
+        urls,
         reader.whole("system_id", None, 1, 255, "the MAVLink system id of the vehicle"),
-        reader.whole("component_id", 1, 1, 255),
+        component_id,
         driver,
         reader.whole("gcs_system_id", GCS_SYSTEM_ID, 1, 255),
         _actuators(reader),
+        signing,
     )
 
 

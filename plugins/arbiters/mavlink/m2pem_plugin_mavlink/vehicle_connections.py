@@ -10,6 +10,7 @@ from m2pem_plugin_mavlink.mavsdk_driver.ground_station import open_mavsdk_link
 from m2pem_plugin_mavlink.mavsdk_driver.link import MavsdkLink
 from m2pem_plugin_mavlink.protocol.messages import Address
 from m2pem_plugin_mavlink.settings import Settings
+from m2pem_plugin_mavlink.signing.key_file import SigningError
 from m2pem_plugin_mavlink.vehicle.failsafe import check
 from m2pem_plugin_mavlink.vehicle.takeover_monitor import TakeoverMonitor
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
@@ -58,8 +59,15 @@ class MavlinkVehicleConnections:
         source = Address(settings.gcs_system_id, GROUND_STATION.component)
         try:
             link = await _OPEN[settings.driver](
-                address, settings.urls, clock, source, self._context.may_send
+                address,
+                settings.urls,
+                clock,
+                source,
+                self._context.may_send,
+                **({"signing": settings.signing} if settings.signing is not None else {}),
             )
+        except SigningError as error:
+            raise PluginError(f"{resource}: connection.signing: {error}") from error
         except PluginError as error:
             raise PluginError(f"{resource}: connection.url: {error}") from error
         self._links.append(link)

@@ -102,6 +102,9 @@ class ScriptedLink:
                 transaction.expire(max(self.now_s(), deadline_s or 0.0))
         news.clear()
 
+    def refused(self) -> tuple[()]:
+        return ()
+
     def quality(self) -> LinkQuality | None:
         return LinkQuality(self.loss, 20.0, 0.0)
 

@@ -39,6 +39,9 @@ class Scripted:
     async def perform(self, transaction: Transaction[Any]) -> Any:
         raise NotImplementedError
 
+    def refused(self) -> tuple[()]:
+        return ()
+
     def quality(self) -> LinkQuality | None:
         return None
 

@@ -130,10 +130,10 @@ def signed(frame: bytes) -> bytes:
 def test_a_signature_is_passed_over() -> None:
     sent = signed(heartbeat()) + heartbeat(1)
     frames = clean(sent)
-    assert frames is not None and [len(each) for each in frames] == [21, 21]
+    assert frames is not None and [len(each) for each in frames] == [34, 21]
     header = read(frames[0])
     assert header is not None and header.id == 0
-    assert right(frames[0], 0)
+    assert header.signed == frames[0] and right(frames[0][:-13], 0)
     assert [frame.sequence for frame in scan(sent)[0]] == [0, 1]
     assert scan(sent)[1] == 0
 

@@ -2,29 +2,34 @@
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Iterable, Set
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable, Mapping, Set
 
 from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.protocol.inbound import Sender
 from m2pem_plugin_mavlink.protocol.url import Url
+from m2pem_plugin_mavlink.signing.signature import SignatureCheck, Signing
 
 logger = logging.getLogger(__name__)
 
 MAX_UNKNOWN_SENDERS = 64
 """Most senders without a route that one peer keeps."""
 
+MOST_KEYS = 8
+"""With more keys on an endpoint, frames to a peer from which no frame came are not signed."""
+
 
 class Endpoint(ABC):
     """`own_systems`: the system ids of this process; frames that claim to come from them are
     dropped. `now_s`: seconds of the hub's clock. `greet` is called with each peer that must receive
-    a frame first."""
+    a frame first, and with how to sign it."""
 
     def __init__(
         self,
         url: Url,
         own_systems: Set[int],
         now_s: Callable[[], float],
-        greet: Callable[[Peer], None],
+        greet: Callable[[Peer, Iterable[Signing | None]], None],
     ) -> None:
         self.url = url
         self.now_s = now_s
@@ -59,6 +64,34 @@ class Endpoint(ABC):
         if not route.users:
             del self._routes[route.system]
             self.forget(route.system)
+
+    def require_signatures(self, route: Route, check: SignatureCheck) -> None:
+        """Sign the frames to a vehicle, and accept only signed ones.
+
+        Raises:
+            SigningError: they are signed in another way.
+        """
+        route.require_signatures(check)
+        self.forget(route.system)
+
+    def check_of(self, sender: int) -> SignatureCheck | None:
+        """See `protocol.inbound.CheckOf`."""
+        route = self._routes.get(sender & 255)
+        return None if route is None else route.check_of(sender >> 8)
+
+    def signings(self) -> Mapping[Peer, set[Signing | None]]:
+        """Return how vehicles at each peer expect frames to be signed. A peer that is not in it has
+        no vehicle in use: see `signings_of_unknown`."""
+        found: defaultdict[Peer, set[Signing | None]] = defaultdict(set)
+        for route in self._routes.values():
+            for peer in route.holders():
+                found[peer].add(route.signing)
+        return found
+
+    def signings_of_unknown(self, peer: Peer) -> set[Signing | None]:
+        """Return how to sign frames to a peer that has no vehicle in use, as far as known."""
+        own: set[Signing | None] = {route.signing for route in self._routes.values()}
+        return {None} if peer.inbound.senders or not 0 < len(own) <= MOST_KEYS else own
 
     def forget(self, system: int) -> None:
         """Forget the senders of a system; they are admitted again at their next frame."""

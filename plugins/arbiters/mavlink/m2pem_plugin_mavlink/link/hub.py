@@ -8,7 +8,7 @@ not sent anything yet.
 
 import asyncio
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -20,6 +20,9 @@ from m2pem_plugin_mavlink.link.streams import SerialEndpoint, TcpInEndpoint, Tcp
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.url import SerialUrl, Url, Way
+from m2pem_plugin_mavlink.signing.policy import SigningPolicy
+from m2pem_plugin_mavlink.signing.registry import Signers
+from m2pem_plugin_mavlink.signing.signature import Signing
 
 HEARTBEAT_US = US_PER_S
 PEERS_AT_ONCE = 64
@@ -54,6 +57,7 @@ class Hub:
         self._opened: dict[Url, _Opened] = {}
         self._sources: Counter[Address] = Counter()
         self._own_systems: set[int] = set()
+        self._signers = Signers()
         self._changing = asyncio.Lock()
         self._beating: asyncio.Task[None] | None = None
 
@@ -66,12 +70,19 @@ class Hub:
         return self._opened[url].endpoint
 
     async def join(
-        self, system: int, urls: Sequence[Url], source: Address, clock: Clock
+        self,
+        system: int,
+        urls: Sequence[Url],
+        source: Address,
+        clock: Clock,
+        signing: SigningPolicy | None = None,
     ) -> list[Route]:
         """Open the endpoints over which a vehicle is reached, and send heartbeats as `source`.
+        `signing`: how frames are signed; None: as another link to this vehicle says, or not.
 
         Raises:
-            PluginError: one of them cannot be opened; nothing is left of the others.
+            PluginError: one of them cannot be opened, or the key cannot be used; nothing is left of
+                the others.
         """
         async with self._changing:
             if not self._opened:
@@ -83,16 +94,24 @@ class Hub:
                 raise PluginError(
                     f"system id {clash} is that of a vehicle and of m2pem: change one of them"
                 )
+            own = list(dict.fromkeys(urls))
+            checks = self._signers.checks(signing, len(own)) if signing is not None else ()
             self._add_source(source)
             joined: list[Url] = []
+            routes: list[Route] = []
             try:
-                for url in dict.fromkeys(urls):
+                for url in own:
                     await self._open(url)
                     joined.append(url)
+                routes += [self._opened[url].endpoint.route(system) for url in joined]
+                for route, check in zip(routes, checks, strict=False):
+                    self._opened[route.url].endpoint.require_signatures(route, check)
             except BaseException:
+                for route in routes:
+                    self._opened[route.url].endpoint.release(route)
                 await self._leave(joined, source)
                 raise
-            return [self._opened[url].endpoint.route(system) for url in joined]
+            return routes
 
     async def leave(self, routes: Sequence[Route], source: Address) -> None:
         """Undo one `join`."""
@@ -124,6 +143,7 @@ class Hub:
             self._beating.cancel()
             await asyncio.wait([self._beating])
             self._beating = None
+            await self._signers.close()
 
     def _add_source(self, source: Address) -> None:
         self._sources[source] += 1
@@ -139,9 +159,10 @@ class Hub:
         self._own_systems.clear()
         self._own_systems.update(each.system for each in self._sources)
 
-    def _greet(self, peer: Peer) -> None:
-        for source in self._sources:
-            peer.send(_HEARTBEAT, source)
+    def _greet(self, peer: Peer, signings: Iterable[Signing | None]) -> None:
+        for signing in signings:
+            for source in self._sources:
+                peer.send(_HEARTBEAT, source, signing)
 
     async def _beat(self) -> None:
         at_us = self._clock.now_us()
@@ -151,10 +172,13 @@ class Hub:
             if at_us <= now_us:  # after a suspension of the machine, skip the missed heartbeats
                 at_us = now_us + HEARTBEAT_US
             await self._clock.sleep_until(at_us)
+            await self._signers.keep()
             for opened in list(self._opened.values()):
-                opened.endpoint.maintain()
-                for number, peer in enumerate(list(opened.endpoint.peers.values())):
-                    self._greet(peer)
+                endpoint = opened.endpoint
+                endpoint.maintain()
+                signings = endpoint.signings()
+                for number, peer in enumerate(list(endpoint.peers.values())):
+                    self._greet(peer, signings.get(peer) or endpoint.signings_of_unknown(peer))
                     if number % PEERS_AT_ONCE == PEERS_AT_ONCE - 1:
                         await asyncio.sleep(0)
 

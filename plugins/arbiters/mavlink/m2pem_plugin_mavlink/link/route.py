@@ -13,10 +13,20 @@ from typing import TypeAlias
 
 from m2pem_plugin_mavlink.link.vehicle_link import KeyedLock
 from m2pem_plugin_mavlink.protocol.frames import encode
-from m2pem_plugin_mavlink.protocol.inbound import NOTHING, Inbound, Listener, Sender, Wanted
+from m2pem_plugin_mavlink.protocol.inbound import (
+    NOTHING,
+    CheckOf,
+    Inbound,
+    Listener,
+    Sender,
+    Wanted,
+    unchecked,
+)
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, types_by_id
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.url import Url
+from m2pem_plugin_mavlink.signing.key_file import SigningError
+from m2pem_plugin_mavlink.signing.signature import RefusedFrames, SignatureCheck, Signing
 
 AdmitSender: TypeAlias = Callable[["Peer", Sender], bool]
 """Called with a new sender at a peer; returns False to drop its frames."""
@@ -30,24 +40,29 @@ class Peer:
     __slots__ = ("_sequences", "inbound", "name", "open", "received_s", "write")
 
     def __init__(
-        self, name: str, write: Callable[[bytes], None], admit: AdmitSender, received_s: float
+        self,
+        name: str,
+        write: Callable[[bytes], None],
+        admit: AdmitSender,
+        received_s: float,
+        check_of: CheckOf = unchecked,
     ) -> None:
         self.name = name
         self.write = write
         self.received_s = received_s
         self.open = True
-        self.inbound = Inbound(partial(admit, self))
+        self.inbound = Inbound(partial(admit, self), check_of)
         self._sequences: dict[Address, int] = {}
 
-    def send(self, message: Message, source: Address) -> None:
-        """Send a message as `source`; the frames of each source to each peer have their own
-        sequence numbers.
+    def send(self, message: Message, source: Address, signing: Signing | None = None) -> None:
+        """Send a message as `source`, signed or (None) not; the frames of each source to each peer
+        have their own sequence numbers.
 
         Raises:
             struct.error: a field's value does not fit its type.
         """
         sequence = self._sequences.get(source, 0)
-        self.write(encode(message, sequence, source))
+        self.write(encode(message, sequence, source, None if signing is None else signing.sign))
         self._sequences[source] = (sequence + 1) & 255
 
 
@@ -81,7 +96,8 @@ class _ComponentOwner:
 
 class Route:
     """`users`: the number of links that use it; `autopilots`: the components that they command,
-    mostly one; `locks`: serialize the exchanges with this vehicle."""
+    mostly one; `locks`: serialize the exchanges with this vehicle; `check`: of the signatures of
+    its frames; None: it does not sign."""
 
     def __init__(self, system: int, url: Url) -> None:
         self.system = system
@@ -89,8 +105,50 @@ class Route:
         self.users = 0
         self.autopilots: set[int] = set()
         self.locks = KeyedLock()
+        self.check: SignatureCheck | None = None
         self._wanted: dict[int, Wanted] = {}
         self._owners: dict[int, _ComponentOwner] = {}
+
+    @property
+    def signing(self) -> Signing | None:
+        """How frames to the vehicle are signed; None: they are not."""
+        return None if self.check is None else self.check.signing
+
+    def require_signatures(self, check: SignatureCheck) -> None:
+        """From now on, sign frames and accept only signed ones; senders must show anew who they
+        are.
+
+        Raises:
+            SigningError: the frames are signed in another way.
+        """
+        if self.check is None:
+            self.check = check
+            self._owners.clear()
+        elif self.check.signing is not check.signing:
+            raise SigningError(
+                f"system {self.system} on {self.url} has another key or link id: that of "
+                f"{self.check.signing.key_file}, link {self.check.signing.link_id}"
+            )
+
+    def refused(self) -> list[RefusedFrames]:
+        """Return which frames were refused, and how many."""
+        check = self.check
+        if check is None:
+            return []
+        return [
+            RefusedFrames(str(self.url), refusal, count, check.last_s[refusal])
+            for refusal, count in check.refused.items()
+        ]
+
+    def check_of(self, component: int) -> SignatureCheck | None:
+        """Return the check of the frames of a component; None: they need no signature."""
+        if self.check is None or component in self.check.unsigned_components:
+            return None
+        return self.check
+
+    def holders(self) -> set[Peer]:
+        """Return the peers at which components of the vehicle are reached."""
+        return {owner.holder.peer for owner in self._owners.values()}
 
     def listen(self, ids: Iterable[int], listener: Listener) -> None:
         """Hand messages with these ids to the listener; twice, if it listens twice.

@@ -14,6 +14,8 @@ from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, Transaction
 from m2pem_plugin_mavlink.protocol.url import parse_url
+from m2pem_plugin_mavlink.signing.policy import SigningPolicy
+from m2pem_plugin_mavlink.signing.signature import RefusedFrames
 
 T = TypeVar("T")
 
@@ -35,19 +37,22 @@ async def open_link(
     clock: Clock,
     source: Address = GROUND_STATION,
     may_send: Callable[[], bool] = lambda: True,
+    signing: SigningPolicy | None = None,
 ) -> "RoutedLink":
     """Open a link to a vehicle over one or more endpoints, the preferred one first; `source`: the
-    address of this ground station. Nothing is sent while `may_send` is false.
+    address of this ground station. Nothing is sent while `may_send` is false. `signing`: how frames
+    are signed; None: as another link to this vehicle says, or not.
 
     Return when listening: a silent vehicle, or a connection that is not made yet, is no error.
 
     Raises:
-        PluginError: a URL is wrong, or an endpoint cannot be opened.
+        PluginError: a URL is wrong, an endpoint cannot be opened, or a key cannot be used.
     """
     if not urls:
         raise PluginError("the vehicle needs a URL, such as udpin://127.0.0.1:14550")
     hub = shared_hub()
-    routes = await hub.join(address.system, [parse_url(url) for url in urls], source, clock)
+    parsed = [parse_url(url) for url in urls]
+    routes = await hub.join(address.system, parsed, source, clock, signing)
     return RoutedLink(hub, address, source, routes, clock, may_send)
 
 
@@ -90,9 +95,10 @@ class RoutedLink:
         if self._closed or not self._may_send():
             return
         component = getattr(message, "target_component", 0)
-        peer = self._best().peer_of(component, self.address.component)
+        route = self._best()
+        peer = route.peer_of(component, self.address.component)
         if peer is not None:
-            peer.send(message, self.source)
+            peer.send(message, self.source, route.signing)
 
     def listen(self, ids: Iterable[int], listener: Listener) -> Callable[[], None]:
         """See `VehicleLink.listen`.
@@ -136,6 +142,10 @@ class RoutedLink:
     def qualities(self) -> dict[str, LinkQuality | None]:
         """The same for each endpoint, by its URL."""
         return {str(route.url): self._quality(route) for route in self._routes}
+
+    def refused(self) -> list[RefusedFrames]:
+        """See `VehicleLink.refused`."""
+        return [each for route in self._routes for each in route.refused()]
 
     def known_systems(self) -> set[int]:
         """Return every system id that sends on its endpoints; for errors, when the vehicle's own

@@ -45,9 +45,11 @@ class Connection(asyncio.Protocol):
             connected.setsockopt(*option)
         address = transport.get_extra_info("peername")
         name = self._name or f"{address[0]}:{address[1]}"
-        self.peer = Peer(name, self._write, self._endpoint.admit, self._endpoint.now_s())
-        self._endpoint.peers[self] = self.peer
-        self._endpoint.greet(self.peer)
+        endpoint = self._endpoint
+        now_s = endpoint.now_s()
+        self.peer = Peer(name, self._write, endpoint.admit, now_s, endpoint.check_of)
+        endpoint.peers[self] = self.peer
+        endpoint.greet(self.peer, endpoint.signings_of_unknown(self.peer))
         self.made.set_result(None)
 
     def data_received(self, data: bytes) -> None:

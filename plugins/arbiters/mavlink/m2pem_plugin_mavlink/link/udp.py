@@ -39,7 +39,7 @@ class UdpEndpoint(Endpoint):
         if self.url.way is Way.UDP_OUT:
             address = self._socket.getpeername()
             self.peers[address] = peer = self._peer(address, self.now_s())
-            self.greet(peer)
+            self.greet(peer, self.signings_of_unknown(peer))
 
     async def close(self) -> None:
         """See `Endpoint.close`."""
@@ -83,6 +83,8 @@ class UdpEndpoint(Endpoint):
         peer = self._peer(address, now_s)
         peer.inbound.datagram(data, now_s)
         if not peer.inbound.senders:
+            if peer.inbound.greeting is not None:
+                self.greet(peer, (peer.inbound.greeting,))
             return
         if len(self.peers) >= MAX_PEERS:
             idle = next(iter(self.idle_peers(now_s)), None)
@@ -108,7 +110,7 @@ class UdpEndpoint(Endpoint):
                 if error.errno not in (errno.ECONNREFUSED, errno.EAGAIN, errno.ENOBUFS):
                     logger.debug("%s: nothing sent to %s: %s", self.url, name, error)
 
-        return Peer(name, write, self.admit, now_s)
+        return Peer(name, write, self.admit, now_s, self.check_of)
 
 
 async def _opened(url: SocketUrl) -> socket.socket:

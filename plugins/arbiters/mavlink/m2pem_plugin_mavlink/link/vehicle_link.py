@@ -6,7 +6,7 @@ transactions that have the same key.
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Hashable, Iterable
+from collections.abc import AsyncIterator, Callable, Hashable, Iterable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any, Protocol, TypeAlias, TypeVar
 
@@ -14,6 +14,7 @@ from m2pem.api import US_PER_S, Clock
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.quality import LinkQuality
 from m2pem_plugin_mavlink.protocol.transaction import Transaction
+from m2pem_plugin_mavlink.signing.signature import RefusedFrames
 
 
 class KeyedLock:
@@ -74,6 +75,11 @@ class VehicleLink(Protocol):
     def quality(self) -> LinkQuality | None:
         """Return the quality over the endpoint in use; None if the autopilot has never sent
         anything."""
+        ...
+
+    def refused(self) -> Sequence[RefusedFrames]:
+        """Return which frames of the vehicle were refused for their signatures, by endpoint and
+        reason."""
         ...
 
 

@@ -28,6 +28,7 @@ from m2pem_plugin_mavlink.protocol.transaction import (
     RefusedError,
     Transaction,
 )
+from m2pem_plugin_mavlink.signing.signature import RefusedFrames
 
 T = TypeVar("T")
 
@@ -248,6 +249,10 @@ class MavsdkLink:
     def quality(self) -> LinkQuality | None:
         """Return None: MAVSDK does not report lost frames."""
         return None
+
+    def refused(self) -> Sequence[RefusedFrames]:
+        """Return nothing: MAVSDK checks no signatures."""
+        return ()
 
     # --- receiving ------------------------------------------------------------------------------
 

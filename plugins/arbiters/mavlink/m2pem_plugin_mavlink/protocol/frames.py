@@ -7,6 +7,7 @@ a valid checksum.
 
 import re
 import sys
+from collections.abc import Callable
 from struct import Struct
 from typing import NamedTuple
 
@@ -40,13 +41,15 @@ _CRC = Struct("<H")
 
 class Frame(NamedTuple):
     """The header of a frame. `sender`: system + 256 * component; `checked`: its checksum is
-    right (False: the message is unknown, or it was not checked)."""
+    right (False: the message is unknown, or it was not checked); `signed`: the whole frame, if it
+    has a signature, else nothing."""
 
     sequence: int
     sender: int
     id: int
     payload: bytes
     checked: bool
+    signed: bytes = b""
 
 
 def right(frame: bytes, id_: int) -> bool:
@@ -55,8 +58,11 @@ def right(frame: bytes, id_: int) -> bool:
     return frame[-2] == sum_ & 255 and frame[-1] == sum_ >> 8
 
 
-def encode(message: Message, sequence: int, source: Address) -> bytes:
-    """Return a message as a frame of MAVLink 2, without trailing zeros. `sequence`: 0..255.
+def encode(
+    message: Message, sequence: int, source: Address, sign: Callable[[bytes], bytes] | None = None
+) -> bytes:
+    """Return a message as a frame of MAVLink 2, without trailing zeros. `sequence`: 0..255;
+    `sign`: returns the signature of a frame.
 
     Raises:
         struct.error: a field's value does not fit its type.
@@ -64,13 +70,15 @@ def encode(message: Message, sequence: int, source: Address) -> bytes:
     type_ = message.TYPE
     payload = type_.pack(message).rstrip(b"\0") or b"\0"
     id_ = type_.id
-    header = _MADE.pack(V2, len(payload), 0, 0, sequence, *source, id_ & 0xFFFF, id_ >> 16)
+    flags = 0 if sign is None else SIGNED
+    header = _MADE.pack(V2, len(payload), flags, 0, sequence, *source, id_ & 0xFFFF, id_ >> 16)
     sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(payload, mcrf4xx(header[1:], CRC_START)))
-    return header + payload + _CRC.pack(sum_)
+    frame = header + payload + _CRC.pack(sum_)
+    return frame if sign is None else frame + sign(frame)
 
 
 def clean(data: bytes) -> list[bytes] | None:
-    """Return the frames of a datagram without signatures; None if it has other bytes."""
+    """Return the frames of a datagram; None if it has other bytes."""
     found = []
     start, size = 0, len(data)
     while start < size:
@@ -78,16 +86,15 @@ def clean(data: bytes) -> list[bytes] | None:
             return None
         magic, length, flags = data[start], data[start + 1], data[start + 2]
         if magic == V2:
-            end = start + AROUND_V2 + length
-            after = end + SIGNATURE if flags & SIGNED else end
+            end = start + AROUND_V2 + length + (SIGNATURE if flags & SIGNED else 0)
         elif magic == V1:
-            end = after = start + AROUND_V1 + length
+            end = start + AROUND_V1 + length
         else:
             return None
-        if after > size:
+        if end > size:
             return None
         found.append(data[start:end])
-        start = after
+        start = end
     return found
 
 
@@ -99,7 +106,8 @@ def read(frame: bytes) -> Frame | None:
     _, flags, sequence, sender, low, high = HEADER_V2.unpack_from(frame)
     if flags & ~SIGNED:
         return None
-    return Frame(sequence, sender, low | high << 16, frame[10:-2], False)
+    end, signed = (-2 - SIGNATURE, frame) if flags else (-2, b"")
+    return Frame(sequence, sender, low | high << 16, frame[10:end], False, signed)
 
 
 def scan(data: bytes, unfinished_from: int = NEVER) -> tuple[list[Frame], int, int]:
@@ -140,19 +148,19 @@ def scan(data: bytes, unfinished_from: int = NEVER) -> tuple[list[Frame], int, i
             position = start
             continue
         end = begin + length
-        after = end + 15 if flags & SIGNED else end + 2
+        after = end + 2 + SIGNATURE if flags & SIGNED else end + 2
         if after <= size:
             extra = None if flags & ~SIGNED else EXTRA.get(id_)
+            signed = data[position:after] if flags & SIGNED else b""
             if extra is not None:
                 sum_ = mcrf4xx(extra, mcrf4xx(data[position + 1 : end], CRC_START))
                 if data[end] == sum_ & 255 and data[end + 1] == sum_ >> 8:
-                    found.append(Frame(sequence, sender, id_, data[begin:end], True))
-                    position = after
-                    doubt_end = 0
+                    found.append(Frame(sequence, sender, id_, data[begin:end], True, signed))
+                    position, doubt_end = after, 0
                     continue
             elif not doubt_end and (after == size or data[after] in (V1, V2)):
-                payload = data[begin:end]
-                doubt = None if flags & ~SIGNED else Frame(sequence, sender, id_, payload, False)
+                made = Frame(sequence, sender, id_, data[begin:end], False, signed)
+                doubt = None if flags & ~SIGNED else made
                 doubt_end, junk_before = after, junk
         elif position >= unfinished_from and not doubt_end:
             break

@@ -13,6 +13,8 @@ from m2pem_plugin_mavlink.protocol.frames import (
     CRC_START,
     EXTRA,
     HEADER_V2,
+    SIGNATURE,
+    SIGNED,
     V2,
     Frame,
     clean,
@@ -22,6 +24,7 @@ from m2pem_plugin_mavlink.protocol.frames import (
 )
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, MessageType
 from m2pem_plugin_mavlink.protocol.quality import Reception
+from m2pem_plugin_mavlink.signing.signature import SignatureCheck, Signing
 
 _logger = logging.getLogger(__name__)
 
@@ -50,13 +53,16 @@ NOTHING: WantedById = {}
 
 class Sender(Reception):
     """One component of a system, as one peer sends it; messages in `wanted` are decoded and passed
-    on."""
+    on. `check` None: its frames need no signature."""
 
-    __slots__ = ("address", "wanted")
+    __slots__ = ("address", "check", "wanted")
 
-    def __init__(self, address: Address, sequence: int, now_s: float) -> None:
+    def __init__(
+        self, address: Address, sequence: int, now_s: float, check: SignatureCheck | None = None
+    ) -> None:
         super().__init__(sequence, now_s)
         self.address = address
+        self.check = check
         self.wanted: WantedById = NOTHING
 
 
@@ -64,38 +70,59 @@ AdmitSender: TypeAlias = Callable[[Sender], bool]
 """Called with a new sender; may set `wanted`. Returns False to drop its frames."""
 
 
-class Inbound:
-    """One peer. A sender becomes known by a frame with a right checksum.
+CheckOf: TypeAlias = Callable[[int], SignatureCheck | None]
+"""Returns the check of a sender, system + 256 * component; None: it needs no signature."""
 
-    `junk_bytes`: those that belong to no frame.
+
+def unchecked(_: int) -> SignatureCheck | None:
+    """Return None: no sender needs a signature."""
+    return None
+
+
+class Inbound:
+    """One peer. A sender becomes known by a frame with a right checksum and, where it must sign, a
+    right signature.
+
+    `junk_bytes`: those that belong to no frame. `greeting`: how to sign a heartbeat that tells a
+    sender the time; see `SignatureCheck.must_answer`.
     """
 
-    __slots__ = ("_admit", "_marked", "_marked_s", "_rest", "junk_bytes", "senders")
+    __slots__ = (
+        "_admit", "_check_of", "_marked", "_marked_s", "_rest", "greeting", "junk_bytes", "senders",
+    )  # fmt: skip
 
-    def __init__(self, admit: AdmitSender) -> None:
+    def __init__(self, admit: AdmitSender, check_of: CheckOf = unchecked) -> None:
         self._admit = admit
+        self._check_of = check_of
         self._rest = b""
         self._marked = 0  # bytes of the rest at `_marked_s`
         self._marked_s = 0.0
         self.senders: dict[int, Sender] = {}
         self.junk_bytes = 0
+        self.greeting: Signing | None = None
 
     def datagram(self, data: bytes, now_s: float) -> None:
         """Receive a datagram."""
         size = len(data)
         # Nearly all datagrams have one frame of MAVLink 2: this path avoids calls and objects.
-        if size >= AROUND_V2 and data[0] == V2 and size == data[1] + AROUND_V2:
+        if size >= AROUND_V2 and data[0] == V2:
             _, flags, sequence, source, low, high = HEADER_V2.unpack_from(data)
-            if not flags:
+            end = data[1] + AROUND_V2
+            if (size == end and not flags) or (size == end + SIGNATURE and flags == SIGNED):
                 id_ = low | high << 16 if high else low
                 sender = self.senders.get(source)
-                if sender is None:
-                    self._frame(Frame(sequence, source, id_, data[10:-2], False), data, now_s)
+                if sender is None or (not flags and sender.check is not None):
+                    signed = data if flags else b""
+                    frame = Frame(sequence, source, id_, data[10 : end - 2], False, signed)
+                    self._frame(frame, data[:end], now_s)
+                    return
+                check = sender.check
+                if check is not None and not check.accepts(data, source, now_s):
                     return
                 wanted = sender.wanted.get(id_)
                 if wanted is not None:
-                    sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(data[1:-2], CRC_START))
-                    if data[-2] != sum_ & 255 or data[-1] != sum_ >> 8:
+                    sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(data[1 : end - 2], CRC_START))
+                    if data[end - 2] != sum_ & 255 or data[end - 1] != sum_ >> 8:
                         return
                 if sequence == sender.expected & 255:
                     sender.expected += 1
@@ -103,7 +130,7 @@ class Inbound:
                     sender.astray(sequence, now_s)
                 sender.received_s = now_s
                 if wanted is not None:
-                    self._hand_over(wanted, data[10:-2], sender.address)
+                    self._hand_over(wanted, data[10 : end - 2], sender.address)
                 return
         frames = clean(data)
         if frames is None:
@@ -115,7 +142,7 @@ class Inbound:
         for each in frames:
             header = read(each)
             if header is not None:
-                self._frame(header, each, now_s)
+                self._frame(header, each[:-SIGNATURE] if header.signed else each, now_s)
 
     def stream(self, data: bytes, now_s: float) -> None:
         """Receive bytes of a stream."""
@@ -132,16 +159,27 @@ class Inbound:
             self._frame(frame, b"", now_s)
 
     def _frame(self, frame: Frame, raw: bytes, now_s: float) -> None:
-        """Process a frame. `raw`: its bytes, if it has not been checked."""
-        sequence, source, id_, payload, checked = frame
+        """Process a frame. `raw`: its bytes without a signature, if it has not been checked."""
+        sequence, source, id_, payload, checked, _ = frame
         sender = self.senders.get(source)
-        if sender is None:
-            if id_ not in EXTRA or not (checked or right(raw, id_)):
+        check = self._check_of(source) if sender is None else sender.check
+        if sender is None or check is not None:
+            if id_ in EXTRA:
+                if not (checked or right(raw, id_)):
+                    return
+                checked = True
+            elif sender is None:
                 return
-            sender = self._met(source, sequence, now_s)
+        if check is not None and not self._is_signed(check, frame, now_s):
+            if not frame.signed and check.accepts_unsigned(id_, now_s) and sender is not None:
+                wanted = sender.wanted.get(id_)
+                if wanted is not None:
+                    self._hand_over(wanted, payload, sender.address)
+            return
+        if sender is None:
+            sender = self._met(source, sequence, now_s, check)
             if sender is None:
                 return
-            checked = True
         wanted = sender.wanted.get(id_)
         if wanted is not None and not checked and not right(raw, id_):
             return
@@ -149,14 +187,24 @@ class Inbound:
         if wanted is not None:
             self._hand_over(wanted, payload, sender.address)
 
+    def _is_signed(self, check: SignatureCheck, frame: Frame, now_s: float) -> bool:
+        if not frame.signed:
+            return False
+        accepted = check.accepts(frame.signed, frame.sender, now_s)
+        if not accepted and check.must_answer(now_s):
+            self.greeting = check.signing
+        return accepted
+
     def forget(self, sender: Sender) -> None:
         """Forget a sender; it is admitted again at its next frame."""
         key = sender.address.system | sender.address.component << 8
         if self.senders.get(key) is sender:
             del self.senders[key]
 
-    def _met(self, source: int, sequence: int, now_s: float) -> Sender | None:
-        sender = Sender(Address(source & 255, source >> 8), sequence, now_s)
+    def _met(
+        self, source: int, sequence: int, now_s: float, check: SignatureCheck | None
+    ) -> Sender | None:
+        sender = Sender(Address(source & 255, source >> 8), sequence, now_s, check)
         if not self._admit(sender):
             return None
         if len(self.senders) >= MOST_SENDERS:

@@ -44,6 +44,7 @@ from m2pem_plugin_mavlink.simulator.motion_commands import GuidedSetpoints, Moti
 from m2pem_plugin_mavlink.simulator.parameters import ParameterServer
 from m2pem_plugin_mavlink.simulator.reports import Reports, Texts
 from m2pem_plugin_mavlink.simulator.sensors import Battery, Estimator
+from m2pem_plugin_mavlink.simulator.signing import SigningState
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 from m2pem_plugin_mavlink.simulator.streams import Streams
 
@@ -81,6 +82,7 @@ class Autopilot:
         self.dynamics = dynamics_of(spec.kind)
         self.parameters = Parameters({**self.firmware.parameters(), **spec.parameters})
         self.plans = PlanStore()
+        self.signing = SigningState(spec.signing_key)
         self.log = EventLog()
         self.injected_faults = InjectedFaults()
         self.outbox: list[Outgoing] = []
@@ -90,7 +92,7 @@ class Autopilot:
         self._boot()
 
     def _boot(self) -> None:
-        """Create all components anew; permanent memory (parameters, plans) stays."""
+        """Create all components anew; permanent memory (parameters, plans, key) stays."""
         self.booted_s = self._silent_until_s
         self.texts = Texts(self)
         self.estimator = Estimator(self)
@@ -238,5 +240,6 @@ class Autopilot:
         """Restart; the vehicle stays where it is."""
         self.log_event("reboot")
         self._silent_until_s = self.now_s + REBOOT_S
+        self.signing.boot()
         self.setpoint = NoThrust()
         self._boot()

@@ -5,6 +5,7 @@ import difflib
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, replace
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import click
@@ -13,6 +14,7 @@ from m2pem.api import GeoPosition
 from m2pem.api.command_options import DurationOption, FaultOption, PositionOption
 from m2pem.api.faults import PlannedFault
 from m2pem.api.foreground import interrupted
+from m2pem_plugin_mavlink.signing.key_file import SigningError, read_key
 from m2pem_plugin_mavlink.simulator.faults import GRAMMAR, Faults
 from m2pem_plugin_mavlink.simulator.firmware import FIRMWARES
 from m2pem_plugin_mavlink.simulator.geometry import LocalFrame, Location, Point
@@ -120,6 +122,12 @@ class Parameter(click.ParamType):  # type: ignore[type-arg]  # older clicks have
 @click.option("--camera", is_flag=True, help="All vehicles have a camera (component 100).")
 @click.option("--gimbal", is_flag=True, help="All vehicles have a gimbal, not copters alone.")
 @click.option(
+    "--signing-key",
+    "key_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="All vehicles sign their frames with the key in this file, and ignore others.",
+)
+@click.option(
     "--fault",
     "faults",
     type=FaultOption(GRAMMAR),
@@ -142,6 +150,7 @@ def mavlink(
     parameters: tuple[tuple[str, float], ...],
     camera: bool,
     gimbal: bool,
+    key_file: Path | None,
     faults: tuple[PlannedFault[Faults], ...],
 ) -> None:
     """Simulate MAVLink vehicles over UDP, as ArduPilot or PX4 speaks, until Ctrl-C.
@@ -163,6 +172,7 @@ def mavlink(
         parameters=dict(parameters),
         camera=camera,
         gimbal=True if gimbal else None,
+        signing_key=_key(key_file, firmware),
     )
     try:
         specs = list(_specs(kinds, like, first_system))
@@ -175,6 +185,17 @@ def mavlink(
         asyncio.run(_run(simulator))
     except OSError as error:
         raise click.ClickException(f"cannot open a vehicle's UDP socket: {error}") from error
+
+
+def _key(file: Path | None, firmware: str) -> bytes | None:
+    if file is None:
+        return None
+    if firmware != "ardupilot":
+        raise click.UsageError("--signing-key is for vehicles of ArduPilot")
+    try:
+        return read_key(file)
+    except SigningError as error:
+        raise click.UsageError(f"--signing-key: {error}") from error
 
 
 def _specs(kinds: list[Kind], like: VehicleSpec, first_system: int) -> Iterator[VehicleSpec]:

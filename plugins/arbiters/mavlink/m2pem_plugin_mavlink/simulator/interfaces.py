@@ -491,6 +491,12 @@ class MissionInterface(Protocol):
 P = TypeVar("P", bound=Component)
 
 
+class SigningMemory(Protocol):
+    """The key with which frames are signed."""
+
+    def set_up(self, key: bytes, timestamp: int) -> None: ...
+
+
 class AutopilotInterface(Protocol):
     """A simulated autopilot as its components see it."""
 
@@ -506,6 +512,8 @@ class AutopilotInterface(Protocol):
     components: list[Component]
     setpoint: MotionSetpoint
 
+    @property
+    def signing(self) -> SigningMemory: ...
     @property
     def estimator(self) -> EstimatorInterface: ...
     @property

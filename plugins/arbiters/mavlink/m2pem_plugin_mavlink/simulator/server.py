@@ -6,8 +6,6 @@ import struct
 from collections.abc import Callable
 from typing import Any, cast
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from m2pem_plugin_mavlink.simulator.autopilot import Autopilot
 from m2pem_plugin_mavlink.simulator.messages import Outgoing
 
@@ -91,7 +89,7 @@ class VehiclePort(asyncio.DatagramProtocol):
     def _encode(self, outgoing: Outgoing, peer: Address) -> bytes:
         encoder = self._encoders.get((peer, outgoing.component))
         if encoder is None:
-            encoder = dialect.MAVLink(None, self.autopilot.spec.system, outgoing.component)
+            encoder = self.autopilot.signing.encoder(self.autopilot.spec.system, outgoing.component)
             self._encoders[peer, outgoing.component] = encoder
         frame: bytes = outgoing.message.pack(encoder)
         encoder.seq = (encoder.seq + 1) % 256
@@ -104,8 +102,7 @@ class VehiclePort(asyncio.DatagramProtocol):
     def _read(self, data: bytes, peer: Address) -> None:
         parser = self._parsers.get(peer)
         if parser is None:
-            parser = self._parsers[peer] = dialect.MAVLink(None)
-            parser.robust_parsing = True
+            parser = self._parsers[peer] = self.autopilot.signing.parser()
         for message in parser.parse_buffer(data) or ():
             if message.get_type() != "BAD_DATA":
                 self.autopilot.receive(message, peer, self.autopilot.now_s)

@@ -28,7 +28,7 @@ class VehicleSpec:
     unknown after the start, in seconds of simulated time;
     `parameters`: what differs from the firmware's defaults; `battery_s`: how long a full battery
     lasts in motion; `gimbal`: it has one (None: if it is a copter); `camera`: it has one, as a
-    component of its own.
+    component of its own; `signing_key`: with which it signs its frames from the start.
     """
 
     kind: Kind = Kind.COPTER
@@ -41,6 +41,7 @@ class VehicleSpec:
     battery_s: float = 1800.0
     gimbal: bool | None = None
     camera: bool = False
+    signing_key: bytes | None = field(default=None, repr=False)
 
     @property
     def heading_rad(self) -> float:

@@ -13,9 +13,10 @@ from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.microservices.texts import GIVE_UP_S, StatusTexts, Text
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
+from m2pem_plugin_mavlink.signing.signature import Refusal
 from m2pem_plugin_mavlink.vehicle import exchanges, fixed_wing
 from m2pem_plugin_mavlink.vehicle.ardupilot import ArdupilotDriver
-from m2pem_plugin_mavlink.vehicle.driver import Driver
+from m2pem_plugin_mavlink.vehicle.driver import Driver, Readiness
 from m2pem_plugin_mavlink.vehicle.identity import ON_THE_GROUND, Firmware, Identity, identity
 from m2pem_plugin_mavlink.vehicle.modes import modes_of
 from m2pem_plugin_mavlink.vehicle.px4 import Px4Driver
@@ -88,6 +89,13 @@ RECEIVED_S = 3.0
 SAID_AGAIN_S = 300.0
 """A warning of the autopilot that comes again within this time is not shown again."""
 
+_REMEDIES = {
+    Refusal.NOT_SIGNED: "`m2pem mavlink signing setup` gives the vehicle the key",
+    Refusal.WRONGLY_SIGNED: "the sender has another key than the fleet",
+    Refusal.REPLAYED: "recorded frames are sent again, or two links have the same frames",
+    Refusal.TOO_OLD: "recorded frames are sent again, or its clock is behind by a minute or more",
+}
+
 RADII_EVERY_S = 10.0
 """Seconds between two requests for the radii of a vehicle's circles."""
 
@@ -119,6 +127,7 @@ class Vehicle:
         self.commanded = CommandedState()
         self.texts = StatusTexts(self._warn_of)
         self._warned_s: dict[str, float] = {}
+        self._refused_s: dict[tuple[str, Refusal], float] = {}
         self.identity: Identity | None = None
         self.lost_after_s = lost_after_s
         self._clock = clock
@@ -188,17 +197,51 @@ class Vehicle:
         quality = self.link.quality()
         return link_state(self.silent_s, self.lost_after_s, quality.loss if quality else 0.0)
 
+    def refused_frames(self) -> str:
+        """Return which of its frames were refused since the last message, and why; "" if none."""
+        since_s = -math.inf if self.state.at_s is None else self.state.at_s
+        by_url: dict[str, list[str]] = {}
+        for each in self.link.refused():
+            if each.last_s > since_s:
+                by_url.setdefault(each.url, []).append(f"{each.refusal} ({each.count})")
+        system, component = self.link.address
+        return "; ".join(
+            f"frames of {system}/{component} on {url} refused: {', '.join(reasons)}"
+            for url, reasons in by_url.items()
+        )
+
+    def warn_of_refused_frames(self) -> bool:
+        """Show operators new reasons for which frames are refused; return whether there are."""
+        warned = False
+        for each in self.link.refused():
+            before_s = self._refused_s.get((each.url, each.refusal), -math.inf)
+            if each.last_s - before_s < SAID_AGAIN_S:
+                continue
+            self._refused_s[each.url, each.refusal] = each.last_s
+            warned = True
+            system, component = self.link.address
+            self._logger.warning(
+                "%s: frames of %d/%d on %s refused: %s (%d); %s",
+                self.resource, system, component, each.url, each.refusal, each.count,
+                _REMEDIES[each.refusal],
+            )  # fmt: skip
+        return warned
+
     def telemetry(self) -> VehicleState:
         """Return the present state for the fleet."""
-        state, driver = self.state, self._driver
+        state, driver, link = self.state, self._driver, self.link_state
+        if link is LinkState.LOST and (refused := self.refused_frames()):
+            readiness: Readiness | None = Readiness(False, (refused,))
+        else:
+            readiness = driver.readiness() if driver is not None else None
         known = driver is not None and state.custom_mode is not None
         return vehicle_state(
             self.resource,
             self._clock.now_us(),
             state,
             driver.mode_name(state.custom_mode or 0) if driver is not None and known else "",
-            driver.readiness() if driver is not None else None,
-            self.link_state,
+            readiness,
+            link,
         )
 
     def recent_texts(self, within_s: float = 5.0) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from m2pem_plugin_mavlink.simulator.maneuvers import (
     Stop,
 )
 from m2pem_plugin_mavlink.simulator.missions.execution import AutoMission
+from m2pem_plugin_mavlink.simulator.signing import SigningSetup
 from m2pem_plugin_mavlink.simulator.specification import Kind, VehicleSpec
 
 COPTER = (
@@ -223,7 +224,7 @@ class ArduPilot(Firmware):
 
     def components(self) -> Sequence[type[Component]]:
         """What only ArduPilot has."""
-        return (ArduPilotFailsafes,)
+        return ArduPilotFailsafes, SigningSetup
 
     def default_streams(self) -> Mapping[int, float]:
         """Return the few messages that are sent without a request."""

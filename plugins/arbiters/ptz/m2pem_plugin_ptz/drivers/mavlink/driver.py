@@ -45,7 +45,7 @@ class MavlinkDriver:
             PluginError: the MAVLink plugin is not installed, or a URL cannot be opened.
         """
         try:
-            from m2pem_plugin_mavlink import Address, open_link  # noqa: PLC0415  # optional
+            from m2pem_plugin_mavlink import Address, open_link, signing_of  # noqa: PLC0415  # optional
 
             from m2pem_plugin_ptz.drivers.mavlink.camera import CameraComponent  # noqa: PLC0415
             from m2pem_plugin_ptz.drivers.mavlink.context import CameraContext  # noqa: PLC0415
@@ -54,9 +54,15 @@ class MavlinkDriver:
             raise PluginError(f"{self._resource}: {MISSING} ({error})") from error
         own, context = self._settings, self._setup.context
         source = Address(own.gcs_system_id, own.own_component)
+        settings = self._setup.connection.settings
+        signing = signing_of(self._resource, settings, context.state_folder)
         try:
             self._link = await open_link(
-                Address(own.system_id, own.component_id), own.urls, context.clock, source
+                Address(own.system_id, own.component_id),
+                own.urls,
+                context.clock,
+                source,
+                signing=signing,
             )
         except PluginError as error:
             raise PluginError(f"{self._resource}: connection.url: {error}") from error
