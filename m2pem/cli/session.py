@@ -123,7 +123,10 @@ async def driving(
         finally:
             superseded.cancel()
             if faces is not None:
-                await faces.end()
+                try:  # a recorder has the ends of all runs
+                    await executive.stop_all("the executive is shutting down")
+                finally:
+                    await faces.end()
             await operators.end()
             output.uncover()
     await printing
