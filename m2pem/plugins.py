@@ -69,7 +69,7 @@ _OBSERVE = "m2pem_records_committed"
 PUBLISHED: Mapping[str, Sequence[str]] = {
     "arbiter": ("mavlink", "ptz", "ros", "vda5050", "zenoh"),
     "ocu": ("mocu", "terminal", "web"),
-    "face": ("cot",),
+    "face": ("cot", "recorder"),
 }
 """What the plugins of m2pem itself provide, installed or not. Plugin NAME provides NAME alone."""
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.argument("run_ids", metavar="[RUN]...", nargs=-1, shell_complete=runs_of_journal(ended=True))
 @journal_option
 @click.option("--export", is_flag=True, help="Print these runs as JSON Lines, to keep them apart.")
-@click.option("--delete", is_flag=True, help="Delete these runs, with their tracks.")
+@click.option("--delete", is_flag=True, help="Delete these runs, with their tracks and recordings.")
 @click.option("--force", is_flag=True, help="Delete runs that were interrupted, too.")
 @click.option(
     "--accept-loss",

@@ -31,7 +31,7 @@ log = logging.getLogger("m2pem.executive")
 async def delete_runs(
     journal: Journal, runs: Sequence[str], *, by: str, unended: bool = False
 ) -> None:
-    """Delete runs as `Journal.delete` does, then their tracks and the marks of their STOP.
+    """Delete runs as `Journal.delete` does, then what is kept of them beside the journal.
 
     What vehicles may still do of a run that has not ended is noted for the next executive.
 
@@ -74,6 +74,7 @@ def _remove_files(journal: Path, identity: UUID, runs: Sequence[str]) -> None:
 def _files(journal: Path, identity: UUID, run: str) -> Iterator[Path]:
     """Yield the files of a run beside the journal (docs/journal.md), if they exist or not."""
     yield beside(journal, "tracks") / f"{run}.jsonl"
+    yield from beside(journal, "recordings").glob(f"{run}-*.mcap")
     yield beside(journal, f"stopped-{run}")
     with suppress(OSError):
         yield runtime_directory() / f"{identity}-stopped-{run}"

@@ -37,9 +37,13 @@ async def test_what_is_kept_of_a_deleted_run_goes_with_it(tmp_path, monkeypatch)
         await with_run(journal, *ENDED)
         tracks = tmp_path / "journal.db-tracks"
         tracks.mkdir()
+        recordings = tmp_path / "journal.db-recordings"
+        recordings.mkdir()
         kept, gone = (
             [
                 tracks / f"{run}.jsonl",
+                recordings / f"{run}-20261126-160312.mcap",
+                recordings / f"{run}-20261126-160312.2.mcap",
                 tmp_path / f"journal.db-stopped-{run}",
                 runtime_directory() / f"{journal.identity}-stopped-{run}",
             ]
@@ -48,8 +52,8 @@ async def test_what_is_kept_of_a_deleted_run_goes_with_it(tmp_path, monkeypatch)
         for file in (*kept, *gone):
             file.touch()
         await delete_runs(journal, ["r2"], by="ann")
-        assert [file.exists() for file in gone] == [False] * 3
-        assert [file.exists() for file in kept] == [True] * 3
+        assert [file.exists() for file in gone] == [False] * 5
+        assert [file.exists() for file in kept] == [True] * 5
 
 
 async def test_only_runs_that_ended_before_are_deleted():

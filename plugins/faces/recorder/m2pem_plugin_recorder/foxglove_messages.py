@@ -1,0 +1,241 @@
+"""States of vehicles, alerts and geometries as Foxglove's well-known messages, in protobuf.
+
+Frames: `map` is the local east-north-up frame of the fleet's origin (REP-105), `VEHICLE/base_link`
+that of a vehicle (REP-103: x forward, y left, z up).
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
+
+import msgspec
+from foxglove import messages as fg
+
+from m2pem.api import (
+    US_PER_S,
+    Alert,
+    Area,
+    GeoPosition,
+    LocalFrame,
+    PayloadState,
+    Point,
+    ResourceId,
+    Route,
+    VehicleState,
+    as_geojson,
+)
+from m2pem_plugin_recorder.channels import (
+    GEOMETRIES,
+    LOG,
+    SCENE,
+    TRANSFORMS,
+    Channel,
+    ChannelMessage,
+    Schema,
+)
+
+MAP = "map"
+LINE_PX = 2.0
+LABEL_PX = 14.0
+_ORANGE = fg.Color(r=1.0, g=0.55, b=0.0, a=1.0)
+_GREEN = fg.Color(r=0.1, g=0.6, b=0.2, a=1.0)
+_RED = fg.Color(r=0.85, g=0.1, b=0.1, a=1.0)
+_BLUE = fg.Color(r=0.1, g=0.4, b=0.9, a=1.0)
+
+
+@cache
+def foxglove_channel(topic: str, type_: Any) -> Channel:
+    """Return a channel of a type of `foxglove.messages`."""
+    schema = type_.get_schema()
+    return Channel(topic, "protobuf", Schema(schema.name, schema.encoding, schema.data))
+
+
+def timestamp(time_us: int) -> fg.Timestamp:
+    """Return a time in microseconds since the Unix epoch as Foxglove has it."""
+    seconds, rest_us = divmod(time_us, US_PER_S)
+    return fg.Timestamp(seconds, rest_us * 1000)
+
+
+def base_link(vehicle: ResourceId) -> str:
+    """Return the frame of a vehicle."""
+    return f"{vehicle}/base_link"
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """Return the quaternion (x, y, z, w) of roll, pitch and yaw (radians, REP-103)."""
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def vehicle_messages(state: VehicleState, frame: LocalFrame) -> Iterator[ChannelMessage]:
+    """Yield location, pose and transform of a vehicle whose position is known.
+
+    Without a heading, pose and transform point east.
+    """
+    if (place := finite(state.position)) is None:
+        return
+    at, us, name = timestamp(state.time_us), state.time_us, state.resource
+    location = fg.LocationFix(
+        timestamp=at,
+        frame_id=base_link(name),
+        latitude=place.latitude_deg,
+        longitude=place.longitude_deg,
+        altitude=place.altitude_m,
+    )
+    yield ChannelMessage(
+        foxglove_channel(f"/{name}/location", fg.LocationFix), us, location.encode()
+    )
+    east, north, up = frame.to_enu(place.latitude_deg, place.longitude_deg, place.altitude_m)
+    x, y, z, w = rotation(state.roll_rad, state.pitch_rad, state.yaw_rad or 0.0)
+    translation, turn = fg.Vector3(x=east, y=north, z=up), fg.Quaternion(x=x, y=y, z=z, w=w)
+    pose = fg.PoseInFrame(
+        timestamp=at, frame_id=MAP, pose=fg.Pose(position=translation, orientation=turn)
+    )
+    yield ChannelMessage(foxglove_channel(f"/{name}/pose", fg.PoseInFrame), us, pose.encode())
+    transform = fg.FrameTransform(
+        timestamp=at,
+        parent_frame_id=MAP,
+        child_frame_id=base_link(name),
+        translation=translation,
+        rotation=turn,
+    )
+    yield ChannelMessage(foxglove_channel(TRANSFORMS, fg.FrameTransform), us, transform.encode())
+
+
+def footprint_messages(state: PayloadState, frame: LocalFrame) -> Iterator[ChannelMessage]:
+    """Yield what a payload sees of the ground, as a part of the scene."""
+    if state.footprint:
+        corners = [(p.latitude_deg, p.longitude_deg, p.altitude_m) for p in state.footprint]
+        line = _line(corners, frame, _BLUE, closed=True)
+        yield _scene(f"footprint {state.resource}", state.time_us, [line], [])
+
+
+def scene_messages(
+    geometries: Mapping[str, object], frame: LocalFrame, fence: str, time_us: int
+) -> Iterator[ChannelMessage]:
+    """Yield routes, areas and points, for the 3D panel and for the map. `fence`: its name."""
+    for name, geometry in geometries.items():
+        entity = scene_message(name, geometry, frame, time_us, is_fence=name == fence)
+        if entity is not None:
+            yield entity
+    yield geojson_message(geometries, time_us)
+
+
+def scene_message(
+    name: str, geometry: object, frame: LocalFrame, time_us: int, *, is_fence: bool = False
+) -> ChannelMessage | None:
+    """Return a geometry as an entity of the scene; None: it has no place of its own."""
+    colour = _RED if is_fence else _GREEN if isinstance(geometry, Area) else _ORANGE
+    match geometry:
+        case Route(waypoints=waypoints):
+            lines = [_line(waypoints, frame, colour, closed=False)]
+            corner = waypoints[0]
+        case Area(rings=rings):
+            lines = [_line(ring[:-1], frame, colour, closed=True) for ring in rings]
+            corner = rings[0][0]
+        case Point(position=position):
+            lines, corner = [], position
+        case _:
+            return None
+    label = fg.TextPrimitive(
+        pose=fg.Pose(
+            position=_vector(corner, frame), orientation=fg.Quaternion(x=0, y=0, z=0, w=1)
+        ),
+        billboard=True,
+        font_size=LABEL_PX,
+        scale_invariant=True,
+        color=colour,
+        text=name,
+    )
+    return _scene(name, time_us, lines, [label])
+
+
+def geojson_message(geometries: Mapping[str, object], time_us: int) -> ChannelMessage:
+    """Return all geometries as one FeatureCollection."""
+    features = []
+    for name, geometry in geometries.items():
+        if isinstance(geometry, Point | Route | Area):
+            feature = as_geojson(geometry)
+            feature["properties"]["name"] = name
+            features.append(feature)
+    text = msgspec.json.encode({"type": "FeatureCollection", "features": features}).decode()
+    channel = foxglove_channel(GEOMETRIES, fg.GeoJson)
+    return ChannelMessage(channel, time_us, fg.GeoJson(geojson=text).encode())
+
+
+def log_message(alert: Alert, time_us: int) -> ChannelMessage:
+    """Return an alert as a line of the log."""
+    line = fg.Log(
+        timestamp=timestamp(time_us),
+        level=fg.LogLevel.Warning,
+        message=f"{alert.run}: {alert.text}" if alert.run else alert.text,
+        name=alert.code,
+    )
+    return ChannelMessage(log_channel(), time_us, line.encode())
+
+
+def log_channel() -> Channel:
+    """The channel of alerts."""
+    return foxglove_channel(LOG, fg.Log)
+
+
+def scene_channels() -> tuple[Channel, Channel, Channel]:
+    """The channels of the scene, of geometries as GeoJSON, and of the frames of vehicles."""
+    return (
+        foxglove_channel(SCENE, fg.SceneUpdate),
+        foxglove_channel(GEOMETRIES, fg.GeoJson),
+        foxglove_channel(TRANSFORMS, fg.FrameTransform),
+    )
+
+
+def finite(place: GeoPosition | None) -> GeoPosition | None:
+    """Return a position; None if it is unknown: devices send NaN for that."""
+    if place is None:
+        return None
+    numbers = (place.latitude_deg, place.longitude_deg, place.altitude_m)
+    return place if all(map(math.isfinite, numbers)) else None
+
+
+def _scene(name: str, time_us: int, lines: list[Any], texts: list[Any]) -> ChannelMessage:
+    entity = fg.SceneEntity(
+        timestamp=timestamp(time_us), frame_id=MAP, id=name, lines=lines, texts=texts
+    )
+    update = fg.SceneUpdate(entities=[entity])
+    return ChannelMessage(foxglove_channel(SCENE, fg.SceneUpdate), time_us, update.encode())
+
+
+def _line(places: Any, frame: LocalFrame, colour: fg.Color, *, closed: bool) -> fg.LinePrimitive:
+    kinds = fg.LinePrimitiveLineType
+    return fg.LinePrimitive(
+        type=kinds.LineLoop if closed else kinds.LineStrip,
+        pose=fg.Pose(
+            position=fg.Vector3(x=0, y=0, z=0), orientation=fg.Quaternion(x=0, y=0, z=0, w=1)
+        ),
+        thickness=LINE_PX,
+        scale_invariant=True,
+        points=[_point(place, frame) for place in places],
+        color=colour,
+    )
+
+
+def _point(place: Any, frame: LocalFrame) -> fg.Point3:
+    east, north, up = _enu(place, frame)
+    return fg.Point3(x=east, y=north, z=up)
+
+
+def _vector(place: Any, frame: LocalFrame) -> fg.Vector3:
+    east, north, up = _enu(place, frame)
+    return fg.Vector3(x=east, y=north, z=up)
+
+
+def _enu(place: Any, frame: LocalFrame) -> tuple[float, float, float]:
+    """Return a place on the ground of the origin: the altitudes of geometries count from home."""
+    return frame.to_enu(place[0], place[1], frame.origin[2])

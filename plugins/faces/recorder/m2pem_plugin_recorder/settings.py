@@ -1,0 +1,86 @@
+"""What a fleet file can say of the faces `recorder` and `foxglove`, under `faces:`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from m2pem.api import FaceSettings
+
+MB = 1_000_000
+
+FOLDER = "recordings"
+"""The folder beside the journal: `journal.db-recordings`."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderSettings:
+    """How the recorder writes, and where.
+
+    `rate_hz`: of telemetry, for each vehicle and payload. `ros`: also in ROS 2's schemas.
+    `file_bytes`: after which a file is followed by another. `total_bytes`: beyond which the oldest
+    files are deleted; None: none is. `min_free_bytes`: of the disk, below which recording stops.
+    """
+
+    folder: Path
+    rate_hz: float = 10.0
+    ros: bool = True
+    file_bytes: int = 1000 * MB
+    total_bytes: int | None = None
+    min_free_bytes: int = 500 * MB
+
+
+def folder_beside(journal: Path) -> Path:
+    """Return the folder of the recordings of a journal's runs."""
+    return journal.with_name(f"{journal.name}-{FOLDER}")
+
+
+def recorder_settings(settings: FaceSettings, journal: Path | None) -> RecorderSettings:
+    """Read the settings of `recorder`. `journal`: its file; None: it is in memory.
+
+    Raises:
+        PluginError: one of them is wrong.
+    """
+    known = ("folder", "rate_hz", "ros", "file_mb", "total_mb", "min_free_mb")
+    settings.refuse_others(known)
+    if "folder" in settings.values:
+        folder = Path(settings.text("folder", "")).expanduser()
+    elif journal is not None:
+        folder = folder_beside(journal)
+    else:
+        raise settings.error("folder", "it is missing: the journal is in memory, beside no file")
+    total_mb = settings.whole("total_mb", 0, 1, 10**9) if "total_mb" in settings.values else None
+    return RecorderSettings(
+        folder,
+        settings.number("rate_hz", 10.0, 0.01, 1000.0),
+        settings.flag("ros", True),
+        settings.whole("file_mb", 1000, 1, 10**6) * MB,
+        None if total_mb is None else total_mb * MB,
+        settings.whole("min_free_mb", 500, 0, 10**7) * MB,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class FoxgloveSettings:
+    """Where viewers connect. `port` 0: one that is free. `backlog`: messages that wait for a
+    viewer; beyond them its oldest are dropped."""
+
+    host: str = "127.0.0.1"
+    port: int = 8765
+    rate_hz: float = 10.0
+    ros: bool = False
+    backlog: int = 1024
+
+
+def foxglove_settings(settings: FaceSettings) -> FoxgloveSettings:
+    """Read the settings of `foxglove`.
+
+    Raises:
+        PluginError: one of them is wrong.
+    """
+    settings.refuse_others(("host", "port", "rate_hz", "ros", "backlog"))
+    return FoxgloveSettings(
+        settings.text("host", "127.0.0.1"),
+        settings.whole("port", 8765, 0, 65535),
+        settings.number("rate_hz", 10.0, 0.01, 1000.0),
+        settings.flag("ros", False),
+        settings.whole("backlog", 1024, 16, 1_000_000),
+    )
