@@ -66,12 +66,19 @@ _PROBLEM_OF: Mapping[str, Callable[[object], str]] = {
 _CHECK = "m2pem_check_mission"
 _CHECK_HOST = "m2pem_check_host"
 _OBSERVE = "m2pem_records_committed"
-PUBLISHED: Mapping[str, Sequence[str]] = {
-    "arbiter": ("mavlink", "ptz", "ros", "vda5050", "zenoh"),
-    "ocu": ("mocu", "terminal", "web"),
-    "face": ("cot", "recorder"),
+PUBLISHED: Mapping[str, Mapping[str, str]] = {
+    "arbiter": {name: name for name in ("mavlink", "ptz", "ros", "vda5050", "zenoh")},
+    "ocu": {name: name for name in ("mocu", "terminal", "web")},
+    "face": {
+        "cot": "cot",
+        "foxglove": "recorder",
+        "otlp": "opentelemetry",
+        "prometheus": "opentelemetry",
+        "recorder": "recorder",
+        "ros": "ros",
+    },
 }
-"""What the plugins of m2pem itself provide, installed or not. Plugin NAME provides NAME alone."""
+"""What the plugins of m2pem itself provide, installed or not, and the plugin that has it."""
 
 
 def how_to_install(distribution: str) -> str:
@@ -279,11 +286,11 @@ class PluginManager:
             parts.append(hint)
         elif kind in PUBLISHED and re.fullmatch(r"[a-z][a-z0-9_-]*", name):
             known = nearest(canonical(name), PUBLISHED[kind], 0.6)
-            parts.append(
-                f"{known!r} is in a plugin: {how_to_install(f'm2pem-plugin-{known}')}"
-                if known
-                else "is the plugin that has it installed?"
-            )
+            if known:
+                distribution = f"m2pem-plugin-{PUBLISHED[kind][known]}"
+                parts.append(f"{known!r} is in a plugin: {how_to_install(distribution)}")
+            else:
+                parts.append("is the plugin that has it installed?")
         if broken:
             parts.append(f"or it belongs to one that was not loaded: {'; '.join(map(str, broken))}")
         return PluginError("; ".join(parts))
