@@ -47,7 +47,7 @@ class OtlpFace:
         self._queue_size = settings.whole("queue", 10_000, 1, 1_000_000)
         self._observation: RunObservation | None = None
         if self._traces or self._metrics:
-            self._observation = RunObservation(control, self._add if self._traces else _no_span)
+            self._observation = RunObservation(control, self._add if self._traces else None)
         self._export: OtlpExport | None = None
 
     async def serve(self) -> None:
@@ -91,10 +91,6 @@ class OtlpFace:
     def _add(self, span: Span) -> None:
         if self._export is not None:
             self._export.add(span)
-
-
-def _no_span(span: Span) -> None:
-    """What becomes of spans where only metrics are sent."""
 
 
 def _is_http(text: str) -> bool:

@@ -27,12 +27,13 @@ LOOK_EACH_S = 0.05
 class RunObservation(Listener):
     """Traces of all runs that have not ended when it is made, and of those that begin.
 
-    `on_span` gets each span that ends, also those of before a restart, which are made again. What
-    ended before is not measured again: it was, by the executive of then.
+    `on_span` gets each span that ends, also those of before a restart, which are made again; None:
+    runs are measured alone. What ended before is not measured again: it was, by the executive of
+    then.
     """
 
     def __init__(
-        self, control: MissionControl, on_span: Callable[[Span], None] = lambda _: None
+        self, control: MissionControl, on_span: Callable[[Span], None] | None = None
     ) -> None:
         self.measures = RunMeasures()
         self._on_span = on_span
@@ -68,14 +69,17 @@ class RunObservation(Listener):
             if not isinstance(stamped.record, r.RunStarted) or view.seq != stamped.seq:
                 return  # of a run that is over
             trace = self._traces[view.run] = RunTrace(view, stamped.record, self._ended)
-            trace_ids[view.run] = f"{trace.trace_id:032x}"
+            if self._on_span is not None:
+                trace_ids[view.run] = f"{trace.trace_id:032x}"
         self._is_new = is_new
         trace.apply(stamped)
         if trace.is_over:
             del self._traces[view.run]
-            trace_ids.pop(view.run, None)
+            if self._on_span is not None:
+                trace_ids.pop(view.run, None)
 
     def _ended(self, span: Span, record: r.Record) -> None:
         if self._is_new:
             self.measures.count(span, record)
-        self._on_span(span)
+        if self._on_span is not None:
+            self._on_span(span)

@@ -27,6 +27,10 @@ def span_id_of(trace_id: int, seq: int) -> int:
     return int.from_bytes(digest[:8], "big") or 1
 
 
+MAX_TEXT = 1000
+"""Characters of an attribute, at most."""
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something that happened within a span. Times are microseconds since the Unix epoch."""
@@ -83,9 +87,9 @@ class Span:
 
 
 def named(attributes: dict[str, Attribute]) -> dict[str, Attribute]:
-    """Attributes as OpenTelemetry names them: `run_id` is "m2pem.run.id"."""
+    """Attributes as OpenTelemetry names them: `run_id` is "m2pem.run.id". Long texts are cut."""
     return {
-        f"m2pem.{name.replace('_', '.')}": value
+        f"m2pem.{name.replace('_', '.')}": value[:MAX_TEXT] if isinstance(value, str) else value
         for name, value in attributes.items()
         if value not in ("", ())
     }

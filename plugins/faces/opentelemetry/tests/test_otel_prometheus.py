@@ -20,6 +20,7 @@ from prometheus_client.parser import text_string_to_metric_families as plain_tex
 
 from m2pem.api.control import MissionControl
 from m2pem.api.face import FaceSettings
+from m2pem.api.log_context import trace_ids
 from m2pem.errors import PluginError
 from m2pem.testing import scenarios, serve_face
 from m2pem.testing.harness import run_executive, run_mission_on
@@ -70,6 +71,7 @@ async def test_both_formats_have_all_metrics_and_the_counts_of_the_executive() -
         await until_measured(client)
         run = await control.start(scenarios.question("Road?"))
         await until(control.prompts)
+        assert run not in trace_ids  # its trace is sent nowhere
         found = await control.statistics()
         plain = await client.get("/metrics")
         opened = await client.get("/metrics", headers=OPEN_METRICS)

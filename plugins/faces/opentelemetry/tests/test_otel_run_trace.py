@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 from m2pem_plugin_opentelemetry.run_trace import RunTrace, root_id
-from m2pem_plugin_opentelemetry.spans import MAX_EVENTS, Span
+from m2pem_plugin_opentelemetry.spans import MAX_EVENTS, MAX_TEXT, Span
 
 from m2pem import rehearse_async
 from m2pem.api import records as r
@@ -140,8 +140,9 @@ async def test_a_mission_that_cannot_be_read_still_gives_a_tree() -> None:
 def test_a_span_keeps_a_bounded_number_of_events() -> None:
     span = Span("x", 1, 1, 0, None, {})
     for number in range(MAX_EVENTS + 7):
-        span.add("again", number)
+        span.add("again", number, reason="x" * 5000)
     assert (len(span.events), span.events_dropped) == (MAX_EVENTS, 7)
+    assert span.events[0].attributes == {"m2pem.reason": "x" * MAX_TEXT}
 
 
 def stamped(*records: r.Record) -> list[StampedRecord]:
