@@ -4,6 +4,7 @@ import importlib
 import importlib.metadata
 import importlib.util
 import os
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -46,6 +47,8 @@ def require_ros() -> None:
         )
     if wheels:
         os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # what sourcing sets elsewhere
+    elif sourced and (other := _other_python(sourced[0])):
+        raise RosError(_for_other_python(sourced[0], other))
     try:
         importlib.import_module("rclpy")
     except ModuleNotFoundError as error:
@@ -106,6 +109,31 @@ def _sourced_prefixes() -> list[str]:
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     own = Path(sys.prefix).resolve()
     return [p for p in prefixes if Path(p).resolve() != own and Path(p, "share", "rclpy").is_dir()]
+
+
+OLDEST_PYTHON = (3, 11)
+"""What m2pem needs. ROS 2 Humble and Iron are built for 3.10."""
+
+
+def _other_python(prefix: str) -> tuple[int, int] | None:
+    """Return the Python that a sourced ROS was built for; None if it is this one, or not known."""
+    found = [
+        (int(version[1]), int(version[2]))
+        for path in Path(prefix).glob("lib/python3.*/*-packages/rclpy")
+        if (version := re.fullmatch(r"python(\d+)\.(\d+)", path.parts[-3]))
+    ]
+    return None if not found or sys.version_info[:2] in found else max(found)
+
+
+def _for_other_python(prefix: str, version: tuple[int, int]) -> str:
+    """Return what to do about a sourced ROS that was built for another Python."""
+    theirs, ours = (".".join(map(str, each)) for each in (version, sys.version_info[:2]))
+    distribution = os.environ.get("ROS_DISTRO", "").capitalize()
+    named = f"ROS 2 {distribution}".rstrip()
+    text = f"{named} of {prefix} was built for Python {theirs}, and this is Python {ours}; "
+    if version < OLDEST_PYTHON:
+        return f"{text}m2pem needs Python 3.11 or newer: use ROS 2 Jazzy or newer"
+    return f"{text}make the environment of m2pem with `python{theirs} -m venv`"
 
 
 def _hint(wheels: bool) -> str:

@@ -71,7 +71,9 @@ def install(python: Path, *packages: str, constraints: str) -> None:
     )
 
 
-def build_workspace(workspace: Path, python: Path, variables: dict[str, str]) -> None:
+def build_workspace(
+    workspace: Path, python: Path, variables: dict[str, str], package: str = "m2pem_interfaces"
+) -> None:
     """What docs/ros.md says to do where ROS is, and what the wheels need beside."""
     includes = INTERFACES / "wheel_backend" / "present_includes.cmake"
     options = [
@@ -80,7 +82,7 @@ def build_workspace(workspace: Path, python: Path, variables: dict[str, str]) ->
         "-DBUILD_TESTING=OFF",
     ]
     built = subprocess.run(
-        ["colcon", "build", "--packages-select", "m2pem_interfaces", "--cmake-args", *options],
+        ["colcon", "build", "--packages-select", package, "--cmake-args", *options],
         cwd=workspace,
         env=variables,
         stdout=subprocess.PIPE,
@@ -98,6 +100,22 @@ def place_of_interfaces(command: Sequence[str], variables: dict[str, str]) -> Pa
         [*command, "-c", program], env=variables, stdout=subprocess.PIPE, text=True, check=True
     )
     return Path(said.stdout.strip())
+
+
+def check_m2pem(installed: Path, command: Sequence[str], variables: dict[str, str]) -> None:
+    """Its program finds its plugins, which are those of the workspace, and has launch files."""
+
+    def said(*words: str) -> str:
+        ended = subprocess.run(
+            [*command, *words], env=variables, stdout=subprocess.PIPE, text=True, check=True
+        )
+        return ended.stdout.strip()
+
+    plugins = said(str(installed / "lib" / "m2pem" / "m2pem"), "plugins").splitlines()
+    assert {"    arbiter ros", "    ocu mocu"} <= set(plugins)
+    place = said("-c", "import m2pem_plugin_ros; print(m2pem_plugin_ros.__file__)")
+    assert Path(place).is_relative_to(installed)
+    assert (installed / "share" / "m2pem" / "launch" / "onboard.launch.py").is_file()
 
 
 async def exchange(domain: int) -> None:
@@ -147,8 +165,10 @@ async def test_with_ros_colcon_builds_the_interfaces(tmp_path: Path, ros_domain:
     """The wheels are the ROS that is there; their build tools are what ROS brings along itself."""
     tools = tomllib.loads((INTERFACES / "pyproject.toml").read_text(encoding="utf-8"))
     requires = tools["build-system"]["requires"]
+    ours = tomllib.loads((ROS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = (*WHEELS, "ros-jazzy-common-interfaces", *requires, *ours["dependencies"])
     underlay = tmp_path / "underlay"
-    python = make_environment(underlay, "-r", str(ROS / "colcon.txt"), *WHEELS, *requires)
+    python = make_environment(underlay, "-r", str(ROS / "colcon.txt"), *needed)
     sourced = environment(
         AMENT_PREFIX_PATH=str(underlay),
         CMAKE_PREFIX_PATH=str(underlay),
@@ -164,3 +184,6 @@ async def test_with_ros_colcon_builds_the_interfaces(tmp_path: Path, ros_domain:
     assert place_of_interfaces(command, sourced).is_relative_to(workspace / "install")
     with Elsewhere(command, ros_domain, sourced):
         await exchange(ros_domain)
+
+    build_workspace(workspace, python, sourced, "m2pem")
+    check_m2pem(workspace / "install" / "m2pem", command, sourced)
