@@ -399,8 +399,8 @@ class Vehicle:
         state = vehicle_state(self.resource, now_us, sensors, health, self.link, behavior)
         if not self._refusal:
             return state
-        reasons = (self._refusal, *state.not_ready_reasons)
-        return replace(state, ready=False, not_ready_reasons=reasons)
+        reasons = dict.fromkeys((self._refusal, *state.not_ready_reasons))
+        return replace(state, ready=False, not_ready_reasons=tuple(reasons))
 
     # --- inside ---------------------------------------------------------------------------------
 

@@ -48,6 +48,8 @@ class PoseEstimator:
         self.position: GeoPosition | None = None
         ros.subscribe(Odometry, f"{namespace}/odom", self._on_message, qos.TELEMETRY)
 
+    wrong_frame = ""
+
     @property
     def age_s(self) -> float:
         if self._heard_us is None:

@@ -205,6 +205,7 @@ class DoubleSenses:
         self.body = body
         self.localization = self
         self.age_s = 0.0
+        self.wrong_frame = ""
         self.problems = ()
         self.refusal = self.absence = ""
         self.is_listed = True

@@ -61,6 +61,7 @@ class Base:
     # --- Localization ---------------------------------------------------------------------------
 
     age_s = 0.0
+    wrong_frame = ""
 
     @property
     def twist(self) -> Twist:

@@ -4,15 +4,17 @@ import math
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
 from typing import Any
+from unittest.mock import Mock
 from uuid import uuid4
 
 import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
+from m2pem_plugin_ros.drivers.driver import DriverSetup, make_driver
 from m2pem_plugin_ros.frames import to_geodetic, to_local
 from m2pem_plugin_ros.pose import Pose
 from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.sensors.localization import TopicLocalization
-from m2pem_plugin_ros.settings import DriverName, OdomFrame, Settings
+from m2pem_plugin_ros.settings import DriverName, OdomFrame, Settings, read_settings
 from m2pem_plugin_ros.simulator.simulation import Simulation
 from m2pem_plugin_ros.simulator.specification import VehicleSpec
 from m2pem_plugin_ros.testing import Peer, reserved_domain
@@ -31,7 +33,7 @@ from ros_sensors import (
     until,
 )
 
-from m2pem.api import BehaviorState, Connection, PayloadState, Point, ResourceId
+from m2pem.api import BehaviorRequest, BehaviorState, Connection, PayloadState, Point, ResourceId
 from m2pem.api.clock import SystemClock
 from m2pem.testing.contracts.arbiter_harness import ArbiterHarness, context
 
@@ -183,3 +185,21 @@ async def test_a_base_whose_pose_is_from_tf_drives_to_where_it_is_sent(ros_domai
         assert math.dist((body.pose.east_m, body.pose.north_m), (east_m, north_m)) < 1.0
         told = bench.latest(ugv1).position
         assert to_local(told, ORIGIN)[:2] == pytest.approx((east_m, north_m), abs=1.5)
+
+
+async def test_an_onboard_driver_refuses_with_the_frame(ros_domain: int) -> None:
+    """The node on board has no arbiter: its driver says it."""
+    own = {"namespace": "/ugv1", "domain_id": ros_domain, "driver": "base", "odom_frame": "tf"}
+    ugv1 = ResourceId("ugv1")
+    connection = Connection(ugv1, "ground", own, sitl=True)
+    settings = read_settings({ugv1: connection})[ugv1]
+    lent = replace(context(SystemClock()), origin=ORIGIN)
+    async with RosRuntime("onboard", domain_id=ros_domain) as ros:
+        where = TopicLocalization(ros, ugv1, settings, lent)
+        driver = make_driver(DriverSetup(connection, settings, lent, ros, where, Mock()))
+        target = to_geodetic(5.0, 0.0, 0.0, ORIGIN)
+        place = Point((target.latitude_deg, target.longitude_deg, None))
+        request = BehaviorRequest("r1.b1", 1, "goto", {"target": place}, (ugv1,))
+        says = "ugv1: its pose is not known: no transform from 'map' to 'base_link' was received"
+        assert driver.refusal(request).startswith(says)
+        assert driver.health.not_ready_reasons[0].startswith(says)

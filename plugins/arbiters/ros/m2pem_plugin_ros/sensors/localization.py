@@ -49,6 +49,11 @@ class Localization(Protocol):
         """Seconds of the arbiter's clock since the pose was received; infinite before the first."""
         ...
 
+    @property
+    def wrong_frame(self) -> str:
+        """Why the pose cannot be known in the local frame of the fleet; "" if it can."""
+        ...
+
 
 class TopicLocalization:
     """Implements `Localization` with nav_msgs/Odometry, sensor_msgs/NavSatFix and tf.
@@ -99,7 +104,6 @@ class TopicLocalization:
 
     @property
     def wrong_frame(self) -> str:
-        """Why the pose cannot be known in the local frame of the fleet; "" if it can."""
         self._look_up()
         return self._wrong_frame
 

@@ -98,6 +98,7 @@ class PayloadSensors:
     twist: Twist | None = None
     position: GeoPosition | None = None
     age_s = math.inf
+    wrong_frame = ""
 
     def __init__(self, status: PayloadStatusTopic, endpoints: Endpoints) -> None:
         self._status = status

@@ -176,6 +176,8 @@ class SimulatedLocalization:
     simulated vehicle, with its faults. It does not use DDS, so that many vehicles in one process
     stay cheap."""
 
+    wrong_frame = ""
+
     def __init__(self, spec: VehicleSpec, clock: Clock) -> None:
         self._spec, self._clock = spec, clock
         self._pose: Pose | None = None

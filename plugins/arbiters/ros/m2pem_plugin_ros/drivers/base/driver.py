@@ -85,7 +85,9 @@ class BaseDriver:
         """The base is ready while odometry arrives."""
         where = self._setup.localization
         reasons: tuple[str, ...] = ()
-        if where.pose is None:
+        if where.wrong_frame:
+            reasons = (where.wrong_frame,)
+        elif where.pose is None:
             reasons = ("its position is not known yet",)
         elif not self._is_fresh():
             reasons = (
@@ -97,6 +99,8 @@ class BaseDriver:
 
     def refusal(self, request: BehaviorRequest) -> str:
         """Return why a plain base cannot do the request, or not from where it is; "" if it can."""
+        if wrong := self._setup.localization.wrong_frame:
+            return wrong
         pose = self._setup.localization.pose
         if pose is None:
             settings = self._setup.settings

@@ -86,7 +86,7 @@ class Nav2Driver:
     def health(self) -> Health:
         if self._nav2 is None:
             return Health()
-        problem = self._nav2.problem
+        problem = self._setup.localization.wrong_frame or self._nav2.problem
         return Health(self._nav2.doing, not problem, (problem,) if problem else ())
 
     def refusal(self, request: BehaviorRequest) -> str:
