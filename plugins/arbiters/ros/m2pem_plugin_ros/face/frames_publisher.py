@@ -1,7 +1,9 @@
 """tf: earth -> map -> VEHICLE/odom -> VEHICLE/base_link (REP-105).
 
 The local frame of the fleet is `map`. m2pem knows one position of a vehicle, so that its `odom` is
-the same as `map`. Frames that another node publishes are left to it.
+the same as `map`. Where `odom` of a ROS vehicle is, is left to the vehicle, whose odometry m2pem
+reads by tf: only map -> VEHICLE/base_link is published for it, and with `odom_frame: tf` nothing.
+Frames that another node publishes are left to it.
 """
 
 import logging
@@ -15,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 from m2pem.api import LocalFrame, ResourceId, VehicleState
 from m2pem_plugin_ros.face import telemetry_messages as messages
 from m2pem_plugin_ros.face.geometry import Vector, earth_from_enu
-from m2pem_plugin_ros.face.names import BASE, EARTH, ODOM, Names
+from m2pem_plugin_ros.face.names import BASE, EARTH, Names
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
 from m2pem_plugin_ros.face.vehicle_topics import VehicleTopics
 from m2pem_plugin_ros.frames import Quaternion
@@ -78,9 +80,11 @@ class FramesPublisher:
         base = self._names.frame(vehicle, BASE)
         self._children.add(base)
         self._sent[base] = deque(maxlen=SENT)
-        self._add_static(
-            self._names.map_frame, self._names.frame(vehicle, ODOM), NO_WAY, NO_ROTATION
-        )
+        map_frame, odom_frame = self._names.map_frame, self._names.odom_frame(vehicle)
+        if odom_frame != map_frame:
+            self._add_static(map_frame, odom_frame, NO_WAY, NO_ROTATION)
+        if self._names.tells_frames(vehicle):
+            self._left.add(base)
 
     def publish_static(self) -> None:
         """Publish the transforms that stay, latched."""

@@ -12,6 +12,7 @@ from m2pem.api import Connection, Fleet, ResourceId
 from m2pem_plugin_ros.face.settings import Options
 from m2pem_plugin_ros.settings import (
     DriverName,
+    OdomFrame,
     Settings,
     in_namespace,
     read_payloads,
@@ -36,7 +37,13 @@ class Names:
     def __init__(self, fleet: Fleet, options: Options) -> None:
         self._options = options
         self._paths = _paths([*fleet.vehicles, *fleet.payloads])
-        self._own = _own_names(fleet, options)
+        here = _settings_here(fleet, options)
+        self._own = frozenset(name for each in here.values() for name in _names_of(each))
+        self._odom_frames = {
+            resource: settings.odom_frame
+            for resource, settings in here.items()
+            if resource in fleet.vehicles
+        }
 
     def topic(self, resource: str, leaf: str) -> str:
         """Return the full name of a topic or action of a vehicle or payload."""
@@ -50,6 +57,17 @@ class Names:
     def left_to_vehicle(self, name: str) -> bool:
         """Whether a ROS vehicle has a topic itself, by its connection in the fleet file."""
         return name in self._own
+
+    def odom_frame(self, vehicle: str) -> str:
+        """Return the frame of a vehicle's odometry here. Where `odom` of a ROS vehicle is, only the
+        vehicle knows: its odometry is in `map`, as m2pem knows its position."""
+        if vehicle in self._odom_frames:
+            return self.map_frame
+        return self.frame(vehicle, ODOM)
+
+    def tells_frames(self, vehicle: str) -> bool:
+        """Whether a ROS vehicle tells on tf itself where it is in `map`."""
+        return self._odom_frames.get(ResourceId(vehicle)) is OdomFrame.TF
 
     def frame(self, resource: str, leaf: str) -> str:
         """Return a frame of a vehicle."""
@@ -85,8 +103,8 @@ def _token(name: str) -> str:
     return token if token[:1].isalpha() else f"n{token}"
 
 
-def _own_names(fleet: Fleet, options: Options) -> frozenset[str]:
-    """The topics and actions that the fleet's ROS vehicles have in the domain of the face."""
+def _settings_here(fleet: Fleet, options: Options) -> Mapping[ResourceId, Settings]:
+    """The settings of the fleet's ROS vehicles and payloads in the domain of the face."""
     vehicles = [each for each in fleet.vehicles.values() if each.arbiter == ARBITER]
     connections = {
         each.id: Connection(each.id, each.domain, each.settings, each.behaviors)
@@ -104,11 +122,11 @@ def _own_names(fleet: Fleet, options: Options) -> frozenset[str]:
         for each in mounted
     }
     read = read_settings(connections)
-    names: set[str] = set()
-    for settings in (*read.values(), *read_payloads(connections, read).values()):
-        if _domain(settings.domain_id) == _domain(options.domain_id):
-            names |= _names_of(settings)
-    return frozenset(names)
+    return {
+        resource: settings
+        for resource, settings in {**read, **read_payloads(connections, read)}.items()
+        if _domain(settings.domain_id) == _domain(options.domain_id)
+    }
 
 
 def _names_of(settings: Settings) -> set[str]:

@@ -11,7 +11,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix
 from m2pem.api import LocalFrame, PayloadState, ResourceId, VehicleState
 from m2pem_plugin_ros.face import telemetry_messages as messages
 from m2pem_plugin_ros.face.geometry import Vector
-from m2pem_plugin_ros.face.names import BASE, ODOM, Names
+from m2pem_plugin_ros.face.names import BASE, Names
 from m2pem_plugin_ros.face.publisher import TelemetryPublisher
 
 
@@ -28,7 +28,7 @@ class VehicleTopics:
         rates: Mapping[str, float],
     ) -> None:
         self._frame = frame
-        self._odom, self._base = names.frame(vehicle, ODOM), names.frame(vehicle, BASE)
+        self._odom, self._base = names.odom_frame(vehicle), names.frame(vehicle, BASE)
         self._payloads: dict[ResourceId, PayloadState] = {}
         self._names = names
         base = self._base
