@@ -16,6 +16,7 @@ from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, Transaction
 from m2pem_plugin_mavlink.protocol.url import parse_url
 from m2pem_plugin_mavlink.signing.policy import SigningPolicy
 from m2pem_plugin_mavlink.signing.signature import RefusedFrames
+from m2pem_plugin_mavlink.signing.timestamps import clock_timestamp
 
 T = TypeVar("T")
 
@@ -146,6 +147,11 @@ class RoutedLink:
     def refused(self) -> list[RefusedFrames]:
         """See `VehicleLink.refused`."""
         return [each for route in self._routes for each in route.refused()]
+
+    def signing_time(self) -> int:
+        """Return the present timestamp of signatures of this vehicle; see `signing.timestamps`."""
+        signing = self._used.signing
+        return clock_timestamp() if signing is None else signing.signer.timestamps.now()
 
     def known_systems(self) -> set[int]:
         """Return every system id that sends on its endpoints; for errors, when the vehicle's own

@@ -11,6 +11,7 @@ import click
 from m2pem import load_fleet
 from m2pem.api import Connection, ResourceId
 from m2pem.errors import PluginError
+from m2pem.journal import default_url, file_of
 from m2pem_plugin_mavlink.protocol.url import SerialUrl, parse_url
 from m2pem_plugin_mavlink.settings import Settings, read_settings
 from m2pem_plugin_mavlink.signing.key_file import write_new_key
@@ -25,6 +26,12 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
     for option in (
         click.argument("vehicle"),
         click.option("--fleet", "fleet_file", required=True, type=_FILE, help="The fleet file."),
+        click.option(
+            "--journal",
+            type=click.Path(dir_okay=False, path_type=Path),
+            help="The executive's journal: timestamps are kept beside it.  [default: the user's "
+            "own journal]",
+        ),
         click.option("--yes", is_flag=True, help="Do not ask."),
     ):
         command = option(command)
@@ -38,7 +45,9 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="The key that the vehicle has, if it has one.",
 )
-def setup(vehicle: str, fleet_file: Path, old_key: Path | None, yes: bool) -> None:
+def setup(
+    vehicle: str, fleet_file: Path, journal: Path | None, old_key: Path | None, yes: bool
+) -> None:
     """Give a vehicle the signing key that its fleet file names, over its own link.
 
     No executive may command the vehicle meanwhile, and it must be disarmed. Whoever reads the link
@@ -46,7 +55,7 @@ def setup(vehicle: str, fleet_file: Path, old_key: Path | None, yes: bool) -> No
 
     Example: m2pem mavlink signing setup --fleet fleet.yaml uav1
     """
-    settings, policy = _signed(fleet_file, vehicle)
+    settings, policy = _signed(fleet_file, vehicle, journal)
     _confirm(settings, f"Send the key of {policy.key} to {vehicle}?", yes)
     before = None if old_key is None else replace(policy, key=old_key.absolute())
     _run(set_up_key(settings, policy, before), vehicle)
@@ -55,12 +64,12 @@ def setup(vehicle: str, fleet_file: Path, old_key: Path | None, yes: bool) -> No
 
 @click.command()
 @_options
-def remove(vehicle: str, fleet_file: Path, yes: bool) -> None:
+def remove(vehicle: str, fleet_file: Path, journal: Path | None, yes: bool) -> None:
     """Turn the signing of a vehicle off: it then obeys everybody who reaches it.
 
     Example: m2pem mavlink signing remove --fleet fleet.yaml uav1
     """
-    settings, policy = _signed(fleet_file, vehicle)
+    settings, policy = _signed(fleet_file, vehicle, journal)
     if not yes:
         click.confirm(f"Turn the signing of {vehicle} off?", abort=True, err=True)
     _run(remove_key(settings, policy), vehicle)
@@ -83,7 +92,7 @@ def keygen(file: Path) -> None:
     click.echo(f"{file}: `signing: {{key: {file.absolute()}}}` in the connection of a vehicle")
 
 
-def _signed(fleet_file: Path, vehicle: str) -> tuple[Settings, SigningPolicy]:
+def _signed(fleet_file: Path, vehicle: str, journal: Path | None) -> tuple[Settings, SigningPolicy]:
     fleet = load_fleet(fleet_file)
     found = fleet.vehicles.get(ResourceId(vehicle))
     if found is None or found.arbiter != "mavlink":
@@ -92,7 +101,9 @@ def _signed(fleet_file: Path, vehicle: str) -> tuple[Settings, SigningPolicy]:
             f"{fleet_file} has no MAVLink vehicle {vehicle!r}; it has: {', '.join(names) or 'none'}"
         )
     connection = Connection(found.id, found.domain.value, found.settings)
-    settings = read_settings({found.id: connection})[found.id]
+    own = journal.absolute() if journal is not None else file_of(default_url())
+    folder = None if own is None else own.parent
+    settings = read_settings({found.id: connection}, folder)[found.id]
     if settings.signing is None:
         raise click.UsageError(
             f"{fleet_file}: {vehicle}: connection.signing is missing, such as "

@@ -12,7 +12,6 @@ from m2pem_plugin_mavlink.settings import Settings
 from m2pem_plugin_mavlink.signing.key_file import read_key
 from m2pem_plugin_mavlink.signing.policy import SigningPolicy
 from m2pem_plugin_mavlink.signing.signature import Refusal
-from m2pem_plugin_mavlink.signing.timestamps import clock_timestamp
 
 RECEIVED_WITHIN_S = 5.0
 REPEAT_S = 1.0
@@ -35,7 +34,10 @@ async def set_up_key(settings: Settings, key: SigningPolicy, old: SigningPolicy 
         PluginError: a URL or a key cannot be used.
     """
     secret = read_key(key.key)
-    texts = await _send(settings, old, secret, clock_timestamp())
+    # Later than all that m2pem and the vehicle have sent with this key, or with the old one.
+    async with _link(settings, key) as link:
+        earliest = link.signing_time()
+    texts = await _send(settings, old, secret, earliest)
     async with _link(settings, key) as link:
         if await _received(link):
             return
@@ -52,7 +54,7 @@ async def remove_key(settings: Settings, key: SigningPolicy) -> None:
         SetupError: it is not received, or signs afterwards.
         PluginError: a URL or a key cannot be used.
     """
-    texts = await _send(settings, key, bytes(32), 0)
+    texts = await _send(settings, key, bytes(32), None)
     async with _link(settings, key) as link:
         # Its frames are refused once they have no signature.
         if not await _until(lambda: any(r.refusal is Refusal.NOT_SIGNED for r in link.refused())):
@@ -71,7 +73,7 @@ async def _link(settings: Settings, signing: SigningPolicy | None) -> AsyncItera
 
 
 async def _send(
-    settings: Settings, signing: SigningPolicy | None, secret: bytes, timestamp: int
+    settings: Settings, signing: SigningPolicy | None, secret: bytes, earliest: int | None
 ) -> list[str]:
     """Send SETUP_SIGNING until the vehicle's frames are no longer as before, or for a while; return
     what the vehicle said meanwhile."""
@@ -89,13 +91,13 @@ async def _send(
                 f"its messages are refused: {refused}"
                 if refused
                 else f"no message of system {settings.system_id} arrives on "
-                f"{', '.join(settings.urls)}"
+                f"{', '.join(settings.urls)}; if it has a key, name it with --old-key"
             )
         message = message_type("SETUP_SIGNING").make(
             target_system=settings.system_id,
             target_component=settings.component_id,
             secret_key=tuple(secret),
-            initial_timestamp=timestamp,
+            initial_timestamp=0 if earliest is None else max(earliest, link.signing_time()),
         )
         for _ in range(TIMES if signing is not None else 2):
             link.send(message)
