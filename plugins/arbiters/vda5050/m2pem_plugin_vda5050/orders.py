@@ -89,7 +89,7 @@ class OrderPlan:
             end_node_id=self._id(number + 1),
             actions=[],
             max_speed=UNSET if self.speed_m_s is None else round(self.speed_m_s, 3),
-            orientation=round(math.pi, 4) if self.backwards else UNSET,
+            orientation=round(math.pi, 5) if self.backwards else UNSET,
             orientation_type="TANGENTIAL" if self.backwards else UNSET,
         )
 

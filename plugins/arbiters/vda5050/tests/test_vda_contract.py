@@ -94,3 +94,39 @@ class TestVda5050ArbiterWithHorizon(TestVda5050Arbiter):
 
     released_nodes = 1
     quick = ("test_less_and_less_is_left_of_a_route",)
+
+
+class TestVda5050ArbiterWithBrokers(TestVda5050Arbiter):
+    """The same, where each vehicle has a broker of its own, which breaks off and comes back."""
+
+    quick = ("test_a_lost_vehicle_whose_link_returns_stops_before_it_is_free",)
+
+    @pytest.fixture
+    def brokers(self, tmp_path: Path) -> Iterator[Mapping[str, Mosquitto]]:
+        made: dict[str, Mosquitto] = {}
+        for name in (AGV1, AGV2):
+            folder = tmp_path / name
+            folder.mkdir()
+            made[name] = Mosquitto(folder)
+            made[name].start()
+        yield made
+        for each in made.values():
+            each.stop()
+
+    @pytest.fixture
+    def settings(
+        self, brokers: Mapping[str, Mosquitto]
+    ) -> Iterator[Mapping[str, Mapping[str, object]]]:
+        judges = [Judge(each.port) for each in brokers.values()]
+        yield {name: connection(each.url, name) for name, each in brokers.items()}
+        for judge in judges:
+            judge.close()
+        assert [problem for judge in judges for problem in judge.problems] == []
+
+    @pytest.fixture
+    def cut_link(self, brokers: Mapping[str, Mosquitto]) -> CutLink:
+        return lambda arbiter, vehicle: brokers[vehicle].stop()
+
+    @pytest.fixture
+    def mend_link(self, brokers: Mapping[str, Mosquitto]) -> CutLink:
+        return lambda arbiter, vehicle: brokers[vehicle].start()

@@ -22,7 +22,6 @@ from ruamel.yaml import YAML
 
 REPOSITORY = Path(__file__).parents[4]
 ORIGIN = {"lat": 38.1075, "lon": -77.3192, "alt": 60.0}
-ORIGIN_TUPLE = (38.1075, -77.3192, 60.0)
 AMPLE_S = 60.0
 TOPICS = ("order", "instantActions", "state", "visualization", "connection", "factsheet")
 TIMESTAMP = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{2,6}Z")
@@ -147,8 +146,11 @@ class Judge:
         self.qos.setdefault(topic, set()).add(message.qos)
         try:
             body = json.loads(message.payload)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             self.problems.append(f"{message.topic}: {error}")
+            return
+        if not isinstance(body, dict):
+            self.problems.append(f"{message.topic}: it is no object")
             return
         for error in self._schemas[topic].iter_errors(body):
             place = "/".join(map(str, error.absolute_path))

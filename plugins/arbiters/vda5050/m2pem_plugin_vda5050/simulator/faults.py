@@ -58,6 +58,9 @@ GRAMMAR: FaultGrammar[FaultTarget] = FaultGrammar(
             r"refuse orders(?:\s+(.+))?",
             lambda match: _setting("refuses_orders", match[1] or "it cannot now", ""),
         ),
+        "accept orders": FaultKind(
+            r"accept orders", fixed(lambda it: it.set("refuses_orders", ""))
+        ),
         "fail actions": FaultKind(
             r"fail actions", lambda _: _setting("fails_actions", True, False)
         ),

@@ -5,6 +5,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any, Self
 
 import aiomqtt
@@ -254,12 +255,11 @@ class Simulation:
         """
         for name in fault.targets_among(self.vehicles.keys()):
             vehicle = self.vehicles[name]
-            begin_s = self._now_s if fault.at_s is None else fault.at_s
-
-            def begin(vehicle: SimulatedVehicle = vehicle) -> None:
+            if fault.at_s is None:
                 fault.start(vehicle, self._after)
-
-            self._schedule.at(begin_s, begin)
+            else:
+                begin = partial(fault.start, vehicle, self._after)
+                self._schedule.at(fault.at_s, begin)
 
     async def __aenter__(self) -> Self:
         for vehicle in self.vehicles.values():
