@@ -83,7 +83,7 @@ $(VENV)/for-%: $(CREATED) pyproject.toml constraints.txt
 	@touch $@
 
 # The tests of what BPMN editors see need Node.js, those of the terminal unit tmux, those of the web page
-# Chromium, those of journals PostgreSQL, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
+# Chromium, those of journals PostgreSQL, those of VDA 5050 mosquitto, and those of verification Spin and a C compiler; nothing else does, so their absence stops nothing.
 npm-packages:
 	@missing=; for wanted in $(DEBIAN_PACKAGES); do first=$${wanted%%/*}; \
 	  program=$${first/nodejs/node}; program=$${program/iproute2/ip}; \

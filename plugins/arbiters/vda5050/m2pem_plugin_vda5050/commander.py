@@ -19,7 +19,7 @@ from m2pem_plugin_vda5050.messages import (
     State,
     encode,
 )
-from m2pem_plugin_vda5050.reading import OURS, action_state, is_paused
+from m2pem_plugin_vda5050.reading import ID_PREFIX, action_state, is_paused
 
 RESEND_AFTER_S = 3.0
 """What a vehicle does not answer is sent again after this time: QoS 0 may lose messages. A vehicle
@@ -48,7 +48,7 @@ class Commander:
 
     def control(self, action_type: str) -> str:
         """Send an action that controls the vehicle. Return its id."""
-        action_id = f"{OURS}{action_type}-{uuid.uuid4().hex[:12]}"
+        action_id = f"{ID_PREFIX}{action_type}-{uuid.uuid4().hex[:12]}"
         self.instant(Action(action_type=action_type, action_id=action_id, blocking_type="NONE"))
         return action_id
 

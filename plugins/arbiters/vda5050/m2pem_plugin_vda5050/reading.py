@@ -6,7 +6,7 @@ from msgspec import UNSET
 
 from m2pem_plugin_vda5050.messages import ActionState, Error, State
 
-OURS = "m2pem-"
+ID_PREFIX = "m2pem-"
 """The ids of instant actions with which m2pem controls a vehicle begin with this."""
 
 COMMANDED = ("AUTOMATIC", "SEMIAUTOMATIC")
@@ -45,7 +45,7 @@ def is_executing(state: State) -> bool:
 
 
 def _is_instant(state: ActionState) -> bool:
-    return state.action_id.startswith(OURS)
+    return state.action_id.startswith(ID_PREFIX)
 
 
 def is_paused(state: State) -> bool:
@@ -73,7 +73,7 @@ def pause_kind(state: ActionState) -> str:
     """Return "startPause" or "stopPause" if m2pem has sent that action, else "". Vehicles need not
     report the type of an action, so that its id has it."""
     parts = state.action_id.split("-")
-    return parts[1] if state.action_id.startswith(OURS) and len(parts) > 2 else ""
+    return parts[1] if state.action_id.startswith(ID_PREFIX) and len(parts) > 2 else ""
 
 
 def traversed(state: State) -> int:

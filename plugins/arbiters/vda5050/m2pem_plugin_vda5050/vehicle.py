@@ -165,7 +165,7 @@ class Vehicle:
             self._velocity = Velocity(vx=0.0, vy=0.0)
         else:
             self._velocity = None
-        self._heard()
+        self._note_contact()
         self.step()
         return self.state()
 
@@ -176,7 +176,7 @@ class Vehicle:
         self._place = message.agv_position
         if message.velocity is not UNSET:
             self._velocity = message.velocity
-        self._heard()
+        self._note_contact()
         return self.state()
 
     def _receive_connection(self, message: ConnectionMessage) -> None:
@@ -188,7 +188,7 @@ class Vehicle:
             case _ if self._broken_us is None:
                 self._broken_us = self._clock.now_us()
 
-    def _heard(self) -> None:
+    def _note_contact(self) -> None:
         self._contact_us = self._clock.now_us()
         self._has_contact, self._invalid = True, ""
         if self._broken_us is not None and self._contact_us > self._broken_us:
