@@ -89,6 +89,7 @@ class TopicLocalization:
         self._base_frame = settings.base_frame
         self._changes = 0
         self._wrong_frame = ""
+        self._seen: tuple[int, str] | None = None
         self._stamp = (0, 0)
         self._posed_us: int | None = None
         self._fixed_us: int | None = None
@@ -231,6 +232,10 @@ class TopicLocalization:
         if self._frame is not OdomFrame.TF:
             return
         frame = self._base_frame or BASE_LINK
+        seen = (self._tf.version, frame)
+        if seen == self._seen:
+            return
+        self._seen = seen
         try:
             found = self._tf.find(frame)
         except TransformError as error:
