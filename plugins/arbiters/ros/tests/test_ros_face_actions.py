@@ -2,6 +2,7 @@
 
 import array
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from action_msgs.msg import GoalStatus
 from m2pem_interfaces.action import ExecuteMission
 from m2pem_interfaces.msg import Allocation, BehaviorStatus, KeyValue, RunStatus
 from m2pem_interfaces.srv import GiveBackVehicle, TakeVehicle
+from m2pem_plugin_ros.testing import Peer
 from ros_face_client import behavior_goal, faced, point, until
 
 from m2pem.api import records as r
@@ -18,6 +20,7 @@ ALL = {"commands": "all"}
 UGV1 = "/ugv1/execute_behavior"
 MISSION = "/face/execute_mission"
 FAR = point(0.1)
+MORTAL = Path(__file__).with_name("ros_face_mortal_client.py")
 
 
 async def test_a_goal_is_a_run_of_its_own_and_ends_with_the_behavior(ros_domain: int) -> None:
@@ -261,3 +264,16 @@ async def test_a_refused_mission_says_why(
     assert (result.run, result.outcome, result.code) == ("", 0, code)
     assert reason in result.reason
     assert bool(result.findings) == (code == "NOT_WELL")
+
+
+async def test_the_goal_of_a_client_that_dies_goes_on(ros_domain: int) -> None:
+    latitude, longitude, _ = scenarios.ORIGIN
+    words = [UGV1, str(latitude + 0.0005), str(longitude)]
+    async with faced(ros_domain, ALL, speed=1.0) as world:
+        peer = Peer(MORTAL, ros_domain, words)
+        await asyncio.to_thread(peer.__enter__)
+        peer.kill()
+        (going,) = await world.control.runs()
+        assert not going.status.ended
+        done = await world.control.wait(going.run)
+    assert done.status.value == "completed"
