@@ -8,12 +8,17 @@ from typing import Any
 import numpy as np
 import pymap3d
 import pytest
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geographic_msgs.msg import GeoPointStamped
 from geometry_msgs.msg import TransformStamped
 from m2pem_interfaces.msg import FleetState
+from m2pem_plugin_ros.runtime import RosRuntime
+from m2pem_plugin_ros.sensors.endpoints import Endpoints
+from m2pem_plugin_ros.settings import DriverName, Settings
 from nav_msgs.msg import Odometry
 from ros_face_client import LATCHED, STATIC, World, faced, point, two_vehicles, until
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStatus
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -330,3 +335,33 @@ async def test_frames_that_another_node_publishes_are_left_to_it_and_said_once(
     assert caplog.text.count("is left to that node") == 1
     ours_too = [e for each in frames for e in each.transforms if e.header.stamp.sec > number]
     assert not [e for e in ours_too if e.child_frame_id == "ugv1/base_link"]
+
+
+async def test_with_use_sim_time_stamps_are_those_of_the_clock(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("M2PEM_ROS_ARGS", "-p use_sim_time:=true")
+    async with faced(ros_domain) as world:
+        clock = world.client.node.create_publisher(Clock, "/clock", 10)
+        odom = world.client.hear("/ugv1/odom", Odometry)
+        came = asyncio.create_task(until(lambda: odom and odom[-1].header.stamp.sec == 77))
+        while not came.done():
+            clock.publish(Clock(clock=Time(sec=77)))
+            world.bus.publish(STATE)
+            await asyncio.sleep(0.05)
+        await came
+
+
+async def test_a_vehicle_that_is_not_there_is_not_found_in_what_the_face_publishes(
+    ros_domain: int,
+) -> None:
+    settings = Settings("/ugv1x", driver=DriverName.BASE)
+    async with faced(ros_domain) as world, RosRuntime("looks", domain_id=ros_domain) as ros:
+        await until(lambda: ros.node.count_publishers("/ugv1/odom"))
+        endpoints = Endpoints(ros, settings, ros_domain)
+        assert "/ugv1x/odom (nav_msgs/msg/Odometry) has no publisher" in endpoints.absence
+        assert "namespace: /ugv1'" not in endpoints.absence
+        world.client.node.create_publisher(Odometry, "/rover/odom", 10)
+        await until(
+            lambda: "write 'namespace: /rover'" in endpoints.absence, lambda: endpoints.absence
+        )

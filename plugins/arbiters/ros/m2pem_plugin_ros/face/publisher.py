@@ -34,11 +34,11 @@ class TelemetryPublisher(Generic[T]):
         rate_hz: float,
         make: Callable[[T], Any],
     ) -> None:
-        self.topic = topic
         self._node = node
-        self._type = message_type
         self._make = make
         self._publisher: Any = node.create_publisher(message_type, topic, TELEMETRY)
+        self.topic: str = self._publisher.topic_name
+        """Its name after remapping."""
         self._limiter = RateLimiter(rate_hz, self._publish)
         self._is_wanted = False
         self._failed = False

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from dataclasses import replace
 from typing import Any
 
 from geographic_msgs.msg import GeoPoint, GeoPointStamped
@@ -56,6 +57,7 @@ class Serving:
         options: Options,
     ) -> None:
         fleet, node = control.fleet(), ros.node
+        self._ros = ros
         self._node = node
         self._control = control
         self._follower = follower
@@ -118,6 +120,8 @@ class Serving:
                 await asyncio.sleep(0)
 
     def _receive(self, state: Telemetry) -> None:
+        if self._ros.uses_sim_time:
+            state = replace(state, time_us=self._ros.stamp_us(state.time_us))
         if isinstance(state, VehicleState) and state.resource in self._topics:
             self._states[state.resource] = state
             self._topics[state.resource].put(state)

@@ -160,11 +160,17 @@ class Endpoints:
         return sorted(set(full) - own)
 
     def _topics_of(self, type_: str) -> list[str]:
-        """Return the topics of a type that have a publisher."""
+        """Return the topics of a type that have a publisher of another process."""
+        from m2pem_plugin_ros.runtime import own_nodes  # noqa: PLC0415  # it needs rclpy
+
+        ours = own_nodes() | {NAMELESS}  # which may be ours
         return [
             name
             for name, types in self._node.get_topic_names_and_types()
-            if type_ in types and self._node.count_publishers(name)
+            if type_ in types
+            and any(
+                _name(each) not in ours for each in self._node.get_publishers_info_by_topic(name)
+            )
         ]
 
     def _wrong_command(self) -> str:
