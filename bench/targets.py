@@ -233,6 +233,8 @@ PROGRAMS = (
             Goal("times", "the same, times pymavlink's speed", "", 6, at_least=True),
             Goal("stream_frames_per_s", "MAVLink frames of a stream, the same", "/s"),
             Goal("stream_times", "the same, times pymavlink's speed", "", 3, at_least=True),
+            Goal("signed_frames_per_s", "MAVLink datagrams, signatures checked, the same", "/s"),
+            Goal("signed_times", "the same, times pymavlink's speed", "", 4, at_least=True),
         ),
     ),
     Program(

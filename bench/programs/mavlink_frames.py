@@ -4,7 +4,7 @@ python -m bench.programs.mavlink_frames <frames>
 
 Both are given the same frames in turn, as datagrams and as a stream. Of ours, CPU seconds include
 counting losses for each sender and handing messages to a listener; of pymavlink, `parse_buffer`
-alone.
+alone. Also datagrams that are signed, and whose signatures both check.
 """
 
 import json
@@ -12,16 +12,19 @@ import random
 import sys
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from m2pem_plugin_mavlink.protocol.frames import encode
 from m2pem_plugin_mavlink.protocol.inbound import Inbound, Sender, Wanted
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.signing.signature import SignatureCheck, Signer, Signing
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bench.measured import again_and_again
 
 VEHICLES = 10
+KEY = bytes(range(32))
 CHUNK_BYTES = 4096
 RATES_HZ = {
     "HEARTBEAT": 1, "SYS_STATUS": 2, "SYSTEM_TIME": 1, "GPS_RAW_INT": 2, "RAW_IMU": 4,
@@ -38,7 +41,7 @@ WANTED = (
 )  # fmt: skip
 
 
-def frames(count: int) -> list[bytes]:
+def frames(count: int, sign: Callable[[bytes], bytes] | None = None) -> list[bytes]:
     """Frames of several vehicles, with any values."""
     rng = random.Random(1)
     numbers = [0] * VEHICLES
@@ -48,15 +51,15 @@ def frames(count: int) -> list[bytes]:
         type_ = message_type(name)
         vehicle = rng.randrange(VEHICLES)
         message = type_.unpack(rng.randbytes(type_.struct.size))
-        made.append(encode(message, numbers[vehicle] & 255, Address(vehicle + 1, 1)))
+        made.append(encode(message, numbers[vehicle] & 255, Address(vehicle + 1, 1), sign))
         numbers[vehicle] += 1
     return made
 
 
 class Ear:
-    """Our side."""
+    """Our side. `check`: of the signatures of all frames."""
 
-    def __init__(self) -> None:
+    def __init__(self, check: SignatureCheck | None = None) -> None:
         self.heard: list[Message] = []
         types = [message_type(name) for name in WANTED]
         wanted = {each.id: Wanted(each, (self._hear,)) for each in types}
@@ -65,15 +68,15 @@ class Ear:
             sender.wanted = wanted
             return True
 
-        self.inbound = Inbound(meet)
+        self.inbound = Inbound(meet, lambda _: check)
 
     def _hear(self, message: Message, _: Address) -> None:
         self.heard.append(message)
 
 
-def ours(pieces: Sequence[bytes], stream: bool) -> tuple[float, Ear]:
+def ours(pieces: Sequence[bytes], stream: bool, *, signed: bool = False) -> tuple[float, Ear]:
     """CPU seconds, and what was heard."""
-    ear = Ear()
+    ear = Ear(SignatureCheck(signing()) if signed else None)
     take = ear.inbound.stream if stream else ear.inbound.datagram
     began_s = time.process_time()
     for piece in pieces:
@@ -81,10 +84,17 @@ def ours(pieces: Sequence[bytes], stream: bool) -> tuple[float, Ear]:
     return time.process_time() - began_s, ear
 
 
-def theirs(pieces: Sequence[bytes]) -> tuple[float, list[Any]]:
+def signing() -> Signing:
+    """A key, and no frame received yet."""
+    return Signing(Signer(KEY, None), Path(), 1)
+
+
+def theirs(pieces: Sequence[bytes], *, signed: bool = False) -> tuple[float, list[Any]]:
     """CPU seconds, and all messages."""
     mav = dialect.MAVLink(None)
     mav.robust_parsing = True
+    if signed:
+        mav.signing.secret_key = KEY
     parsed: list[Any] = []
     began_s = time.process_time()
     for piece in pieces:
@@ -110,16 +120,20 @@ def same(ear: Ear, parsed: Sequence[Any], count: int) -> None:
 def measure(count: int) -> dict[str, float]:
     """Both, in turn."""
     datagrams = frames(count)
+    signed = frames(count, signing().sign)
     joined = b"".join(datagrams)
     stream = [joined[at : at + CHUNK_BYTES] for at in range(0, len(joined), CHUNK_BYTES)]
     figures: dict[str, float] = {}
     kinds: dict[str, tuple[Callable[[], tuple[float, Ear]], Sequence[bytes]]] = {
         "": (lambda: ours(datagrams, stream=False), datagrams),
         "stream_": (lambda: ours(stream, stream=True), stream),
+        "signed_": (lambda: ours(signed, stream=False, signed=True), signed),
     }
     for prefix, (mine, pieces) in kinds.items():
         mine_s, ear = again_and_again(mine)
-        their_s, parsed = again_and_again(lambda: theirs(pieces))  # noqa: B023  # called at once
+        their_s, parsed = again_and_again(
+            lambda: theirs(pieces, signed=pieces is signed)  # noqa: B023  # called at once
+        )
         same(ear, parsed, count)
         figures[f"{prefix}frames_per_s"] = count / mine_s
         figures[f"{prefix}times"] = their_s / mine_s

@@ -1,9 +1,10 @@
 """Many MAVLink vehicles over UDP: what it costs to hear them, and how soon one is spoken to.
 
-python -m bench.programs.mavlink_gateway load|latency <vehicles> <messages a second of each> <s>
+python -m bench.programs.mavlink_gateway load|signed|latency <vehicles> <messages a second> <s>
 
 The vehicles are a process of their own: a socket each, a datagram a message, evenly spread. `load`:
-what was lost, and CPU and memory of the hub; eleven kinds of messages are decoded. `latency`: the
+what was lost, and CPU and memory of the hub; eleven kinds of messages are decoded. `signed`: the
+same, all frames are signed, and checked. `latency`: the
 milliseconds between the wish to send a command, which a thread gives to the event loop, and the
 moment at which the vehicle's socket has it, by the kernel's time stamp. Needs Linux.
 """
@@ -20,7 +21,9 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from multiprocessing.connection import Connection
+from pathlib import Path
 from statistics import quantiles
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from m2pem_plugin_mavlink.link.hub import shared_hub
@@ -29,6 +32,9 @@ from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.frames import encode
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.url import parse_url
+from m2pem_plugin_mavlink.signing.key_file import read_key, write_new_key
+from m2pem_plugin_mavlink.signing.policy import SigningPolicy
+from m2pem_plugin_mavlink.signing.signature import Signer, Signing
 
 from bench.measured import Stopwatch, peak_kb
 from bench.programs.mavlink_frames import RATES_HZ, WANTED
@@ -50,10 +56,13 @@ def address(vehicle: int) -> Address:
     return Address(vehicle % SYSTEMS + 1, vehicle // SYSTEMS + 1)
 
 
-def vehicles(port: int, count: int, rate_hz: int, seconds: float, pipe: Connection) -> None:
+def vehicles(
+    port: int, count: int, rate_hz: int, seconds: float, key: bytes | None, pipe: Connection
+) -> None:
     """The other process: makes all known, streams when it is told to, and then says how many
     messages it has sent, how many of them are wanted, and which commands came when (ns since the
     epoch)."""
+    sign = None if key is None else Signing(Signer(key, None), Path(), 0).sign
     rng = random.Random(2)
     names = rng.choices([*RATES_HZ], weights=[*RATES_HZ.values()], k=64)
     types = [message_type(name) for name in names]
@@ -68,7 +77,7 @@ def vehicles(port: int, count: int, rate_hz: int, seconds: float, pipe: Connecti
         sockets.append(made)
     beat = message_type("HEARTBEAT").make(type=2)
     for vehicle, made in enumerate(sockets):
-        made.send(encode(beat, 0, address(vehicle)))
+        made.send(encode(beat, 0, address(vehicle), sign))
     pipe.send("known")
     pipe.recv()
     sent = wanted = 0
@@ -77,7 +86,7 @@ def vehicles(port: int, count: int, rate_hz: int, seconds: float, pipe: Connecti
         due = int(elapsed_s * rate_hz * count)
         while sent < due:
             turn, vehicle = divmod(sent, count)
-            frame = encode(messages[turn % 64], (turn + 1) & 255, address(vehicle))
+            frame = encode(messages[turn % 64], (turn + 1) & 255, address(vehicle), sign)
             sockets[vehicle].send(frame)
             sent += 1
             wanted += names[turn % 64] in WANTED
@@ -104,7 +113,7 @@ def commands(made: socket.socket) -> list[tuple[int, int]]:
 
 @asynccontextmanager
 async def streaming(
-    count: int, rate_hz: int, seconds: float
+    count: int, rate_hz: int, seconds: float, policy: SigningPolicy | None = None
 ) -> AsyncIterator[tuple[list[RoutedLink], list[int], Connection]]:
     """Links to all vehicles, how many messages were handed over, and the pipe to their process."""
     clock = SystemClock()
@@ -116,14 +125,15 @@ async def streaming(
 
     links = []
     for vehicle in range(count):
-        links.append(await open_link(address(vehicle), [URL], clock))
+        links.append(await open_link(address(vehicle), [URL], clock, signing=policy))
         if vehicle < SYSTEMS:
             links[-1].listen(ids, hear)
     endpoint = shared_hub().endpoint(parse_url(URL))
     assert isinstance(endpoint, UdpEndpoint)
     context = multiprocessing.get_context("spawn")
     ours, pipe = context.Pipe()
-    arguments = (endpoint.port, count, rate_hz, seconds, pipe)
+    key = None if policy is None else read_key(policy.key)
+    arguments = (endpoint.port, count, rate_hz, seconds, key, pipe)
     process = context.Process(target=vehicles, args=arguments)
     process.start()
     assert await asyncio.to_thread(ours.recv) == "known"
@@ -150,9 +160,19 @@ async def until_quiet() -> None:
         await asyncio.sleep(0.1)
 
 
-async def load(count: int, rate_hz: int, seconds: float) -> dict[str, float]:
+async def signed(count: int, rate_hz: int, seconds: float) -> dict[str, float]:
+    """Hear them, and check their signatures; timestamps are kept in a file."""
+    with TemporaryDirectory() as folder:
+        policy = SigningPolicy(Path(folder) / "key", state_folder=Path(folder))
+        write_new_key(policy.key)
+        return await load(count, rate_hz, seconds, policy)
+
+
+async def load(
+    count: int, rate_hz: int, seconds: float, policy: SigningPolicy | None = None
+) -> dict[str, float]:
     """Hear them."""
-    async with streaming(count, rate_hz, seconds) as (_, heard, pipe):
+    async with streaming(count, rate_hz, seconds, policy) as (_, heard, pipe):
         watch = Stopwatch()
         before = counted()[0]
         with watch:
@@ -210,7 +230,7 @@ async def latency(count: int, rate_hz: int, seconds: float) -> dict[str, float]:
 
 def main() -> None:
     """The command."""
-    kinds = {"load": load, "latency": latency}
+    kinds = {"load": load, "signed": signed, "latency": latency}
     kind, count, rate_hz, seconds = sys.argv[1:]
     print(json.dumps(asyncio.run(kinds[kind](int(count), int(rate_hz), float(seconds)))))
 
