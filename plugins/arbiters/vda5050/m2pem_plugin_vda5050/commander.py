@@ -116,12 +116,13 @@ class CancelControl:
         self._repeater.sent()
 
     def step(self, state: State, *, may_send: bool) -> str:
-        """Look at a state. Return the status of the action, "" if the vehicle does not have it.
-        One that is lost or has failed is sent again."""
+        """Look at a state of a vehicle that should end its order. Return the status of the action,
+        "" if the vehicle does not have it. One that is lost, or has not had its effect, is sent
+        again."""
         known = action_state(state, self._action_id) if self._action_id else None
         status = "" if known is None else known.action_status
         self.refused = self.refused or status == "FAILED"
-        if status in ("", "FAILED") and self._repeater.is_due and may_send:
+        if status in ("", "FAILED", "FINISHED") and self._repeater.is_due and may_send:
             self.send()
         return status
 

@@ -57,7 +57,8 @@ class Action(Part):
 
 
 class NodePosition(Part):
-    """In metres and radians in the frame of a map."""
+    """In metres and radians in the frame of a map. `allowed_deviation_xy`: the schema of version
+    2.0 spells it so, its text as the other one."""
 
     x: float
     y: float
@@ -66,6 +67,7 @@ class NodePosition(Part):
     allowed_deviation_x_y: NotNegative | UnsetType = msgspec.field(
         default=UNSET, name="allowedDeviationXY"
     )
+    allowed_deviation_xy: NotNegative | UnsetType = UNSET
     allowed_deviation_theta: Direction | UnsetType = UNSET
 
 

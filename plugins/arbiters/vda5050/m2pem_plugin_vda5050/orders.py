@@ -19,7 +19,8 @@ class OrderPlan:
 
     `start`: where the vehicle stands; None after a restart, when it is not sent again. `points`:
     the waypoints. `theta_rad`: the direction at the last one; None: any. `loop`: the first waypoint
-    follows the last one, without end. `actions`: of the last node.
+    follows the last one, without end. `actions`: of the last node. `both_spellings`: send
+    `allowedDeviationXy`, too, as the schema of version 2.0 spells it.
     """
 
     order_id: str
@@ -34,6 +35,7 @@ class OrderPlan:
     end_deviation_m: float = 0.5
     start_deviation_m: float = 1.0
     actions: tuple[Action, ...] = field(default=())
+    both_spellings: bool = False
 
     @property
     def last(self) -> int | None:
@@ -69,6 +71,7 @@ class OrderPlan:
             map_id=self.map_id,
             theta=theta,
             allowed_deviation_x_y=deviation_m,
+            allowed_deviation_xy=deviation_m if self.both_spellings else UNSET,
         )
         actions = list(self.actions) if is_last else []
         return Node(

@@ -111,7 +111,6 @@ class Vehicle:
         headers = Headers(settings.manufacturer, settings.serial_number, settings.version)
         self._commander = Commander(headers, self._clock, setup.publish)
         self._pause = PauseControl(self._commander, self._clock)
-        self._cancel = CancelControl(self._commander, self._clock)
         self._own = {own.spec.name: own for own in settings.own_behaviors}
         fence = setup.connection.fence
         self._fence = None if fence is None else Fence(fence)
@@ -125,7 +124,7 @@ class Vehicle:
         self._broken_us: int | None = None
         self._is_offline = False
         self._task: Task | None = None
-        self._left: dict[str, bool] = {}
+        self._left: dict[str, CancelControl | None] = {}
         self._left_us = 0
         self._resolved = asyncio.Event()
         self._is_held = False
@@ -256,8 +255,8 @@ class Vehicle:
         """Begin a behavior. What the vehicle still does is cancelled first."""
         if self._task is not None and not self._task.over:
             self._leave_behind(self._task.id, cancel=True)
-        for order in self._left:
-            self._left[order] = True
+        self._left.pop(self._id(request.id), None)  # the vehicle may go on with it
+        self._cancel_left()
         self._is_held = False
         if request.behavior not in STOPS and self._is_paused_by_us():
             self._pause.want(False)
@@ -300,8 +299,7 @@ class Vehicle:
         Return "" when its state shows that they have ended; otherwise what it may still do."""
         if self.doing is not None:
             self._lose((self._clock.now_us() - self._contact_us) / 1e6)
-        for order in self._left:
-            self._left[order] = True
+        self._cancel_left()
         self.step()
         try:
             async with asyncio.timeout(RECLAIM_WITHIN_S):
@@ -440,19 +438,27 @@ class Vehicle:
 
     def _step_left(self, state: State, *, may_send: bool) -> None:
         """Forget orders that have ended; cancel those that should not go on."""
-        for order, cancels in list(self._left.items()):
+        for order, cancel in list(self._left.items()):
             if self._state_us <= self._left_us:
                 return  # the state is older
             has_ended = state.order_id != order or not (is_executing(state) or state.driving)
             if has_ended:
                 del self._left[order]
                 self._resolved.set()
-            elif cancels:
-                self._cancel.step(state, may_send=may_send)
+            elif cancel is not None:
+                cancel.step(state, may_send=may_send)
 
     def _leave_behind(self, order: str, cancel: bool) -> None:
-        self._left[order] = cancel or self._left.get(order, False)
+        self._left.setdefault(order, None)
         self._left_us = self._clock.now_us()
+        if cancel:
+            self._cancel_left()
+
+    def _cancel_left(self) -> None:
+        """Cancel the orders that are left behind, once a state shows that they go on."""
+        for order, cancel in self._left.items():
+            if cancel is None:
+                self._left[order] = CancelControl(self._commander, self._clock)
 
     def _known_orders(self) -> set[str]:
         task = set() if self._task is None else {self._task.id}
@@ -527,6 +533,7 @@ class Vehicle:
             float(tolerance) if isinstance(tolerance, int | float) else settings.deviation_m,
             settings.start_deviation_m,
             actions,
+            settings.version.startswith("2.0."),
         )
 
     def _points(

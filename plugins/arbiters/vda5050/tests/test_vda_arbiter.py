@@ -356,3 +356,49 @@ async def test_qos_and_retained_messages_are_those_of_the_standard(world: World)
     for topic in ("order", "instantActions"):
         ids = [message["headerId"] for message in world.judge.of(topic, AGV1)]
         assert ids == list(range(len(ids)))
+
+
+async def test_an_order_that_no_report_is_stored_of_goes_on_when_it_is_started_again(
+    world: World,
+) -> None:
+    settings = world.simulate()
+    async with commanding(settings) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR, speed=0.5)
+        await moving(harness)
+    async with commanding(settings) as harness:
+        found = await harness.arbiter.query("r1.b1", None)
+        assert (found.state, found.number) == (BehaviorState.UNKNOWN, 0)
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR, speed=0.5)
+        assert (await harness.ended("r1.b1", 120)).state is BehaviorState.SUCCEEDED
+    assert world.sim.count("accepts order") == 1
+
+
+async def test_what_a_vehicle_has_not_begun_is_said_not_to_have_begun(world: World) -> None:
+    settings = world.simulate()
+    async with commanding(settings) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR)
+        await harness.ended("r1.b1", 120)
+        world.sim.fault("agv1: cut link")
+        await harness.start("r1.b2", "goto", AGV1, target=FAR)
+        sent = order_id(JOURNAL, "r1.b2")
+        await world.heard("order", AGV1, lambda order: order["orderId"] == sent)
+        reference = harness.of("r1.b2")[-1].native_ref
+    world.sim.fault("agv1: mend link")
+    async with commanding(settings) as harness:
+        found = await harness.arbiter.query("r1.b2", reference)
+        assert (found.state, found.not_begun) == (BehaviorState.UNKNOWN, True)
+        found = await harness.arbiter.query("r1.b1", reference)
+        assert found.state is BehaviorState.SUCCEEDED
+
+
+async def test_a_vehicle_of_version_2_0_gets_what_both_its_schema_and_its_text_say(
+    world: World,
+) -> None:
+    settings = world.simulate(version="2.0.0", deviation="30 cm")
+    async with commanding(settings) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR)
+        assert (await harness.ended("r1.b1", 120)).state is BehaviorState.SUCCEEDED
+    (order,) = world.judge.of("order", AGV1)
+    assert order["version"] == "2.0.0"
+    position = order["nodes"][-1]["nodePosition"]
+    assert position["allowedDeviationXY"] == position["allowedDeviationXy"] == 0.3
