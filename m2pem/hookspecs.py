@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import click
 
     from m2pem.api.arbiter import Arbiter
+    from m2pem.api.exporter import Exporter
     from m2pem.api.face import Face
     from m2pem.api.health import HealthCheck
     from m2pem.api.ocu import Ocu
@@ -46,6 +47,11 @@ def m2pem_register_ocus(register: "Callable[[str, Callable[..., Ocu]], None]") -
 @hookspec
 def m2pem_register_faces(register: "Callable[[str, Callable[..., Face]], None]") -> None:
     """Register faces for programs of other protocols: `register("mavlink", MavlinkFace)`."""
+
+
+@hookspec
+def m2pem_register_exporters(register: "Callable[[str, Callable[..., Exporter]], None]") -> None:
+    """Register formats of `m2pem export`: `register("kml", KmlExporter)`."""
 
 
 @hookspec

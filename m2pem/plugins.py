@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import click
 
     from m2pem.api.arbiter import Arbiter
+    from m2pem.api.exporter import Exporter
     from m2pem.api.face import Face
     from m2pem.api.ocu import Ocu
     from m2pem.api.service import Service
@@ -52,6 +53,7 @@ _HOOKS = {
     "arbiter": "m2pem_register_arbiters",
     "ocu": "m2pem_register_ocus",
     "face": "m2pem_register_faces",
+    "exporter": "m2pem_register_exporters",
     "service": "m2pem_register_services",
     "command": "m2pem_register_commands",
 }
@@ -59,6 +61,7 @@ _PROBLEM_OF: Mapping[str, Callable[[object], str]] = {
     "arbiter": arbiter_problem,
     "ocu": ocu_problem,
     "face": face_problem,
+    "exporter": lambda _: "",
     "service": lambda _: "",
 }
 """What is wrong in the capabilities that a factory declares, by the kind of what it makes."""
@@ -156,6 +159,10 @@ class PluginManager:
         """Every face by its name."""
         return self._factories("face")
 
+    def exporters(self) -> "Mapping[str, Callable[..., Exporter]]":
+        """Every format of `m2pem export` by its name."""
+        return self._factories("exporter")
+
     def services(self) -> "Mapping[str, Callable[[], Service]]":
         """Every service by its name."""
         return self._factories("service")
@@ -175,6 +182,10 @@ class PluginManager:
     def face(self, name: str) -> "Callable[..., Face]":
         """The face of that name; errors as for `arbiter`."""
         return self._one("face", self.faces(), name)
+
+    def exporter(self, name: str) -> "Callable[..., Exporter]":
+        """The exporter of that name; errors as for `arbiter`."""
+        return self._one("exporter", self.exporters(), name)
 
     def service(self, name: str) -> "Callable[[], Service]":
         """The service of that name; errors as for `arbiter`."""
@@ -265,14 +276,14 @@ class PluginManager:
             import click  # noqa: PLC0415  # see `commands`
 
             self.commands(click.Group())
-        for kind in ("arbiter", "ocu", "face", "service"):
+        for kind in ("arbiter", "ocu", "face", "exporter", "service"):
             self._factories(kind)
         loaded = [plugin.origin for plugin in self._found.loaded]
         broken = [origin for origin, _ in self._found.failed]
         return [self._info(origin) for origin in (*loaded, *broken, *self._found.blocked)]
 
     def unknown(self, kind: str, name: str) -> PluginError:
-        """Return the error for an unknown name. `kind`: arbiter, ocu, face, service or command."""
+        """Return the error for an unknown name. `kind`: the names of `_HOOKS`."""
         hook = _HOOKS[kind]
         blocked = [_blocked(origin) for origin in self._found.blocked]
         broken = [each for each in self.failures if each.hook in ("", hook)] + blocked

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
         Thrown,
         thrown_by_missions,
     )
+    from m2pem.api.exporter import ExportedRecord, ExportedRun, Exporter, ExportOptions
     from m2pem.api.face import Face, FaceSettings
     from m2pem.api.follower import Follower, Listener, follow
     from m2pem.api.goals import GoalArbiter
@@ -186,6 +187,7 @@ _MODULES = {
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
     "m2pem.api.event_rules": "Fields ReceiveRule SendRule Thrown thrown_by_missions",
+    "m2pem.api.exporter": "ExportedRecord ExportedRun Exporter ExportOptions",
     "m2pem.api.face": "Face FaceSettings",
     "m2pem.api.log_context": "current_run trace_ids",
     "m2pem.api.ocu": "Ocu StandbyOcu",
@@ -273,6 +275,10 @@ __all__ = [
     "Clock",
     "Connection",
     "ConnectionReader",
+    "ExportOptions",
+    "ExportedRecord",
+    "ExportedRun",
+    "Exporter",
     "Face",
     "FaceCapabilities",
     "FaceSettings",

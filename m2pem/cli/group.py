@@ -36,6 +36,7 @@ COMMANDS = {
     "verify": "Prove properties and requirements of a mission, or show a run that violates them.",
     "simulate": "Rehearse a mission on a virtual clock.",
     "runs": "List the runs of a journal.",
+    "export": "Export runs for other programs.",
     "journal": "Show the state of a journal, check it, back it up, salvage or compact it.",
     "replay": "Print the records of a run, and its state.",
     "explain": "Explain which vehicles a task got, and why.",

@@ -3,12 +3,11 @@
 import asyncio
 import logging
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from m2pem.api import (
     US_PER_S,
     Alert,
-    Fleet,
     LocalFrame,
     MissionControl,
     RunId,
@@ -21,7 +20,7 @@ from m2pem.api import (
 from m2pem.api import records as r
 from m2pem.api.follower import Listener
 from m2pem.errors import M2pemError, PluginError
-from m2pem.fleet.fleet import dump
+from m2pem_plugin_recorder.fleets import fleet_json
 from m2pem_plugin_recorder.settings import RecorderSettings
 from m2pem_plugin_recorder.telemetry_messages import RateLimit
 from m2pem_plugin_recorder.writing_thread import Begin, End, Geometries, Warned, WritingThread
@@ -66,7 +65,7 @@ class Recorder(Listener):
         self._thread = WritingThread(
             settings,
             LocalFrame(fleet.origin),
-            _without_connections(fleet),
+            fleet_json(fleet),
             fleet.name,
             fleet.fence,
             self._room,
@@ -233,14 +232,3 @@ class Recorder(Listener):
             while not await self._read_run(found) and not self._thread.failure:
                 self._wake.clear()
                 await self._wake.wait()
-
-
-def _without_connections(fleet: Fleet) -> bytes:
-    """Return a fleet as JSON. Recordings are handed on, so addresses and passwords stay out."""
-    return dump(
-        replace(
-            fleet,
-            vehicles={key: replace(each, settings={}) for key, each in fleet.vehicles.items()},
-            payloads={key: replace(each, settings={}) for key, each in fleet.payloads.items()},
-        )
-    )

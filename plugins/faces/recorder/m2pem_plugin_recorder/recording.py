@@ -74,14 +74,11 @@ def recording_files(folder: Path, stem: str = "") -> list[RecordingFile]:
 
 
 class McapFile:
-    """An MCAP file that is written. Methods raise OSError."""
+    """MCAP that is written to a file. Methods raise OSError."""
 
-    def __init__(self, path: Path, run: RecordedRun, part: int = 1) -> None:
-        self.path = path
-        # Recordings show where vehicles are: they are their owner's, as the journal is.
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-        self._file: IO[bytes] = os.fdopen(descriptor, "wb")
-        self._written = _CountedWrites(self._file)
+    def __init__(self, file: IO[bytes], run: RecordedRun, part: int = 1) -> None:
+        self._file = file
+        self._written = _CountedWrites(file)
         self._writer = Writer(
             self._written,  # type: ignore[arg-type]  # it has all that the writer uses
             chunk_size=CHUNK_BYTES,
@@ -108,10 +105,14 @@ class McapFile:
         """End the chunk: who ends the process now leaves a file with all messages so far."""
         self._writer.flush()  # type: ignore[no-untyped-call]
 
+    def finish(self) -> None:
+        """Write the index; the file stays open."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
     def close(self) -> None:
         """Write the index, and close the file."""
         try:
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self.finish()
         finally:
             self._file.close()
 
@@ -197,11 +198,8 @@ class RunRecording:
         self._folder = folder
         self._most = most_bytes
         self._file: McapFile | None = None
-
-    @property
-    def path(self) -> Path | None:
-        """The file that is written now."""
-        return None if self._file is None else self._file.path
+        self.path: Path | None = None
+        """The last file."""
 
     def write(self, messages: Iterable[ChannelMessage]) -> None:
         """Add messages."""
@@ -233,7 +231,10 @@ class RunRecording:
         before = recording_files(self._folder, self.run.stem)
         part = before[-1].part + 1 if before else 1
         name = f"{self.run.stem}{f'.{part}' if part > 1 else ''}{SUFFIX}"
-        self._file = McapFile(self._folder / name, self.run, part)
+        self.path = self._folder / name
+        # Recordings show where vehicles are: they are their owner's, as the journal is.
+        descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        self._file = McapFile(os.fdopen(descriptor, "wb"), self.run, part)
         for message in self._first(at_us):
             self._file.write(message)
         return self._file

@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from m2pem.api import Alert, LocalFrame, Mission, RunId, StampedRecord, Telemetry
 from m2pem_plugin_recorder.channels import ChannelMessage
+from m2pem_plugin_recorder.diagrams import diagram_of
 from m2pem_plugin_recorder.foxglove_messages import log_message, scene_messages
 from m2pem_plugin_recorder.reading import last_record
 from m2pem_plugin_recorder.record_messages import RecordEncoder
@@ -225,7 +226,7 @@ class WritingThread:
             () if mission is None else tuple(mission.files()),
             self._fleet,
             self._fleet_name,
-            "" if mission is None else _diagram(mission),
+            "" if mission is None else diagram_of(mission),
         )
         recording = RunRecording(self._folder, run, self._settings.file_bytes, self._scene)
         before = [each.path for each in recording_files(self._folder, run.stem)]
@@ -256,12 +257,3 @@ class WritingThread:
         self._waiting.clear()
         self.failure = why
         self._room()
-
-
-def _diagram(mission: Mission) -> str:
-    from m2pem.diagram import draw  # noqa: PLC0415  # only runs that are recorded need it
-
-    try:
-        return draw(mission.source)
-    except ValueError:  # it has no diagram, and cannot be laid out
-        return ""

@@ -1,0 +1,197 @@
+"""Maps: the tracks of vehicles, detections, and the routes, areas and points of a run, as GeoJSON
+(RFC 7946) or KML 2.3."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+import msgspec
+from lxml import etree
+
+from m2pem.api import (
+    Area,
+    Detection,
+    ExportedRun,
+    ExportOptions,
+    GeoPosition,
+    PayloadState,
+    Point,
+    Route,
+    VehicleState,
+    as_geojson,
+    parse_geojson,
+)
+from m2pem.api import records as r
+from m2pem.errors import M2pemError
+from m2pem_plugin_recorder.export.states import States, iso_time
+from m2pem_plugin_recorder.export.xes import xml_text
+from m2pem_plugin_recorder.foxglove_messages import finite
+
+
+@dataclass(slots=True, eq=False)
+class Places:
+    """What a run has on a map. `tracks`: places with their times, by vehicle."""
+
+    geometries: dict[str, Point | Route | Area] = field(default_factory=dict)
+    tracks: dict[str, list[tuple[int, GeoPosition]]] = field(default_factory=dict)
+    detections: list[Detection] = field(default_factory=list)
+
+
+def places_of(run: ExportedRun, states: States) -> Places:
+    """Return what a run has on a map."""
+    places = Places()
+    for name, geometry in run.fleet.geometries.items() if run.fleet is not None else ():
+        if isinstance(geometry, Point | Route | Area):
+            places.geometries[name] = geometry
+    for each in run.records:
+        if isinstance(each.record, r.GeometryReceived):
+            try:
+                places.geometries[each.record.name] = parse_geojson(each.record.geometry)
+            except M2pemError:  # one of an older release that this one does not read
+                continue
+    for state in states.of(run):
+        if isinstance(state, VehicleState):
+            place = finite(state.position)
+            track = places.tracks.setdefault(state.resource, [])
+            # Records of two parts, or a clock that was set back, must not fold a track.
+            if place is not None and (not track or track[-1][0] < state.time_us):
+                track.append((state.time_us, place))
+        elif isinstance(state, PayloadState):
+            places.detections += state.detections
+    places.tracks = {name: track for name, track in places.tracks.items() if track}
+    return places
+
+
+class GeoJsonExporter:
+    """A FeatureCollection. Tracks have their times in the property `coordTimes`."""
+
+    def __init__(self, output: BinaryIO, options: ExportOptions) -> None:
+        self._output = output
+        self._states = States(options.recordings)
+        self._features: list[dict[str, Any]] = []
+
+    def add(self, run: ExportedRun) -> None:
+        """Add the features of a run."""
+        self._features += _features(run.summary.run, places_of(run, self._states))
+
+    def close(self) -> Sequence[str]:
+        """See `m2pem.api.Exporter.close`."""
+        collection = {"type": "FeatureCollection", "features": self._features}
+        self._output.write(msgspec.json.encode(collection) + b"\n")
+        return self._states.remarks
+
+
+def _features(run: str, places: Places) -> Iterator[dict[str, Any]]:
+    for name, geometry in places.geometries.items():
+        feature = as_geojson(geometry)
+        feature["properties"] |= {"run": run, "kind": "geometry", "name": name}
+        yield feature
+    for vehicle, track in places.tracks.items():
+        coordinates = [_coordinates(place) for _, place in track]
+        is_line = len(coordinates) > 1
+        yield {
+            "type": "Feature",
+            "properties": {
+                "run": run,
+                "kind": "track",
+                "name": vehicle,
+                "coordTimes": [iso_time(time_us) for time_us, _ in track],
+            },
+            "geometry": {
+                "type": "LineString" if is_line else "Point",
+                "coordinates": coordinates if is_line else coordinates[0],
+            },
+        }
+    for each in places.detections:
+        yield {
+            "type": "Feature",
+            "properties": {
+                "run": run,
+                "kind": "detection",
+                "name": each.type,
+                "source": each.source,
+                "time": iso_time(each.time_us),
+            },
+            "geometry": {"type": "Point", "coordinates": _coordinates(each.position)},
+        }
+
+
+def _coordinates(place: GeoPosition) -> list[float]:
+    return [place.longitude_deg, place.latitude_deg, place.altitude_m]
+
+
+_KML = "http://www.opengis.net/kml/2.2"
+_GX = "http://www.google.com/kml/ext/2.2"
+_PREFIXES: dict[Any, str] = {None: _KML, "gx": _GX}
+
+
+class KmlExporter:
+    """A folder for each run; tracks are `gx:Track`, so that a time slider moves the vehicles."""
+
+    def __init__(self, output: BinaryIO, options: ExportOptions) -> None:
+        self._output = output
+        self._states = States(options.recordings)
+        self._kml = etree.Element(f"{{{_KML}}}kml", nsmap=_PREFIXES)
+        self._document = _kml(self._kml, "Document")
+        _kml(self._document, "name", "m2pem")
+
+    def add(self, run: ExportedRun) -> None:
+        """Add the folder of a run."""
+        places = places_of(run, self._states)
+        folder = _kml(self._document, "Folder")
+        _kml(folder, "name", f"{run.summary.run} {run.summary.mission}".strip())
+        for name, geometry in places.geometries.items():
+            _add_geometry(_placemark(folder, name), geometry)
+        for vehicle, track in places.tracks.items():
+            element = etree.SubElement(_placemark(folder, vehicle), f"{{{_GX}}}Track")
+            _kml(element, "altitudeMode", "absolute")  # above mean sea level
+            for time_us, _ in track:
+                _kml(element, "when", iso_time(time_us).replace("+00:00", "Z"))
+            for _, place in track:
+                coordinates = etree.SubElement(element, f"{{{_GX}}}coord")
+                coordinates.text = " ".join(map(str, _coordinates(place)))
+        for each in places.detections:
+            placemark = _placemark(folder, each.type)
+            stamp = _kml(placemark, "TimeStamp")
+            _kml(stamp, "when", iso_time(each.time_us).replace("+00:00", "Z"))
+            point = _kml(placemark, "Point")
+            _kml(point, "coordinates", ",".join(map(str, _coordinates(each.position))))
+
+    def close(self) -> Sequence[str]:
+        """See `m2pem.api.Exporter.close`."""
+        tree = etree.ElementTree(self._kml)
+        tree.write(self._output, encoding="UTF-8", xml_declaration=True, pretty_print=True)
+        return self._states.remarks
+
+
+def _add_geometry(placemark: etree._Element, geometry: Point | Route | Area) -> None:
+    """Add a geometry on the ground: altitudes of geometries count from home."""
+    match geometry:
+        case Point(position=position):
+            _kml(_kml(placemark, "Point"), "coordinates", _ground([position]))
+        case Route(waypoints=waypoints):
+            line = _kml(placemark, "LineString")
+            _kml(line, "tessellate", "1")
+            # A line needs two places.
+            _kml(line, "coordinates", _ground(waypoints if len(waypoints) > 1 else waypoints * 2))
+        case Area(rings=rings):
+            polygon = _kml(placemark, "Polygon")
+            for index, ring in enumerate(rings):
+                boundary = _kml(polygon, "innerBoundaryIs" if index else "outerBoundaryIs")
+                _kml(_kml(boundary, "LinearRing"), "coordinates", _ground(ring))
+
+
+def _ground(places: Sequence[Sequence[float | None]]) -> str:
+    return " ".join(f"{place[1]},{place[0]}" for place in places)
+
+
+def _placemark(folder: etree._Element, name: str) -> etree._Element:
+    placemark = _kml(folder, "Placemark")
+    _kml(placemark, "name", name)
+    return placemark
+
+
+def _kml(parent: etree._Element, name: str, text: str | None = None) -> etree._Element:
+    element = etree.SubElement(parent, f"{{{_KML}}}{name}")
+    element.text = None if text is None else xml_text(text)
+    return element

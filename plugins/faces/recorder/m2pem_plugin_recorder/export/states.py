@@ -1,0 +1,105 @@
+"""The telemetry of an exported run: from its recording, or else from the web page's tracks."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from m2pem.api import US_PER_S, ExportedRun, PayloadState, Telemetry, VehicleState
+from m2pem_plugin_recorder.reading import telemetry_of
+from m2pem_plugin_recorder.recording import RecordedRun, recording_files
+from m2pem_plugin_recorder.settings import folder_beside
+
+
+class _Sample(msgspec.Struct):
+    """A line of a track (`journal.db-tracks`): the states at one mission time."""
+
+    t: float
+    vehicles: dict[str, msgspec.Raw] = msgspec.field(default_factory=dict)
+    payloads: dict[str, msgspec.Raw] = msgspec.field(default_factory=dict)
+
+
+class _Head(msgspec.Struct):
+    """The first line of a track."""
+
+    run: str
+    started_us: int
+
+
+_head = msgspec.json.Decoder(_Head)
+_sample = msgspec.json.Decoder(_Sample)
+_vehicle = msgspec.json.Decoder(VehicleState)
+_payload = msgspec.json.Decoder(PayloadState)
+
+
+def files_of(run: ExportedRun, folder: Path | None) -> list[Path]:
+    """Return the files of a run's recording. `folder` None: beside the journal."""
+    if folder is None:
+        if run.journal is None:
+            return []
+        folder = folder_beside(run.journal)
+    stem = RecordedRun(run.summary.run, run.summary.mission, run.summary.started_us).stem
+    return [each.path for each in recording_files(folder, stem)]
+
+
+class States:
+    """The states of runs; `remarks` says where they come from, if not from a recording."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.remarks: list[str] = []
+        self._folder = folder
+
+    def of(self, run: ExportedRun) -> Iterator[Telemetry]:
+        """Yield the states of a run.
+
+        Raises:
+            OSError: a file cannot be read.
+        """
+        name = run.summary.run
+        files = files_of(run, self._folder)
+        if files:
+            yield from telemetry_of(files)
+            return
+        found = False
+        for state in _tracked(run):
+            found = True
+            yield state
+        self.remarks.append(
+            f"{name}: there is no recording; positions are those that the web page kept"
+            if found
+            else f"{name}: there is no recording, so there is no telemetry "
+            "(the face `recorder` makes recordings)"
+        )
+
+
+def _tracked(run: ExportedRun) -> Iterator[Telemetry]:
+    if run.journal is None:
+        return
+    path = run.journal.with_name(f"{run.journal.name}-tracks") / f"{run.summary.run}.jsonl"
+    try:
+        head, *lines = path.read_bytes().split(b"\n")
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    try:
+        if _head.decode(head).started_us != run.summary.started_us:
+            return
+    except (ValueError, msgspec.DecodeError):
+        return
+    decoders: tuple[tuple[str, Any], ...] = (("vehicles", _vehicle), ("payloads", _payload))
+    for line in lines:
+        try:
+            sample = _sample.decode(line)
+            for kind, decoder in decoders:
+                for raw in getattr(sample, kind).values():
+                    yield decoder.decode(raw)
+        except (ValueError, msgspec.DecodeError):  # a torn line
+            continue
+
+
+def iso_time(time_us: int) -> str:
+    """Return a time in microseconds since the Unix epoch as ISO 8601 has it, in UTC."""
+    seconds, rest_us = divmod(time_us, US_PER_S)
+    time = datetime.fromtimestamp(seconds, UTC).replace(microsecond=rest_us)
+    return time.isoformat(timespec="milliseconds")
