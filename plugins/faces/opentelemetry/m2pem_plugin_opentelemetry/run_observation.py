@@ -68,7 +68,9 @@ class RunObservation(Listener):
         if trace is None:
             if not isinstance(stamped.record, r.RunStarted) or view.seq != stamped.seq:
                 return  # of a run that is over
-            trace = self._traces[view.run] = RunTrace(view, stamped.record, self._ended)
+            trace = self._traces[view.run] = RunTrace(
+                view, stamped.record, self._ended, whole=self._on_span is not None
+            )
             if self._on_span is not None:
                 trace_ids[view.run] = f"{trace.trace_id:032x}"
         self._is_new = is_new

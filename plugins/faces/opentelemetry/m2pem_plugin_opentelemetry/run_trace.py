@@ -36,10 +36,17 @@ WELL = (BehaviorState.SUCCEEDED, BehaviorState.CANCELLED)
 
 
 class RunTrace:
-    """The spans of one run that have not ended. Apply all records of the run to it, in order."""
+    """The spans of one run that have not ended. Apply all records of the run to it, in order.
 
-    def __init__(self, view: "RunView", started: r.RunStarted, ended: Ended) -> None:
+    `whole` False: only behaviors and prompts, which are measured, with the ids that they have in
+    the whole tree.
+    """
+
+    def __init__(
+        self, view: "RunView", started: r.RunStarted, ended: Ended, *, whole: bool = True
+    ) -> None:
         self.seq = 0
+        self._handlers = _HANDLERS if whole else _MEASURED
         self.trace_id = trace_id_of(view.run, started.process, started.started_us)
         self.is_over = False
         """Whether the run has ended, with all that it commanded."""
@@ -77,7 +84,7 @@ class RunTrace:
             return
         self.seq = stamped.seq
         record = stamped.record
-        handle = _HANDLERS.get(type(record))
+        handle = self._handlers.get(type(record))
         if handle is not None:
             handle(self, record, stamped.seq, self._view.at_us(stamped.t_s))
         self.is_over = self._run_ended and not self._behaviors
@@ -210,6 +217,8 @@ class RunTrace:
 
     def _left(self, record: r.TokenLeft, seq: int, at_us: int) -> None:
         span = self._activities.pop(record.token, None)
+        if span is None:
+            return
         self._reassigned.discard(record.token)
         self._latest.pop(record.token, None)
         self._end(span, record, at_us, _failure(record.outcome), outcome=record.outcome.value)
@@ -468,4 +477,16 @@ _HANDLERS: dict[type, Callable[..., None]] = {
     r.EscalationThrown: RunTrace._escalation,
     r.ErrorThrown: RunTrace._error,
     r.TransactionCancelled: RunTrace._cancelled,
+}
+
+_MEASURED: dict[type, Callable[..., None]] = {
+    kind: _HANDLERS[kind]
+    for kind in (
+        r.RunEnded,
+        r.BehaviorRequested,
+        r.BehaviorEnded,
+        r.PromptOpened,
+        r.PromptAnswered,
+        r.PromptWithdrawn,
+    )
 }

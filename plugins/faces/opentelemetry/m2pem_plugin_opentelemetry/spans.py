@@ -5,6 +5,7 @@ what it exports continues the tree, and what is exported twice is recognized.
 """
 
 from dataclasses import dataclass, field
+from functools import cache
 from hashlib import sha256
 from typing import TypeAlias
 
@@ -89,7 +90,12 @@ class Span:
 def named(attributes: dict[str, Attribute]) -> dict[str, Attribute]:
     """Attributes as OpenTelemetry names them: `run_id` is "m2pem.run.id". Long texts are cut."""
     return {
-        f"m2pem.{name.replace('_', '.')}": value[:MAX_TEXT] if isinstance(value, str) else value
+        _named(name): value[:MAX_TEXT] if isinstance(value, str) else value
         for name, value in attributes.items()
         if value not in ("", ())
     }
+
+
+@cache
+def _named(name: str) -> str:
+    return f"m2pem.{name.replace('_', '.')}"

@@ -66,15 +66,23 @@ def spans_of(result: RunResult) -> list[Span]:
 
 
 def built(
-    records: Sequence[StampedRecord], summary: RunSummary, mission: Mission | None = None
+    records: Sequence[StampedRecord],
+    summary: RunSummary,
+    mission: Mission | None = None,
+    *,
+    whole: bool = True,
 ) -> list[Span]:
     view = RunView(summary, mission)
     spans: list[Span] = []
+
+    def keep(span: Span, _: r.Record) -> None:
+        spans.append(span)
+
     trace: RunTrace | None = None
     for stamped in records:
         view.apply(stamped)
         if isinstance(stamped.record, r.RunStarted):
-            trace = RunTrace(view, stamped.record, lambda span, _: spans.append(span))
+            trace = RunTrace(view, stamped.record, keep, whole=whole)
         assert trace is not None
         trace.apply(stamped)
     assert trace is not None
@@ -135,6 +143,19 @@ async def test_the_same_records_give_the_same_spans() -> None:
 async def test_a_mission_that_cannot_be_read_still_gives_a_tree() -> None:
     result = await rehearsed("compensation")
     assert_one_tree(built(result.records, result.summary))
+
+
+async def test_what_is_measured_alone_has_the_ids_and_times_of_the_whole_tree() -> None:
+    result = await rehearsed("behaviors of a team")
+    whole = {each.span_id: each for each in spans_of(result)}
+    measured = built(result.records, result.summary, result.mission, whole=False)
+    kinds = ("m2pem.behavior.state", "m2pem.prompt.decision")
+    expected = {
+        key: (each.began_us, each.ended_us)
+        for key, each in whole.items()
+        if any(kind in each.attributes for kind in kinds) or each.parent_id is None
+    }
+    assert {each.span_id: (each.began_us, each.ended_us) for each in measured} == expected
 
 
 def test_a_span_keeps_a_bounded_number_of_events() -> None:
