@@ -43,6 +43,8 @@ class Commander:
 
     def instant(self, action: Action) -> None:
         header = self._headers.of("instantActions", self._clock.now_us())
+        if self._headers.is_2_0:
+            action.action_name = action.action_type
         message = InstantActions(**header, actions=[action])
         self._publish("instantActions", encode(message), QOS.get("instantActions", 0))
 

@@ -50,10 +50,14 @@ class ActionParameter(Part):
 
 
 class Action(Part):
+    """`action_name`: the schema of version 2.0 calls the type of an instant action so, its text
+    `actionType`."""
+
     action_type: str
     action_id: str
     blocking_type: Literal["NONE", "SOFT", "HARD"]
     action_parameters: list[ActionParameter] | UnsetType = UNSET
+    action_name: str | UnsetType = UNSET
 
 
 class NodePosition(Part):
@@ -299,6 +303,11 @@ class Headers:
             "serial_number": serial_number,
         }
         self._next: dict[str, int] = {}
+
+    @property
+    def is_2_0(self) -> bool:
+        """Whether the version is 2.0, whose schemas spell two fields otherwise than its text."""
+        return self._fixed["version"].startswith("2.0.")
 
     def of(self, topic: str, time_us: int) -> dict[str, Any]:
         """Return the fields of the next header on a topic."""

@@ -108,8 +108,8 @@ class Vehicle:
         origin = setup.context.origin
         place = settings.map.origin or origin[:2]
         self._frame = MapFrame((*place, origin[2]), settings.map.rotation_rad)
-        headers = Headers(settings.manufacturer, settings.serial_number, settings.version)
-        self._commander = Commander(headers, self._clock, setup.publish)
+        self._headers = Headers(settings.manufacturer, settings.serial_number, settings.version)
+        self._commander = Commander(self._headers, self._clock, setup.publish)
         self._pause = PauseControl(self._commander, self._clock)
         self._own = {own.spec.name: own for own in settings.own_behaviors}
         fence = setup.connection.fence
@@ -533,7 +533,7 @@ class Vehicle:
             float(tolerance) if isinstance(tolerance, int | float) else settings.deviation_m,
             settings.start_deviation_m,
             actions,
-            settings.version.startswith("2.0."),
+            self._headers.is_2_0,
         )
 
     def _points(

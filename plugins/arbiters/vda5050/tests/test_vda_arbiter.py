@@ -402,3 +402,6 @@ async def test_a_vehicle_of_version_2_0_gets_what_both_its_schema_and_its_text_s
     assert order["version"] == "2.0.0"
     position = order["nodes"][-1]["nodePosition"]
     assert position["allowedDeviationXY"] == position["allowedDeviationXy"] == 0.3
+    for message in world.judge.of("instantActions", AGV1):
+        (action,) = message["actions"]
+        assert action["actionName"] == action["actionType"]
