@@ -365,3 +365,17 @@ async def test_a_vehicle_that_is_not_there_is_not_found_in_what_the_face_publish
         await until(
             lambda: "write 'namespace: /rover'" in endpoints.absence, lambda: endpoints.absence
         )
+
+
+async def test_nothing_is_published_when_the_face_has_ended(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    after_all = asyncio.Event()
+    async with faced(ros_domain, {"rate": "10 Hz"}) as world:
+        await hears(world, STATE, "/ugv1/odom", Odometry, of_state)
+        for _ in range(2):  # the second one waits for its time, up to 0.1 s
+            world.bus.publish(STATE)
+        await asyncio.sleep(0)
+    asyncio.get_running_loop().call_later(0.2, after_all.set)  # timers end in their order
+    await after_all.wait()
+    assert "cannot be published" not in caplog.text

@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from m2pem_interfaces import msg
@@ -73,44 +74,59 @@ class FleetStatePublisher:
         """Publish the state, if it is not that which was published last."""
         holders = await self._control.holders()
         labels = await self._control.holder_labels()
-        message = msg.FleetState(
-            fleet=self._fleet_name,
-            resources=[
-                self._resource(each, states.get(each), holders.get(each, ""), labels)
-                for each in self._resources
-            ],
-            runs=[run_status(view.summary) for view in self._follower.views.values()],
-        )
-        content = repr(message)  # NaN is not equal to itself
+        summaries = [view.summary for view in self._follower.views.values()]
+        resources = []
+        for resource in self._resources:
+            holder = holders.get(resource, "")
+            resources.append(_Seen.of(states.get(resource), holder, labels.get(holder, "")))
+        content = (resources, summaries)
         if content == self._last:
             return
         self._last = content
-        message.stamp = time_of(now_us)
+        message = msg.FleetState(
+            stamp=time_of(now_us),
+            fleet=self._fleet_name,
+            resources=[
+                msg.FleetResource(**self._fixed[resource], **asdict(seen))
+                for resource, seen in zip(self._resources, resources, strict=True)
+            ],
+            runs=[run_status(each) for each in summaries],
+        )
         self._publisher.publish(message)
 
-    def _resource(
-        self,
-        resource: ResourceId,
-        state: VehicleState | PayloadState | None,
-        holder: str,
-        labels: Mapping[str, str],
-    ) -> Any:
-        message = msg.FleetResource(
-            holder=sendable(holder),
-            holder_label=sendable(labels.get(holder, "")),
-            battery=math.nan,
-            **self._fixed[resource],
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """The fields of a FleetResource that change."""
+
+    holder: str
+    holder_label: str
+    link: int = msg.FleetResource.NOT_SAID
+    behavior: str = ""
+    readiness: int = msg.FleetResource.NOT_KNOWN
+    not_ready_reasons: tuple[str, ...] = ()
+    mode: str = ""
+    battery: float = math.nan
+
+    @classmethod
+    def of(cls, state: VehicleState | PayloadState | None, holder: str, label: str) -> "_Seen":
+        holder, label = sendable(holder), sendable(label)
+        if state is None:
+            return cls(holder, label)
+        link, behavior = _LINKS[state.link], sendable(state.behavior)
+        if not isinstance(state, VehicleState):
+            return cls(holder, label, link, behavior)
+        charge = state.battery_fraction
+        return cls(
+            holder,
+            label,
+            link,
+            behavior,
+            _READINESS[state.ready],
+            tuple(sendable(each) for each in state.not_ready_reasons),
+            sendable(state.mode),
+            math.nan if charge is None else round(charge, 2),
         )
-        if state is not None:
-            message.link = _LINKS[state.link]
-            message.behavior = sendable(state.behavior)
-        if isinstance(state, VehicleState):
-            message.readiness = _READINESS[state.ready]
-            message.not_ready_reasons = [sendable(each) for each in state.not_ready_reasons]
-            message.mode = sendable(state.mode)
-            if state.battery_fraction is not None:
-                message.battery = round(state.battery_fraction, 2)
-        return message
 
 
 def _in_order(fleet: Fleet) -> list[ResourceId]:

@@ -107,6 +107,11 @@ class FramesPublisher:
             if topic not in self._subscriptions and self._node.count_publishers(topic) > 1:
                 self._subscriptions[topic] = self._ros.subscribe(TFMessage, topic, hear, qos)
 
+    def close(self) -> None:
+        """Publish nothing more."""
+        self._is_wanted = False
+        self._limiter.close()
+
     # --- inside ---------------------------------------------------------------------------------
 
     def _publish(self, _: None) -> None:

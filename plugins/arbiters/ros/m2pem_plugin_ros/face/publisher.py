@@ -53,11 +53,16 @@ class TelemetryPublisher(Generic[T]):
         other = self._other()
         if self._publisher is not None and other:
             log.info("%s is left to the node %s, which publishes it", self.topic, other)
-            self._limiter.close()
+            self.close()
             self._node.destroy_publisher(self._publisher)
-            self._publisher, self._is_wanted = None, False
+            self._publisher = None
         elif self._publisher is not None:
             self._is_wanted = self._publisher.get_subscription_count() > 0
+
+    def close(self) -> None:
+        """Publish nothing more."""
+        self._is_wanted = False
+        self._limiter.close()
 
     def _other(self) -> str:
         """Return another node that publishes the topic; "" if there is none."""
@@ -71,8 +76,6 @@ class TelemetryPublisher(Generic[T]):
         return ""
 
     def _publish(self, item: T) -> None:
-        if self._publisher is None:
-            return
         try:
             message = self._make(item)
             if message is not None:

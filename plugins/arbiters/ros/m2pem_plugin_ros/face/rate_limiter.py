@@ -7,6 +7,10 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
+def _drop(_: object) -> None:
+    return
+
+
 class RateLimiter(Generic[T]):
     """Hands each item to `publish` at once, or, if the last one was less than a period ago, the
     latest item when the period is over.
@@ -33,7 +37,8 @@ class RateLimiter(Generic[T]):
             self._timer = self._loop.call_at(self._due_s, self._send_waiting)
 
     def close(self) -> None:
-        """Drop the item that waits."""
+        """Publish nothing more."""
+        self._publish = _drop
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._waiting = None

@@ -38,8 +38,8 @@ SLOW_EVERY = 2
 WAITING = 10_000
 """States that may wait to be published; the oldest are dropped."""
 
-STATES_IN_A_ROW = 100
-"""States that are taken before other tasks run."""
+STATES_IN_A_ROW = 10
+"""States that are taken before other tasks run: each may be several messages."""
 
 log = logging.getLogger("m2pem.face.ros")
 
@@ -107,8 +107,16 @@ class Serving:
             for task in (following, *tasks):
                 task.cancel()
             await asyncio.gather(following, *tasks, return_exceptions=True)
+            self._close()
 
     # --- inside ---------------------------------------------------------------------------------
+
+    def _close(self) -> None:
+        """Publish nothing more: what waits for its time must not come after the node."""
+        self._frames.close()
+        for topics in self._topics.values():
+            for publisher in topics.publishers():
+                publisher.close()
 
     async def _listen(self) -> None:
         """Receive telemetry of the fleet."""
