@@ -26,6 +26,7 @@ from m2pem_plugin_mavlink.protocol.url import (
     parse_url,
 )
 from m2pem_plugin_mavlink.settings import Settings, read_settings
+from m2pem_plugin_mavlink.signing.key_file import SigningError, read_key
 
 LISTENED_S = 2.5
 """Autopilots send a heartbeat every second."""
@@ -48,7 +49,11 @@ def check_fleet(fleet: Fleet) -> Sequence[HealthCheck]:
         urls = {url: parse_url(url) for each in settings.values() for url in each.urls}
     except PluginError:
         return ()  # the check of the fleet itself says it
-    checks = [*_drivers(settings), *(check for url in urls.values() for check in _endpoint(url))]
+    checks = [
+        *_drivers(settings),
+        *_keys(settings),
+        *(check for url in urls.values() for check in _endpoint(url)),
+    ]
     well = all(check.status is OK for check in checks)
     return [*checks, *_autopilots(settings)] if well else checks
 
@@ -57,6 +62,21 @@ def _drivers(settings: Mapping[ResourceId, Settings]) -> Iterator[HealthCheck]:
     if any(each.driver == "mavsdk" for each in settings.values()) and not find_spec("mavsdk"):
         remedy = "pip install 'm2pem-plugin-mavlink[mavsdk]'"
         yield HealthCheck("mavsdk", ERROR, "the driver mavsdk is not installed", remedy)
+
+
+def _keys(settings: Mapping[ResourceId, Settings]) -> Iterator[HealthCheck]:
+    """Check that the keys of vehicles that sign can be read, by their owner alone."""
+    for resource, each in settings.items():
+        if each.signing is None:
+            continue
+        name = f"signing {resource}"
+        try:
+            read_key(each.signing.key)
+        except SigningError as error:
+            remedy = "m2pem mavlink signing keygen writes a new key, for its owner alone"
+            yield HealthCheck(name, ERROR, str(error), remedy)
+        else:
+            yield HealthCheck(name, OK, f"{each.signing.key} has a key")
 
 
 def _endpoint(url: Url) -> Iterator[HealthCheck]:

@@ -11,6 +11,7 @@ import pytest
 from m2pem_plugin_mavlink import host_checks
 from m2pem_plugin_mavlink.host_checks import check_fleet, check_serial_line
 from m2pem_plugin_mavlink.protocol.url import SerialUrl
+from mavlink_signed_end import write_key
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import Fleet, HealthCheck, HealthStatus
@@ -60,6 +61,21 @@ def sending(system: int, port: int) -> Iterator[None]:
     finally:
         ended.set()
         thread.join()
+
+
+@pytest.mark.parametrize(
+    ("mode", "status", "message"),
+    [(0o600, HealthStatus.OK, "has a key"), (0o644, HealthStatus.ERROR, "chmod 600")],
+)
+def test_the_key_of_a_vehicle_that_signs_is_checked(
+    tmp_path: Path, mode: int, status: HealthStatus, message: str
+) -> None:
+    key = write_key(tmp_path)
+    key.chmod(mode)
+    url = f"udpout://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+    uav = f"url: '{url}', system_id: 7, signing: {{key: {key}}}"
+    check = checks_of(fleet_of(tmp_path, uav=uav))["signing uav"]
+    assert (check.status, message in check.message) == (status, True)
 
 
 def test_an_autopilot_that_sends_is_received(tmp_path: Path) -> None:

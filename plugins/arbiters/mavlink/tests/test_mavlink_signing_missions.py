@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 import re
 import sqlite3
 import subprocess
@@ -13,9 +14,11 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from m2pem_plugin_mavlink.arbiter import MavlinkArbiter
 from m2pem_plugin_mavlink.settings import read_settings
 from m2pem_plugin_mavlink.signing import command_line
 from m2pem_plugin_mavlink.signing.setup import SetupError, remove_key, set_up_key
+from m2pem_plugin_mavlink.signing.timestamps import clock_timestamp
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind
 from mavlink_copters import simulated, task, write
@@ -23,8 +26,16 @@ from mavlink_signed_end import KEY, OTHER_KEY, write_key
 from mavlink_simulated import specs
 from mavlink_sitl import free_port
 
-from m2pem.api import Connection, ResourceId
+from m2pem.api import (
+    ArbiterContext,
+    Connection,
+    LinkState,
+    ResourceId,
+    SystemClock,
+    VehicleState,
+)
 from m2pem.errors import PluginError
+from m2pem.telemetry.bus import Bus
 from tests.executive.conftest import mission, sequence
 
 V1 = ResourceId("v1")
@@ -128,6 +139,34 @@ def test_a_mission_without_it_fails_with_that_reason(
     )
     assert re.search(rf"uav1: frames of 1/1 on udpin\S+ refused: {reason} \(\d+\); ", run.text)
     assert not any(secret in run.text for secret in SECRETS)
+
+
+async def test_operators_see_why_a_vehicle_is_not_received(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    port = free_port()
+    key = write_key(tmp_path)
+    values = {"url": f"udpin://127.0.0.1:{port}", "system_id": 1, "signing": {"key": str(key)}}
+    context = ArbiterContext(SystemClock(), Bus(), logging.getLogger("test"), (47.4, 8.5, 488.0))
+    async with rover(port) as simulator:
+        arbiter = MavlinkArbiter({V1: Connection(V1, "ground", values)}, context)
+        await arbiter.connect()
+        try:
+            async for state in arbiter.telemetry():
+                assert isinstance(state, VehicleState)
+                if state.not_ready_reasons:
+                    break
+            assert (state.link, state.ready, state.position) == (LinkState.LOST, False, None)
+            assert "frames of 1/1 on udpin" in state.not_ready_reasons[0]
+            assert "refused: not signed (" in state.not_ready_reasons[0]
+            simulator[1].autopilot.signing.set_up(KEY, clock_timestamp())
+            async for state in arbiter.telemetry():
+                if state.link is LinkState.CONNECTED:  # type: ignore[union-attr]
+                    break
+        finally:
+            await arbiter.close()
+    (text,) = [each for each in caplog.messages if "refused" in each]
+    assert text.endswith("; `m2pem mavlink signing setup` gives the vehicle the key")
 
 
 # --- setting up ---------------------------------------------------------------------------------
