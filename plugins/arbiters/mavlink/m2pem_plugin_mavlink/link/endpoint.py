@@ -3,7 +3,8 @@
 import logging
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Mapping, Set
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
+from typing import TypeAlias
 
 from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.protocol.inbound import Sender
@@ -11,6 +12,9 @@ from m2pem_plugin_mavlink.protocol.url import Url
 from m2pem_plugin_mavlink.signing.signature import SignatureCheck, Signing
 
 logger = logging.getLogger(__name__)
+
+Tap: TypeAlias = Callable[["Endpoint", Peer, bytes], None]
+"""Called with the bytes that a known peer has sent, after they were processed; must not raise."""
 
 MAX_UNKNOWN_SENDERS = 64
 """Most senders without a route that one peer keeps."""
@@ -22,7 +26,8 @@ MOST_KEYS = 8
 class Endpoint(ABC):
     """`own_systems`: the system ids of this process; frames that claim to come from them are
     dropped. `now_s`: seconds of the hub's clock. `greet` is called with each peer that must receive
-    a frame first, and with how to sign it."""
+    a frame first, and with how to sign it. `taps` get the bytes that arrive, as they are; they may
+    change later."""
 
     def __init__(
         self,
@@ -30,10 +35,12 @@ class Endpoint(ABC):
         own_systems: Set[int],
         now_s: Callable[[], float],
         greet: Callable[[Peer, Iterable[Signing | None]], None],
+        taps: Sequence[Tap] = (),
     ) -> None:
         self.url = url
         self.now_s = now_s
         self.greet = greet
+        self.taps = taps
         self.peers: dict[Hashable, Peer] = {}
         self._routes: dict[int, Route] = {}
         self._own_systems = own_systems
@@ -108,6 +115,11 @@ class Endpoint(ABC):
         if route is not None:
             return route.claim(peer, sender, self.now_s())
         return len(peer.inbound.senders) < MAX_UNKNOWN_SENDERS
+
+    def owner(self, system: int, component: int) -> Peer | None:
+        """Return the peer that owns a component of a system that links use; None: there is none."""
+        route = self._routes.get(system)
+        return route.peer_of(component, component) if route is not None else None
 
     def has_route(self, system: int) -> bool:
         """Return whether a link uses this system id here."""

@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 
 from m2pem.api import US_PER_S, Clock
 from m2pem.errors import PluginError
-from m2pem_plugin_mavlink.link.endpoint import Endpoint
+from m2pem_plugin_mavlink.link.endpoint import Endpoint, Tap
 from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.link.streams import SerialEndpoint, TcpInEndpoint, TcpOutEndpoint
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
@@ -41,6 +41,11 @@ _KINDS: dict[Way, type[Endpoint]] = {
 }
 
 
+def endpoint_kind(url: Url) -> type[Endpoint]:
+    """Return the class of the endpoints of a URL."""
+    return SerialEndpoint if isinstance(url, SerialUrl) else _KINDS[url.way]
+
+
 @dataclass(slots=True)
 class _Opened:
     endpoint: Endpoint
@@ -54,6 +59,8 @@ class Hub:
     _clock: Clock
 
     def __init__(self) -> None:
+        self.taps: list[Tap] = []
+        """They get the bytes of all endpoints."""
         self._opened: dict[Url, _Opened] = {}
         self._sources: Counter[Address] = Counter()
         self._own_systems: set[int] = set()
@@ -68,6 +75,11 @@ class Hub:
     def endpoint(self, url: Url) -> Endpoint:
         """Return an open endpoint."""
         return self._opened[url].endpoint
+
+    def owners(self, system: int, component: int) -> list[Peer]:
+        """Return the peers that own a component of a system, on all endpoints."""
+        found = (each.endpoint.owner(system, component) for each in self._opened.values())
+        return [peer for peer in found if peer is not None]
 
     async def join(
         self,
@@ -123,8 +135,9 @@ class Hub:
     async def _open(self, url: Url) -> None:
         opened = self._opened.get(url)
         if opened is None:
-            kind = SerialEndpoint if isinstance(url, SerialUrl) else _KINDS[url.way]
-            endpoint = kind(url, self._own_systems, self.now_s, self._greet)
+            endpoint = endpoint_kind(url)(
+                url, self._own_systems, self.now_s, self._greet, self.taps
+            )
             await endpoint.open()
             opened = self._opened[url] = _Opened(endpoint)
         opened.users += 1

@@ -35,9 +35,9 @@ AdmitSender: TypeAlias = Callable[["Peer", Sender], bool]
 class Peer:
     """A peer of an endpoint: a UDP address, a TCP connection, or the other end of a serial line.
     `name`: for messages; `write` sends bytes at once, or drops them; `received_s`: the time of its
-    last data; `open`: it has not closed the connection."""
+    last data; `open`: it has not closed the connection; `unsent`: the writes that were dropped."""
 
-    __slots__ = ("_sequences", "inbound", "name", "open", "received_s", "write")
+    __slots__ = ("_sequences", "inbound", "name", "open", "received_s", "unsent", "write")
 
     def __init__(
         self,
@@ -51,6 +51,7 @@ class Peer:
         self.write = write
         self.received_s = received_s
         self.open = True
+        self.unsent = 0
         self.inbound = Inbound(partial(admit, self), check_of)
         self._sequences: dict[Address, int] = {}
 

@@ -55,6 +55,8 @@ class Connection(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         self.peer.received_s = now_s = self._endpoint.now_s()
         self.peer.inbound.stream(data, now_s)
+        for tap in self._endpoint.taps:
+            tap(self._endpoint, self.peer, data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._endpoint.drop(self)
@@ -67,6 +69,8 @@ class Connection(asyncio.Protocol):
     def _write(self, data: bytes) -> None:
         if self._transport.get_write_buffer_size() < MOST_UNSENT_BYTES:
             self._transport.write(data)
+        else:
+            self.peer.unsent += 1
 
 
 class ConnectingEndpoint(Endpoint):

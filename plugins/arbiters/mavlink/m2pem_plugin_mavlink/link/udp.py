@@ -63,7 +63,7 @@ class UdpEndpoint(Endpoint):
 
     def _readable(self) -> None:
         now_s = self.now_s()
-        receive, peers = self._socket.recvfrom, self.peers
+        receive, peers, taps = self._socket.recvfrom, self.peers, self.taps
         for _ in range(AT_ONCE):
             try:
                 data, address = receive(LARGEST_DATAGRAM)
@@ -77,6 +77,8 @@ class UdpEndpoint(Endpoint):
             else:
                 peer.received_s = now_s
                 peer.inbound.datagram(data, now_s)
+                for tap in taps:
+                    tap(self, peer, data)
 
     def _receive_from_new_peer(self, data: bytes, address: Any, now_s: float) -> None:
         """Add a peer for an address that has sent a valid frame; nothing is kept of others."""
@@ -93,6 +95,8 @@ class UdpEndpoint(Endpoint):
                 return
             self.drop(idle)
         self.peers[address] = peer
+        for tap in self.taps:
+            tap(self, peer, data)
 
     def _peer(self, address: Any, now_s: float) -> Peer:
         host, port = address[:2]
@@ -107,10 +111,12 @@ class UdpEndpoint(Endpoint):
                     self._socket.sendto(data, address)
             except OSError as error:
                 # Lost, as any datagram may be; a refusal answers an earlier one.
+                peer.unsent += 1
                 if error.errno not in (errno.ECONNREFUSED, errno.EAGAIN, errno.ENOBUFS):
                     logger.debug("%s: nothing sent to %s: %s", self.url, name, error)
 
-        return Peer(name, write, self.admit, now_s, self.check_of)
+        peer = Peer(name, write, self.admit, now_s, self.check_of)
+        return peer
 
 
 async def _opened(url: SocketUrl) -> socket.socket:

@@ -72,7 +72,8 @@ def encode(
     id_ = type_.id
     flags = 0 if sign is None else SIGNED
     header = _MADE.pack(V2, len(payload), flags, 0, sequence, *source, id_ & 0xFFFF, id_ >> 16)
-    sum_ = mcrf4xx(EXTRA[id_], mcrf4xx(payload, mcrf4xx(header[1:], CRC_START)))
+    extra = EXTRA.get(id_) or bytes((type_.crc_extra,))  # messages of other dialects
+    sum_ = mcrf4xx(extra, mcrf4xx(payload, mcrf4xx(header[1:], CRC_START)))
     frame = header + payload + _CRC.pack(sum_)
     return frame if sign is None else frame + sign(frame)
 

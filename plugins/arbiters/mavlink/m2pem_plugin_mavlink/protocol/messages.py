@@ -89,7 +89,7 @@ class MessageType:
 @cache
 def types_by_id() -> dict[int, MessageType]:
     """Return every message type of the dialect."""
-    return {id_: _message_type(source) for id_, source in dialect.mavlink_map.items()}
+    return {id_: message_type_of(source) for id_, source in dialect.mavlink_map.items()}
 
 
 @cache
@@ -106,7 +106,8 @@ def message_type(name: str) -> MessageType:
     return _types_by_name()[name]
 
 
-def _message_type(source: Any) -> MessageType:
+def message_type_of(source: Any) -> MessageType:
+    """Return the type of a message, given pymavlink's class of it, of any dialect."""
     types = dict(zip(source.fieldnames, source.fieldtypes, strict=True))
     fields: Sequence[str] = source.ordered_fieldnames
     lengths: Sequence[int] = source.lengths
