@@ -1,4 +1,5 @@
-"""The hooks of this plugin: the arbiter `mavlink`, commands and host checks, loaded when used."""
+"""The hooks of this plugin: the arbiter and the face `mavlink`, commands and host checks, loaded
+when used."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -8,7 +9,7 @@ from m2pem import hookimpl
 if TYPE_CHECKING:
     import click
 
-    from m2pem.api import Arbiter, Fleet, HealthCheck
+    from m2pem.api import Arbiter, Face, Fleet, HealthCheck
 
 
 @hookimpl
@@ -17,6 +18,14 @@ def m2pem_register_arbiters(register: "Callable[[str, Callable[..., Arbiter]], N
     from m2pem_plugin_mavlink.arbiter import MavlinkArbiter  # noqa: PLC0415  # starting up must be fast
 
     register("mavlink", MavlinkArbiter)
+
+
+@hookimpl
+def m2pem_register_faces(register: "Callable[[str, Callable[..., Face]], None]") -> None:
+    """Register `mavlink`."""
+    from m2pem_plugin_mavlink.face.face import MavlinkFace  # noqa: PLC0415  # starting up must be fast
+
+    register("mavlink", MavlinkFace)
 
 
 @hookimpl

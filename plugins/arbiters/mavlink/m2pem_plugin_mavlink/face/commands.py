@@ -1,0 +1,323 @@
+"""Commands of ground stations as behaviors of m2pem."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import ResourceId, Value
+from m2pem_plugin_mavlink.face import modes
+from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
+from m2pem_plugin_mavlink.protocol.messages import Message
+from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+
+REQUEST_OPERATOR_CONTROL = 32100
+"""MAV_CMD_REQUEST_OPERATOR_CONTROL, which pymavlink 2.4.50 does not have. Parameter 1: 1 asks for
+control, 0 gives it back."""
+
+POSITION_TARGET: int = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
+
+_FRAMES: Mapping[int, str] = {
+    0: "amsl",
+    5: "amsl",
+    3: "relative",
+    6: "relative",
+    10: "terrain",
+    11: "terrain",
+}
+"""The frame of altitudes of each MAV_FRAME that is global."""
+
+POSITION_IGNORED = 1 | 2 | 4
+"""POSITION_TARGET_TYPEMASK of the three coordinates."""
+
+YAW_LOCK = 16
+"""GIMBAL_MANAGER_FLAGS: the yaw is from north."""
+
+YAW_IN_EARTH_FRAME = 64
+
+
+class RefusedCommandError(Exception):
+    """A command that is not carried out. `result`: its MAV_RESULT."""
+
+    def __init__(self, reason: str, result: int = dialect.MAV_RESULT_DENIED) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.result = result
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One behavior on a vehicle or payload."""
+
+    resource: ResourceId
+    behavior: str
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """COMMAND_LONG or COMMAND_INT. `place`: latitude and longitude in degrees, if both are given;
+    `z`: parameter 7, an altitude in the frame `altitude_frame`; `flags`: parameter 5 as it is."""
+
+    id: int
+    params: tuple[float, float, float, float]
+    place: tuple[float, float] | None
+    z: float
+    altitude_frame: str
+    confirmation: int
+    flags: int = 0
+
+    @property
+    def name(self) -> str:
+        """Its name without MAV_CMD_."""
+        if self.id == REQUEST_OPERATOR_CONTROL:
+            return "REQUEST_OPERATOR_CONTROL"
+        entry = dialect.enums["MAV_CMD"].get(self.id)
+        return str(entry.name).removeprefix("MAV_CMD_") if entry is not None else f"{self.id}"
+
+
+def command_of(message: Message, frame: RawFrame) -> Command:
+    """Read a command."""
+    params = (message.param1, message.param2, message.param3, message.param4)
+    if frame.id == dialect.MAVLINK_MSG_ID_COMMAND_LONG:
+        x, y, z, altitude_frame = message.param5, message.param6, message.param7, "amsl"
+        confirmation = message.confirmation
+        flags = int(x) if math.isfinite(x) else 0
+    else:
+        x, y, z, confirmation = message.x * 1e-7, message.y * 1e-7, message.z, 0
+        altitude_frame, flags = _FRAMES.get(message.frame, ""), message.x
+    return Command(message.command, params, _place(x, y), z, altitude_frame, confirmation, flags)
+
+
+def _place(latitude: float, longitude: float) -> tuple[float, float] | None:
+    if not (math.isfinite(latitude) and math.isfinite(longitude)):
+        return None
+    if (latitude, longitude) == (0.0, 0.0) or abs(latitude) > 90 or abs(longitude) > 180:
+        return None
+    return latitude, longitude
+
+
+Read = Callable[[Command, ShownVehicle], Order | None]
+"""Returns what to do; None: it is so already.
+
+Raises:
+    RefusedCommandError: it cannot be done.
+"""
+
+
+def order_of(command: Command, vehicle: ShownVehicle, camera: Camera | None) -> Order | None:
+    """Return what a command means; None: there is nothing to do. `camera`: the component that it is
+    addressed to, if it is one.
+
+    Raises:
+        RefusedCommandError: m2pem does not do this.
+    """
+    if camera is not None:
+        return _camera_order(command, camera)
+    read = _READ.get(command.id)
+    if read is None:
+        raise RefusedCommandError(
+            f"{command.name} is not carried out", dialect.MAV_RESULT_UNSUPPORTED
+        )
+    order = read(command, vehicle)
+    is_own = order is not None and order.resource == vehicle.resource
+    if order is not None and is_own and order.behavior not in vehicle.behaviors:
+        raise RefusedCommandError(
+            f"{vehicle.resource} has no behavior {order.behavior}",
+            dialect.MAV_RESULT_UNSUPPORTED,
+        )
+    return order
+
+
+def _target(
+    vehicle: ShownVehicle, place: tuple[float, float], z: float, frame: str
+) -> dict[str, Value]:
+    parameters: dict[str, Value] = {"target": list(place)}
+    if vehicle.domain in ("air", "subsurface") and math.isfinite(z):
+        parameters["target"] = [*place, z]
+        parameters["altitude_frame"] = frame
+    return parameters
+
+
+def _reposition(command: Command, vehicle: ShownVehicle) -> Order:
+    if command.place is None:
+        raise RefusedCommandError("DO_REPOSITION needs a latitude and a longitude")
+    if not command.altitude_frame:
+        raise RefusedCommandError("DO_REPOSITION needs a global frame")
+    parameters = _target(vehicle, command.place, command.z, command.altitude_frame)
+    speed = command.params[0]
+    if math.isfinite(speed) and speed > 0:
+        parameters["speed"] = f"{speed} m/s"
+    return Order(vehicle.resource, "goto", parameters)
+
+
+def _takeoff(command: Command, vehicle: ShownVehicle) -> Order:
+    if not math.isfinite(command.z):
+        raise RefusedCommandError("NAV_TAKEOFF needs an altitude")
+    altitude_m = command.z
+    # COMMAND_LONG has no frame: ArduPilot takes the altitude above home, PX4 above sea level.
+    home = vehicle.home
+    if command.altitude_frame == "amsl" and home is not None and altitude_m > home.altitude_m + 1:
+        altitude_m -= home.altitude_m
+    if altitude_m <= 0:
+        raise RefusedCommandError("NAV_TAKEOFF needs an altitude above the ground")
+    return Order(vehicle.resource, "takeoff", {"altitude": f"{altitude_m} m"})
+
+
+def _land(command: Command, vehicle: ShownVehicle) -> Order:
+    return Order(vehicle.resource, "land")
+
+
+def _return(command: Command, vehicle: ShownVehicle) -> Order:
+    return Order(vehicle.resource, "return_to_launch")
+
+
+def _speed(command: Command, vehicle: ShownVehicle) -> Order:
+    speed = command.params[1]
+    if not math.isfinite(speed) or speed <= 0:
+        raise RefusedCommandError("DO_CHANGE_SPEED needs a speed in parameter 2")
+    return Order(vehicle.resource, "set_speed", {"speed": f"{speed} m/s"})
+
+
+def _pause(command: Command, vehicle: ShownVehicle) -> Order:
+    if command.params[0] != 0:
+        raise RefusedCommandError("m2pem's operators continue a mission")
+    return Order(vehicle.resource, "hold")
+
+
+def _loiter(command: Command, vehicle: ShownVehicle) -> Order:
+    if command.place is None:
+        return Order(vehicle.resource, "hold")
+    return Order(
+        vehicle.resource,
+        "goto",
+        _target(vehicle, command.place, command.z, command.altitude_frame or "relative"),
+    )
+
+
+def _set_mode(command: Command, vehicle: ShownVehicle) -> Order:
+    base, main, sub = (each if math.isfinite(each) else 0.0 for each in command.params[:3])
+    number = int(main)
+    if 0 < main < 256:  # PX4's notation: main mode and sub mode
+        number = int(main) << 16 | (int(sub) & 255) << 24
+    mode = modes.BY_NUMBER.get(number)
+    if mode is None or not int(base) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        raise RefusedCommandError(f"there is no mode {number:#x}")
+    return _of_mode(mode, vehicle)
+
+
+def _set_standard_mode(command: Command, vehicle: ShownVehicle) -> Order:
+    standard = command.params[0]
+    mode = next((each for each in modes.MODES if each.standard == standard != 0), None)
+    if mode is None:
+        raise RefusedCommandError(f"there is no standard mode {standard:g}")
+    return _of_mode(mode, vehicle)
+
+
+def _of_mode(mode: modes.Mode, vehicle: ShownVehicle) -> Order:
+    if not mode.behavior:
+        raise RefusedCommandError(f"the mode {mode.name} cannot be commanded")
+    return Order(vehicle.resource, mode.behavior)
+
+
+def _arm(command: Command, vehicle: ShownVehicle) -> None:
+    arms = command.params[0] == 1
+    if arms == vehicle.armed:
+        return
+    if arms:
+        raise RefusedCommandError("m2pem arms it when it sets out: send a takeoff or a target")
+    raise RefusedCommandError("m2pem does not disarm: send a landing or a hold")
+
+
+def _gimbal_of(vehicle: ShownVehicle, device: float) -> Camera:
+    gimbals = [each for each in vehicle.cameras if each.gimbal_device]
+    wanted = int(device) if math.isfinite(device) else 0
+    found = next((each for each in gimbals if wanted in (0, each.gimbal_device)), None)
+    if found is None:
+        raise RefusedCommandError("it has no such gimbal", dialect.MAV_RESULT_UNSUPPORTED)
+    return found
+
+
+def _point(
+    camera: Camera, vehicle: ShownVehicle, pitch_rad: float, yaw_rad: float, flags: int
+) -> Order:
+    """Point a gimbal; the yaw is from the vehicle's heading, or with a flag from north.
+
+    Raises:
+        RefusedCommandError: an angle is missing, or the vehicle's heading is not known.
+    """
+    if not (math.isfinite(pitch_rad) and math.isfinite(yaw_rad)):
+        raise RefusedCommandError("a gimbal is pointed by a pitch and a yaw angle")
+    if flags & (YAW_LOCK | YAW_IN_EARTH_FRAME):
+        heading = vehicle.state.yaw_rad if vehicle.state is not None else None
+        if heading is None:
+            raise RefusedCommandError("its heading is not known")
+        yaw_rad = math.remainder(yaw_rad - (math.pi / 2 - heading), 2 * math.pi)
+    parameters: dict[str, Value] = {
+        "bearing": f"{math.degrees(yaw_rad):.4f} deg",
+        "elevation": f"{math.degrees(pitch_rad):.4f} deg",
+    }
+    return Order(camera.resource, "ptz_point_at", parameters)
+
+
+def _pitch_yaw(command: Command, vehicle: ShownVehicle) -> Order:
+    pitch, yaw = command.params[:2]
+    camera = _gimbal_of(vehicle, command.z)
+    return _point(camera, vehicle, math.radians(pitch), math.radians(yaw), command.flags)
+
+
+def _roi(command: Command, vehicle: ShownVehicle) -> Order:
+    if command.place is None:
+        raise RefusedCommandError("DO_SET_ROI_LOCATION needs a latitude and a longitude")
+    camera = _gimbal_of(vehicle, 0)
+    parameters: dict[str, Value] = {"target": list(command.place)}
+    if math.isfinite(command.z) and command.altitude_frame:
+        parameters["target"] = [*command.place, command.z]
+        parameters["altitude_frame"] = command.altitude_frame
+    return Order(camera.resource, "ptz_point_at", parameters)
+
+
+def _camera_order(command: Command, camera: Camera) -> Order:
+    if command.id == dialect.MAV_CMD_IMAGE_START_CAPTURE and camera.takes_pictures:
+        interval, count = command.params[1:3]
+        if not math.isfinite(count) or not 1 <= count <= 10_000:
+            raise RefusedCommandError("IMAGE_START_CAPTURE needs the number of pictures")
+        parameters: dict[str, Value] = {"count": int(count)}
+        if math.isfinite(interval) and interval > 0:
+            parameters["interval"] = f"{interval} s"
+        return Order(camera.resource, "take_picture", parameters)
+    raise RefusedCommandError(f"{command.name} is not carried out", dialect.MAV_RESULT_UNSUPPORTED)
+
+
+_READ: Mapping[int, Read] = {
+    dialect.MAV_CMD_DO_REPOSITION: _reposition,
+    dialect.MAV_CMD_NAV_TAKEOFF: _takeoff,
+    dialect.MAV_CMD_NAV_LAND: _land,
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
+    dialect.MAV_CMD_DO_CHANGE_SPEED: _speed,
+    dialect.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
+    dialect.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
+    dialect.MAV_CMD_DO_SET_MODE: _set_mode,
+    262: _set_standard_mode,  # MAV_CMD_DO_SET_STANDARD_MODE
+    dialect.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
+    dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: _pitch_yaw,
+    dialect.MAV_CMD_DO_SET_ROI_LOCATION: _roi,
+}
+
+
+def position_order(message: Message, vehicle: ShownVehicle) -> Order | None:
+    """Return the goto that SET_POSITION_TARGET_GLOBAL_INT means; None: it has no position.
+
+    Raises:
+        RefusedCommandError: its frame is not global.
+    """
+    if message.type_mask & POSITION_IGNORED:
+        return None
+    frame = _FRAMES.get(message.coordinate_frame)
+    if frame is None:
+        raise RefusedCommandError("a position target needs a global frame")
+    place = _place(message.lat_int * 1e-7, message.lon_int * 1e-7)
+    if place is None:
+        return None
+    return Order(vehicle.resource, "goto", _target(vehicle, place, message.alt, frame))

@@ -1,0 +1,91 @@
+"""The modes that the systems of the face announce.
+
+The autopilot is MAV_AUTOPILOT_GENERIC: m2pem is neither ArduPilot nor PX4. MAVSDK reads the modes
+of all autopilots but ArduPilot as those of PX4, so the numbers are PX4's; QGroundControl asks for
+AVAILABLE_MODES and shows the names. pymavlink has that message in the dialect `development` only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from m2pem_plugin_mavlink.protocol.messages import Message, MessageType, message_type_of
+from m2pem_plugin_mavlink.vehicle.modes import PX4_AUTO, PX4_MANUAL, PX4_OFFBOARD, px4_mode
+
+AVAILABLE_MODES = 435
+CURRENT_MODE = 436
+NOT_USER_SELECTABLE = 2
+"""MAV_MODE_PROPERTY: ground stations do not offer it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """`standard`: MAV_STANDARD_MODE, 0: none. `behavior`: what commanding it means; "": it cannot
+    be commanded."""
+
+    number: int
+    name: str
+    standard: int
+    behavior: str = ""
+
+
+HOLD = Mode(px4_mode(PX4_AUTO, 3), "Hold", 0, "hold")
+MISSION = Mode(px4_mode(PX4_AUTO, 4), "Mission", 6)
+RETURN = Mode(px4_mode(PX4_AUTO, 5), "Return", 5, "return_to_launch")
+LAND = Mode(px4_mode(PX4_AUTO, 6), "Land", 7, "land")
+TAKEOFF = Mode(px4_mode(PX4_AUTO, 2), "Takeoff", 8)
+GUIDED = Mode(px4_mode(PX4_OFFBOARD), "Guided", 0)
+MANUAL = Mode(px4_mode(PX4_MANUAL), "Manual", 0)
+
+MODES = (HOLD, MISSION, RETURN, LAND, TAKEOFF, GUIDED, MANUAL)
+BY_NUMBER: Mapping[int, Mode] = {mode.number: mode for mode in MODES}
+
+_BY_BEHAVIOR: Mapping[str, Mode] = {
+    "hold": HOLD,
+    "drive_stop": HOLD,
+    "takeoff": TAKEOFF,
+    "land": LAND,
+    "return_to_launch": RETURN,
+    "single_vehicle_routing": MISSION,
+    "area_survey": MISSION,
+    "run_onboard_mission": MISSION,
+    "teleop": MANUAL,
+}
+
+
+def mode_of(behavior: str, operator: str) -> Mode:
+    """Return the mode of a vehicle, given the behavior that it carries out ("": none) and the
+    operator who has taken it ("": nobody)."""
+    if behavior:
+        return _BY_BEHAVIOR.get(behavior, GUIDED)
+    return MANUAL if operator else HOLD
+
+
+@cache
+def _types() -> tuple[MessageType, MessageType]:
+    from pymavlink.dialects.v20 import development  # noqa: PLC0415  # few ask for it
+
+    available, current = (development.mavlink_map[id_] for id_ in (AVAILABLE_MODES, CURRENT_MODE))
+    return message_type_of(available), message_type_of(current)
+
+
+def available_mode(index: int) -> Message:
+    """Return AVAILABLE_MODES of one mode; `index` counts from 1."""
+    mode = MODES[index - 1]
+    made: Message = _types()[0].make(
+        number_modes=len(MODES),
+        mode_index=index,
+        standard_mode=mode.standard,
+        custom_mode=mode.number,
+        properties=0 if mode.behavior else NOT_USER_SELECTABLE,
+        mode_name=mode.name.encode(),
+    )
+    return made
+
+
+def current_mode(mode: Mode) -> Message:
+    """Return CURRENT_MODE."""
+    made: Message = _types()[1].make(
+        standard_mode=mode.standard, custom_mode=mode.number, intended_custom_mode=mode.number
+    )
+    return made

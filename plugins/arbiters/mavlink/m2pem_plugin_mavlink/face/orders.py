@@ -1,0 +1,385 @@
+"""Orders of ground stations: checked, carried out as behaviors of m2pem, and acknowledged.
+
+`MissionControl.execute_behavior` decides: it refuses a vehicle that a run or another operator has.
+A station that asks for control (MAV_CMD_REQUEST_OPERATOR_CONTROL) takes the vehicle as an operator
+does, and what the run did there ends.
+"""
+
+import asyncio
+import logging
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Coroutine
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import BehaviorState, MissionControl, ResourceId, RunId, distance_m
+from m2pem.errors import BusyError, M2pemError, MissionError, OperatorError
+from m2pem_plugin_mavlink.face.commands import (
+    REQUEST_OPERATOR_CONTROL,
+    Command,
+    Order,
+    RefusedCommandError,
+    order_of,
+)
+from m2pem_plugin_mavlink.face.stations import Station
+from m2pem_plugin_mavlink.face.vehicle import AUTOPILOT, Camera, ShownVehicle
+from m2pem_plugin_mavlink.link.route import Peer
+from m2pem_plugin_mavlink.protocol.messages import Address, message_type
+from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+
+_logger = logging.getLogger(__name__)
+
+ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
+REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+DENIED: int = dialect.MAV_RESULT_DENIED
+FAILED: int = dialect.MAV_RESULT_FAILED
+IN_PROGRESS: int = dialect.MAV_RESULT_IN_PROGRESS
+CONFIGURE_GIMBAL: int = dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+
+PROGRESS_EVERY_S = 0.5
+REPEATED_S = 3.0
+"""Seconds after its end for which a command that comes again is a repetition of the same one."""
+
+ORDERS_PER_S = 2.0
+MOST_ORDERS_AT_ONCE = 6.0
+"""Orders for one resource: each is a run in the journal. Those that stop it are counted apart."""
+
+TARGET_EVERY_S = 1.0
+SAME_TARGET_M = 0.5
+MOST_OUTCOMES = 256
+UNKNOWN_PROGRESS = 255
+
+OFF = "commands of ground stations are off: faces.mavlink.commands"
+
+Say = Callable[[Station, ShownVehicle, str], None]
+
+
+@dataclass(slots=True)
+class _Pending:
+    """A command of a station. `result`: its last acknowledgement."""
+
+    command: Command
+    result: int = IN_PROGRESS
+    ended_s: float = 0.0
+
+
+@dataclass(slots=True)
+class _Started:
+    """What became of a run that carries out an order."""
+
+    began: asyncio.Future[tuple[int, str]] = field(
+        default_factory=lambda: asyncio.get_running_loop().create_future()
+    )
+
+
+_Key = tuple[Peer, Address, int, int, int]
+
+
+class Orders:
+    """`allowed`: the vehicles that stations may command; `say` tells a station why one is
+    refused."""
+
+    def __init__(
+        self,
+        control: MissionControl,
+        allowed: Collection[ResourceId],
+        say: Say,
+        now_s: Callable[[], float],
+    ) -> None:
+        self._control = control
+        self._allowed = allowed
+        self._say = say
+        self._now_s = now_s
+        self._pending: OrderedDict[_Key, _Pending] = OrderedDict()
+        self._latest: dict[ResourceId, _Key] = {}
+        self._last: dict[ResourceId, Order] = {}
+        self._budgets: dict[tuple[ResourceId, bool], tuple[float, float]] = {}
+        self._started: OrderedDict[RunId, _Started] = OrderedDict()
+        self._targets: dict[tuple[Peer, Address, int], Order] = {}
+        self._followed: set[tuple[Peer, Address, int]] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    async def close(self) -> None:
+        """Follow no order any more. What vehicles do goes on: the executive has it."""
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        if tasks:
+            await asyncio.wait(tasks)
+
+    # --- what the records say ---------------------------------------------------------------------
+
+    def progressed(self, run: RunId, state: BehaviorState) -> None:
+        """The behavior of a run is accepted or under way."""
+        if state is BehaviorState.RUNNING:
+            self._settle(run, ACCEPTED, "")
+
+    def ended(self, run: RunId, state: BehaviorState, reason: str) -> None:
+        """The behavior of a run has ended."""
+        self._settle(run, ACCEPTED if state is BehaviorState.SUCCEEDED else FAILED, reason)
+
+    def _settle(self, run: RunId, result: int, reason: str) -> None:
+        began = self._outcome(run).began
+        if not began.done():
+            began.set_result((result, reason))
+
+    def _outcome(self, run: RunId) -> _Started:
+        """The records of a run may come before `execute_behavior` returns."""
+        started = self._started.get(run)
+        if started is None:
+            while len(self._started) >= MOST_OUTCOMES:
+                self._started.popitem(last=False)
+            started = self._started[run] = _Started()
+        return started
+
+    # --- commands ---------------------------------------------------------------------------------
+
+    def command(
+        self,
+        command: Command,
+        frame: RawFrame,
+        station: Station,
+        vehicle: ShownVehicle,
+        camera: Camera | None = None,
+    ) -> None:
+        """Carry out a command, or refuse it."""
+        component = camera.component if camera is not None else AUTOPILOT
+        key = station.peer, frame.source, vehicle.system, component, command.id
+        known = self._pending.get(key)
+        if known is not None and self._repeats(known, command, vehicle.resource, key):
+            self._acknowledge(key, station, known.result)
+            return
+        pending = self._pending[key] = _Pending(command)
+        self._pending.move_to_end(key)
+        while len(self._pending) > MOST_OUTCOMES:
+            self._pending.popitem(last=False)
+        try:
+            work = self._work(key, pending, frame, station, vehicle, camera)
+        except RefusedCommandError as error:
+            self._refuse(key, pending, station, vehicle, error)
+            return
+        if work is None:
+            self._end(key, pending, station, ACCEPTED)
+        else:
+            self._begin(work)
+
+    def _repeats(self, known: _Pending, command: Command, resource: ResourceId, key: _Key) -> bool:
+        """Return whether a command is the same one again, as its acknowledgement was lost."""
+        same = (known.command.params, known.command.place, known.command.z)
+        if same != (command.params, command.place, command.z) and repr(same) != repr(
+            (command.params, command.place, command.z)  # NaN differs from itself
+        ):
+            return False
+        if known.result == IN_PROGRESS:
+            return True
+        recent = self._now_s() - known.ended_s <= REPEATED_S
+        latest = self._latest.get(resource) in (key, None)
+        return recent and latest and (command.confirmation > 0 or known.result == ACCEPTED)
+
+    def _work(
+        self,
+        key: _Key,
+        pending: _Pending,
+        frame: RawFrame,
+        station: Station,
+        vehicle: ShownVehicle,
+        camera: Camera | None,
+    ) -> Coroutine[Any, Any, None] | None:
+        """Return what carries a command out; None: nothing is to be done.
+
+        Raises:
+            RefusedCommandError: it is refused.
+        """
+        command = pending.command
+        if vehicle.resource not in self._allowed:
+            raise RefusedCommandError(OFF)
+        by = name_of(frame, station)
+        if command.id == REQUEST_OPERATOR_CONTROL:
+            return self._hand_over(key, pending, station, vehicle, by)
+        if command.id == CONFIGURE_GIMBAL:
+            for each in vehicle.cameras:
+                each.controller = frame.source
+            return None
+        order = order_of(command, vehicle, camera)
+        if order is None:
+            return None
+        self._count(order)
+        order = self._with_speed(order, vehicle)
+        self._latest[vehicle.resource] = key
+        self._last[order.resource] = order
+        return self._carry_out(key, pending, order, station, vehicle, by)
+
+    def _with_speed(self, order: Order, vehicle: ShownVehicle) -> Order:
+        """Another speed on the way to a target is a new order to go there: one behavior replaces
+        the other, and `set_speed` alone would stop the vehicle."""
+        last = self._last.get(vehicle.resource)
+        if order.behavior != "set_speed" or last is None or last.behavior != "goto":
+            return order
+        if vehicle.behavior != "goto":
+            return order
+        return Order(last.resource, "goto", {**last.parameters, **order.parameters})
+
+    def _count(self, order: Order) -> None:
+        """Count an order.
+
+        Raises:
+            RefusedCommandError: there are too many.
+        """
+        now_s = self._now_s()
+        key = order.resource, order.behavior == "hold"
+        left, counted_s = self._budgets.get(key, (MOST_ORDERS_AT_ONCE, now_s))
+        left = min(MOST_ORDERS_AT_ONCE, left + ORDERS_PER_S * (now_s - counted_s))
+        if left < 1.0:
+            raise RefusedCommandError("commands come too fast", REJECTED)
+        self._budgets[key] = left - 1.0, now_s
+
+    async def _hand_over(
+        self, key: _Key, pending: _Pending, station: Station, vehicle: ShownVehicle, by: str
+    ) -> None:
+        takes = pending.command.params[0] == 1
+        try:
+            if takes:
+                await self._control.take(vehicle.resource, by=by)
+            else:
+                await self._control.give_back(vehicle.resource, by=by)
+        except M2pemError as error:
+            self._refuse(key, pending, station, vehicle, RefusedCommandError(str(error), REJECTED))
+        else:
+            self._end(key, pending, station, ACCEPTED)
+
+    async def _carry_out(
+        self,
+        key: _Key,
+        pending: _Pending,
+        order: Order,
+        station: Station,
+        vehicle: ShownVehicle,
+        by: str,
+    ) -> None:
+        executing = asyncio.ensure_future(self._execute(order, by))
+        try:
+            while True:
+                self._acknowledge(key, station, IN_PROGRESS)
+                done, _ = await asyncio.wait([executing], timeout=PROGRESS_EVERY_S)
+                if done:
+                    break
+            result, reason = executing.result()
+        except asyncio.CancelledError:
+            executing.cancel()
+            raise
+        if result == ACCEPTED:
+            self._end(key, pending, station, ACCEPTED)
+        else:
+            self._refuse(key, pending, station, vehicle, RefusedCommandError(reason, result))
+
+    async def _execute(self, order: Order, by: str) -> tuple[int, str]:
+        """Begin a behavior; return when it is under way or has ended: MAV_RESULT and reason."""
+        try:
+            run = await self._control.execute_behavior(
+                order.resource, order.behavior, order.parameters, by=by
+            )
+        except MissionError as error:
+            return DENIED, _first(error)
+        except (BusyError, OperatorError) as error:
+            return REJECTED, str(error)
+        except M2pemError as error:
+            return FAILED, str(error)
+        began = self._outcome(run).began
+        ending = asyncio.ensure_future(self._control.wait(run))
+        try:
+            both: list[asyncio.Future[Any]] = [began, ending]
+            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+            if began.done():
+                return began.result()
+            return FAILED, ending.result().detail or "it did not begin"
+        finally:
+            ending.cancel()
+            self._started.pop(run, None)
+
+    # --- targets that are sent again and again ----------------------------------------------------
+
+    def target(
+        self, order: Order, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        """Go to a target that has no acknowledgement (SET_POSITION_TARGET_GLOBAL_INT). Stations
+        repeat it many times in a second: only another target is a new order."""
+        key = station.peer, frame.source, vehicle.system
+        if vehicle.resource not in self._allowed:
+            self._say(station, vehicle, OFF)
+            return
+        self._targets[key] = order
+        if key not in self._followed:
+            self._followed.add(key)
+            self._begin(self._follow(key, station, vehicle, name_of(frame, station)))
+
+    async def _follow(
+        self, key: tuple[Peer, Address, int], station: Station, vehicle: ShownVehicle, by: str
+    ) -> None:
+        done: Order | None = None
+        try:
+            while (order := self._targets.pop(key, None)) is not None:
+                if done is None or not _same(order, done):
+                    result, reason = await self._execute(order, by)
+                    done = order
+                    if result != ACCEPTED:
+                        self._say(station, vehicle, reason)
+                await asyncio.sleep(TARGET_EVERY_S)
+        finally:
+            self._followed.discard(key)
+
+    # --- acknowledgements -------------------------------------------------------------------------
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _refuse(
+        self,
+        key: _Key,
+        pending: _Pending,
+        station: Station,
+        vehicle: ShownVehicle,
+        error: RefusedCommandError,
+    ) -> None:
+        self._end(key, pending, station, error.result)
+        self._say(station, vehicle, f"{pending.command.name}: {error.reason}")
+
+    def _end(self, key: _Key, pending: _Pending, station: Station, result: int) -> None:
+        pending.result, pending.ended_s = result, self._now_s()
+        self._acknowledge(key, station, result)
+
+    @staticmethod
+    def _acknowledge(key: _Key, station: Station, result: int) -> None:
+        _, to, system, component, command = key
+        station.send(acknowledgement(command, result, to), Address(system, component))
+
+
+def acknowledgement(command: int, result: int, to: Address) -> Any:
+    """Return COMMAND_ACK."""
+    return message_type("COMMAND_ACK").make(
+        command=command,
+        result=result,
+        progress=UNKNOWN_PROGRESS if result == IN_PROGRESS else 0,
+        target_system=to.system,
+        target_component=to.component,
+    )
+
+
+def name_of(frame: RawFrame, station: Station) -> str:
+    """Return who asks, for the journal."""
+    return f"mavlink {frame.source.system}/{frame.source.component} at {station.name}"
+
+
+def _same(order: Order, other: Order) -> bool:
+    a, b = order.parameters["target"], other.parameters["target"]
+    assert isinstance(a, list) and isinstance(b, list)
+    near = distance_m((a[0], a[1]), (b[0], b[1])) <= SAME_TARGET_M  # type: ignore[arg-type]
+    return near and a[2:] == b[2:]
+
+
+def _first(error: MissionError) -> str:
+    findings = list(error.findings)
+    return findings[0].message if findings else str(error)

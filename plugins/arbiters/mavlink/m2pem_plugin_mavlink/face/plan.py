@@ -1,0 +1,125 @@
+"""What a vehicle carries out now, as a read-only plan of the mission protocol."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from m2pem.api import (
+    Area,
+    Dimension,
+    Fleet,
+    LatLon,
+    LocalFrame,
+    Point,
+    Route,
+    UnitError,
+    Value,
+    distance_m,
+    lawn_mower,
+    longest_edge_yaw,
+    parse_geojson,
+    quantity,
+)
+from m2pem.errors import M2pemError
+
+MOST_ITEMS = 1_000
+REACHED_M = 5.0
+SPACING_M = 20.0
+"""Of a survey's tracks, where its parameters say none; the vehicle may have another default."""
+
+_FRAMES = {"relative": 6, "amsl": 5, "terrain": 11}
+"""MAV_FRAME with integer coordinates."""
+
+
+class Item(NamedTuple):
+    """A waypoint; `altitude_m` in the MAV_FRAME `frame`."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    frame: int
+
+
+@dataclass(slots=True)
+class Plan:
+    """`current`: the number of the waypoint that the vehicle is on the way to."""
+
+    items: Sequence[Item] = ()
+    current: int = 0
+
+    def replace(self, items: Sequence[Item]) -> None:
+        """Another plan; none if there are no items."""
+        self.items, self.current = items[:MOST_ITEMS], 0
+
+    def advance(self, position: LatLon) -> None:
+        """The vehicle is at a position: waypoints that it has reached are past."""
+        while self.current < len(self.items) - 1:
+            here, after = self.items[self.current : self.current + 2]
+            reached = distance_m(position, here[:2]) <= REACHED_M
+            leg_m = distance_m(here[:2], after[:2])
+            if not reached and distance_m(position, after[:2]) >= max(leg_m - REACHED_M, REACHED_M):
+                return
+            self.current += 1
+
+
+def plan_of(behavior: str, parameters: Mapping[str, Value], fleet: Fleet) -> list[Item]:
+    """Return the waypoints of a behavior, given its parameters as the mission has them; none if it
+    has none, or if they cannot be read."""
+    try:
+        return _items(behavior, parameters, fleet)
+    except (M2pemError, UnitError, ValueError, TypeError, KeyError):
+        return []
+
+
+def _items(behavior: str, parameters: Mapping[str, Value], fleet: Fleet) -> list[Item]:
+    altitude_m = _number(parameters.get("altitude"))
+    own_frame = parameters.get("altitude_frame")
+
+    def item(latitude: float, longitude: float, own_m: float | None, frame: str) -> Item:
+        if altitude_m is not None:
+            frame = str(own_frame or "relative")
+        height_m = altitude_m if altitude_m is not None else own_m or 0.0
+        return Item(latitude, longitude, height_m, _FRAMES.get(frame, 6))
+
+    if behavior == "single_vehicle_routing":
+        route = _geometry(parameters["route"], fleet)
+        if isinstance(route, Route):
+            return [item(*each, route.altitude_frame) for each in route.waypoints]
+    elif behavior == "area_survey":
+        area = _geometry(parameters["area"], fleet)
+        if isinstance(area, Area):
+            tracks = _tracks(area, parameters)
+            return [item(*each, None, area.altitude_frame) for each in tracks]
+    elif "target" in parameters:
+        target = _geometry(parameters["target"], fleet)
+        if isinstance(target, Point):
+            return [item(*target.position, target.altitude_frame)]
+    return []
+
+
+def _geometry(value: Value, fleet: Fleet) -> object:
+    if isinstance(value, str):
+        return fleet.geometries.get(value)
+    if isinstance(value, dict):
+        return parse_geojson(value)
+    if isinstance(value, list) and len(value) in (2, 3):
+        latitude, longitude, *height = (float(each) for each in value)  # type: ignore[arg-type]
+        return Point((latitude, longitude, height[0] if height else None))
+    return None
+
+
+def _tracks(area: Area, parameters: Mapping[str, Value]) -> list[LatLon]:
+    frame = LocalFrame(area.rings[0][0][:2])
+    rings = [[frame.to_local(corner[:2]) for corner in ring] for ring in area.rings]
+    heading = parameters.get("heading")
+    if heading is None:
+        yaw_rad = longest_edge_yaw(rings[0])
+    else:
+        yaw_rad = math.pi / 2 - quantity(heading, Dimension.ANGLE)
+    spacing_m = _number(parameters.get("spacing")) or SPACING_M
+    return [frame.to_latlon(point) for point in lawn_mower(rings, spacing_m, yaw_rad)]
+
+
+def _number(value: Value) -> float | None:
+    return None if value is None else quantity(value, Dimension.DISTANCE)

@@ -1,0 +1,319 @@
+"""What ground stations ask vehicles for: messages, intervals, parameters, the plan. Nothing here
+changes what a vehicle does; what would is refused."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import Area, Fleet, LatLon
+from m2pem_plugin_mavlink.face import modes
+from m2pem_plugin_mavlink.face.commands import Command
+from m2pem_plugin_mavlink.face.components import CAMERA_MAKERS
+from m2pem_plugin_mavlink.face.plan import Item
+from m2pem_plugin_mavlink.face.stations import Station
+from m2pem_plugin_mavlink.face.streams import HEARTBEAT, Streams, is_known, messages_of
+from m2pem_plugin_mavlink.face.telemetry import heartbeat
+from m2pem_plugin_mavlink.face.vehicle import Camera, ShownVehicle
+from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
+from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+
+ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
+DENIED: int = dialect.MAV_RESULT_DENIED
+UNSUPPORTED: int = dialect.MAV_RESULT_UNSUPPORTED
+TEMPORARILY_REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+
+MISSION, FENCE = 0, 1
+"""MAV_MISSION_TYPE."""
+
+MOST_DOWNLOADS = 64
+
+Say = Callable[[Station, ShownVehicle, str], None]
+"""Tells a station why something is refused."""
+
+Answer = Callable[[Command, Station, ShownVehicle, Camera | None], int]
+
+_ONE_MESSAGE: Mapping[int, int] = {
+    dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    dialect.MAV_CMD_GET_HOME_POSITION: dialect.MAVLINK_MSG_ID_HOME_POSITION,
+    dialect.MAV_CMD_REQUEST_CAMERA_INFORMATION: dialect.MAVLINK_MSG_ID_CAMERA_INFORMATION,
+    dialect.MAV_CMD_REQUEST_CAMERA_SETTINGS: dialect.MAVLINK_MSG_ID_CAMERA_SETTINGS,
+    dialect.MAV_CMD_REQUEST_STORAGE_INFORMATION: dialect.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+    dialect.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: dialect.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
+}
+"""Commands that ask for one message."""
+
+
+class Requests:
+    """Answers requests of stations."""
+
+    def __init__(self, streams: Streams, fleet: Fleet, say: Say) -> None:
+        self._streams = streams
+        self._say = say
+        area = fleet.geometries.get(fleet.fence)
+        self._fence = (
+            [corner[:2] for corner in area.rings[0][:-1]] if isinstance(area, Area) else []
+        )
+        self._downloads: dict[tuple[str, Address, int, int], Sequence[Message]] = {}
+        self._commands: Mapping[int, Answer] = {
+            dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            **dict.fromkeys(_ONE_MESSAGE, self._request_one),
+        }
+        self._messages: Mapping[str, Callable[[Message, RawFrame, Station, ShownVehicle], None]] = {
+            "PARAM_REQUEST_LIST": self._list_parameters,
+            "PARAM_REQUEST_READ": self._read_parameter,
+            "PARAM_SET": self._set_parameter,
+            "MISSION_REQUEST_LIST": self._list_items,
+            "MISSION_REQUEST": self._send_item,
+            "MISSION_REQUEST_INT": self._send_item,
+            **dict.fromkeys(
+                (
+                    "MISSION_COUNT",
+                    "MISSION_ITEM",
+                    "MISSION_ITEM_INT",
+                    "MISSION_WRITE_PARTIAL_LIST",
+                    "MISSION_CLEAR_ALL",
+                    "MISSION_SET_CURRENT",
+                ),
+                self._refuse_upload,
+            ),
+        }
+
+    def command(
+        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
+    ) -> int | None:
+        """Carry out a command that only asks; return its MAV_RESULT; None: it is another one."""
+        answer = self._commands.get(command.id)
+        return None if answer is None else answer(command, station, vehicle, camera)
+
+    def message(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> bool:
+        """Answer a message; return False if it is of another kind."""
+        answer = self._messages.get(message.TYPE.name)
+        if answer is not None:
+            answer(message, frame, station, vehicle)
+        return answer is not None
+
+    # --- messages and intervals -------------------------------------------------------------------
+
+    def _request_message(
+        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
+    ) -> int:
+        return self._send(_whole(command.params[0]), command, station, vehicle, camera)
+
+    def _request_one(
+        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
+    ) -> int:
+        return self._send(_ONE_MESSAGE[command.id], command, station, vehicle, camera)
+
+    def _send(
+        self,
+        id_: int,
+        command: Command,
+        station: Station,
+        vehicle: ShownVehicle,
+        camera: Camera | None,
+    ) -> int:
+        if camera is not None:
+            make = CAMERA_MAKERS.get(id_)
+            if make is None:
+                return UNSUPPORTED
+            station.send(make(camera), Address(vehicle.system, camera.component))
+            return ACCEPTED
+        if id_ == modes.AVAILABLE_MODES:
+            return self._send_modes(_whole(command.params[1]), station, vehicle)
+        if not is_known(id_):
+            return UNSUPPORTED
+        found = messages_of(vehicle, id_)
+        for message, source in found:
+            station.send(message, source)
+        return ACCEPTED if found else DENIED
+
+    def _send_modes(self, index: int, station: Station, vehicle: ShownVehicle) -> int:
+        if not 0 <= index <= len(modes.MODES):
+            return DENIED
+        for each in [index] if index else range(1, len(modes.MODES) + 1):
+            station.send(modes.available_mode(each), vehicle.autopilot)
+        return ACCEPTED
+
+    def _set_interval(
+        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
+    ) -> int:
+        id_, interval_us = _whole(command.params[0]), command.params[1]
+        if camera is not None or not is_known(id_):
+            return UNSUPPORTED
+        if not math.isfinite(interval_us) or (id_ == HEARTBEAT and interval_us < 0):
+            return DENIED
+        set_ = self._streams.set_interval(station, vehicle, id_, interval_us / 1e6)
+        return ACCEPTED if set_ else TEMPORARILY_REJECTED
+
+    def _get_interval(
+        self, command: Command, station: Station, vehicle: ShownVehicle, camera: Camera | None
+    ) -> int:
+        id_ = _whole(command.params[0])
+        if camera is not None:
+            return UNSUPPORTED
+        interval_us = 0
+        if is_known(id_):
+            interval_us = round(self._streams.interval_s(station, vehicle, id_) * 1e6) or -1
+        made = message_type("MESSAGE_INTERVAL").make(
+            message_id=max(0, min(id_, 0xFFFF)), interval_us=interval_us
+        )
+        station.send(made, vehicle.autopilot)
+        return ACCEPTED
+
+    # --- parameters -------------------------------------------------------------------------------
+
+    def _list_parameters(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        for index in range(len(_PARAMETERS)):
+            station.send(_parameter(index, vehicle), vehicle.autopilot)
+
+    def _read_parameter(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        index = message.param_index
+        if index < 0:
+            index = _index_of(message.param_id)
+        if 0 <= index < len(_PARAMETERS):  # of others nothing is said, as autopilots do
+            station.send(_parameter(index, vehicle), vehicle.autopilot)
+
+    def _set_parameter(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        index = _index_of(message.param_id)
+        if index >= 0:
+            station.send(_parameter(index, vehicle), vehicle.autopilot)
+        self._say(station, vehicle, "parameters are read-only here")
+
+    # --- the plan ---------------------------------------------------------------------------------
+
+    def _list_items(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        type_ = message.mission_type
+        items = self._items(type_, frame.source, vehicle)
+        key = station.name, frame.source, vehicle.system, type_
+        self._downloads.pop(key, None)
+        if len(self._downloads) >= MOST_DOWNLOADS:
+            del self._downloads[next(iter(self._downloads))]
+        self._downloads[key] = items
+        made = message_type("MISSION_COUNT").make(
+            target_system=frame.source.system,
+            target_component=frame.source.component,
+            count=len(items),
+            mission_type=type_,
+        )
+        station.send(made, vehicle.autopilot)
+
+    def _send_item(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        key = station.name, frame.source, vehicle.system, message.mission_type
+        items = self._downloads.get(key)
+        if items is None:
+            items = self._items(message.mission_type, frame.source, vehicle)
+        if message.seq < len(items):
+            station.send(items[message.seq], vehicle.autopilot)
+        else:
+            result = dialect.MAV_MISSION_INVALID_SEQUENCE
+            self._acknowledge(result, message, frame, station, vehicle)
+
+    def _refuse_upload(
+        self, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        self._acknowledge(dialect.MAV_MISSION_DENIED, message, frame, station, vehicle)
+        self._say(station, vehicle, "the plan is read-only here: missions are m2pem's")
+
+    @staticmethod
+    def _acknowledge(
+        result: int, message: Message, frame: RawFrame, station: Station, vehicle: ShownVehicle
+    ) -> None:
+        made = message_type("MISSION_ACK").make(
+            target_system=frame.source.system,
+            target_component=frame.source.component,
+            type=result,
+            mission_type=getattr(message, "mission_type", MISSION),
+        )
+        station.send(made, vehicle.autopilot)
+
+    def _items(self, type_: int, to: Address, vehicle: ShownVehicle) -> list[Message]:
+        if type_ == MISSION:
+            current = vehicle.plan.current
+            return [
+                _waypoint(number, item, number == current, to)
+                for number, item in enumerate(vehicle.plan.items)
+            ]
+        if type_ == FENCE:
+            return [
+                _corner(number, corner, len(self._fence), to)
+                for number, corner in enumerate(self._fence)
+            ]
+        return []
+
+
+def _whole(value: float) -> int:
+    return int(value) if math.isfinite(value) else -1
+
+
+def _waypoint(number: int, item: Item, is_current: bool, to: Address) -> Message:
+    made: Message = message_type("MISSION_ITEM_INT").make(
+        target_system=to.system,
+        target_component=to.component,
+        seq=number,
+        frame=item.frame,
+        command=dialect.MAV_CMD_NAV_WAYPOINT,
+        current=is_current,
+        autocontinue=1,
+        param4=math.nan,
+        x=round(item.latitude_deg * 1e7),
+        y=round(item.longitude_deg * 1e7),
+        z=item.altitude_m,
+        mission_type=MISSION,
+    )
+    return made
+
+
+def _corner(number: int, corner: LatLon, corners: int, to: Address) -> Message:
+    made: Message = message_type("MISSION_ITEM_INT").make(
+        target_system=to.system,
+        target_component=to.component,
+        seq=number,
+        frame=dialect.MAV_FRAME_GLOBAL_INT,
+        command=dialect.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+        autocontinue=1,
+        param1=corners,
+        x=round(corner[0] * 1e7),
+        y=round(corner[1] * 1e7),
+        mission_type=FENCE,
+    )
+    return made
+
+
+_PARAMETERS: Sequence[tuple[bytes, Callable[[ShownVehicle], float]]] = (
+    (b"MAV_SYS_ID", lambda vehicle: float(vehicle.system)),
+    (b"MAV_COMP_ID", lambda vehicle: float(vehicle.autopilot.component)),
+    (b"MAV_TYPE", lambda vehicle: float(heartbeat(vehicle).type)),
+)
+"""Ground stations wait for a list of parameters; this is the shortest that is true."""
+
+
+def _index_of(name: bytes) -> int:
+    found = (index for index, (each, _) in enumerate(_PARAMETERS) if each == name)
+    return next(found, -1)
+
+
+def _parameter(index: int, vehicle: ShownVehicle) -> Message:
+    name, read = _PARAMETERS[index]
+    made: Message = message_type("PARAM_VALUE").make(
+        param_id=name,
+        param_value=read(vehicle),
+        param_type=dialect.MAV_PARAM_TYPE_REAL32,
+        param_count=len(_PARAMETERS),
+        param_index=index,
+    )
+    return made

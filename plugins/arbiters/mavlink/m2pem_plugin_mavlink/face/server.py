@@ -1,0 +1,221 @@
+"""Serves ground stations: what they send goes to whom it concerns, and they get what there is."""
+
+import asyncio
+import logging
+from collections import OrderedDict
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import (
+    MissionControl,
+    PayloadState,
+    ResourceId,
+    VehicleState,
+    follow,
+)
+from m2pem_plugin_mavlink.face.commands import (
+    POSITION_TARGET,
+    Command,
+    RefusedCommandError,
+    command_of,
+    position_order,
+)
+from m2pem_plugin_mavlink.face.components import cameras_of
+from m2pem_plugin_mavlink.face.events import Events
+from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
+from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement
+from m2pem_plugin_mavlink.face.requests import Requests
+from m2pem_plugin_mavlink.face.settings import Settings
+from m2pem_plugin_mavlink.face.stations import Station, Stations
+from m2pem_plugin_mavlink.face.streams import Streams
+from m2pem_plugin_mavlink.face.texts import TextSeverity, status_texts
+from m2pem_plugin_mavlink.face.vehicle import AUTOPILOT, Camera, ShownVehicle
+from m2pem_plugin_mavlink.link.hub import shared_hub
+from m2pem_plugin_mavlink.link.route import Peer
+from m2pem_plugin_mavlink.protocol.messages import Address, types_by_id
+from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+
+_logger = logging.getLogger(__name__)
+
+ONBOARD_COMPUTER: int = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
+"""m2pem speaks as it for a forwarded vehicle, whose autopilot numbers its own frames."""
+
+SAID_AGAIN_S = 5.0
+"""Seconds after which a station is told the same again."""
+
+MOST_SAID = 256
+LEAST_WAITING = 100
+STATES_PER_VEHICLE = 4
+
+SET_MODE: int = dialect.MAVLINK_MSG_ID_SET_MODE
+_NO_REQUEST = frozenset(
+    getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+    for name in ("HEARTBEAT", "SYSTEM_TIME", "PING", "TIMESYNC", "MISSION_ACK", "COMMAND_ACK")
+)
+
+
+class FaceServer:
+    """Every vehicle of the fleet as a MAVLink system: shown by m2pem, or forwarded."""
+
+    def __init__(self, control: MissionControl, settings: Settings) -> None:
+        fleet = control.fleet()
+        self._control = control
+        self._settings = settings
+        behaviors = {
+            resource: frozenset(spec.name for spec in specs)
+            for resource, specs in control.catalogue().items()
+        }
+        self._vehicles = {
+            name: ShownVehicle(
+                name,
+                str(fleet.vehicles[name].domain),
+                system,
+                behaviors.get(name, frozenset()),
+                cameras_of(name, fleet, behaviors),
+            )
+            for name, system in self._settings.systems.items()
+            if name not in self._settings.forwarded
+        }
+        self._by_system = {each.system: each for each in self._vehicles.values()}
+        self._cameras: dict[ResourceId, Camera] = {
+            camera.resource: camera for each in self._vehicles.values() for camera in each.cameras
+        }
+        self._said: OrderedDict[tuple[Peer, int, str], float] = OrderedDict()
+        systems = frozenset(self._settings.systems.values())
+        self._stations = Stations(self._settings.urls, systems, self._receive)
+        self._streams = Streams(
+            self._stations,
+            list(self._vehicles.values()),
+            self._settings.rates_hz,
+            self._stations.now_s,
+        )
+        self._requests = Requests(self._streams, fleet, self._tell)
+        self._orders = Orders(control, self._settings.commands, self._tell, self._stations.now_s)
+        self._events = Events(self._vehicles, fleet, self._orders, self._say)
+
+    async def serve(self) -> None:
+        """Serve ground stations until cancelled.
+
+        Raises:
+            PluginError: an endpoint cannot be opened.
+        """
+        forwarded = {self._settings.systems[name]: name for name in self._settings.forwarded}
+        self._forwarder = Forwarder(
+            shared_hub(),
+            self._stations,
+            forwarded,
+            self._settings.forwarded_commands,
+            self._refuse_forwarding,
+        )
+        await self._stations.open()
+        self._forwarder.open()
+        try:
+            async with asyncio.TaskGroup() as group:
+                group.create_task(self._follow_telemetry())
+                group.create_task(follow(self._control, self._events).run())
+                group.create_task(self._events.follow_holders(self._control))
+                group.create_task(self._stations.maintain())
+                group.create_task(self._streams.run())
+        finally:
+            self._forwarder.close()
+            await self._orders.close()
+            await self._stations.close()
+
+    async def _follow_telemetry(self) -> None:
+        size = max(LEAST_WAITING, STATES_PER_VEHICLE * len(self._vehicles))
+        async for state in self._control.telemetry(size=size):
+            if isinstance(state, VehicleState):
+                vehicle = self._vehicles.get(state.resource)
+                if vehicle is not None:
+                    vehicle.update(state, self._stations.now_s())
+            elif isinstance(state, PayloadState):
+                camera = self._cameras.get(state.resource)
+                if camera is not None:
+                    camera.state = state
+
+    # --- what stations send -----------------------------------------------------------------------
+
+    def _receive(self, station: Station, frame: RawFrame) -> None:
+        self._forwarder.from_station(station, frame)
+        type_ = types_by_id().get(frame.id)
+        vehicle = self._by_system.get(frame.target.system)
+        if type_ is None or vehicle is None or frame.id in _NO_REQUEST:
+            return
+        component = frame.target.component or AUTOPILOT
+        camera = next((each for each in vehicle.cameras if each.component == component), None)
+        if component != AUTOPILOT and camera is None:
+            return
+        message = type_.unpack(frame.payload)
+        if frame.id in (COMMAND_LONG, COMMAND_INT):
+            self._command(command_of(message, frame), frame, station, vehicle, camera)
+        elif frame.id == SET_MODE:
+            params = float(message.base_mode), float(message.custom_mode), 0.0, 0.0
+            mode = Command(dialect.MAV_CMD_DO_SET_MODE, params, None, 0.0, "", 0)
+            self._orders.command(mode, frame, station, vehicle)
+        elif frame.id == POSITION_TARGET:
+            try:
+                order = position_order(message, vehicle)
+            except RefusedCommandError as error:
+                self._tell(station, vehicle, error.reason)
+            else:
+                if order is not None:
+                    self._orders.target(order, frame, station, vehicle)
+        elif not self._requests.message(message, frame, station, vehicle):
+            self._tell(station, vehicle, f"{type_.name} is not carried out")
+
+    def _command(
+        self,
+        command: Command,
+        frame: RawFrame,
+        station: Station,
+        vehicle: ShownVehicle,
+        camera: Camera | None,
+    ) -> None:
+        result = self._requests.command(command, station, vehicle, camera)
+        if result is None:
+            self._orders.command(command, frame, station, vehicle, camera)
+            return
+        source = Address(vehicle.system, camera.component if camera is not None else AUTOPILOT)
+        station.send(acknowledgement(command.id, result, frame.source), source)
+
+    # --- what stations are told -------------------------------------------------------------------
+
+    def _say(self, vehicle: ShownVehicle, severity: TextSeverity, text: str) -> None:
+        """Send a text to all stations."""
+        for message in status_texts(text, severity):
+            for station in self._stations:
+                station.send(message, vehicle.autopilot)
+
+    def _tell(self, station: Station, vehicle: ShownVehicle, text: str) -> None:
+        """Tell one station why something is refused."""
+        self._tell_as(station, vehicle.autopilot, f"{vehicle.resource}: {text}")
+
+    def _tell_as(self, station: Station, source: Address, text: str) -> None:
+        now_s = self._stations.now_s()
+        key = station.peer, source.system, text
+        if now_s - self._said.get(key, -SAID_AGAIN_S) < SAID_AGAIN_S:
+            return
+        self._said[key] = now_s
+        self._said.move_to_end(key)
+        while len(self._said) > MOST_SAID:
+            self._said.popitem(last=False)
+        for message in status_texts(text, TextSeverity.WARNING):
+            station.send(message, source)
+
+    def _refuse_forwarding(self, station: Station, frame: RawFrame, system: int) -> None:
+        """Refuse a command to a forwarded vehicle."""
+        name = next(each for each, id_ in self._settings.systems.items() if id_ == system)
+        message = (
+            types_by_id()[frame.id].unpack(frame.payload) if frame.id in types_by_id() else None
+        )
+        if frame.id in (COMMAND_LONG, COMMAND_INT) and frame.target.system:
+            assert message is not None
+            answer = acknowledgement(message.command, DENIED, frame.source)
+            station.send(answer, Address(system, frame.target.component or AUTOPILOT))
+        if frame.target.system:
+            what = message.TYPE.name if message is not None else f"message {frame.id}"
+            self._tell_as(
+                station,
+                Address(system, ONBOARD_COMPUTER),
+                f"{name}: {what} is not forwarded: faces.mavlink.forward_commands",
+            )

@@ -1,0 +1,197 @@
+"""The settings of the face in the fleet file, and the system id of each vehicle."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from m2pem.api import FaceSettings, Fleet, ResourceId, did_you_mean
+from m2pem.errors import PluginError
+from m2pem_plugin_mavlink.protocol.url import Url, parse_url
+from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
+
+ALL, NONE = "all", "none"
+DEFAULT_URL = "udpout://127.0.0.1:14550"
+HIGHEST_SYSTEM = 254
+FASTEST_HZ = 20.0
+SLOWEST_HZ = 0.01
+
+RATES_HZ: Mapping[str, float] = {
+    "HEARTBEAT": 1.0,
+    "GLOBAL_POSITION_INT": 4.0,
+    "ATTITUDE": 4.0,
+    "VFR_HUD": 2.0,
+    "SYS_STATUS": 1.0,
+    "BATTERY_STATUS": 0.5,
+    "GPS_RAW_INT": 1.0,
+    "EXTENDED_SYS_STATE": 1.0,
+    "HOME_POSITION": 0.2,
+    "MISSION_CURRENT": 1.0,
+    "GIMBAL_MANAGER_STATUS": 0.2,
+    "GIMBAL_DEVICE_ATTITUDE_STATUS": 2.0,
+}
+"""Messages that are sent by themselves, and how often in a second."""
+
+_KEYS = ("url", "system_ids", "commands", "rates", "forward", "forward_commands")
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """`systems`: the system id of each vehicle, in the order of the fleet file. `commands`: the
+    vehicles that ground stations may command. `forwarded`: those whose own frames they get.
+    `forwarded_commands`: those of `forwarded` to which commands pass, too. `rates_hz`: by name."""
+
+    urls: tuple[Url, ...]
+    systems: Mapping[ResourceId, int]
+    commands: frozenset[ResourceId] = frozenset()
+    rates_hz: Mapping[str, float] = field(default_factory=dict)
+    forwarded: frozenset[ResourceId] = frozenset()
+    forwarded_commands: frozenset[ResourceId] = frozenset()
+
+
+def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
+    """Read the settings.
+
+    Raises:
+        PluginError: something is wrong; the text names the key.
+    """
+    reader.refuse_others(_KEYS)
+    forwarded = _vehicles(reader, "forward", fleet)
+    for each in fleet.vehicles.values():
+        if each.id in forwarded and (problem := _not_forwarded(fleet, each.id)):
+            if reader.values.get("forward") == ALL:
+                forwarded -= {each.id}
+            else:
+                raise reader.error("forward", f"{each.id}: {problem}")
+    commands = _vehicles(reader, "forward_commands", fleet)
+    if (
+        extra := sorted(commands - forwarded)
+        if reader.values.get("forward_commands") != ALL
+        else []
+    ):
+        raise reader.error("forward_commands", f"{extra[0]} is not one of those of `forward`")
+    return Settings(
+        _urls(reader),
+        _systems(reader, fleet, forwarded),
+        _vehicles(reader, "commands", fleet),
+        _rates(reader),
+        forwarded,
+        commands & forwarded,
+    )
+
+
+def _urls(reader: FaceSettings) -> tuple[Url, ...]:
+    value = reader.values.get("url", DEFAULT_URL)
+    texts = value if isinstance(value, list) and value else [value]
+    urls = []
+    for text in texts:
+        if not isinstance(text, str):
+            raise reader.error("url", f"{text!r} is not a URL such as {DEFAULT_URL}")
+        try:
+            urls.append(parse_url(text))
+        except PluginError as error:
+            raise reader.error("url", str(error)) from None
+    return tuple(dict.fromkeys(urls))
+
+
+def _vehicles(reader: FaceSettings, key: str, fleet: Fleet) -> frozenset[ResourceId]:
+    """Return the vehicles of a key whose value is `all`, `none` or a list of names."""
+    value = reader.values.get(key, NONE)
+    if value in (ALL, NONE):
+        return frozenset(fleet.vehicles if value == ALL else ())
+    if not isinstance(value, list):
+        raise reader.error(key, f"{value!r} is neither all, none, nor a list of vehicles")
+    for name in value:
+        _known(reader, key, name, fleet.vehicles)
+    return frozenset(value)
+
+
+def _known(reader: FaceSettings, key: str, name: object, known: Collection[str]) -> None:
+    if name not in known:
+        hint = did_you_mean(str(name), known) or f"known: {', '.join(known)}"
+        raise reader.error(key, f"the fleet has no vehicle '{name}'; {hint}")
+
+
+def _not_forwarded(fleet: Fleet, name: ResourceId) -> str:
+    vehicle = fleet.vehicles[name]
+    if vehicle.arbiter != "mavlink":
+        return f"its arbiter is {vehicle.arbiter}; only frames of MAVLink vehicles are forwarded"
+    if vehicle.host:
+        return f"its link is on the host {vehicle.host}; serve the face without forwarding it"
+    if vehicle.settings.get("driver") == "mavsdk":
+        return "with the driver mavsdk its frames do not pass m2pem; use the driver pymavlink"
+    if vehicle.settings.get("component_id", 1) != 1:
+        return "its autopilot is not component 1"
+    return ""
+
+
+def _rates(reader: FaceSettings) -> dict[str, float]:
+    inner = reader.inner("rates", "{GLOBAL_POSITION_INT: 2 Hz}")
+    inner.refuse_others(tuple(RATES_HZ))
+    rates = dict(RATES_HZ)
+    for name, value in inner.values.items():
+        text = str(value).removesuffix("Hz").strip()
+        try:
+            rate = float(text)
+        except ValueError:
+            rate = -1.0
+        if isinstance(value, bool) or not SLOWEST_HZ <= rate <= FASTEST_HZ:
+            raise inner.error(
+                name, f"{value!r} is not a rate from {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz"
+            )
+        rates[name] = rate
+    if rates["HEARTBEAT"] < 1.0:
+        raise inner.error("HEARTBEAT", "ground stations expect 1 Hz or more")
+    return rates
+
+
+def _systems(
+    reader: FaceSettings, fleet: Fleet, forwarded: Collection[ResourceId]
+) -> dict[ResourceId, int]:
+    """Return the system id of each vehicle: given ones, then those of MAVLink vehicles; others get
+    the lowest that are free, in the order of the fleet file."""
+    given = reader.inner("system_ids", "{rover1: 11}")
+    for name in given.values:
+        _known(reader, "system_ids", name, fleet.vehicles)
+    owners: dict[int, ResourceId] = {}
+    ids: dict[ResourceId, int] = {}
+    for name, vehicle in fleet.vehicles.items():
+        own = own_system(vehicle.settings)
+        if name not in given.values and own is None:
+            continue
+        id_ = given.whole(name, own, 1, HIGHEST_SYSTEM, "a MAVLink system id")
+        if name in forwarded and id_ != own:
+            raise given.error(
+                name, f"its own frames are forwarded, and they have system id {own}: leave it out"
+            )
+        if (other := owners.setdefault(id_, name)) != name:
+            raise reader.error(
+                "system_ids",
+                f"{name} and {other} both have system id {id_}: give one of them another",
+            )
+        ids[name] = id_
+    stations = {GCS_SYSTEM_ID, *_ground_stations(fleet)}
+    for id_ in sorted(stations & owners.keys()):
+        raise reader.error(
+            "system_ids", f"{owners[id_]} has system id {id_}, which is m2pem's own ground station"
+        )
+    free = (n for n in range(1, HIGHEST_SYSTEM + 1) if n not in owners and n not in stations)
+    for name in fleet.vehicles:
+        if name not in ids:
+            id_ = next(free, 0)
+            if not id_:
+                raise reader.error(
+                    "system_ids", f"no system id is free for {name}: MAVLink has {HIGHEST_SYSTEM}"
+                )
+            ids[name] = id_
+    return {name: ids[name] for name in fleet.vehicles}
+
+
+def own_system(settings: Mapping[str, Any]) -> int | None:
+    """Return the system id of a MAVLink vehicle, given its connection; None: it has none."""
+    id_ = settings.get("system_id")
+    return id_ if isinstance(id_, int) and not isinstance(id_, bool) else None
+
+
+def _ground_stations(fleet: Fleet) -> set[int]:
+    found = (each.settings.get("gcs_system_id") for each in fleet.vehicles.values())
+    return {id_ for id_ in found if isinstance(id_, int)}

@@ -1,0 +1,104 @@
+"""What the face knows of one vehicle: its latest telemetry, behavior, home and payloads."""
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+from m2pem.api import (
+    GeoPosition,
+    LinkState,
+    PayloadState,
+    ResourceId,
+    VehicleState,
+)
+from m2pem_plugin_mavlink.face.modes import Mode, mode_of
+from m2pem_plugin_mavlink.face.plan import Plan
+from m2pem_plugin_mavlink.protocol.messages import Address
+
+AUTOPILOT = 1
+CAMERA = 100
+"""MAV_COMP_ID_CAMERA; five more follow it."""
+
+MOST_CAMERAS = 6
+AIRBORNE_M = 1.0
+NO_ADDRESS = Address(0, 0)
+SILENT_AFTER_S = 5.0
+"""Without telemetry for so long, a vehicle is not shown as present."""
+
+
+@dataclass(slots=True)
+class Camera:
+    """A payload as a camera component; `gimbal_device`: its number among the gimbals, 0: none;
+    `controller`: the ground station that last took the gimbal."""
+
+    resource: ResourceId
+    component: int
+    gimbal_device: int
+    takes_pictures: bool
+    state: PayloadState | None = None
+    pictures: int = 0
+    controller: Address = NO_ADDRESS
+
+
+@dataclass(slots=True)
+class ShownVehicle:
+    """`behaviors`: the names of those that it has. `received_s`: the time of the last telemetry, by
+    the clock of the event loop. `behavior`: the name of what it carries out, and `behavior_id`.
+    `operator`: who has taken it. `home`: where it was first seen on the ground."""
+
+    resource: ResourceId
+    domain: str
+    system: int
+    behaviors: Collection[str]
+    cameras: Sequence[Camera] = ()
+    state: VehicleState | None = None
+    received_s: float = -math.inf
+    behavior: str = ""
+    behavior_id: str = ""
+    operator: str = ""
+    home: GeoPosition | None = None
+    plan: Plan = field(default_factory=Plan)
+
+    @property
+    def autopilot(self) -> Address:
+        """The address of the autopilot."""
+        return Address(self.system, AUTOPILOT)
+
+    @property
+    def mode(self) -> Mode:
+        """The mode that it is shown in."""
+        return mode_of(self.behavior, self.operator)
+
+    @property
+    def armed(self) -> bool:
+        """Whether it is armed; of vehicles that do not say: whether it carries something out."""
+        if self.state is None or self.state.armed is None:
+            return bool(self.behavior)
+        return self.state.armed
+
+    @property
+    def airborne(self) -> bool:
+        """Whether it is an aircraft in the air."""
+        height_m = self.state.altitude_above_home_m if self.state is not None else None
+        return self.domain == "air" and height_m is not None and height_m > AIRBORNE_M
+
+    def present(self, now_s: float) -> bool:
+        """Return whether its telemetry arrives: as of a vehicle of its own, silence means that its
+        link is lost."""
+        return (
+            self.state is not None
+            and self.state.link is not LinkState.LOST
+            and now_s - self.received_s <= SILENT_AFTER_S
+        )
+
+    def update(self, state: VehicleState, now_s: float) -> None:
+        """New telemetry."""
+        self.state = state
+        if state.link is not LinkState.LOST:
+            self.received_s = now_s
+        position, height_m = state.position, state.altitude_above_home_m
+        if position is not None:
+            if self.home is None and not self.airborne:
+                home_m = position.altitude_m - (height_m or 0.0)
+                self.home = GeoPosition(position.latitude_deg, position.longitude_deg, home_m)
+            self.plan.advance(position.latlon)

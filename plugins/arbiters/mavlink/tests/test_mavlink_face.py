@@ -1,0 +1,202 @@
+"""What ground stations see of a fleet, and what they may command; pymavlink is the other end."""
+
+import asyncio
+import math
+from pathlib import Path
+
+from mavlink_gcs import HOME, gateway, ground_station
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import RunStatus, distance_m
+from m2pem.testing import scenarios
+
+ROVER1, UAV1, ROVER2 = 1, 2, 3
+NEAR = (38.1076, -77.3191)
+
+
+def test_every_vehicle_is_a_system_with_its_own_position(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with gateway(tmp_path) as (_, port), ground_station(port) as station:
+            types = {}
+            for system in (ROVER1, UAV1, ROVER2):
+                beat = await station.hears(
+                    "HEARTBEAT",
+                    lambda each: each.get_srcSystem() == system and each.get_srcComponent() == 1,  # noqa: B023
+                )
+                types[system] = beat.type
+                assert beat.autopilot == dialect.MAV_AUTOPILOT_GENERIC
+            assert types == {
+                ROVER1: dialect.MAV_TYPE_GROUND_ROVER,
+                UAV1: dialect.MAV_TYPE_QUADROTOR,
+                ROVER2: dialect.MAV_TYPE_GROUND_ROVER,
+            }
+            for system, place in ((ROVER1, HOME), (UAV1, (38.1080, -77.3192))):
+                position = await station.hears(
+                    "GLOBAL_POSITION_INT",
+                    lambda each: each.get_srcSystem() == system,  # noqa: B023
+                )
+                assert distance_m((position.lat / 1e7, position.lon / 1e7), place) < 0.1
+            for name in ("ATTITUDE", "VFR_HUD", "SYS_STATUS", "GPS_RAW_INT", "EXTENDED_SYS_STATE"):
+                await station.hears(name, lambda each: each.get_srcSystem() == UAV1)
+            home = await station.hears("HOME_POSITION", lambda each: each.get_srcSystem() == ROVER1)
+            assert distance_m((home.latitude / 1e7, home.longitude / 1e7), HOME) < 0.1
+
+    asyncio.run(main())
+
+
+def test_commands_are_refused_with_the_setting_that_allows_them(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with gateway(tmp_path) as (control, port), ground_station(port) as station:
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            assert await station.go_to(ROVER1, NEAR) == dialect.MAV_RESULT_DENIED
+            await station.told("rover1: DO_REPOSITION", "faces.mavlink.commands")
+            assert not await control.runs()
+
+    asyncio.run(main())
+
+
+def test_an_allowed_command_drives_the_rover_and_the_journal_says_who_asked(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, speed=5.0, commands=["rover1"]) as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            assert await station.go_to(ROVER1, NEAR) == dialect.MAV_RESULT_ACCEPTED
+            assert any(
+                each.get_type() == "COMMAND_ACK" and each.result == dialect.MAV_RESULT_IN_PROGRESS
+                for each in station.received
+            )
+            await station.hears(
+                "GLOBAL_POSITION_INT",
+                lambda each: (
+                    each.get_srcSystem() == ROVER1
+                    and distance_m((each.lat / 1e7, each.lon / 1e7), NEAR) < 2.0
+                ),
+            )
+            (run,) = await control.runs()
+            assert (await control.wait(run.run)).status is RunStatus.COMPLETED
+            records = [each.record for each in await control.records(run.run)]
+            assert any("mavlink 254/190 at 127.0.0.1:" in str(record) for record in records)
+            await station.told("rover1 begins goto")
+            assert await station.go_to(ROVER2, NEAR) == dialect.MAV_RESULT_DENIED
+
+    asyncio.run(main())
+
+
+def test_a_vehicle_that_a_mission_has_is_refused_until_the_station_takes_it(tmp_path: Path) -> None:
+    async def main() -> None:
+        far = f"[{HOME[0] + 0.005}, {HOME[1]}]"
+        async with (
+            gateway(tmp_path, speed=2.0, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            run = await control.start(scenarios.one_behavior("goto", "rover1", target=far))
+            await station.told("rover1 begins goto")
+            for command in (dialect.MAV_CMD_DO_PAUSE_CONTINUE, dialect.MAV_CMD_NAV_LOITER_UNLIM):
+                result = await station.command(ROVER1, command)
+                assert result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+            await station.told("DO_PAUSE_CONTINUE", run)
+            assert await station.command(ROVER1, 32100, 1) == dialect.MAV_RESULT_ACCEPTED
+            assert (await control.wait(run)).status is RunStatus.FAILED
+            result = await station.command(ROVER1, dialect.MAV_CMD_DO_PAUSE_CONTINUE)
+            assert result == 0
+            holder = (await control.holders())["rover1"]
+            assert holder.startswith("mavlink 254/190")
+            async with ground_station(port, system=253) as other:
+                assert await other.go_to(ROVER1, NEAR) == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+                await other.told("rover1: DO_REPOSITION", "mavlink 254/190")
+            assert await station.command(ROVER1, 32100, 0) == dialect.MAV_RESULT_ACCEPTED
+            assert not (await control.holders())["rover1"].startswith("mavlink")
+
+    asyncio.run(main())
+
+
+def test_the_plan_is_what_the_mission_does_now_and_uploads_are_denied(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with gateway(tmp_path) as (control, port), ground_station(port) as station:
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            station.mav.mission_request_list_send(ROVER1, 1, 0)
+            assert (await station.hears("MISSION_COUNT")).count == 0
+            run = await control.start(
+                scenarios.one_behavior("single_vehicle_routing", "rover1", route="round")
+            )
+            await station.told("rover1 begins single_vehicle_routing")
+            since = len(station.received)
+            station.mav.mission_request_list_send(ROVER1, 1, 0)
+            assert (await station.hears("MISSION_COUNT", since=since)).count == 3
+            for number, place in enumerate(((38.1075, -77.3190), (38.1075, -77.3180))):
+                station.mav.mission_request_int_send(ROVER1, 1, number, 0)
+                item = await station.hears("MISSION_ITEM_INT", lambda each: each.seq == number)  # noqa: B023
+                assert (item.x, item.y) == tuple(round(each * 1e7) for each in place)
+            await station.hears("MISSION_CURRENT", lambda each: each.total == 3)
+            station.mav.mission_request_list_send(ROVER1, 1, 1)
+            fence = await station.hears("MISSION_COUNT", lambda each: each.mission_type == 1)
+            assert fence.count == 4
+            station.mav.mission_count_send(ROVER1, 1, 5, 0)
+            answer = await station.hears("MISSION_ACK")
+            assert answer.type == dialect.MAV_MISSION_DENIED
+            await station.told("read-only")
+            await control.stop(run)
+
+    asyncio.run(main())
+
+
+def test_parameters_messages_intervals_and_modes_on_request(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with gateway(tmp_path) as (_, port), ground_station(port) as station:
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == UAV1)
+            station.mav.param_request_list_send(UAV1, 1)
+            first = await station.hears("PARAM_VALUE")
+            for index in range(first.param_count):
+                await station.hears("PARAM_VALUE", lambda each: each.param_index == index)  # noqa: B023
+            station.mav.param_set_send(UAV1, 1, b"MAV_SYS_ID", 9.0, dialect.MAV_PARAM_TYPE_REAL32)
+            await station.told("parameters are read-only")
+            request = dialect.MAV_CMD_REQUEST_MESSAGE
+            assert await station.command(UAV1, request, 148) == dialect.MAV_RESULT_ACCEPTED
+            version = await station.hears("AUTOPILOT_VERSION")
+            assert version.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            assert await station.command(UAV1, request, 9999) == dialect.MAV_RESULT_UNSUPPORTED
+            assert await station.command(UAV1, request, 435) == dialect.MAV_RESULT_ACCEPTED
+            interval, attitude = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 30
+            assert await station.command(UAV1, interval, attitude, 100) == 0
+            got = dialect.MAV_CMD_GET_MESSAGE_INTERVAL
+            assert await station.command(UAV1, got, attitude) == dialect.MAV_RESULT_ACCEPTED
+            bounded = await station.hears("MESSAGE_INTERVAL")
+            assert bounded.interval_us == 50_000
+            assert await station.command(UAV1, interval, 0, -1) == dialect.MAV_RESULT_DENIED
+
+    asyncio.run(main())
+
+
+def test_payloads_are_a_camera_and_a_gimbal_that_can_be_commanded(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, speed=5.0, commands="all") as (_, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.type == dialect.MAV_TYPE_CAMERA)
+            request = dialect.MAV_CMD_REQUEST_MESSAGE
+            result = await station.command(UAV1, request, 259, component=100)
+            assert result == dialect.MAV_RESULT_ACCEPTED
+            camera = await station.hears("CAMERA_INFORMATION")
+            assert bytes(camera.model_name).rstrip(b"\0") == b"eye"
+            assert await station.command(UAV1, request, 280) == dialect.MAV_RESULT_ACCEPTED
+            gimbal = await station.hears("GIMBAL_MANAGER_INFORMATION")
+            assert gimbal.gimbal_device_id == camera.gimbal_device_id == 1
+            nan, pitch_yaw = math.nan, dialect.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+            result = await station.command(UAV1, pitch_yaw, -30, 40, nan, nan, 0, 0, 1)
+            assert result == dialect.MAV_RESULT_ACCEPTED
+
+            def points(message: dialect.MAVLink_gimbal_device_attitude_status_message) -> bool:
+                w, x, y, z = message.q
+                yaw = math.degrees(math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+                pitch = math.degrees(math.asin(2 * (w * y - z * x)))
+                return abs(yaw - 40) < 1 and abs(pitch + 30) < 1
+
+            await station.hears("GIMBAL_DEVICE_ATTITUDE_STATUS", points)
+            shoot = dialect.MAV_CMD_IMAGE_START_CAPTURE
+            assert await station.command(UAV1, shoot, 0, 1, 1, component=100) == 0
+
+    asyncio.run(main())
