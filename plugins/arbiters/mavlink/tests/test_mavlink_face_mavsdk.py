@@ -1,0 +1,189 @@
+"""MAVSDK, an independent client, sees and commands a mixed fleet."""
+
+import asyncio
+import math
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import aclosing, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mavlink_gcs import HOME, gateway
+from mavlink_mavsdk_world import free_port
+from mavsdk import logging as mavsdk_log
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.camera import CameraAsync
+from mavsdk.asyncio.plugins.gimbal import GimbalAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.plugins.action import ActionError, ActionResult
+from mavsdk.plugins.mission_raw import MissionRawError
+from mavsdk.plugins.telemetry import FlightMode
+
+from m2pem.api import distance_m
+from m2pem.testing import scenarios
+
+ROVER1, UAV1 = 1, 2
+PLACES = {ROVER1: HOME, UAV1: (38.1080, -77.3192), 3: (38.1070, -77.3192)}
+NEAR = (38.1076, -77.3191)
+WITHIN_S = 60.0
+
+Plugin = Callable[[Any], Any]
+
+
+class Client:
+    """MAVSDK's plugins by system id, destroyed at the end in the order that MAVSDK wants."""
+
+    def __init__(self, systems: dict[int, Any]) -> None:
+        self.systems = systems
+        self._made: list[Any] = []
+
+    def plugin(self, kind: Plugin, system: int) -> Any:
+        made = kind(self.systems[system])
+        self._made.append(made)
+        return made
+
+    def release(self) -> None:
+        for each in self._made:
+            each.destroy()
+
+
+@asynccontextmanager
+async def client(port: int) -> AsyncIterator[Client]:
+    """MAVSDK with all systems of the fleet."""
+    mavsdk_log.log_subscribe(lambda *_: True)
+    mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+    found: dict[int, Any] = {}
+
+    async def find(news: AsyncGenerator[None, None]) -> None:
+        async with aclosing(news):
+            async for _ in news:
+                for each in await mavsdk.get_systems():
+                    found[await each.get_system_id()] = each
+                if found.keys() >= PLACES.keys():
+                    return
+
+    # Begun before the connection, so that no system is missed.
+    finding = asyncio.create_task(find(mavsdk.on_new_system()))
+    await asyncio.sleep(0)
+    await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
+    async with asyncio.timeout(WITHIN_S):
+        await finding
+    made = Client(found)
+    try:
+        yield made
+    finally:
+        made.release()
+        await asyncio.to_thread(mavsdk.destroy)
+
+
+async def first(stream: AsyncGenerator[Any, None], true: Callable[[Any], bool]) -> Any:
+    async with asyncio.timeout(WITHIN_S), aclosing(stream):
+        async for value in stream:
+            if true(value):
+                return value
+
+
+def at(place: tuple[float, float], within_m: float) -> Callable[[Any], bool]:
+    return lambda each: distance_m((each.latitude_deg, each.longitude_deg), place) < within_m
+
+
+def fleet_on(
+    folder: Path, main: Callable[[Any, Client], Any], speed: float = 5.0, **settings: Any
+) -> None:
+    """Run `main` with an executive that shows its fleet to MAVSDK."""
+
+    async def run() -> None:
+        port = free_port()
+        settings["url"] = f"udpout://127.0.0.1:{port}"
+        async with gateway(folder, speed=speed, **settings) as (control, _), client(port) as sdk:
+            await main(control, sdk)
+
+    asyncio.run(run())
+
+
+def test_mavsdk_lists_all_vehicles_with_their_positions(tmp_path: Path) -> None:
+    async def main(_: Any, sdk: Client) -> None:
+        for system, place in PLACES.items():
+            telemetry = sdk.plugin(TelemetryAsync, system)
+            await first(telemetry.subscribe_position(), at(place, 0.1))
+            await first(telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.HOLD)
+            await first(telemetry.subscribe_battery(), lambda each: each.remaining_percent > 50)
+
+    fleet_on(tmp_path, main)
+
+
+def test_a_command_of_mavsdk_is_refused(tmp_path: Path) -> None:
+    async def main(control: Any, sdk: Client) -> None:
+        action, telemetry = sdk.plugin(ActionAsync, ROVER1), sdk.plugin(TelemetryAsync, ROVER1)
+        texts = telemetry.subscribe_status_text()
+        told = asyncio.create_task(first(texts, lambda each: "faces.mavlink.commands" in each.text))
+        with pytest.raises(ActionError) as refused:
+            await action.goto_location(*NEAR, 60.0, math.nan)
+        assert refused.value.result is ActionResult.COMMAND_DENIED
+        await told
+        assert not await control.runs()
+
+    fleet_on(tmp_path, main)
+
+
+def test_an_allowed_command_of_mavsdk_drives_the_rover(tmp_path: Path) -> None:
+    async def main(control: Any, sdk: Client) -> None:
+        action, telemetry = sdk.plugin(ActionAsync, ROVER1), sdk.plugin(TelemetryAsync, ROVER1)
+        await action.goto_location(*NEAR, 60.0, math.nan)
+        await first(telemetry.subscribe_position(), at(NEAR, 2.0))
+        await first(telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.HOLD)
+        (run,) = await control.runs()
+        assert run.status == "completed"
+
+    fleet_on(tmp_path, main, commands=["rover1"])
+
+
+def test_mavsdk_flies_a_copter_of_another_arbiter(tmp_path: Path) -> None:
+    async def main(_: Any, sdk: Client) -> None:
+        action, telemetry = sdk.plugin(ActionAsync, UAV1), sdk.plugin(TelemetryAsync, UAV1)
+        with pytest.raises(ActionError):
+            await action.arm()
+        await action.goto_location(38.1082, -77.3190, 90.0, math.nan)
+        await first(telemetry.subscribe_armed(), bool)
+        await first(telemetry.subscribe_position(), at((38.1082, -77.3190), 2.0))
+        await action.return_to_launch()
+        await first(
+            telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.RETURN_TO_LAUNCH
+        )
+        await action.land()
+        await first(telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.LAND)
+        await first(telemetry.subscribe_position(), lambda each: each.relative_altitude_m < 0.5)
+
+    fleet_on(tmp_path, main, commands="all")
+
+
+def test_mavsdk_downloads_the_plan_and_may_not_upload_one(tmp_path: Path) -> None:
+    async def main(control: Any, sdk: Client) -> None:
+        missions = sdk.plugin(MissionRawAsync, ROVER1)
+        telemetry = sdk.plugin(TelemetryAsync, ROVER1)
+        assert await missions.download_mission() == []
+        route = scenarios.one_behavior("single_vehicle_routing", "rover1", route="round")
+        run = await control.start(route)
+        await first(telemetry.subscribe_flight_mode(), lambda each: each is FlightMode.MISSION)
+        items = await missions.download_mission()
+        places = [(each.x / 1e7, each.y / 1e7) for each in items]
+        assert places == [(38.1075, -77.3190), (38.1075, -77.3180), (38.1085, -77.3180)]
+        assert len(await missions.download_geofence()) == 4
+        with pytest.raises(MissionRawError):
+            await missions.upload_mission(items)
+        await control.stop(run)
+
+    fleet_on(tmp_path, main, speed=1.0)
+
+
+def test_mavsdk_finds_the_camera_and_the_gimbal(tmp_path: Path) -> None:
+    async def main(_: Any, sdk: Client) -> None:
+        gimbal, camera = sdk.plugin(GimbalAsync, UAV1), sdk.plugin(CameraAsync, UAV1)
+        listed = await first(gimbal.subscribe_gimbal_list(), lambda each: each.gimbals)
+        assert listed.gimbals[0].vendor_name == "m2pem"
+        cameras = await first(camera.subscribe_camera_list(), lambda each: each.cameras)
+        assert cameras.cameras[0].model_name == "eye"
+
+    fleet_on(tmp_path, main)
