@@ -1,0 +1,99 @@
+"""Programs that send garbage, too much, or do not read: nothing happens to the others."""
+
+import asyncio
+import random
+import socket
+from pathlib import Path
+
+from mavlink_gcs import gateway, ground_station
+from mavlink_mavsdk_world import free_port
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from m2pem.api import RunStatus
+from m2pem.testing import scenarios
+
+ROVER1 = 1
+
+
+def test_garbage_and_floods_change_nothing(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, speed=5.0) as (control, port),
+            ground_station(port) as station,
+            ground_station(port, system=253) as flooding,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            run = await control.start(
+                scenarios.one_behavior("goto", "rover1", target="[38.1077, -77.3190]")
+            )
+            random_ = random.Random(1)
+            for number in range(3000):
+                flooding.write(random_.randbytes(random_.randrange(1, 300)))
+                flooding.mav.command_long_send(ROVER1, 1, number % 4000, 0, *[float("nan")] * 7)
+                flooding.mav.param_request_list_send(ROVER1, 1)
+                flooding.mav.mission_item_int_send(ROVER1, 1, number, 0, 16, 0, 0, *[0] * 7)
+                if number % 50 == 0:
+                    await asyncio.sleep(0)
+            assert (await control.wait(run)).status is RunStatus.COMPLETED
+            assert len(await control.runs()) == 1
+            since = len(station.received)
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1, since)
+            assert await station.command(ROVER1, dialect.MAV_CMD_REQUEST_MESSAGE, 148) == 0
+
+    asyncio.run(main())
+
+
+def test_a_station_that_does_not_read_delays_nobody(tmp_path: Path) -> None:
+    async def main() -> None:
+        udp, tcp = free_port(), free_port()
+        rates = dict.fromkeys(("GLOBAL_POSITION_INT", "ATTITUDE", "VFR_HUD"), "20 Hz")
+        urls = [f"udpin://127.0.0.1:{udp}", f"tcpin://127.0.0.1:{tcp}"]
+        async with (
+            gateway(tmp_path, speed=5.0, url=urls, rates=rates) as (control, _),
+            ground_station(udp) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            with socket.socket() as stalled:
+                stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+                stalled.setblocking(False)
+                loop = asyncio.get_running_loop()
+                await loop.sock_connect(stalled, ("127.0.0.1", tcp))
+                run = await control.start(
+                    scenarios.one_behavior("goto", "rover1", target="[38.1077, -77.3190]")
+                )
+                assert (await control.wait(run)).status is RunStatus.COMPLETED
+                await station.hears("ATTITUDE", since=len(station.received))
+                parser = dialect.MAVLink(None)
+                parser.robust_parsing = True
+                found = parser.parse_buffer(await loop.sock_recv(stalled, 4096))
+                assert len(found) > 10
+                assert "BAD_DATA" not in {each.get_type() for each in found[:-1]}
+
+    asyncio.run(main())
+
+
+def test_two_stations_have_their_own_intervals_and_answers(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path) as (_, port),
+            ground_station(port) as station,
+            ground_station(port, system=253) as other,
+        ):
+            for each in (station, other):
+                await each.hears("ATTITUDE", lambda message: message.get_srcSystem() == ROVER1)
+            interval = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+            assert await station.command(ROVER1, interval, 30, -1) == dialect.MAV_RESULT_ACCEPTED
+            since, before = len(station.received), len(other.received)
+            for _ in range(3):
+                number = len(other.received)
+                await other.hears(
+                    "ATTITUDE", lambda message: message.get_srcSystem() == ROVER1, number
+                )
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1, since)
+            assert not any(
+                each.get_type() == "ATTITUDE" and each.get_srcSystem() == ROVER1
+                for each in station.received[since:]
+            )
+            assert not any(each.get_type() == "COMMAND_ACK" for each in other.received[before:])
+
+    asyncio.run(main())
