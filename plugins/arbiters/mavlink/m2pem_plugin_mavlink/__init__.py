@@ -14,6 +14,7 @@ from m2pem_plugin_mavlink.hooks import (
     m2pem_check_host,
     m2pem_register_arbiters,
     m2pem_register_commands,
+    m2pem_register_faces,
 )
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ __all__ = [
     "m2pem_check_host",
     "m2pem_register_arbiters",
     "m2pem_register_commands",
+    "m2pem_register_faces",
     "message_type",
     "open_link",
     "signing_of",

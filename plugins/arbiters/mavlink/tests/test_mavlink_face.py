@@ -4,14 +4,20 @@ import asyncio
 import math
 from pathlib import Path
 
+from m2pem_plugin_mavlink.face.face import MavlinkFace
 from mavlink_gcs import HOME, gateway, ground_station
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import RunStatus, distance_m
+from m2pem.plugins import PluginManager
 from m2pem.testing import scenarios
 
 ROVER1, UAV1, ROVER2 = 1, 2, 3
 NEAR = (38.1076, -77.3191)
+
+
+def test_the_plugin_registers_the_face() -> None:
+    assert PluginManager().face("mavlink") is MavlinkFace
 
 
 def test_every_vehicle_is_a_system_with_its_own_position(tmp_path: Path) -> None:

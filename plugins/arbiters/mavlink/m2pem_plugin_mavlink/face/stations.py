@@ -6,7 +6,7 @@ may send in a second, and of addresses that are kept for it have bounds.
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.link.endpoint import Endpoint
@@ -16,6 +16,7 @@ from m2pem_plugin_mavlink.link.udp import UdpEndpoint
 from m2pem_plugin_mavlink.protocol.messages import Address, Message
 from m2pem_plugin_mavlink.protocol.raw_frames import FrameSplitter, RawFrame
 from m2pem_plugin_mavlink.protocol.url import Url
+from m2pem_plugin_mavlink.signing.signature import Signing
 
 MOST_STATIONS = 16
 MOST_ADDRESSES = 32
@@ -141,7 +142,7 @@ class Stations:
     def _present(self, peer: Peer) -> bool:
         return peer.open and any(peer in each.peers.values() for each in self._endpoints)
 
-    def _greet(self, peer: Peer) -> None:
+    def _greet(self, peer: Peer, _: Iterable[Signing | None]) -> None:
         self._station(peer)
 
     def _station(self, peer: Peer) -> Station | None:
