@@ -258,8 +258,10 @@ class OnboardNode:
             self._logger.exception("%s: %s", self._name, message.behavior)
             reason = f"internal error of the driver: {error!r}"
         if reason:
+            self._logger.info("%s: %s is rejected: %s", self._name, id_, reason)
             self._journal.reject(id_, "REJECTED", reason)
             return
+        self._logger.info("%s: %s begins: %s", self._name, id_, request.behavior)
         self._begin(request, message.run)
 
     def cancel(self, id_: str) -> None:
@@ -340,6 +342,9 @@ class OnboardNode:
     def ended(self, goal: UUID, outcome: Outcome) -> None:
         if goal in self._ids:
             reason = outcome.reason or self._end_reason
+            state = outcome.state.name
+            why = f": {reason}" if reason else ""
+            self._logger.info("%s: %s ends: %s%s", self._name, self._ids[goal], state, why)
             self._journal.end(self._ids[goal], outcome.state, outcome.code, reason, outcome.outputs)
 
     def superseded(self, run: str, newest: int) -> None:

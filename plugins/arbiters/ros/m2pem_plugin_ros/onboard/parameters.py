@@ -106,6 +106,9 @@ def _parameters(
         tuple(each.value for each in OdomFrame),
     )
     yield _Parameter(
+        "base_frame", settings.base_frame, "Frame of the vehicle; empty: that of its odometry."
+    )
+    yield _Parameter(
         "route_action",
         settings.route_action.value,
         "Action of Nav2 for routes.",

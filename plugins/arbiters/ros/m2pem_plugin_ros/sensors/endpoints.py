@@ -9,7 +9,7 @@ import difflib
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from m2pem_plugin_ros.settings import DriverName, Settings, Via
@@ -48,7 +48,11 @@ class Endpoints:
         self._node = ros.node
         self._settings = settings
         self.domain = domain
-        self._singles = _singles(settings, is_payload=is_payload)
+        resolve = ros.node.resolve_topic_name  # names may be remapped (--ros-args)
+        self._singles = tuple(
+            replace(single, topic=resolve(single.topic))
+            for single in _singles(settings, is_payload=is_payload)
+        )
         self.elsewhere: tuple[int, ...] = ()
 
     @property
@@ -175,7 +179,7 @@ class Endpoints:
 
     def _wrong_command(self) -> str:
         settings = self._settings
-        topic = settings.topic(settings.topics.cmd_vel)
+        topic = self._node.resolve_topic_name(settings.topic(settings.topics.cmd_vel))
         expected = f"geometry_msgs/msg/{'TwistStamped' if settings.stamped else 'Twist'}"
         found = self._node.get_subscriptions_info_by_topic(topic)
         if not found:
