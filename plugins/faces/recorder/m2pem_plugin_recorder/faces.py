@@ -12,7 +12,9 @@ class RecorderFace:
     def __init__(self, control: MissionControl, settings: FaceSettings) -> None:
         from m2pem_plugin_recorder.recorder import Recorder  # noqa: PLC0415
 
-        self._recorder = Recorder(control, recorder_settings(settings, control.journal_file()))
+        self._recorder = Recorder(
+            control, recorder_settings(settings, control.fleet(), control.journal_file())
+        )
 
     async def serve(self) -> None:
         """Record until cancelled.
@@ -31,7 +33,7 @@ class FoxgloveFace:
     def __init__(self, control: MissionControl, settings: FaceSettings) -> None:
         from m2pem_plugin_recorder.live import LiveServer  # noqa: PLC0415
 
-        self._server = LiveServer(control, foxglove_settings(settings))
+        self._server = LiveServer(control, foxglove_settings(settings, control.fleet()))
 
     async def serve(self) -> None:
         """Serve until cancelled.

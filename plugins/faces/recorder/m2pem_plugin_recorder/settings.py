@@ -3,9 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from m2pem.api import FaceSettings
+from m2pem.api import FaceSettings, Fleet
 
 MB = 1_000_000
+
+RATE_HZ = 10.0
+STATES_PER_S = 1000.0
+"""The default rates: of a vehicle or payload, and of all together, for large fleets."""
 
 FOLDER = "recordings"
 """The folder beside the journal: `journal.db-recordings`."""
@@ -21,11 +25,17 @@ class RecorderSettings:
     """
 
     folder: Path
-    rate_hz: float = 10.0
+    rate_hz: float = RATE_HZ
     ros: bool = True
     file_bytes: int = 1000 * MB
     total_bytes: int | None = None
     min_free_bytes: int = 500 * MB
+
+
+def default_rate_hz(fleet: Fleet) -> float:
+    """Return how often each vehicle and payload is recorded if the fleet file does not say."""
+    resources = len(fleet.vehicles) + len(fleet.payloads)
+    return min(RATE_HZ, STATES_PER_S / max(1, resources))
 
 
 def folder_beside(journal: Path) -> Path:
@@ -33,7 +43,9 @@ def folder_beside(journal: Path) -> Path:
     return journal.with_name(f"{journal.name}-{FOLDER}")
 
 
-def recorder_settings(settings: FaceSettings, journal: Path | None) -> RecorderSettings:
+def recorder_settings(
+    settings: FaceSettings, fleet: Fleet, journal: Path | None
+) -> RecorderSettings:
     """Read the settings of `recorder`. `journal`: its file; None: it is in memory.
 
     Raises:
@@ -50,7 +62,7 @@ def recorder_settings(settings: FaceSettings, journal: Path | None) -> RecorderS
     total_mb = settings.whole("total_mb", 0, 1, 10**9) if "total_mb" in settings.values else None
     return RecorderSettings(
         folder,
-        settings.number("rate_hz", 10.0, 0.01, 1000.0),
+        settings.number("rate_hz", default_rate_hz(fleet), 0.01, 1000.0),
         settings.flag("ros", True),
         settings.whole("file_mb", 1000, 1, 10**6) * MB,
         None if total_mb is None else total_mb * MB,
@@ -65,12 +77,12 @@ class FoxgloveSettings:
 
     host: str = "127.0.0.1"
     port: int = 8765
-    rate_hz: float = 10.0
+    rate_hz: float = RATE_HZ
     ros: bool = False
     backlog: int = 1024
 
 
-def foxglove_settings(settings: FaceSettings) -> FoxgloveSettings:
+def foxglove_settings(settings: FaceSettings, fleet: Fleet) -> FoxgloveSettings:
     """Read the settings of `foxglove`.
 
     Raises:
@@ -80,7 +92,7 @@ def foxglove_settings(settings: FaceSettings) -> FoxgloveSettings:
     return FoxgloveSettings(
         settings.text("host", "127.0.0.1"),
         settings.whole("port", 8765, 0, 65535),
-        settings.number("rate_hz", 10.0, 0.01, 1000.0),
+        settings.number("rate_hz", default_rate_hz(fleet), 0.01, 1000.0),
         settings.flag("ros", False),
         settings.whole("backlog", 1024, 16, 1_000_000),
     )

@@ -23,9 +23,11 @@ class RateLimit:
         if isinstance(state, PayloadState) and state.detections:
             return True
         key = state.behavior if isinstance(state, TeamState) else state.resource
-        due_us = self._due_us.get(key, 0.0)
+        due_us = self._due_us.get(key)
         # A clock that was set back must not silence a vehicle.
-        if due_us - 2 * self._every_us < state.time_us < due_us:
+        if due_us is None or state.time_us < due_us - 2 * self._every_us:
+            due_us = state.time_us
+        if state.time_us < due_us:
             return False
         # Steady: a jitter of the sender does not lower the rate.
         self._due_us[key] = max(due_us + self._every_us, state.time_us + self._every_us / 2)
