@@ -38,7 +38,7 @@ PIP = PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt $(BIN)
 PIP_FAILED = { echo "pip could not install what is needed (its own message is above): is a package index reachable? \
   Then the same make command again" >&2; exit 1; }
 
-.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team
+.PHONY: help setup python-packages npm-packages page demo demo-web demo-air demo-sitl demo-ros demo-team demo-gateway
 .PHONY: check page-test test test-long test-ros fuzz chaos lint format docs pictures
 .PHONY: bench bench-quick conformance clean dist ros
 
@@ -184,6 +184,9 @@ demo-ros: ros ## run missions on simulated ROS 2 vehicles, with an operator over
 
 demo-team: ros ## march in a column with a camera and a copter, over ROS 2 and MAVLink, and measure how well
 	@$(ROS_PYTHON) -m m2pem demo team $(if $(FOLDER),--ardupilot "$(FOLDER)")
+
+demo-gateway: ros ## show ROS rovers and MAVLink copters to a ROS client and a ground station
+	@$(ROS_PYTHON) -m m2pem demo gateway
 
 lint: setup ## check style, types and layers
 	@$(BIN)/ruff check .

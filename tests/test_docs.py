@@ -32,9 +32,19 @@ NEEDS_ROS = DOCS / "tutorials" / "ros2.md"
 """The tests of the ROS plugin follow it."""
 EXAMPLES = sorted((REPOSITORY / "examples").rglob("README.md"))
 MAKE_TARGETS = {
-    *("setup", "demo", "demo-air", "demo-ros", "demo-team", "demo-web", "test", "test-long"),
+    *(
+        "setup",
+        "demo",
+        "demo-air",
+        "demo-ros",
+        "demo-team",
+        "demo-gateway",
+        "demo-web",
+        "test",
+        "test-long",
+    ),
     *("test-ros", "ros", "fuzz", "lint", "format", "docs", "pictures", "conformance", "bench"),
-    *("bench-quick", "chaos", "check", "clean", "demo-sitl", "dist"),
+    *("bench-quick", "chaos", "check", "clean", "demo-gateway", "demo-sitl", "dist"),
 }
 
 BLOCKS = {

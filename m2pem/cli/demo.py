@@ -74,6 +74,18 @@ def ros(context: click.Context, domain: int, only: str | None) -> None:
 
 @demo.command()
 @DOMAIN
+@click.option("--vehicles-port", default=14540, show_default=True, help="Where autopilots send to.")
+@click.option("--port", default=14550, show_default=True, help="Where ground stations listen.")
+@click.pass_context
+def gateway(context: click.Context, domain: int, vehicles_port: int, port: int) -> None:
+    """Show ROS rovers and MAVLink copters to a ROS client and a ground station."""
+    from m2pem.demo import demos
+
+    context.exit(demos.gateway(domain, vehicles_port, port))
+
+
+@demo.command()
+@DOMAIN
 @ARDUPILOT
 @click.option(
     "--fleet",

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from m2pem.demo.programs import Programs, copy_once, m2pem
 from m2pem.demo.shipped_files import examples
@@ -28,6 +29,7 @@ ROS_DOMAIN = 101
 """None of those that tests reserve, so that a demonstration meets no test."""
 ROS_SPEED = 10
 TEAM_WITHIN_S = 300
+GATEWAY_VEHICLES = ("rover1", "rover2", "copter1", "copter2")
 
 
 def vignette() -> int:
@@ -130,6 +132,43 @@ def ros_team(domain: int = ROS_DOMAIN) -> int:
         " cross the bridge."
     )
     return _over_ros("mehds_ros.yaml", {"mehds_vignette_1_swept": "mehds_vignette_1"}, domain)
+
+
+def gateway(domain: int = ROS_DOMAIN, vehicles_port: int = 14540, port: int = 14550) -> int:
+    """Show two ROS rovers and two MAVLink copters to a ROS client and to a ground station.
+
+    `vehicles_port`: where autopilots send to. `port`: where ground stations listen.
+    """
+    _needs("m2pem_plugin_mavlink", "m2pem-plugin-mavlink[mavsdk]")
+    _needs("mavsdk", "m2pem-plugin-mavlink[mavsdk]")
+    here = examples()
+    written = (here / "fleet_configs/gateway.yaml").read_text(encoding="utf-8")
+    written = written.replace("127.0.0.1:14540", f"127.0.0.1:{vehicles_port}")
+    written = written.replace("127.0.0.1:14550", f"127.0.0.1:{port}")
+    programs = here / "examples/t24_gateway"
+    with TemporaryDirectory() as folder, Programs(_loopback(domain)) as vehicles:
+        fleet, refusing = Path(folder) / "gateway.yaml", Path(folder) / "refusing.yaml"
+        fleet.write_text(written, encoding="utf-8")
+        refusing.write_text(written.replace("commands: [rover1]", "commands: none"), "utf-8")
+        _say("Two rovers over ROS 2 and two copters over MAVLink, as fast as real ones.")
+        vehicles.start(m2pem("sim", "ros", "--fleet", fleet), ready="ready")
+        words = m2pem("sim", "mavlink", "--copters", "2", *AUTOPILOT)
+        words += ["--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{vehicles_port}"]
+        vehicles.start(words)
+        station = [sys.executable, programs / "ground_station.py", "--port", str(port)]
+        with Programs(_loopback(domain)) as served:
+            served.start(m2pem("gateway", "--fleet", refusing, "--journal", "memory:"))
+            _say("\nA ROS client sees all four, and sends a MAVLink copter somewhere.")
+            client = [sys.executable, programs / "ros_client.py", *GATEWAY_VEHICLES]
+            if status := served.run([*client, "--fly", "copter1"]):
+                return status
+            _say("\nA ground station sees all four. It may not command rover1, a ROS vehicle.")
+            if status := served.run([*station, "--drive", "11", "--refused"]):
+                return status
+        with Programs(_loopback(domain)) as served:
+            _say("\nThe same with a fleet file that allows it.")
+            served.start(m2pem("gateway", "--fleet", fleet, "--journal", "memory:"))
+            return served.run([*station, "--drive", "11"])
 
 
 def _over_ros(fleet_name: str, runs: Mapping[str, str], domain: int) -> int:
