@@ -17,6 +17,7 @@ from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import ActionError
+from mavsdk.plugins.telemetry import FlightMode
 
 WITHIN_S = 60.0
 DEGREE_M = 111_320.0
@@ -38,7 +39,8 @@ async def systems_of(mavsdk: Any, port: int, wanted: int) -> dict[int, Any]:
     async def find(news: AsyncGenerator[None, None]) -> None:
         async with aclosing(news):
             async for _ in news:
-                found.update({each.get_system_id(): each for each in await mavsdk.get_systems()})
+                for each in await mavsdk.get_systems():
+                    found[await each.get_system_id()] = each
                 if len(found) >= wanted:
                     return
 
@@ -82,7 +84,8 @@ async def command(telemetry: Any, action: Any, place: tuple[float, float], refus
         return DEGREE_M * math.hypot(position.latitude_deg - place[0], east) < 2
 
     await first(telemetry.subscribe_position(), there)
-    print("MAVLink: the rover is there", flush=True)
+    await first(telemetry.subscribe_flight_mode(), lambda mode: mode is FlightMode.HOLD)
+    print("MAVLink: the rover is there, and holds", flush=True)
 
 
 async def serve(arguments: argparse.Namespace) -> None:

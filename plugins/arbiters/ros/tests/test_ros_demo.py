@@ -201,3 +201,28 @@ def test_ctrl_c_ends_the_whole_team(domain: int, tmp_path: Path, team: list[str]
     finally:
         demo.end()
     assert not [line for line in demo.lines if re.search("Traceback|not a child", line)]
+
+
+def free_port() -> int:
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.mark.timeout(200)
+def test_a_mixed_fleet_is_seen_and_commanded_from_both_sides(domain: int, tmp_path: Path) -> None:
+    ports = ("--vehicles-port", str(free_port()), "--port", str(free_port()))
+    demo = Demo("gateway", domain, tmp_path, *ports)
+    try:
+        assert demo.rest() == 0, demo.lines[-20:]
+    finally:
+        demo.end()
+    seen = [line.split(":")[1].strip() for line in demo.lines if line.startswith("ROS: ")]
+    assert seen[:4] == ["rover1", "rover2", "copter1", "copter2"]
+    assert "ROS: copter1: goto succeeded" in demo.lines
+    systems = [line.split()[2] for line in demo.lines if line.startswith("MAVLink: system")]
+    assert systems == 2 * ["1:", "2:", "11:", "12:"]
+    assert any(line.startswith("MAVLink: refused: rover1: DO_REPOSITION") for line in demo.lines)
+    assert "MAVLink: the rover is there, and holds" in demo.lines
+    asked = [line.split(" started by ")[1] for line in demo.lines if " started by " in line]
+    assert [who.split()[0] for who in asked] == ["ros", "ros", "mavlink"]
