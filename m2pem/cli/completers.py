@@ -124,10 +124,10 @@ def operator_units(_: click.Context, __: click.Parameter, incomplete: str) -> li
 
 def faces(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete the last one of several names of faces."""
-    from m2pem.cli.faces import NO_FACE
+    from m2pem.cli.ocus import NO_UNIT
     from m2pem.plugins import PluginManager
 
-    return _last_of_several(PluginManager().faces(), NO_FACE, incomplete)
+    return _last_of_several(PluginManager().faces(), NO_UNIT, incomplete)
 
 
 def _last_of_several(names: Iterable[str], none: str, incomplete: str) -> list[CompletionItem]:

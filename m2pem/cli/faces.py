@@ -10,14 +10,13 @@ import click
 from m2pem.api.capabilities import face_capabilities
 from m2pem.api.control import MissionControl
 from m2pem.api.face import Face, FaceSettings
+from m2pem.cli.ocus import NO_UNIT
 from m2pem.cli.options import UnusableError
 from m2pem.errors import PluginError
 from m2pem.fleet.fleet import Fleet
 from m2pem.plugins import PluginManager
 
 log = logging.getLogger("m2pem.face")
-
-NO_FACE = "none"
 
 
 def chosen_faces(names: str | None, fleet: Fleet) -> tuple[str, ...]:
@@ -29,10 +28,10 @@ def chosen_faces(names: str | None, fleet: Fleet) -> tuple[str, ...]:
     if names is None:
         return tuple(fleet.faces)
     wanted = tuple(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
-    if wanted == (NO_FACE,):
+    if wanted == (NO_UNIT,):
         return ()
-    if not wanted or NO_FACE in wanted:
-        raise click.UsageError(f"--face {names!r}: name faces, or `{NO_FACE}` alone")
+    if not wanted or NO_UNIT in wanted:
+        raise click.UsageError(f"--face {names!r}: name faces, or `{NO_UNIT}` alone")
     return wanted
 
 
