@@ -30,10 +30,11 @@ def gateway(
     speed: float,
     output: str,
 ) -> int:
-    """Show a fleet to programs of other protocols, without operators, until stopped.
+    """Show a fleet to programs of other protocols, without operators.
 
-    It is `m2pem serve --ocu none` that needs a face: what programs command through it is journaled
-    and taken up again, and `m2pem attach`, `start` and `stop` find it.
+    Ctrl-C or SIGTERM end it. It is `m2pem serve --ocu none` that needs a face: what programs
+    command through it is journaled and taken up again, and `m2pem attach`, `start` and `stop` find
+    it.
     """
     from m2pem.cli.interruption import Interruption
     from m2pem.cli.serve import serve_fleet

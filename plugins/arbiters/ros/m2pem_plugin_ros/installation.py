@@ -127,13 +127,13 @@ def _other_python(prefix: str) -> tuple[int, int] | None:
 
 def _for_other_python(prefix: str, version: tuple[int, int]) -> str:
     """Return what to do about a sourced ROS that was built for another Python."""
-    theirs, ours = (".".join(map(str, each)) for each in (version, sys.version_info[:2]))
+    built, running = (".".join(map(str, each)) for each in (version, sys.version_info[:2]))
     distribution = os.environ.get("ROS_DISTRO", "").capitalize()
     named = f"ROS 2 {distribution}".rstrip()
-    text = f"{named} of {prefix} was built for Python {theirs}, and this is Python {ours}; "
+    text = f"{named} of {prefix} was built for Python {built}, and this is Python {running}; "
     if version < OLDEST_PYTHON:
         return f"{text}m2pem needs Python 3.11 or newer: use ROS 2 Jazzy or newer"
-    return f"{text}make the environment of m2pem with `python{theirs} -m venv`"
+    return f"{text}make the environment of m2pem with `python{built} -m venv`"
 
 
 def _hint(wheels: bool) -> str:

@@ -144,10 +144,10 @@ class FramesPublisher:
             child = transform.child_frame_id.removeprefix("/")
             if child in self._left:
                 continue
-            ours = self._statics.get(child)
-            differs = ours is not None and (
-                transform.transform != ours.transform
-                or transform.header.frame_id != ours.header.frame_id
+            own = self._statics.get(child)
+            differs = own is not None and (
+                transform.transform != own.transform
+                or transform.header.frame_id != own.header.frame_id
             )
             if differs or child in self._children:
                 self._leave(child, transform.header.frame_id)

@@ -66,12 +66,12 @@ class TelemetryPublisher(Generic[T]):
 
     def _other(self) -> str:
         """Return another node that publishes the topic; "" if there is none."""
-        ours = self._node.get_fully_qualified_name()
+        own_name = self._node.get_fully_qualified_name()
         if self._node.count_publishers(self.topic) <= (self._publisher is not None):
             return ""
         for endpoint in self._node.get_publishers_info_by_topic(self.topic):
             name = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
-            if name != ours:
+            if name != own_name:
                 return name
         return ""
 

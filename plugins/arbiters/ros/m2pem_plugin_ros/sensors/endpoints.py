@@ -167,13 +167,13 @@ class Endpoints:
         """Return the topics of a type that have a publisher of another process."""
         from m2pem_plugin_ros.runtime import own_nodes  # noqa: PLC0415  # it needs rclpy
 
-        ours = own_nodes() | {NAMELESS}  # which may be ours
+        own = own_nodes() | {NAMELESS}  # which may be one of them
         return [
             name
             for name, types in self._node.get_topic_names_and_types()
             if type_ in types
             and any(
-                _name(each) not in ours for each in self._node.get_publishers_info_by_topic(name)
+                _name(each) not in own for each in self._node.get_publishers_info_by_topic(name)
             )
         ]
 
