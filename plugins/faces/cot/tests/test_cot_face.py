@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import random
 import socket
 import ssl
 import subprocess
@@ -28,9 +29,12 @@ HANDED_OVER = ("lz",)
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:
-    with socket.socket(type=kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port that no socket gets by itself: those are above 32767."""
+    for port in random.sample(range(20_000, 32_000), 100):
+        with socket.socket(type=kind) as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError
 
 
 @asynccontextmanager
@@ -103,8 +107,8 @@ def marker(name: str = "lz", place: str = 'lat="38.1077" lon="-77.3190"') -> byt
 async def test_a_marker_of_pytak_is_handed_over_if_the_fleet_allows_it() -> None:
     port = free_port()
     settings = {"url": f"udp://127.0.0.1:{free_port()}", "listen": f"udp://127.0.0.1:{port}"}
-    _, writer = await pytak.create_udp_client(urlparse(f"udp+wo://127.0.0.1:{port}"), None)
     async with fleet(**settings, receive=True) as control:
+        _, writer = await pytak.create_udp_client(urlparse(f"udp+wo://127.0.0.1:{port}"), None)
 
         async def send() -> None:
             while "lz" not in control.geometries():  # the socket may not be open yet
@@ -122,7 +126,7 @@ async def test_a_marker_of_pytak_is_handed_over_if_the_fleet_allows_it() -> None
         assert given.geometry["geometry"]["coordinates"] == [-77.319, 38.1077]
         assert given.by.startswith("cot phone.1 at 127.0.0.1:")
         assert "gate" not in control.geometries()
-    writer.close()
+        writer.close()
 
 
 async def test_a_hostile_sender_changes_nothing_and_slows_nothing() -> None:
