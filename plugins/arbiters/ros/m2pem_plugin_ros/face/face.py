@@ -63,6 +63,7 @@ class RosFace:
 
         namespace, domain_id = self._options.namespace, self._options.domain_id
         async with RosRuntime(NODE, namespace=namespace, domain_id=domain_id) as ros:
+            await asyncio.sleep(0)
             serving = Serving(
                 ros, self._control, self._follower, self._watcher, self._names, self._options
             )

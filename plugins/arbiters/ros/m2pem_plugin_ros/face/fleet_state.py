@@ -51,7 +51,7 @@ class FleetStatePublisher:
     ) -> None:
         self._control = control
         self._follower = follower
-        fleet = control.fleet()
+        fleet, catalogue = control.fleet(), control.catalogue()
         self._fleet_name = sendable(fleet.name)
         self._resources = _in_order(fleet)
         self._fixed = {
@@ -60,7 +60,7 @@ class FleetStatePublisher:
                 "domain": _domain(fleet, each),
                 "arbiter": sendable(_arbiter(fleet, each)),
                 "action": names.action(each),
-                "behaviors": [sendable(spec.name) for spec in control.catalogue().get(each, ())],
+                "behaviors": [sendable(spec.name) for spec in catalogue.get(each, ())],
                 "takes_commands": options.takes_commands(each),
             }
             for each in self._resources

@@ -326,7 +326,8 @@ class RosRuntime:
         # End the thread first: it may wait for entities that are destroyed below.
         rclpy.try_shutdown(context=self.context)
         await asyncio.to_thread(self._thread.join, JOIN_S)
-        self._let_go()
+        # In a thread, too: it takes milliseconds for each entity.
+        await asyncio.to_thread(self._let_go)
 
     def _let_go(self) -> None:
         for node in self._nodes:
