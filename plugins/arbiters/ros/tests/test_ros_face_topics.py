@@ -337,6 +337,31 @@ async def test_frames_that_another_node_publishes_are_left_to_it_and_said_once(
     assert not [e for e in ours_too if e.child_frame_id == "ugv1/base_link"]
 
 
+async def test_the_face_of_an_executive_that_is_replaced_takes_no_frames_from_the_next_one(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    place = GeoPosition(LATITUDE, LONGITUDE, ALTITUDE)
+
+    def moves(message: Any) -> bool:
+        return any(each.child_frame_id == "ugv1/base_link" for each in message.transforms)
+
+    async with faced(ros_domain) as new:
+        async with faced(ros_domain) as old:
+            frames = new.client.hear("/tf", TFMessage)
+            node, number = new.client.node, 0
+            while node.count_subscribers("/tf") < 3 or number < 60:  # both listen to each other
+                number += 1
+                for world, offset_us in ((old, 0), (new, 7)):
+                    moment_us = TIME_US + number * 1000 + offset_us
+                    world.bus.publish(VehicleState(UGV1, moment_us, place))
+                await asyncio.sleep(0.05)
+                assert number < 400
+        assert "is left to that node" not in caplog.text
+        del frames[:]
+        ours = asyncio.create_task(until(lambda: [each for each in list(frames) if moves(each)]))
+        await said(new, STATE, ours)
+
+
 async def test_with_use_sim_time_stamps_are_those_of_the_clock(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -153,12 +153,19 @@ class FramesPublisher:
                 self._leave(child, transform.header.frame_id)
 
     def _leave(self, child: str, parent: str) -> None:
+        if self._has_namesake():
+            return
         self._left.add(child)
         log.warning(
             "another node publishes the transform %r -> %r: it is left to that node", parent, child
         )
         if self._statics.pop(child, None) is not None:
             self.publish_static()
+
+    def _has_namesake(self) -> bool:
+        """Whether the face of another executive, which this one replaces, has not ended yet."""
+        own = self._node.get_name(), self._node.get_namespace()
+        return bool(self._node.get_node_names_and_namespaces().count(own) > 1)
 
 
 def _stamp(transform: Any) -> tuple[int, int]:
