@@ -168,6 +168,17 @@ def test_a_loop_is_named() -> None:
         made.find(MAP, BASE)
 
 
+def test_a_tree_that_is_too_deep_is_not_looked_up() -> None:
+    made = buffer()
+    put(made, MAP, "f0", 1.0, 10.0)
+    for number in range(99):
+        put(made, f"f{number}", f"f{number + 1}", 1.0, 10.0)
+    assert place(made, "f98")[0] == 99.0
+    put(made, "f99", BASE, 1.0, 10.0)
+    with pytest.raises(TransformError, match="more than 100 frames above 'rover1/base_link'"):
+        made.find(MAP, BASE)
+
+
 @pytest.mark.parametrize(
     ("links", "says"),
     [

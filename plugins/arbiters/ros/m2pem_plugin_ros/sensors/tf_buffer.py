@@ -24,6 +24,10 @@ BOTH_WITHIN_S = 2.0
 static."""
 
 MOST_FRAMES = 10_000
+DEEPEST = 100
+"""Frames between a frame and the root of its tree. A deeper tree is none of a vehicle, and looking
+it up would take long."""
+
 MOST_KEPT = 2_000
 """Of more transforms of one frame, the oldest are dropped."""
 
@@ -202,6 +206,10 @@ class TransformBuffer:
                 loop = [*chain[chain.index(link.parent) :], link.parent]
                 named = " -> ".join(f"'{each}'" for each in reversed(loop))
                 raise TransformError(f"the frames {named} on {self._topic} are a loop")
+            if len(chain) > DEEPEST:
+                raise TransformError(
+                    f"there are more than {DEEPEST} frames above '{frame}' on {self._topic}"
+                )
             chain.append(link.parent)
         return chain
 
