@@ -2,6 +2,7 @@
 
 import array
 import asyncio
+import gc
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from m2pem_interfaces.srv import GiveBackVehicle, TakeVehicle
 from m2pem_plugin_ros.testing import Peer
 from ros_face_client import behavior_goal, faced, point, until
 
+from m2pem.api import RunId
 from m2pem.api import records as r
+from m2pem.executive.control import Control
 from m2pem.testing import scenarios
 
 ALL = {"commands": "all"}
@@ -192,6 +195,59 @@ async def test_a_flood_of_goals_is_refused_and_others_are_served(ros_domain: int
         assert {result.status.code for _, result in ends} <= {"BUSY", "REFUSED"}
         assert sum(bool(each.feedback) for each in flood) == 1
         assert len(await world.control.runs()) == 2
+
+
+async def test_a_goal_that_is_cancelled_while_it_waits_commands_nothing(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, go_on = [], asyncio.Event()
+    execute = Control.execute_behavior
+
+    async def slow(self: Control, resource: str, *arguments: Any, **options: Any) -> RunId:
+        asked.append(resource)
+        await go_on.wait()
+        return await execute(self, resource, *arguments, **options)
+
+    monkeypatch.setattr(Control, "execute_behavior", slow)
+    async with faced(ros_domain, ALL) as world:
+        goals = [
+            await world.client.send(UGV1, behavior_goal("goto", target=point(0.0005)))
+            for _ in range(2)
+        ]
+        await until(lambda: len(asked) == 2)
+        waiting = await world.client.send(
+            "/ugv2/execute_behavior", behavior_goal("goto", target=FAR)
+        )
+        await waiting.cancel()
+        # What is cancelled is known when a later request has its answer.
+        await world.client.call(GiveBackVehicle, "/face/give_back_vehicle", vehicle="ugv2")
+        go_on.set()
+        status, result = await waiting.end()
+        for each in goals:
+            await each.end()
+    assert status == GoalStatus.STATUS_CANCELED
+    assert (result.status.state, result.status.code) == (BehaviorStatus.CANCELLED, "")
+    assert "before it began" in result.status.reason
+    assert asked == ["ugv1", "ugv1"]
+
+
+async def test_what_a_goal_asked_for_is_freed_when_it_is_over(ros_domain: int) -> None:
+    large = 1_000_000
+
+    def held() -> int:
+        gc.collect()
+        return sum(
+            len(each.value) > large for each in gc.get_objects() if isinstance(each, KeyValue)
+        )
+
+    async with faced(ros_domain) as world:
+        for _ in range(5):
+            goal = behavior_goal("goto", target="x" * large)
+            sent = await world.client.send(UGV1, goal)
+            status, _ = await sent.end()
+            assert status == GoalStatus.STATUS_ABORTED
+            del goal, sent
+        await until(lambda: held() <= 1, held)  # rclpy holds the last one for a moment
 
 
 # --- missions -------------------------------------------------------------------------------------

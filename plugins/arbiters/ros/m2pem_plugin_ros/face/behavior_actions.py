@@ -80,8 +80,11 @@ class BehaviorActions:
             spec, run, by = await self._begin(resource, goal)
         except M2pemError as error:
             code, reason = refusal(error)
-            goal.end(succeeded=False, cancelled=False)
-            return _result(Status(id_, 1, BehaviorState.REJECTED, code, reason))
+            state = BehaviorState.REJECTED
+            if cancelled := await goal.is_canceling():
+                code, state = "", BehaviorState.CANCELLED
+            goal.end(succeeded=False, cancelled=cancelled)
+            return _result(Status(id_, 1, state, code, reason))
         stopping = asyncio.create_task(stop_when_cancelled(self._control, goal, run, by))
         following = asyncio.create_task(self._follow(goal, run, id_))
         try:
@@ -115,6 +118,7 @@ class BehaviorActions:
         self._check_allocation(resource, command)
         async with self._admission:
             by = await self._asker(resource, goal)
+            goal.check_not_cancelled()
             run = await self._control.execute_behavior(resource, behavior, parameters, by=by)
         return spec, run, by
 

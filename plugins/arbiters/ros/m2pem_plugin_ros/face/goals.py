@@ -67,6 +67,15 @@ class Goal:
         if self.handle.is_active:
             self.handle.publish_feedback(feedback)
 
+    def check_not_cancelled(self) -> None:
+        """To be called just before the goal begins.
+
+        Raises:
+            OperatorError: its client has cancelled it.
+        """
+        if self.cancelled.is_set():
+            raise OperatorError("its client has cancelled it before it began")
+
     async def is_canceling(self) -> bool:
         """Whether its client has cancelled the goal, so that it can end as canceled."""
         if not self.cancelled.is_set():
@@ -149,6 +158,7 @@ class GoalServer:
         finally:
             del self._goals[key]
             self._open -= 1
+            _empty(handle.request)
 
 
 async def stop_when_cancelled(control: MissionControl, goal: Goal, run: RunId, by: str) -> None:
@@ -165,6 +175,13 @@ async def ended(task: "asyncio.Task[None]") -> None:
     task.cancel()
     with suppress(asyncio.CancelledError):
         await task
+
+
+def _empty(request: Any) -> None:
+    """Free what a goal asked for: rclpy keeps its request as long as its result."""
+    empty = type(request)()
+    for name in request.get_fields_and_field_types():
+        setattr(request, name, getattr(empty, name))
 
 
 def _key(handle: Any) -> bytes:

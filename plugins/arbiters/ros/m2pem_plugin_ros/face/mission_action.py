@@ -54,7 +54,7 @@ class MissionAction:
         try:
             run, by = await self._begin(goal)
         except M2pemError as error:
-            goal.end(succeeded=False, cancelled=False)
+            goal.end(succeeded=False, cancelled=await goal.is_canceling())
             return _refused(error)
         stopping = asyncio.create_task(stop_when_cancelled(self._control, goal, run, by))
         following = asyncio.create_task(self._follow(goal, run))
@@ -90,6 +90,7 @@ class MissionAction:
         name = asker(request.by, "")
         by = f"{self._prefix} {name}" if name else goal.client
         async with self._admission:
+            goal.check_not_cancelled()
             return await self._control.start(mission, process=process, data=data, by=by), by
 
     async def _error_of(self, summary: RunSummary) -> tuple[str, str]:
