@@ -6,6 +6,7 @@ checks every promise made here.
 
 from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard
 from uuid import UUID, uuid4
 
@@ -38,7 +39,8 @@ class Connection:
     `failsafe`: the vehicle's own reaction to a lost link, as the fleet states it, or "".
     `fence`: the area that the vehicle may not leave; None: the fleet has none. `sitl`: software in
     the loop: the vehicle is simulated on this machine. `cruise_speed_m_s`: its default speed;
-    `endurance_s`: how long it can move with a full battery; None: the fleet states none.
+    `endurance_s`: how long it can move with a full battery; None: the fleet states none. `folder`:
+    of the fleet file; names of files are relative to it.
     """
 
     resource: ResourceId
@@ -52,6 +54,7 @@ class Connection:
     sitl: bool = False
     cruise_speed_m_s: float | None = None
     endurance_s: float | None = None
+    folder: Path = field(default_factory=Path)
 
 
 @dataclass(frozen=True, slots=True)

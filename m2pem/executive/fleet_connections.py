@@ -4,6 +4,7 @@ import json
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from m2pem.api.arbiter import (
@@ -55,6 +56,7 @@ def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connect
     """The connections of each arbiter, by its name and the host that it runs on."""
     area = fleet.geometries.get(fleet.fence)
     fence = area if isinstance(area, Area) else None
+    folder = Path(fleet.file).parent
     connections: dict[tuple[str, str], dict[ResourceId, Connection]] = {}
     for vehicle in fleet.vehicles.values():
         group = connections.setdefault((vehicle.arbiter, vehicle.host), {})
@@ -69,6 +71,7 @@ def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connect
             sitl=vehicle.sitl,
             cruise_speed_m_s=vehicle.cruise_speed_m_s,
             endurance_s=vehicle.endurance_s,
+            folder=folder,
         )
     for payload in fleet.payloads.values():
         owner = fleet.vehicles[payload.vehicle]
@@ -83,6 +86,7 @@ def _connections(fleet: Fleet) -> dict[tuple[str, str], dict[ResourceId, Connect
             failsafe=owner.failsafe,
             fence=fence,
             sitl=owner.sitl,
+            folder=folder,
         )
     return connections
 

@@ -30,7 +30,7 @@ from m2pem_plugin_vda5050.checkpoint import (
     order_id,
 )
 from m2pem_plugin_vda5050.messages import FROM_VEHICLE, QOS, State
-from m2pem_plugin_vda5050.reading import action_state, is_executing
+from m2pem_plugin_vda5050.reading import action_state, base_end, is_executing
 from m2pem_plugin_vda5050.settings import BrokerSettings, Settings, read_settings
 from m2pem_plugin_vda5050.vehicle import Vehicle, VehicleSetup
 
@@ -295,13 +295,30 @@ class Vda5050Arbiter:
             return replace(known, native_ref=reference, reason=vehicle.absence)
         if not self._has_it(state, behavior):
             return self._unknown(known, state, checkpoint, reference)
-        self._tracker.adopt(behavior, (checkpoint.resource,), reference)
         request = BehaviorRequest(
             behavior, 0, checkpoint.behavior, checkpoint.parameters, (checkpoint.resource,)
         )
+        if reason := self._why_it_ends_early(checkpoint, state):
+            vehicle.leave_behind(behavior)
+            return replace(known, native_ref=reference, reason=reason)
+        self._tracker.adopt(behavior, (checkpoint.resource,), reference)
         vehicle.adopt(request)
         last = self._tracker.last(behavior)
         return last if last.state.terminal else replace(last, held=vehicle.is_held)
+
+    def _why_it_ends_early(self, checkpoint: Checkpoint, state: State) -> str:
+        """Return why the rest of an order cannot be sent after a restart; "" if it can, or if the
+        vehicle has all of it."""
+        count = checkpoint.left_out
+        if not count:
+            return ""
+        lacks = f"its route of {count} waypoints is too long to be stored, and"
+        if checkpoint.parameters.get("loop") is True:
+            return f"{lacks} the vehicle stops where it has no more of the loop"
+        if checkpoint.behavior not in {spec.name for spec in USUAL}:
+            return f"{lacks} whether its action is done cannot be seen"
+        released = base_end(state)
+        return "" if released >= count else f"{lacks} the vehicle stops at waypoint {released}"
 
     def _has_it(self, state: State, behavior: BehaviorId) -> bool:
         wanted = order_id(self._context.journal, behavior)

@@ -7,12 +7,14 @@ derived from the ids of behaviors, and are the same after a restart.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 from uuid import UUID, uuid5
 
 from m2pem.api import (
     BehaviorId,
     ResolvedValue,
     ResourceId,
+    Route,
     decode_parameters,
     encode_parameters,
 )
@@ -26,22 +28,28 @@ _VERSION = 1
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
     """`order_before`: the order that the vehicle had before; "" if it had none, or it is not
-    known."""
+    known. `left_out`: the number of waypoints of a route that was too long to be stored; 0: none
+    was."""
 
     resource: ResourceId
     behavior: str
     parameters: Mapping[str, ResolvedValue]
     order_before: str = ""
+    left_out: int = 0
 
 
 def encode_checkpoint(checkpoint: Checkpoint) -> str:
-    whole = {
+    route = checkpoint.parameters.get("route")
+    count = len(route.waypoints) if isinstance(route, Route) else 0
+    whole: dict[str, Any] = {
         "v": _VERSION,
         "resource": checkpoint.resource,
         "behavior": checkpoint.behavior,
         "parameters": encode_parameters(checkpoint.parameters, LONGEST_ROUTE),
         "before": checkpoint.order_before,
     }
+    if count > LONGEST_ROUTE:
+        whole["left_out"] = count
     return json.dumps(whole, separators=(",", ":"))
 
 
@@ -56,6 +64,7 @@ def decode_checkpoint(text: str) -> Checkpoint | None:
             str(whole["behavior"]),
             decode_parameters(whole["parameters"]),
             str(whole["before"]),
+            int(whole.get("left_out", 0)),
         )
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None

@@ -119,9 +119,9 @@ def _read(connection: Connection) -> Settings:
     version = str(reader.values.get("version", "2.1.0"))
     if not VERSIONS.fullmatch(version):
         raise reader.error("version", f"{version!r} is neither 2.0.0 nor 2.1.0")
-    factsheet = _factsheet(reader)
+    factsheet = _factsheet(reader, connection.folder)
     return Settings(
-        _broker(reader),
+        _broker(reader, connection.folder),
         _level(reader, "manufacturer", None),
         _level(reader, "serial_number", None, _SERIAL),
         _map(reader),
@@ -137,7 +137,13 @@ def _read(connection: Connection) -> Settings:
     )
 
 
-def _broker(reader: ConnectionReader) -> BrokerSettings:
+def _file(reader: ConnectionReader, key: str, folder: Path) -> str:
+    """Return the path of a file, which may be named relative to the fleet file; "": none."""
+    name = reader.text(key, "")
+    return str(folder / Path(name).expanduser()) if name else ""
+
+
+def _broker(reader: ConnectionReader, folder: Path) -> BrokerSettings:
     example = "such as mqtt://127.0.0.1:1883, or mqtts://broker.example.org"
     if "url" not in reader.values:
         raise reader.error("url", f"it is missing: write the MQTT broker, {example}")
@@ -165,10 +171,10 @@ def _broker(reader: ConnectionReader) -> BrokerSettings:
         port or PORTS[parts.scheme],
         parts.scheme == "mqtts",
         reader.text("user", ""),
-        reader.text("password_file", ""),
-        tls.text("ca", ""),
-        tls.text("certificate", ""),
-        tls.text("key", ""),
+        _file(reader, "password_file", folder),
+        _file(tls, "ca", folder),
+        _file(tls, "certificate", folder),
+        _file(tls, "key", folder),
     )
 
 
@@ -203,10 +209,10 @@ def _map(reader: ConnectionReader) -> MapSettings:
     return MapSettings(inner.text("id", ""), origin, rotation)
 
 
-def _factsheet(reader: ConnectionReader) -> Factsheet | None:
+def _factsheet(reader: ConnectionReader, folder: Path) -> Factsheet | None:
     if "factsheet" not in reader.values:
         return None
-    file = Path(reader.text("factsheet", ""))
+    file = Path(_file(reader, "factsheet", folder))
     try:
         return decode(file.read_bytes(), Factsheet)
     except OSError as error:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from m2pem_plugin_vda5050.arbiter import Vda5050Arbiter
 from m2pem_plugin_vda5050.checkpoint import order_id
-from vda_world import Judge, Mosquitto, SimProcess, connection, write_fleet
+from vda_world import Judge, Mosquitto, SimProcess, connection, until, write_fleet
 
 from m2pem.api import (
     BehaviorState,
@@ -370,6 +370,34 @@ async def test_an_order_that_no_report_is_stored_of_goes_on_when_it_is_started_a
         assert (found.state, found.number) == (BehaviorState.UNKNOWN, 0)
         await harness.start("r1.b1", "goto", AGV1, target=NEAR, speed=0.5)
         assert (await harness.ended("r1.b1", 120)).state is BehaviorState.SUCCEEDED
+    assert world.sim.count("accepts order") == 1
+
+
+@pytest.mark.parametrize("released", [2, 0])
+async def test_a_route_too_long_to_be_stored_does_not_end_early_after_a_restart(
+    world: World, released: int
+) -> None:
+    """The vehicle would stop at the last node that was released, and its behavior go on for ever:
+    an operator is asked, unless the vehicle has the whole route."""
+    settings = world.simulate(released_nodes=released)
+    waypoints = tuple((38.1080 + 2e-6 * number, -77.3192, None) for number in range(301))
+    route = Route(waypoints)
+    async with commanding(settings) as harness:
+        await harness.start("r1.b1", "single_vehicle_routing", AGV1, route=route)
+        await moving(harness)
+        reference = harness.of("r1.b1")[-1].native_ref
+    sent = len(world.judge.of("order", AGV1))
+    async with commanding(settings) as harness:
+        found = await harness.arbiter.query("r1.b1", reference)
+        if not released:
+            assert found.state is BehaviorState.RUNNING
+            return
+        assert (found.state, found.not_begun) == (BehaviorState.UNKNOWN, False)
+        assert "its route of 301 waypoints is too long to be stored" in found.reason
+        assert "the vehicle stops at waypoint " in found.reason
+        await harness.start("r1.b1", "single_vehicle_routing", AGV1, route=route)
+        await asyncio.to_thread(until, lambda: len(world.judge.of("order", AGV1)) > sent + 1)
+        await harness.running("r1.b1")
     assert world.sim.count("accepts order") == 1
 
 

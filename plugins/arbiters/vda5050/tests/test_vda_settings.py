@@ -9,15 +9,20 @@ import pytest
 from m2pem_plugin_vda5050.arbiter import Vda5050Arbiter
 from m2pem_plugin_vda5050.broker import tls_context
 from m2pem_plugin_vda5050.catalogue import Scope
+from m2pem_plugin_vda5050.host_checks import check_brokers
 from m2pem_plugin_vda5050.map_frame import MapFrame
 from m2pem_plugin_vda5050.messages import Headers
 from m2pem_plugin_vda5050.settings import Settings, read_password, read_settings
 from m2pem_plugin_vda5050.simulator.agv import AgvSpec
 from m2pem_plugin_vda5050.simulator.factsheet import factsheet
+from m2pem_plugin_vda5050.simulator.simulation import read_specs
+from vda_world import child_environment, write_fleet
 
+from m2pem import load_fleet
 from m2pem.api import Connection, ResourceId, SystemClock
 from m2pem.errors import PluginError
 from m2pem.testing.contracts.arbiter_harness import context
+from tests.command_line import CommandLine
 
 LEAST = {
     "url": "mqtt://127.0.0.1",
@@ -138,6 +143,31 @@ def test_a_password_is_in_a_file_that_its_owner_alone_may_read(tmp_path: Path) -
     file.write_text("\n", encoding="utf-8")
     with pytest.raises(PluginError, match="its first line has no password"):
         read_password(broker)
+
+
+def test_files_are_named_relative_to_the_fleet_file(tmp_path: Path) -> None:
+    spec = AgvSpec("agv1", "KIT", "0001", "2.1.0", "hall", actions={"weld": 1.0})
+    (tmp_path / "agv.json").write_bytes(factsheet(spec, Headers("KIT", "0001").of("factsheet", 0)))
+    files = {
+        "user": "m2pem",
+        "password_file": "secret",
+        "tls": {"ca": "ca.pem", "certificate": "/etc/m2pem.pem", "key": "keys/m2pem.key"},
+        "factsheet": "agv.json",
+    }
+    url = {"url": "mqtts://127.0.0.1:1"}
+    file = write_fleet(tmp_path / "fleet.yaml", {"agv1": {**LEAST, **url, **files}})
+    ((_, settings, _),) = read_specs(load_fleet(file))
+    broker = settings.broker
+    assert broker.password_file == str(tmp_path / "secret")
+    assert broker.ca == str(tmp_path / "ca.pem")
+    assert broker.certificate == "/etc/m2pem.pem"
+    assert broker.key == str(tmp_path / "keys/m2pem.key")
+    (check,) = check_brokers(load_fleet(file))
+    assert str(tmp_path / "secret") in check.message
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    status, listed, said = CommandLine(elsewhere, child_environment(tmp_path)).run("fleet", file)
+    assert (status, "weld " in listed) == (0, True), said
 
 
 def test_a_certificate_that_cannot_be_used_is_named(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any, Self
 
 import aiomqtt
@@ -55,8 +56,9 @@ def read_specs(fleet: Fleet) -> list[tuple[AgvSpec, Settings, float]]:
         PluginError: a connection is wrong; the text names the resource and the key.
     """
     vehicles = [each for each in fleet.vehicles.values() if each.arbiter == ARBITER and each.sitl]
+    folder = Path(fleet.file).parent
     connections = {
-        each.id: Connection(each.id, each.domain.value, each.settings, sitl=True)
+        each.id: Connection(each.id, each.domain.value, each.settings, sitl=True, folder=folder)
         for each in vehicles
     }
     read = read_settings(connections)
