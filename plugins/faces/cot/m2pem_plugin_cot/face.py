@@ -34,6 +34,7 @@ GEOMETRIES_EVERY_S = 60.0
 MAX_WAITING = 100
 """Received events that wait; more are dropped."""
 RECEIVED_PER_S = 20
+CHANGES_EVERY_S = 1.0
 SAY_EVERY_S = 60.0
 
 
@@ -50,6 +51,8 @@ class CotFace:
         self._states: dict[str, VehicleState] = {}
         self._holders: Mapping[ResourceId, str] = {}
         self._waiting: asyncio.Queue[tuple[bytes, str]] = asyncio.Queue(MAX_WAITING)
+        self._next: dict[str, tuple[Received, str]] = {}
+        """What becomes of a geometry, by its name: the newest event."""
         self._given: dict[str, Point | Route | Area] = {}
         self._refused: dict[str, int] = {}
 
@@ -61,7 +64,7 @@ class CotFace:
         """
         works = [self._link.run(), self._follow(), self._send(), self._send_geometries()]
         if self._settings.receive:
-            works.append(self._take_in())
+            works += [self._take_in(), self._change()]
         works.append(self._say())
         tasks = [asyncio.create_task(work) for work in works]
         try:
@@ -163,14 +166,21 @@ class CotFace:
                 self._refuse(str(error))
                 received = None
             if received is not None and not received.uid.startswith(self._uid("", "")):
-                await self._hand_over(received, source)
+                if received.name in self._fleet.handed_over:
+                    self._next[received.name] = received, source
+                else:
+                    self._refuse(f"{received.name!r} is not among the fleet's handed_over")
             await asyncio.sleep(1 / RECEIVED_PER_S)
 
-    async def _hand_over(self, received: Received, source: str) -> None:
-        name = received.name
-        if name not in self._fleet.handed_over:
-            self._refuse(f"{name!r} is not among the fleet's handed_over")
-            return
+    async def _change(self) -> None:
+        """Hand geometries over. Each change is in the journals of all runs, so that a sender could
+        fill the disk: the newest one of a period counts."""
+        while True:
+            for name in list(self._next):
+                await self._hand_over(name, *self._next.pop(name))
+            await asyncio.sleep(CHANGES_EVERY_S)
+
+    async def _hand_over(self, name: str, received: Received, source: str) -> None:
         if self._given.get(name) == received.geometry:
             return
         by = f"cot {received.uid} at {source}"

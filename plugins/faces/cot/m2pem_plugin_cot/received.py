@@ -45,14 +45,19 @@ def read_event(content: bytes) -> Received | None:
     try:
         event = etree.fromstring(content, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
-        raise EventError(f"no XML: {error}") from None
+        raise EventError(f"no XML: {printable(str(error))}") from None
     if event.tag != "event":
         raise EventError("its root is no event")
-    type_, uid = event.get("type", ""), event.get("uid", "")[:MAX_NAME]
+    type_, uid = event.get("type", ""), printable(event.get("uid", ""))
     contact = event.find("detail/contact")
     name = "" if contact is None else contact.get("callsign", "")[:MAX_NAME]
     geometry = _geometry(type_, event)
     return None if geometry is None else Received(uid, name, geometry)
+
+
+def printable(text: str) -> str:
+    """Return a text of a sender for logs and journals: in one line, and not too long."""
+    return "".join(each if each.isprintable() else " " for each in text[:MAX_NAME])
 
 
 def _geometry(type_: str, event: etree._Element) -> Point | Route | Area | None:
@@ -101,15 +106,17 @@ class EventStream:
 
     def feed(self, content: bytes) -> Iterator[bytes]:
         """Yield the events that are whole now."""
-        self._waiting += content
-        while (end := self._waiting.find(END)) >= 0:
-            event, self._waiting = self._waiting[: end + len(END)], self._waiting[end + len(END) :]
+        waiting, begin = self._waiting + content, 0
+        while (found := waiting.find(END, begin)) >= 0:
+            end = found + len(END)
             if self._skips:
                 self._skips = False
-            elif len(event) > MAX_EVENT_BYTES:
+            elif end - begin > MAX_EVENT_BYTES:
                 self.too_long += 1
             else:
-                yield _without_prologue(event)
+                yield _without_prologue(waiting[begin:end])
+            begin = end
+        self._waiting = waiting[begin:]
         if len(self._waiting) > MAX_EVENT_BYTES:
             self.too_long += not self._skips
             self._skips = True

@@ -1,6 +1,7 @@
 """What is sent, and what of received bytes is used."""
 
 import contextlib
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -106,3 +107,40 @@ def test_a_stream_is_split_into_its_events_wherever_it_is_cut(
     assert len(found) <= sum(part == event() for part in parts)
     if all(part == event() for part in parts):
         assert found == at_once == [event()] * len(parts)
+
+
+class Counted(bytes):
+    """Bytes that count how many of them are copied."""
+
+    copied = 0
+
+    def __add__(self, other: bytes) -> "Counted":
+        return Counted(super().__add__(other))
+
+    def __radd__(self, other: bytes) -> "Counted":
+        return Counted(other + bytes(self))
+
+    def __getitem__(self, key: Any) -> Any:
+        part = super().__getitem__(key)
+        if not isinstance(part, bytes):
+            return part
+        Counted.copied += len(part)
+        return Counted(part)
+
+
+def test_many_small_events_at_once_are_copied_once() -> None:
+    """A server must not hold up the executive: copying the rest for each event took 0.2 s."""
+    Counted.copied = 0
+    content = Counted(b"</event>" * 32_768)
+    assert sum(1 for _ in EventStream().feed(content)) == 32_768
+    assert Counted.copied <= 2 * len(content)
+
+
+def test_what_a_sender_calls_itself_is_one_line() -> None:
+    content = event().replace(b'uid="m1"', b'uid="anna&#10;WARNING&#x9b;31m&#x202e;"')
+    found = read_event(content)
+    assert found is not None
+    assert found.uid == "anna WARNING 31m "
+    with pytest.raises(EventError) as raised:
+        read_event(b"<" + b"a" * 40_000 + b"></b>")
+    assert len(str(raised.value)) < 200

@@ -18,12 +18,12 @@ import pytest
 from lxml import etree
 from m2pem_plugin_cot.face import CotFace
 
-from m2pem.api import FaceSettings, GeoPosition, MissionControl, Point, VehicleState
+from m2pem.api import FaceSettings, GeoPosition, MissionControl, Point, VehicleState, records
 from m2pem.errors import PluginError
 from m2pem.testing import run_executive, scenarios, serve_face
 
 WITHIN_S = 20.0
-PLACE = [38.10755, -77.3192]
+PLACE, FAR = [38.10755, -77.3192], [38.15, -77.3192]
 NAMES = ("rover1", "rover2")
 HANDED_OVER = ("lz",)
 
@@ -35,6 +35,15 @@ def free_port(kind: int = socket.SOCK_DGRAM) -> int:
             probe.bind(("127.0.0.1", port))
             return port
     raise AssertionError
+
+
+def is_bound(port: int) -> bool:
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return True
+    return False
 
 
 @asynccontextmanager
@@ -154,6 +163,28 @@ async def test_a_hostile_sender_changes_nothing_and_slows_nothing() -> None:
             assert str((await ended).status) == "completed"
             assert sent > 1000
             assert control.geometries() == {}
+
+
+async def test_a_flood_of_changes_does_not_fill_the_journal() -> None:
+    """Each change is a record of every run. The last one counts."""
+    port = free_port()
+    settings = {"url": f"udp://127.0.0.1:{free_port()}", "listen": f"udp://127.0.0.1:{port}"}
+    places = [f'lat="38.{1080 + number}" lon="-77.3190"' for number in range(40)]
+
+    def is_last(control: MissionControl) -> bool:
+        given = control.geometries().get("lz")
+        return given is not None and given.geometry["geometry"]["coordinates"][1] == 38.1119
+
+    with socket.socket(type=socket.SOCK_DGRAM) as flood:
+        async with fleet(**settings, receive=True) as control:
+            run = await control.execute_behavior("rover1", "goto", {"target": FAR}, by="anna")
+            await until(lambda: is_bound(port))
+            for place in places:
+                flood.sendto(marker(place=place), ("127.0.0.1", port))
+            await until(lambda: is_last(control))
+            found = [each.record for each in await control.records(run, 0, 1000)]
+            changes = [each for each in found if isinstance(each, records.GeometryReceived)]
+            assert len(changes) < len(places) // 2
 
 
 async def test_a_stalled_server_loses_events_and_the_face_connects_again() -> None:
