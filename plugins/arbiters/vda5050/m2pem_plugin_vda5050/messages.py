@@ -5,7 +5,6 @@ a later minor version may have more. Enumerations of what a vehicle sends are pl
 a value that is not known is still understood.
 """
 
-import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal, TypeVar
@@ -16,6 +15,9 @@ from msgspec import UNSET, Meta, Struct, UnsetType
 VERSION = "2.1.0"
 LARGEST_MESSAGE = 4 << 20
 """In bytes. Larger messages are not read."""
+
+FURTHEST = 1e6
+"""In metres: a map is a plane, and a number beyond this gives no position on Earth."""
 
 Whole = Annotated[int, Meta(ge=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
@@ -282,8 +284,8 @@ def decode(payload: bytes, type_: type[T]) -> T:
     numbers = [] if position is UNSET else [position.x, position.y, position.theta]
     if velocity is not UNSET:
         numbers += [each for each in (velocity.vx, velocity.vy) if each is not UNSET]
-    if not all(math.isfinite(number) for number in numbers):
-        raise MessageError("a position or velocity is not finite")
+    if not all(abs(number) <= FURTHEST for number in numbers):
+        raise MessageError(f"a position or velocity is beyond {FURTHEST:g} (SI)")
     return message  # type: ignore[return-value]  # its decoder was chosen by the type
 
 

@@ -120,6 +120,11 @@ class OrderProgress:
         self.update_id, self.traversed, self.base_end = update_id, traversed, base_end
         self._first, self._end = base_end, base_end
 
+    def reach(self, number: int) -> None:
+        """Note the last node that the vehicle says it has reached: none that is not released, or
+        the next update would be as long as a wrong number is high."""
+        self.traversed = max(self.traversed, min(number, self.base_end))
+
     @property
     def is_update_due(self) -> bool:
         """Whether more nodes should be released."""

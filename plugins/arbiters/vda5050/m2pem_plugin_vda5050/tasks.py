@@ -243,7 +243,7 @@ class OrderTask(Task):
                 self._adopt(state)
         self._progress()
         if self._order is not None:
-            self._order.traversed = max(self._order.traversed, traversed(state))
+            self._order.reach(traversed(state))
         self._follow_route(traversed(state))
         if self._step_end(state):
             return

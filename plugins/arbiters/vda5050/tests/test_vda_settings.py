@@ -10,8 +10,9 @@ from m2pem_plugin_vda5050.arbiter import Vda5050Arbiter
 from m2pem_plugin_vda5050.broker import tls_context
 from m2pem_plugin_vda5050.catalogue import Scope
 from m2pem_plugin_vda5050.host_checks import check_brokers
-from m2pem_plugin_vda5050.map_frame import MapFrame
-from m2pem_plugin_vda5050.messages import Headers
+from m2pem_plugin_vda5050.map_frame import MapFrame, MapPoint
+from m2pem_plugin_vda5050.messages import Headers, MessageError, Visualization, decode
+from m2pem_plugin_vda5050.orders import OrderPlan, OrderProgress
 from m2pem_plugin_vda5050.settings import Settings, read_password, read_settings
 from m2pem_plugin_vda5050.simulator.agv import AgvSpec
 from m2pem_plugin_vda5050.simulator.factsheet import factsheet
@@ -208,6 +209,24 @@ def test_a_factsheet_offers_its_actions(tmp_path: Path) -> None:
     assert [(each.name, each.required) for each in own["paint"].spec.parameters] == [
         ("colour", True)
     ]
+
+
+def test_a_vehicle_cannot_make_an_update_long_by_a_wrong_number() -> None:
+    square = tuple(MapPoint(*place) for place in ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)))
+    order = OrderProgress(OrderPlan("o", "hall", square[0], square, loop=True), 2, None)
+    order.extend()
+    order.reach(2**40)
+    assert order.is_update_due
+    order.extend()
+    nodes, _ = order.message()
+    assert [node.sequence_id for node in nodes] == [4, 6, 8]
+
+
+@pytest.mark.parametrize("x", ["1e300", "-2e6"])
+def test_a_place_that_is_not_on_earth_is_no_message(x: str) -> None:
+    place = f'{{"x": {x}, "y": 0, "theta": 0, "mapId": "hall", "positionInitialized": true}}'
+    with pytest.raises(MessageError, match="a position or velocity is beyond"):
+        decode(f'{{"agvPosition": {place}}}'.encode(), Visualization)
 
 
 def test_the_catalogue_needs_no_connection() -> None:
