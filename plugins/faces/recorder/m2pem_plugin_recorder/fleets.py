@@ -13,5 +13,6 @@ def fleet_json(fleet: Fleet) -> bytes:
             fleet,
             vehicles={key: replace(each, settings={}) for key, each in fleet.vehicles.items()},
             payloads={key: replace(each, settings={}) for key, each in fleet.payloads.items()},
+            hosts={},
         )
     )

@@ -3,6 +3,7 @@
 import asyncio
 import hashlib
 import math
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import msgspec
 import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from lxml import etree
+from m2pem_plugin_recorder.fleets import fleet_json
 from m2pem_plugin_recorder.recording import recording_files
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoder
@@ -20,7 +22,8 @@ from recording_world import DRIVE, FIELD, GATE, ROAD, recorded, simulated_fleet
 
 import m2pem
 from m2pem.api import LocalFrame, StampedRecord
-from m2pem.testing import MissionResult, run_executive
+from m2pem.fleet.hosts import Host
+from m2pem.testing import MissionResult, run_executive, scenarios
 from m2pem.testing.harness import run_mission_on
 from m2pem.testing.scenarios import ORIGIN, question
 
@@ -205,6 +208,15 @@ def test_mission_diagram_and_fleet_are_attached(tmp_path: Path) -> None:
     told = metadata.metadata
     assert told["mission_sha256"] == hashlib.sha256(DRIVE).hexdigest()
     assert (told["run"], told["m2pem"], told["part"]) == ("r1", m2pem.__version__, "1")
+
+
+def test_no_address_is_handed_on_with_a_recording() -> None:
+    secrets = {"ugv1": {"url": "udp://10.0.0.7:1", "password_file": "/etc/secret"}}
+    made = scenarios.fleet("sim", secrets)
+    host = Host("truck", connect=("tls/10.0.0.7:7447",), credentials="/etc/secret")
+    told = fleet_json(replace(made, hosts={"truck": host}, faces={"cot": {"url": "10.0.0.7"}}))
+    assert b"10.0.0.7" not in told
+    assert b"secret" not in told
 
 
 def test_a_full_file_is_followed_by_the_next(
