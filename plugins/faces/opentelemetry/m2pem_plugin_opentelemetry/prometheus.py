@@ -1,6 +1,7 @@
 """Face `prometheus`: serves `/metrics`."""
 
 import asyncio
+import time
 from http import HTTPStatus
 
 from m2pem.api.capabilities import FaceCapabilities
@@ -15,6 +16,10 @@ REQUEST_BYTES = 16_384
 
 WITHIN_S = 10.0
 """How long a client may take to ask, and again to read."""
+
+PAGE_EVERY_S = 0.5
+"""Between two pages: one of hundreds of vehicles takes 50 ms of the executive's time, and a client
+could ask without a pause."""
 
 CONNECTIONS = 16
 """Connections at one time; others are closed at once."""
@@ -38,6 +43,7 @@ class PrometheusFace:
         self._observation = RunObservation(control)
         self._connections: set[asyncio.Task[None]] = set()
         self._one = asyncio.Lock()
+        self._rendered_s = -PAGE_EVERY_S
 
     async def serve(self) -> None:
         """Serve until cancelled.
@@ -107,7 +113,9 @@ class PrometheusFace:
         fields = [each.partition(":") for each in rest.split("\r\n")]
         accept = ",".join(value for name, _, value in fields if name.strip().lower() == "accept")
         async with self._one:
+            await asyncio.sleep(self._rendered_s + PAGE_EVERY_S - time.monotonic())
             page, content_type = await self._render(accept)
+            self._rendered_s = time.monotonic()
         return HTTPStatus.OK, page, content_type
 
     async def _render(self, accept: str) -> tuple[bytes, str]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -10,7 +11,7 @@ import httpx
 import pytest
 from m2pem_plugin_opentelemetry import exposition, prometheus
 from m2pem_plugin_opentelemetry.metrics import METRICS, Kind
-from m2pem_plugin_opentelemetry.prometheus import CONNECTIONS, PrometheusFace
+from m2pem_plugin_opentelemetry.prometheus import CONNECTIONS, PAGE_EVERY_S, PrometheusFace
 from otel_collector import free_port
 from otel_condition import until
 from prometheus_client.openmetrics.parser import (
@@ -145,6 +146,14 @@ async def test_a_head_has_no_body() -> None:
     assert head.status_code == 200
     assert int(head.headers["content-length"]) > 1000
     assert head.content == b""
+
+
+async def test_a_client_that_asks_without_a_pause_does_not_take_the_executives_time() -> None:
+    async with scraped() as (_, client, _):
+        begun_s = time.monotonic()
+        pages = await asyncio.gather(*(client.get("/metrics") for _ in range(4)))
+        assert time.monotonic() - begun_s >= 3 * PAGE_EVERY_S
+    assert {each.status_code for each in pages} == {200}
 
 
 async def test_clients_that_never_ask_or_never_read_are_bounded_and_let_go(
