@@ -33,6 +33,7 @@ from m2pem.api.runs import (
     RunSummary,
     SimulationResult,
     StampedRecord,
+    stamped_records,
 )
 from m2pem.api.schedule import WHEN_FREE, EntryId, Schedule, When
 from m2pem.api.statistics import ExecutiveStatistics
@@ -444,10 +445,7 @@ class Control:
         """A page of a run's records; it ends with those of an input, so it may be longer."""
         page: list[StampedRecord] = []
         async for entry in self._supervisor.journal.read(run, after_seq):
-            page += (
-                StampedRecord(run, entry.seq + place, entry.t_us / 1_000_000, record)
-                for place, record in enumerate(entry.records)
-            )
+            page += stamped_records(run, entry.seq, entry.t_us / 1_000_000, entry.records)
             if len(page) >= limit:
                 break
         return page

@@ -14,7 +14,7 @@ from typing import Protocol
 
 from m2pem.api.clock import Clock
 from m2pem.api.log_context import current_run
-from m2pem.api.runs import Alert, OpenPrompt, PromptClosed, RunId, StampedRecord
+from m2pem.api.runs import Alert, OpenPrompt, PromptClosed, RunId, stamped_records
 from m2pem.engine import commands as c
 from m2pem.engine import records as r
 from m2pem.engine.inputs import (
@@ -457,10 +457,7 @@ class Runner:
                 context.dispatcher.release(record.keeping)
         if context.events.has_subscribers:
             t_s = step.t_us / 1_000_000
-            places = enumerate(step.records, step.seq)
-            context.events.publish(
-                *(StampedRecord(self.id, seq, t_s, record) for seq, record in places)
-            )
+            context.events.publish(*stamped_records(self.id, step.seq, t_s, step.records))
 
     def _dispatch_early(self, step: Step) -> None:
         for command in step.commands:
