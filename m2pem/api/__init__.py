@@ -54,11 +54,16 @@ if TYPE_CHECKING:
     from m2pem.api.description import Description, Importance, Kind, describe
     from m2pem.api.epoch_fence import EpochFence
     from m2pem.api.event_rules import (
+        UNKNOWN,
+        AnswerRule,
+        EventThrower,
         Fields,
         ReceiveRule,
         SendRule,
         Thrown,
-        thrown_by_missions,
+        ThrownEvents,
+        Unknown,
+        read_rules,
     )
     from m2pem.api.exporter import ExportedRecord, ExportedRun, Exporter, ExportOptions
     from m2pem.api.face import Face, FaceSettings
@@ -186,7 +191,8 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
-    "m2pem.api.event_rules": "Fields ReceiveRule SendRule Thrown thrown_by_missions",
+    "m2pem.api.event_rules": "AnswerRule EventThrower Fields ReceiveRule SendRule Thrown "
+    "ThrownEvents UNKNOWN Unknown read_rules",
     "m2pem.api.exporter": "ExportedRecord ExportedRun Exporter ExportOptions",
     "m2pem.api.face": "Face FaceSettings",
     "m2pem.api.log_context": "current_run trace_ids",
@@ -240,6 +246,12 @@ _MODULES = {
 _LAZY = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 __all__ = [
+    "read_rules",
+    "Unknown",
+    "UNKNOWN",
+    "ThrownEvents",
+    "EventThrower",
+    "AnswerRule",
     "SCHEDULE",
     "WHEN_FREE",
     "When",
@@ -286,7 +298,6 @@ __all__ = [
     "ReceiveRule",
     "SendRule",
     "Thrown",
-    "thrown_by_missions",
     "CutOffPolicy",
     "DataName",
     "Decision",

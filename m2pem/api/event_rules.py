@@ -4,22 +4,25 @@ A face reads such rules from its settings. What a received message holds is a ma
 conditions and values of a rule are expressions (docs/conditions.md) that read it by dotted names.
 """
 
+import asyncio
 import logging
+from collections import deque
 from collections.abc import AsyncIterator, Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from m2pem.api.control import MissionControl
 from m2pem.api.face import FaceSettings
 from m2pem.api.runs import RunId, RunStatus, StampedRecord
 from m2pem.engine.records import MessageThrown, SignalThrown
-from m2pem.errors import ExpressionSyntaxError, M2pemError, OperatorError
+from m2pem.errors import ExpressionError, ExpressionSyntaxError, M2pemError, OperatorError
 from m2pem.mission.expression import Expression, literal, parse, template
 from m2pem.mission.mission import Mission
-from m2pem.mission.values import Value
+from m2pem.mission.values import ReadValue, Value
 from m2pem.units import Dimension
 
-log = logging.getLogger("m2pem.face")
+log = logging.getLogger("m2pem.face.events")
+"""Its warnings are alerts of operators, too."""
 
 Fields = Mapping[str, Value]
 
@@ -27,6 +30,21 @@ RECEIVED = ("signal", "message", "when", "every", "rate", "data")
 """What each rule of `receive` may say, beside what names the messages in its protocol."""
 THROWN = ("signal", "message", "fields")
 """What each rule of `send` may say, beside where it is sent to."""
+ANSWERED = ("done", "failed", "success", "data")
+"""What a rule of `send` may say of the answer, where its protocol has answers."""
+
+MOST_RULES = 200
+DEEPEST = 10
+"""Levels of maps and lists in `fields`."""
+WAITING = 1000
+"""Events that wait to be thrown. Of more, the oldest are dropped."""
+
+
+class Unknown:
+    """Stands for a value that is known only when a mission throws."""
+
+
+UNKNOWN: Final = Unknown()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +70,8 @@ class Thrown:
 class ReceiveRule:
     """Received messages, such as those of a topic, and what they are to missions.
 
-    They are an event when `when` becomes true, or each time that it is true (`every`); never
-    more often than `rate`.
+    They are an event when `when` becomes true, or each time that it is true (`every`, the default
+    without a `when`); never more often than `rate`. A rule belongs to one thread, but for `throw`.
     """
 
     def __init__(
@@ -87,7 +105,7 @@ class ReceiveRule:
             _thrown(given),
             _expression(given, "when", given.text("when", "true")),
             {name: _template(data, name) for name in data.values},
-            every=given.flag("every", False),
+            every=given.flag("every", "when" not in given.values),
             period_s=1 / rate_hz,
         )
 
@@ -114,20 +132,50 @@ class ReceiveRule:
 
     async def throw(self, control: MissionControl, data: Fields, by: str) -> None:
         """Throw it in every run that goes on and has it."""
-        if self.thrown.signal:
-            try:
-                await control.signal(self.thrown.signal, data=data, by=by)
-            except OperatorError as error:
-                log.info("%s by %s: %s", self.thrown, by, error)
-            return
         for run in await control.runs():
             if run.status not in (RunStatus.RUNNING, RunStatus.PAUSED):
                 continue
             try:
-                for message in self.thrown.ids(await control.mission(run.run)):
-                    await control.message(message, run=run.run, data=data, by=by)
-            except M2pemError as error:
-                log.warning("%s for %s by %s: %s", self.thrown, run.run, by, error)
+                for id_ in self.thrown.ids(await control.mission(run.run)):
+                    if self.thrown.signal:
+                        await control.signal(id_, run=run.run, data=data, by=by)
+                    else:
+                        await control.message(id_, run=run.run, data=data, by=by)
+            except M2pemError as error:  # it may have ended meanwhile
+                log.info("%s for %s by %s: %s", self.thrown, run.run, by, error)
+
+
+class EventThrower:
+    """Throws events one after the other, in the order in which they came.
+
+    It belongs to the event loop; `run` goes on until cancelled.
+    """
+
+    def __init__(self, control: MissionControl) -> None:
+        self._control = control
+        self._waiting: deque[tuple[ReceiveRule, Fields, str]] = deque()
+        self._wake = asyncio.Event()
+        self._dropped = 0
+
+    def put(self, rule: ReceiveRule, data: Fields, by: str) -> None:
+        """Throw an event soon. `by`: where it came from, such as "ros /alarm"."""
+        if len(self._waiting) >= WAITING:
+            self._waiting.popleft()
+            if not self._dropped:
+                log.warning("events from outside come too fast: the oldest are dropped")
+            self._dropped += 1
+        self._waiting.append((rule, data, by))
+        self._wake.set()
+
+    async def run(self) -> None:
+        """Throw what comes, until cancelled."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._waiting:
+                rule, data, by = self._waiting.popleft()
+                await rule.throw(self._control, data, by)
+            self._dropped = 0
 
 
 class SendRule:
@@ -153,32 +201,131 @@ class SendRule:
         Raises:
             ExpressionError: a value cannot be evaluated on this data.
         """
-        return _filled(self._fields, data)
+        return dict(_filled(self._fields, data))
+
+    def constants(self) -> dict[str, Any]:
+        """Return the fields, with `UNKNOWN` for what depends on what is thrown.
+
+        Raises:
+            ExpressionError: a value cannot be evaluated.
+        """
+        return dict(_filled(self._fields, None))
 
 
-async def thrown_by_missions(
-    control: MissionControl, rules: Collection[SendRule]
-) -> AsyncIterator[tuple[SendRule, RunId, Fields]]:
-    """Yield what missions throw, from now on, that a rule is about. What others throw into them,
-    a face among them, is not."""
-    missions: dict[RunId, Mission] = {}
-    async for event in control.subscribe():
-        if not isinstance(event, StampedRecord):
-            continue
+class AnswerRule:
+    """What the answer to something sent is to the run that threw it: the signal `done` or `failed`,
+    if it is named, with `data` of the answer's fields."""
+
+    def __init__(
+        self, done: str, failed: str, success: Expression, data: Mapping[str, Expression]
+    ) -> None:
+        self.done = done
+        self.failed = failed
+        self._success = success
+        self._data = data
+
+    @classmethod
+    def read(cls, given: FaceSettings, success: str) -> Self:
+        """Read it. `success`: the usual condition for `done`.
+
+        Raises:
+            PluginError: something is wrong; it names the key.
+        """
+        data = given.inner("data", '{gate.text: "${message}"}')
+        return cls(
+            given.text("done", ""),
+            given.text("failed", ""),
+            _expression(given, "success", given.text("success", success)),
+            {name: _template(data, name) for name in data.values},
+        )
+
+    async def throw(
+        self, control: MissionControl, run: RunId, answer: Fields | None, by: str, problem: str = ""
+    ) -> None:
+        """Throw the signal for an answer. None: there was none, because of the `problem`."""
+        data: dict[str, Value] = {}
+        try:
+            fields = answer if answer is not None else {}
+            read = _reader(fields)
+            succeeded = answer is not None and self._success.holds(read)
+            data = {name: value.evaluate(read) for name, value in self._data.items()}
+        except ExpressionError as error:
+            succeeded, problem = False, f"its answer: {error}"
+        if not succeeded:
+            log.warning("%s: %s, asked by run %s", by, problem or "it was not done", run)
+        if signal := self.done if succeeded else self.failed:
+            try:
+                await control.signal(signal, run=run, data=data, by=by)
+            except OperatorError as error:
+                log.warning("the answer of %s: %s", by, error)
+
+
+class ThrownEvents:
+    """What missions throw, from when this is made, that a rule is about. What others throw into
+    them, a face among them, is not.
+
+    Iterate over it: each is the rule, the run, and the data. It ends with the executive.
+    """
+
+    def __init__(self, control: MissionControl, rules: Collection[SendRule]) -> None:
+        self._control = control
+        self._rules = rules
+        self._events = control.subscribe()
+        self._missions: dict[RunId, Mission] = {}
+
+    async def __aiter__(self) -> AsyncIterator[tuple[SendRule, RunId, Fields]]:
+        while True:
+            try:
+                async for event in self._events:
+                    if isinstance(event, StampedRecord):
+                        for rule, data in await self._meant(event):
+                            yield rule, event.run, data
+            except OperatorError as error:
+                log.warning("what missions threw may not have been sent: %s", error)
+                self._events = self._control.subscribe()
+            else:
+                return
+
+    async def _meant(self, event: StampedRecord) -> list[tuple[SendRule, Fields]]:
         record = event.record
         if not isinstance(record, SignalThrown | MessageThrown) or not record.element:
-            continue
-        if event.run not in missions:
-            if len(missions) > 100:
-                missions.clear()
-            missions[event.run] = await control.mission(event.run)
-        for rule in rules:
-            is_signal = isinstance(record, SignalThrown)
-            id_ = record.signal if isinstance(record, SignalThrown) else record.message
-            if is_signal == bool(rule.thrown.signal) and id_ in rule.thrown.ids(
-                missions[event.run]
-            ):
-                yield rule, event.run, record.data
+            return []
+        try:
+            mission = await self._mission(event.run)
+        except M2pemError as error:
+            log.warning("what run %s throws is not sent: %s", event.run, error)
+            return []
+        is_signal = isinstance(record, SignalThrown)
+        id_ = record.signal if isinstance(record, SignalThrown) else record.message
+        return [
+            (rule, record.data)
+            for rule in self._rules
+            if is_signal == bool(rule.thrown.signal) and id_ in rule.thrown.ids(mission)
+        ]
+
+    async def _mission(self, run: RunId) -> Mission:
+        if run not in self._missions:
+            if len(self._missions) > 100:
+                self._missions.clear()
+            self._missions[run] = await self._control.mission(run)
+        return self._missions[run]
+
+
+def read_rules(given: FaceSettings, key: str) -> list[FaceSettings]:
+    """Return a reader of each rule of a list, such as `receive`; its errors say which it is.
+
+    Raises:
+        PluginError: it is no list of maps, or too long.
+    """
+    value = given.values.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
+        raise given.error(key, "it is not a list of rules such as - {signal: alarm, ...}")
+    if len(value) > MOST_RULES:
+        raise given.error(key, f"it has {len(value)} rules; {MOST_RULES} are the most")
+    return [
+        FaceSettings(given.resource, each, f"{given.path}.{key}[{number}]")
+        for number, each in enumerate(value)
+    ]
 
 
 def _thrown(given: FaceSettings) -> Thrown:
@@ -207,42 +354,54 @@ def _template(given: FaceSettings, key: str) -> Expression:
         raise given.error(key, str(error)) from None
 
 
-def _tree(given: FaceSettings) -> dict[str, Any]:
-    """Fields as they are written: maps within maps, with expressions in place of values."""
-    return {
-        key: _tree(given.inner(key, "{x: 1}"))
-        if isinstance(value, Mapping)
-        else [_template(FaceSettings("", {key: each}, given.path), key) for each in value]
-        if isinstance(value, list)
-        else _template(given, key)
-        for key, value in given.values.items()
-    }
+def _tree(given: FaceSettings, level: int = 1) -> dict[str, Any]:
+    """Fields as they are written: maps and lists in each other, with expressions for values."""
+    return {str(key): _branch(given, key, value, level) for key, value in given.values.items()}
 
 
-def _filled(fields: Mapping[str, Any], data: Fields) -> dict[str, Any]:
-    read = _reader(data)
+def _branch(given: FaceSettings, key: str, value: Any, level: int) -> Any:
+    if level > DEEPEST:
+        raise given.error(key, f"it is nested deeper than {DEEPEST} levels")
+    if isinstance(value, Mapping):
+        return _tree(FaceSettings(given.resource, value, f"{given.path}.{key}"), level + 1)
+    if isinstance(value, list):
+        return [
+            _branch(FaceSettings(given.resource, {name: each}, given.path), name, each, level + 1)
+            for number, each in enumerate(value)
+            for name in [f"{key}[{number}]"]
+        ]
+    return _template(FaceSettings(given.resource, {key: value}, given.path), key)
 
-    def value_of(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {key: value_of(each) for key, each in value.items()}
-        if isinstance(value, list):
-            return [value_of(each) for each in value]
-        return value.evaluate(read)
 
-    return {key: value_of(value) for key, value in fields.items()}
+def _filled(tree: Any, data: Fields | None) -> Any:
+    """Evaluate a tree; `data` None: only what is constant."""
+    if isinstance(tree, Mapping):
+        return {key: _filled(each, data) for key, each in tree.items()}
+    if isinstance(tree, list):
+        return [_filled(each, data) for each in tree]
+    if data is None and not tree.constant:
+        return UNKNOWN
+    return tree.evaluate(_reader(data or {}))
 
 
-def _reader(fields: Fields) -> Any:
+def _reader(fields: Fields) -> ReadValue:
     """Read fields by dotted names, through maps within maps."""
 
     def read(name: str) -> Value:
         if name in fields:
-            return fields[name]
+            return _plain(fields[name])
         value: Any = fields
         for part in name.split("."):
             if not isinstance(value, Mapping) or part not in value:
                 return None
             value = value[part]
-        return value if not isinstance(value, Mapping) else dict(value)
+        return _plain(value)
 
     return read
+
+
+def _plain(value: Any) -> Value:
+    """A face may convert maps when they are read; what an expression gets is whole."""
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return value  # type: ignore[no-any-return]

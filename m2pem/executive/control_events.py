@@ -207,7 +207,13 @@ class RecordObservers:
             self._events.publish(Alert("", "OBSERVERS_BEHIND", text))
 
 
-LOGGERS = ("m2pem.arbiter", "m2pem.dispatch", "m2pem.executive", "m2pem.teams")
+LOGGERS = (
+    "m2pem.arbiter",
+    "m2pem.dispatch",
+    "m2pem.executive",
+    "m2pem.face.events",
+    "m2pem.teams",
+)
 
 
 class LoggedAlerts(logging.Handler):

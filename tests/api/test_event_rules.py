@@ -5,8 +5,17 @@ from typing import Any
 
 import pytest
 
-from m2pem.api.event_rules import ReceiveRule, SendRule, thrown_by_missions
+from m2pem.api.event_rules import (
+    UNKNOWN,
+    AnswerRule,
+    EventThrower,
+    ReceiveRule,
+    SendRule,
+    ThrownEvents,
+    read_rules,
+)
 from m2pem.api.face import FaceSettings
+from m2pem.api.runs import RunId
 from m2pem.errors import ExpressionError, PluginError
 from m2pem.testing import run_executive, scenarios
 
@@ -95,6 +104,67 @@ def test_a_wrong_rule_is_named(settings: dict[str, Any], says: str) -> None:
     assert says in str(raised.value)
 
 
+def test_without_a_condition_each_message_is_an_event() -> None:
+    assert events(receive(), 1, 1, 2) == [True, True, True]
+
+
+def test_fields_that_depend_on_what_is_thrown_are_unknown_before() -> None:
+    fields = {"data": "${level}", "list": [{"key": "a"}, "${level}"], "n": 3}
+    rule = SendRule.read(FaceSettings("ros", {"signal": "s", "fields": fields}), [])
+    assert rule.constants() == {"data": UNKNOWN, "list": [{"key": "a"}, UNKNOWN], "n": 3}
+
+
+def test_fields_may_not_be_too_deep() -> None:
+    fields: Any = {"x": 1}
+    for _ in range(12):
+        fields = {"x": [fields]}
+    with pytest.raises(PluginError, match="nested deeper than 10 levels"):
+        SendRule.read(FaceSettings("ros", {"signal": "s", "fields": fields}), [])
+
+
+@pytest.mark.parametrize(
+    ("rules", "says"),
+    [
+        ({"signal": "a"}, r"faces\.ros\.receive: it is not a list of rules"),
+        (["a"], r"faces\.ros\.receive: it is not a list of rules"),
+        ([{}] * 201, r"it has 201 rules; 200 are the most"),
+    ],
+)
+def test_rules_are_a_list(rules: Any, says: str) -> None:
+    with pytest.raises(PluginError, match=says):
+        read_rules(FaceSettings("ros", {"receive": rules}), "receive")
+
+
+def test_each_rule_is_named_by_its_number() -> None:
+    first, second = read_rules(FaceSettings("ros", {"receive": [{"a": 1}, {"b": 2}]}), "receive")
+    assert (first.values, second.path) == ({"a": 1}, "faces.ros.receive[1]")
+
+
+@pytest.mark.parametrize(
+    ("answer", "signal"),
+    [({"success": True}, "done"), ({"success": False}, "failed"), (None, "failed"), ({}, "done")],
+)
+async def test_an_answer_is_a_signal_for_the_run_that_asked(answer: Any, signal: str) -> None:
+    rule = AnswerRule.read(
+        FaceSettings("ros", {"done": "done", "failed": "failed", "data": {"ok": "${success}"}}),
+        "success != false",
+    )
+    control = SignalLog()
+    await rule.throw(control, RunId("r7"), answer, "ros /gate", "no answer")  # type: ignore[arg-type]
+    success = (answer or {}).get("success")
+    assert control.signals == [(signal, "r7", {"ok": success}, "ros /gate")]
+
+
+class SignalLog:
+    """Keeps the signals that it is asked to emit."""
+
+    def __init__(self) -> None:
+        self.signals: list[tuple[str, str, Any, str]] = []
+
+    async def signal(self, signal: str, *, run: str, data: Any, by: str) -> None:
+        self.signals.append((signal, run, data, by))
+
+
 async def test_missions_get_events_and_what_they_throw_is_sent() -> None:
     fields = {"data": "${level}", "header": {"frame_id": "map"}, "list": [1, "${level}"]}
     sends = SendRule.read(
@@ -104,20 +174,22 @@ async def test_missions_get_events_and_what_they_throw_is_sent() -> None:
     alarm = receive(data={"alarm.level": "${level}"})
     go = ReceiveRule.read(FaceSettings("ros", {"message": "go"}), [])
     async with run_executive(scenarios.fleet("sim", {"rover1": {}})) as control:
+        thrown = ThrownEvents(control, [sends, other])
 
         async def follow() -> tuple[Any, Any]:
-            async for rule, run, data in thrown_by_missions(control, [sends, other]):
+            async for rule, run, data in thrown:
                 return run, rule.filled(data)
             raise AssertionError
 
-        following = asyncio.create_task(follow())
-        await asyncio.sleep(0)
         await alarm.throw(control, {"alarm.level": 1}, "ros /alarm")  # no run has it: nothing
         run = await control.start(BPMN)
-        await alarm.throw(control, {"alarm.level": 4}, "ros /alarm")
-        await go.throw(control, {}, "ros /go")
+        thrower = EventThrower(control)
+        throwing = asyncio.create_task(thrower.run())
+        thrower.put(alarm, {"alarm.level": 4}, "ros /alarm")
+        thrower.put(go, {}, "ros /go")
         assert str((await control.wait(run)).status) == "completed"
         records = await control.records(run)
-        sent = await following
+        sent = await follow()
+        throwing.cancel()
     assert sent == (run, {"data": 5, "header": {"frame_id": "map"}, "list": [1, 5]})
     assert {"ros /alarm", "ros /go"} <= {getattr(each.record, "by", "") for each in records}

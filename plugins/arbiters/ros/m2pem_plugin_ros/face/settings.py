@@ -28,7 +28,8 @@ RATES: Mapping[str, float] = {
 when it comes."""
 
 ALL, NONE = "all", "none"
-KEYS = ("namespace", "domain_id", "rate", "commands")
+KEYS = ("namespace", "domain_id", "rate", "commands", "receive", "send")
+"""`receive` and `send`: event_settings.py."""
 
 
 @dataclass(frozen=True, slots=True)
