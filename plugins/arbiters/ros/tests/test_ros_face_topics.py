@@ -17,6 +17,7 @@ from m2pem_plugin_ros.runtime import RosRuntime
 from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.settings import DriverName, Settings
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 from ros_face_client import LATCHED, STATIC, World, faced, point, two_vehicles, until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStatus
@@ -303,6 +304,29 @@ async def test_a_topic_that_another_node_publishes_is_left_to_it(
             "client"
         ]
         await hears(world, STATE, "/ugv1/imu", Imu, of_state)
+    assert "/ugv1/odom is left to the node /client, which publishes it" in caplog.text
+
+
+async def test_a_topic_is_left_to_a_node_when_its_name_is_known(
+    ros_domain: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caplog.set_level("INFO")
+    looks, info = 0, Node.get_publishers_info_by_topic
+
+    def late(self: Node, topic: str, *arguments: Any) -> Any:
+        nonlocal looks
+        looks += topic == "/ugv1/odom"
+        found = info(self, topic, *arguments)
+        for each in found if looks < 3 else ():
+            each.node_name, each.node_namespace = "_NODE_NAME_UNKNOWN_", "_NODE_NAMESPACE_UNKNOWN_"
+        return found
+
+    monkeypatch.setattr(Node, "get_publishers_info_by_topic", late)
+    async with faced(ros_domain) as world:
+        await hears(world, STATE, "/ugv1/odom", Odometry, of_state)
+        world.client.node.create_publisher(Odometry, "/ugv1/odom", 10)
+        await until(lambda: "/ugv1/odom is left to the node" in caplog.text)
+    assert looks >= 3
     assert "/ugv1/odom is left to the node /client, which publishes it" in caplog.text
 
 

@@ -18,6 +18,7 @@ from m2pem.api import LocalFrame, ResourceId, VehicleState
 from m2pem_plugin_ros.face import telemetry_messages as messages
 from m2pem_plugin_ros.face.geometry import Vector, earth_from_enu
 from m2pem_plugin_ros.face.names import BASE, EARTH, Names
+from m2pem_plugin_ros.face.publisher import publishers_of
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
 from m2pem_plugin_ros.face.vehicle_topics import VehicleTopics
 from m2pem_plugin_ros.frames import Quaternion
@@ -153,7 +154,7 @@ class FramesPublisher:
                 self._leave(child, transform.header.frame_id)
 
     def _leave(self, child: str, parent: str) -> None:
-        if self._has_namesake():
+        if self._may_be_namesake():
             return
         self._left.add(child)
         log.warning(
@@ -162,10 +163,12 @@ class FramesPublisher:
         if self._statics.pop(child, None) is not None:
             self.publish_static()
 
-    def _has_namesake(self) -> bool:
-        """Whether the face of another executive, which this one replaces, has not ended yet."""
-        own = self._node.get_name(), self._node.get_namespace()
-        return bool(self._node.get_node_names_and_namespaces().count(own) > 1)
+    def _may_be_namesake(self) -> bool:
+        """Whether the face of another executive, which this one replaces, may have published it."""
+        topic = self._publisher.topic_name
+        known = publishers_of(self._node, topic)
+        ours = known.count(self._node.get_fully_qualified_name())
+        return ours > 1 or len(known) < self._node.count_publishers(topic)
 
 
 def _stamp(transform: Any) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
+from m2pem_plugin_ros.sensors.endpoints import UNKNOWN_NODE
 
 TELEMETRY = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Reliable, as the displays of RViz and the nodes of Nav2 subscribe by default; a subscriber of
@@ -18,6 +19,15 @@ dropped."""
 T = TypeVar("T")
 
 log = logging.getLogger("m2pem.face.ros")
+
+
+def publishers_of(node: Node, topic: str) -> list[str]:
+    """Return the full name of the node of each publisher of a topic, of those that are known."""
+    return [
+        f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+        for endpoint in node.get_publishers_info_by_topic(topic)
+        if endpoint.node_name != UNKNOWN_NODE
+    ]
 
 
 class TelemetryPublisher(Generic[T]):
@@ -65,15 +75,12 @@ class TelemetryPublisher(Generic[T]):
         self._limiter.close()
 
     def _other(self) -> str:
-        """Return another node that publishes the topic; "" if there is none."""
-        own_name = self._node.get_fully_qualified_name()
+        """Return another node that publishes the topic; "" if there is none, or it has our name, as
+        the face of an executive has that is replaced by this one."""
         if self._node.count_publishers(self.topic) <= (self._publisher is not None):
             return ""
-        for endpoint in self._node.get_publishers_info_by_topic(self.topic):
-            name = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
-            if name != own_name:
-                return name
-        return ""
+        own = self._node.get_fully_qualified_name()
+        return next((name for name in publishers_of(self._node, self.topic) if name != own), "")
 
     def _publish(self, item: T) -> None:
         try:

@@ -17,6 +17,9 @@ from m2pem_plugin_ros.settings import DriverName, Settings, Via
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
 
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+"""The name of a node whose endpoint was discovered before the node itself."""
+
 NAMELESS = "a node whose name is not known yet"
 LEASE = "a crashed one is listed for up to 20 s"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -270,7 +273,7 @@ def _named(found: Sequence[Any]) -> str:
 
 
 def _name(endpoint: Any) -> str:
-    if endpoint.node_name == "_NODE_NAME_UNKNOWN_":  # an endpoint is discovered before its node
+    if endpoint.node_name == UNKNOWN_NODE:
         return NAMELESS
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
