@@ -381,6 +381,7 @@ async def test_the_face_of_an_executive_that_is_replaced_takes_no_frames_from_th
                 await asyncio.sleep(0.05)
                 assert number < 400
         assert "is left to that node" not in caplog.text
+        assert caplog.text.count("another node is /face, too") == 2
         del frames[:]
         ours = asyncio.create_task(until(lambda: [each for each in list(frames) if moves(each)]))
         await said(new, STATE, ours)

@@ -67,7 +67,7 @@ class FramesPublisher:
         self._latest: dict[ResourceId, VehicleState] = {}
         self._sent: dict[str, deque[tuple[int, int]]] = {}
         self._limiter: RateLimiter[None] = RateLimiter(rate_hz, self._publish)
-        self._is_wanted = False
+        self._is_wanted = self._namesake_told = False
         self._subscriptions: dict[str, Any] = {}
         self._statics: dict[str, Any] = {}
         """The transforms that stay, by the frame that they lead to."""
@@ -166,9 +166,17 @@ class FramesPublisher:
     def _may_be_namesake(self) -> bool:
         """Whether the face of another executive, which this one replaces, may have published it."""
         topic = self._publisher.topic_name
-        known = publishers_of(self._node, topic)
-        ours = known.count(self._node.get_fully_qualified_name())
-        return ours > 1 or len(known) < self._node.count_publishers(topic)
+        known, name = publishers_of(self._node, topic), self._node.get_fully_qualified_name()
+        if known.count(name) > 1:
+            if not self._namesake_told:
+                self._namesake_told = True
+                log.warning(
+                    "another node is %s, too: the face of an executive that this one replaces, or "
+                    "of a second one in this ROS domain, which needs a namespace of its own",
+                    name,
+                )
+            return True
+        return bool(len(known) < self._node.count_publishers(topic))
 
 
 def _stamp(transform: Any) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections import deque
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import Any
@@ -112,8 +113,8 @@ class GoalServer:
         self._node = node.get_fully_qualified_name()
         self._carry_out = carry_out
         self._goals: dict[bytes, Goal] = {}
-        self._cancelled: set[bytes] = set()
-        """Goals that were cancelled before they began here."""
+        self._cancelled: deque[bytes] = deque(maxlen=MOST_GOALS)
+        """Goals that were cancelled before they began here, or just when they ended."""
         self._open = 0
         self._server = ActionServer(
             node,
@@ -144,14 +145,14 @@ class GoalServer:
         goal = self._goals.get(key)
         if goal is not None:
             goal.cancelled.set()
-        elif len(self._cancelled) < MOST_GOALS:
-            self._cancelled.add(key)
+        else:
+            self._cancelled.append(key)
 
     async def _execute(self, handle: Any) -> Any:
         key = _key(handle)
         goal = self._goals[key] = Goal(handle, f"ros {self._node} goal {key.hex()[:8]}")
         if key in self._cancelled:
-            self._cancelled.discard(key)
+            self._cancelled.remove(key)
             goal.cancelled.set()
         try:
             return await self._carry_out(goal)

@@ -71,7 +71,8 @@ class RosRuntime:
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._calls = Calls(self._loop)
-        self._nodes: list[Node] = []
+        self._nodes: dict[Node, str] = {}
+        """With their full names."""
         self._tasks: set[asyncio.Task[Any]] = set()
         self._closing: asyncio.Task[None] | None = None
         self.context = Context()
@@ -101,7 +102,7 @@ class RosRuntime:
     @property
     def node_names(self) -> Sequence[str]:
         """The full names of its nodes."""
-        return [node.get_fully_qualified_name() for node in self._nodes]
+        return list(self._nodes.values())
 
     async def __aenter__(self) -> Self:
         return self
@@ -125,13 +126,13 @@ class RosRuntime:
             what = f"the node '{namespace}/{name}' cannot be created"
             raise RosError(f"{what}: {refused(error)}{_security()}") from error
         self.executor.add_node(node)
-        self._nodes.append(node)
+        self._nodes[node] = node.get_fully_qualified_name()
         return node
 
     def drop_node(self, node: Node) -> None:
         """Destroy a node that `make_node` made, and all that belongs to it."""
         self.executor.remove_node(node)
-        self._nodes.remove(node)
+        del self._nodes[node]
         _destroy(node)
 
     def entities(self, node: Node | None = None) -> frozenset[Any]:
@@ -330,7 +331,7 @@ class RosRuntime:
         await asyncio.to_thread(self._let_go)
 
     def _let_go(self) -> None:
-        for node in self._nodes:
+        for node in list(self._nodes):
             _destroy(node)
         self._nodes.clear()
         self.executor.shutdown(timeout_sec=0)
