@@ -23,7 +23,7 @@ class JsonFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line, without its end. Called where it is logged, so that the run is known."""
-        run = getattr(record, "run", "") or current_run.get()
+        run = str(getattr(record, "run", "") or current_run.get())
         at = datetime.fromtimestamp(record.created, UTC)
         line = {
             "time": at.isoformat(timespec="microseconds").replace("+00:00", "Z"),

@@ -54,6 +54,12 @@ def test_what_is_known_of_a_line_is_in_its_fields(lines: list[dict[str, Any]]) -
     }
 
 
+def test_fields_of_other_libraries_are_no_errors(lines: list[dict[str, Any]]) -> None:
+    log.warning("started", extra={"run": ["a", 1], "resource": {"x": 1}})
+    (line,) = lines
+    assert (line["run"], line["resource"]) == ("['a', 1]", "{'x': 1}")
+
+
 def test_what_was_raised_has_its_traceback_only_if_asked_for() -> None:
     try:
         raise ValueError("no radio")
