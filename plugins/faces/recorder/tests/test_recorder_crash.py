@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from m2pem_plugin_recorder.channels import RECORDS, TELEMETRY
-from m2pem_plugin_recorder.reading import messages_of
+from m2pem_plugin_recorder.reading import last_record, messages_of
 from m2pem_plugin_recorder.recording import recording_files
 from mcap.exceptions import McapError
 from mcap.stream_reader import StreamReader
@@ -75,6 +75,37 @@ def test_a_killed_process_leaves_a_readable_file_and_its_successor_goes_on(tmp_p
     assert numbers(*paths) == [each["seq"] for each in journal]
     written = [msgspec.json.decode(m.data) for p in paths for m in messages_of(p, (RECORDS,))]
     assert written == journal
+
+
+def test_the_last_record_is_found_without_reading_telemetry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An executive that takes a run up does not wait for gigabytes of it, wherever they end."""
+
+    async def main() -> None:
+        async with (
+            run_executive(simulated_fleet(), speed=20.0) as control,
+            recorded(control, tmp_path),
+        ):
+            await run_mission_on(control, DRIVE)
+
+    monkeypatch.setattr("m2pem_plugin_recorder.recording.CHUNK_BYTES", 2_000)
+    asyncio.run(main())
+    (path,) = tmp_path.glob("*.mcap")
+    whole, torn = path.read_bytes(), tmp_path / "torn.mcap"
+    found = []
+    for size in (*range(0, len(whole), 997), len(whole)):
+        torn.write_bytes(whole[:size])
+        found.append((torn.read_bytes(), numbers(torn)))
+
+    def read(*_: object) -> None:
+        raise AssertionError("a message is read")
+
+    monkeypatch.setattr("mcap.records.Message.read", read)
+    for content, left in found:
+        torn.write_bytes(content)
+        assert last_record([torn]) == len(left)
+    assert len({len(left) for _, left in found}) > 3
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_mission(tmp_path: Path) -> None:
