@@ -45,6 +45,9 @@ ACCEPTED_WITHIN_S = 15.0
 CANCEL_SHARE = 0.8
 """A cancel that takes more than this part of the cancel timeout has failed."""
 
+UNSENT_AFTER_S = 6.0
+"""So long after a cancel, it has failed if the broker is not connected: operators must hear it."""
+
 LEAST_PROGRESS_M = 1.0
 """What is left of a route that fails or is lost is reported if so much was driven since."""
 
@@ -55,7 +58,8 @@ REFUSED = "REJECTED"
 class TaskSetup:
     """The arguments of a task. `id`: of the order or action. `left_behind`: is called with the id
     of an order that the vehicle may still execute when its behavior has ended, and whether it is to
-    be cancelled at once. `position`: the place of the vehicle."""
+    be cancelled at once. `position`: the place of the vehicle. `broker_problem`: why the
+    broker is not connected, or ""."""
 
     request: BehaviorRequest
     spec: BehaviorSpec
@@ -67,6 +71,7 @@ class TaskSetup:
     cancel_timeout_s: float
     left_behind: Callable[[str, bool], None]
     position: Callable[[], GeoPosition | None]
+    broker_problem: Callable[[], str]
 
 
 class Task(ABC):
@@ -305,6 +310,8 @@ class OrderTask(Task):
 
     def _fail_cancel_after_limit(self, cancelled_us: int) -> None:
         limit_s = CANCEL_SHARE * self._setup.cancel_timeout_s
+        if problem := self._setup.broker_problem():
+            limit_s = min(limit_s, UNSENT_AFTER_S)
         if self._waited_s(cancelled_us) < limit_s:
             return
         self._leave(cancel=True)
@@ -312,6 +319,8 @@ class OrderTask(Task):
         self._report_left(LEAST_PROGRESS_M)
         did = "has refused the cancel" if self._cancel.refused else "did not stop"
         reason = f"the vehicle {did} within {limit_s:g} s, and may still execute its order"
+        if problem:
+            reason += f": the broker is not connected: {problem}"
         self._end(BehaviorState.FAILED, "TIMEOUT", reason)
 
     # --- inside ---------------------------------------------------------------------------------

@@ -129,7 +129,7 @@ class Vehicle:
         self._resolved = asyncio.Event()
         self._is_held = False
         self._logged: dict[str, int] = {}
-        self._invalid = ""
+        self._invalid = self._broker_problem = ""
 
     # --- messages of the vehicle ----------------------------------------------------------------
 
@@ -339,7 +339,7 @@ class Vehicle:
         connected, or "".
         """
         silent_s = (self._clock.now_us() - self._contact_us) / 1e6
-        before = self.link
+        before, self._broker_problem = self.link, problem
         self.link = self._link_state(silent_s, may_lose=may_lose)
         if self.link is LinkState.LOST and may_lose and self._is_silent(silent_s):
             if self.doing is not None:
@@ -485,6 +485,7 @@ class Vehicle:
             self._limits.cancel_timeout_s,
             self._leave_behind,
             self.position,
+            lambda: self._broker_problem,
         )
         if request.behavior in STOPS:
             return StopTask(setup, lambda: not self._is_held)

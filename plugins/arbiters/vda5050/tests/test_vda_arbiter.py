@@ -101,6 +101,22 @@ async def test_a_vehicle_that_refuses_a_cancel_is_not_said_to_have_stopped(world
         assert paused["nodeStates"], "it still has its order"
 
 
+async def test_a_cancel_without_a_broker_is_soon_said_not_to_have_arrived(world: World) -> None:
+    settings = world.simulate(cancel_timeout="600 s")
+    async with commanding(settings, lost_after_s=600.0) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=FAR)
+        await moving(harness)
+        world.broker.stop()
+        await harness.arbiter.cancel("r1.b1", 1)
+        end = await harness.ended("r1.b1", 60)
+        assert (end.state, end.code) == (BehaviorState.FAILED, "TIMEOUT")
+        assert "may still execute its order: the broker is not connected: " in end.reason
+        world.broker.start()
+        # It is paused and cancelled as soon as it is received again.
+        await world.heard("state", AGV1, lambda state: state["paused"])
+        await world.heard("state", AGV1, lambda state: state["orderId"] and not state["nodeStates"])
+
+
 async def test_a_vehicle_that_stops_at_the_next_node_is_cancelled_when_it_is_there(
     world: World,
 ) -> None:
