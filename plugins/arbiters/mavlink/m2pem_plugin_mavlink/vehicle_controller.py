@@ -19,8 +19,14 @@ from m2pem_plugin_mavlink.behaviors.arrival import (
 from m2pem_plugin_mavlink.behaviors.behavior import Behavior, BehaviorFailedError
 from m2pem_plugin_mavlink.behaviors.takeoff_landing import Land, ReturnToLaunch, SetSpeed
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError
+from m2pem_plugin_mavlink.vehicle.autopilot import ModeLeftError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode
-from m2pem_plugin_mavlink.vehicle.takeover_monitor import TEXTS_BEFORE_S, Cause, TakeoverMonitor
+from m2pem_plugin_mavlink.vehicle.takeover_monitor import (
+    SETTLES_S,
+    TEXTS_BEFORE_S,
+    Cause,
+    TakeoverMonitor,
+)
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 
 LOOK_EVERY_S = 0.2
@@ -216,6 +222,8 @@ class VehicleController:
             await self._fail(active, error.reason, error.code)
         except _TakenOverError as error:
             self._end(active, BehaviorState.FAILED, error.code, error.reason)
+        except ModeLeftError as error:
+            await self._end_taken_over(active, error.reason)
         except ExchangeError as error:
             await self._fail(active, error.reason)
         except asyncio.CancelledError:
@@ -295,6 +303,19 @@ class VehicleController:
             if takeover.cause is Cause.FAILSAFE:
                 code = "BATTERY_LOW" if "batt" in takeover.reason.lower() else "FAILED"
             raise _TakenOverError(takeover.reason, code)
+
+    async def _end_taken_over(self, active: _ActiveBehavior, reason: str) -> None:
+        """End a behavior that was taken over while it was prepared, with the cause once it is
+        known."""
+        code = "TAKEN_OVER"
+        end_s = self.vehicle.link.now_s() + SETTLES_S + LOOK_EVERY_S
+        try:
+            while self.vehicle.link.now_s() < end_s:
+                self._check_takeover(accepted_modes(active.behavior))
+                await self.vehicle.sleep(LOOK_EVERY_S)
+        except _TakenOverError as error:
+            code, reason = error.code, error.reason
+        self._end(active, BehaviorState.FAILED, code, reason)
 
     def _has_restarted(self) -> bool:
         """Return False.

@@ -234,6 +234,12 @@ class DoubleVehicle:
     def link_state(self) -> LinkState:
         return LinkState.CONNECTED if self.body.heard_by_us else LinkState.LOST
 
+    def refused_frames(self) -> str:
+        return ""
+
+    def warn_of_refused_frames(self) -> bool:
+        return False
+
     def telemetry(self) -> VehicleState:
         state = self.state
         return VehicleState(

@@ -7,12 +7,14 @@ from typing import Any
 import pytest
 from m2pem_plugin_mavlink.protocol.transaction import ExchangeError, NoAnswerError, RefusedError
 from m2pem_plugin_mavlink.sitl.readiness import ready
+from m2pem_plugin_mavlink.vehicle.autopilot import ModeLeftError
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.vehicle import Vehicle
 from mavlink_vehicle_world import (
     ACCEPTED,
     AUTO,
     BRAKE,
+    DENIED,
     FAILED,
     GUIDED,
     LOITER,
@@ -35,6 +37,7 @@ Run = Callable[[Callable[[Clock], Any]], Any]
 
 ARM, SET_MODE = dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_SET_MODE
 TAKEOFF, REPOSITION = dialect.MAV_CMD_NAV_TAKEOFF, dialect.MAV_CMD_DO_REPOSITION
+HOLD = 4
 SPEED = dialect.MAV_CMD_DO_CHANGE_SPEED
 THERE = TargetPosition(47.4, 8.55, 20.0)
 
@@ -136,14 +139,66 @@ def test_guided_is_repeated_until_the_heartbeat_shows_it(virtual: Run) -> None:
     virtual(main)
 
 
-def test_a_mode_that_is_acknowledged_but_does_not_come_is_no_success(virtual: Run) -> None:
+def test_a_mode_that_is_acknowledged_but_does_not_come_is_left_to_whoever_revoked_it(
+    virtual: Run,
+) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             link.obey[SET_MODE] = lambda _: ACCEPTED
             with pytest.raises(
+                ModeLeftError,
+                match=r"mode GUIDED was accepted, and then .* changed the mode to STABILIZE",
+            ):
+                await vehicle.driver.set_mode(FlightMode.GUIDED)
+            assert commands(link) == [SET_MODE]
+
+    virtual(main)
+
+
+def test_a_mode_that_is_acknowledged_and_then_silence_is_no_success(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(copter(clock)) as (link, vehicle):
+            link.obey[SET_MODE] = lambda _: ACCEPTED
+            await link.switch_off()
+            with pytest.raises(
                 NoAnswerError, match="mode GUIDED was accepted, but was not confirmed"
             ):
                 await vehicle.driver.set_mode(FlightMode.GUIDED)
+            assert commands(link).count(SET_MODE) > 1
+
+    virtual(main)
+
+
+def test_a_pilot_who_stops_a_rover_while_it_is_armed_is_not_overridden(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(rover(clock)) as (link, vehicle):
+            arm = link.obey[ARM]
+
+            def arm_and_hold(message: Any) -> int | None:
+                link.custom_mode = HOLD
+                return arm(message)
+
+            link.obey[ARM] = arm_and_hold
+            with pytest.raises(ModeLeftError, match=r"it was in GUIDED, and then .* to HOLD"):
+                await vehicle.driver.go_to(THERE)
+            assert link.custom_mode == HOLD
+            assert commands(link) == [SET_MODE, ARM]
+
+    virtual(main)
+
+
+def test_a_pilot_who_stops_a_rover_before_it_has_a_target_is_not_overridden(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        async with Playing(rover(clock)) as (link, vehicle):
+
+            def refuse_outside_guided(message: Any) -> int:
+                link.custom_mode = HOLD  # just before, and no heartbeat has shown it yet
+                return ACCEPTED if message.param2 else DENIED
+
+            link.obey[REPOSITION] = refuse_outside_guided
+            with pytest.raises(ModeLeftError, match=r"it was in GUIDED, and then .* to HOLD"):
+                await vehicle.driver.go_to(THERE)
+            assert commands(link) == [SET_MODE, ARM, REPOSITION]
 
     virtual(main)
 
@@ -209,7 +264,7 @@ def test_a_copter_takes_off_in_guided_after_arming(virtual: Run) -> None:
     async def main(clock: Clock) -> None:
         async with Playing(copter(clock)) as (link, vehicle):
             await vehicle.driver.take_off(15.0)
-            assert commands(link) == [SET_MODE, ARM, SET_MODE, TAKEOFF]
+            assert commands(link) == [SET_MODE, ARM, TAKEOFF]
             assert link.of("COMMAND_LONG", TAKEOFF)[0].param7 == 15.0
 
     virtual(main)
@@ -267,7 +322,7 @@ def test_a_place_is_told_in_its_altitude_frame(virtual: Run, frame: str, number:
             assert (there.frame, there.x, there.y, there.z) == (
                 number, 474_000_000, 85_500_000, 20.0,
             )  # fmt: skip
-            assert (there.param1, there.param2) == (-1.0, 1.0)
+            assert (there.param1, there.param2) == (-1.0, 0.0)
             (speed,) = link.of("COMMAND_LONG", SPEED)
             assert speed.param2 == 5.0
             assert commands(link) == [SET_MODE, REPOSITION, SPEED]

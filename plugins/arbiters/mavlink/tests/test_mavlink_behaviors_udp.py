@@ -344,6 +344,29 @@ def test_another_ground_station_that_changes_the_mode_is_reported_and_not_fought
     fly(main, COPTER)
 
 
+@pytest.mark.parametrize("moment", ["in its mode", "armed"])
+def test_another_ground_station_that_stops_a_vehicle_that_is_being_prepared_is_not_overridden(
+    moment: str,
+) -> None:
+    async def main(bench) -> None:
+        so_far = {
+            "in its mode": lambda: bench.truth().mode == "GUIDED",
+            "armed": lambda: bench.truth().armed,
+        }[moment]
+        async with another_station(bench) as other:
+            await bench.start("r1.b1", "goto", "v1", target=point(300, 0))
+            assert await bench.until(so_far, AMPLE_S)
+            hold = 4
+            assert await asyncio.to_thread(other.command, DO_SET_MODE, 1, hold) == ACCEPTED
+            end = await bench.ended("r1.b1", AMPLE_S)
+        assert (end.state, end.code) == (BehaviorState.FAILED, "TAKEN_OVER"), end
+        assert "HOLD" in end.reason
+        await bench.clock.sleep(20)
+        assert bench.truth().mode == "HOLD"
+
+    fly(main, ROVER, speed=5.0)
+
+
 def test_a_person_drives_a_rover_from_another_ground_station() -> None:
     async def main(bench) -> None:
         await bench.start("r1.b1", "goto", "v1", target=point(300, 0))

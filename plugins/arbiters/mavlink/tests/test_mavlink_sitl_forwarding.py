@@ -1,5 +1,5 @@
-"""A real ArduCopter behind an executive that forwards it: MAVSDK flies it only where the fleet lets
-commands through."""
+"""Real autopilots behind an executive that forwards them: other ground stations command them only
+where the fleet lets commands through, and then they have precedence."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -9,22 +9,19 @@ from typing import Any
 
 import mavlink_sitl as sitl
 import pytest
-from mavlink_gcs import gateway
+from mavlink_gcs import gateway, ground_station
 from mavlink_mavsdk_world import free_port
 from mavsdk import logging as mavsdk_log
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import ActionError
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import MissionControl
+from m2pem.testing import scenarios
 
-pytestmark = [
-    pytest.mark.sitl,
-    pytest.mark.skipif(
-        sitl.program("M2PEM_ARDUCOPTER") is None, reason="M2PEM_ARDUCOPTER names no program"
-    ),
-]
+pytestmark = pytest.mark.sitl("M2PEM_ARDUCOPTER", "M2PEM_ARDUROVER")
 
 WITHIN_S = 120.0
 
@@ -103,5 +100,52 @@ def test_mavsdk_takes_arducopter_off_through_m2pem_where_it_is_let(tmp_path: Pat
             await action.arm()
             await action.takeoff()
             await first(telemetry.subscribe_position(), lambda each: each.relative_altitude_m > 5.0)
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("moment", ["in GUIDED", "armed"])
+def test_who_stops_ardurover_while_m2pem_prepares_a_goto_is_not_overridden(
+    tmp_path: Path, moment: str
+) -> None:
+    async def main() -> None:
+        binary = sitl.program("M2PEM_ARDUROVER")
+        assert binary is not None
+        port = free_port()
+        fleet = FLEET.format(port=port).replace("uav1", "ugv1").replace("air", "ground")
+        rover, hold, guided, armed = 1, 4, 15, dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        so_far: Callable[[Any], bool] = {
+            "in GUIDED": lambda beat: beat.custom_mode == guided,
+            "armed": lambda beat: bool(beat.base_mode & armed),
+        }[moment]
+
+        def is_rover(message: Any) -> bool:
+            return (message.get_srcSystem(), message.get_srcComponent()) == (rover, 1)
+
+        with sitl.running([sitl.ardupilot(binary, "rover", 0, port)], tmp_path):
+            async with (
+                gateway(
+                    tmp_path,
+                    speed=sitl.SPEED,
+                    fleet=fleet,
+                    forward="all",
+                    forward_commands="all",
+                ) as (control, own),
+                ground_station(own) as station,
+            ):
+                await ready(control)
+                since = len(station.received)
+                far = f"[{sitl.HOME[0] + 0.003}, {sitl.HOME[1]}]"
+                run = await control.start(scenarios.one_behavior("goto", "ugv1", target=far))
+                await station.hears("HEARTBEAT", lambda m: is_rover(m) and so_far(m), since)
+                mode = dialect.MAV_CMD_DO_SET_MODE
+                assert await station.command(rover, mode, 1, hold) == dialect.MAV_RESULT_ACCEPTED
+                async with asyncio.timeout(WITHIN_S):
+                    summary = await control.wait(run)
+                assert "TAKEN_OVER" in summary.detail
+                assert "HOLD" in summary.detail
+                for _ in range(3):
+                    beat = await station.hears("HEARTBEAT", is_rover, len(station.received))
+                    assert beat.custom_mode == hold
 
     asyncio.run(main())

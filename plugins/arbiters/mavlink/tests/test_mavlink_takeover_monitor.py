@@ -148,6 +148,7 @@ def test_a_breach_of_the_fence_is_the_cause_of_a_change_without_a_text(virtual: 
                 "fence breached (boundary)"
             )
             # Outside since long, it explains nothing more.
+            watched.watch.begin()
             await vehicle.driver.set_mode(FlightMode.GUIDED)
             await vehicle.sleep(5.0)
             await changes_to(link, vehicle, LOITER)
@@ -214,6 +215,22 @@ def test_what_is_new_begins_with_the_vehicle_as_it_is(virtual: Run) -> None:
             await changes_to(link, vehicle, STABILIZE)
             await vehicle.sleep(2.0)
             assert watched.watch.takeover(FLYING) is not None
+
+    virtual(main)
+
+
+def test_a_mode_that_was_there_before_is_a_takeover_when_it_comes_back(virtual: Run) -> None:
+    async def main(clock: Clock) -> None:
+        watched = Watched(clock)
+        async with watched as (link, vehicle):
+            await changes_to(link, vehicle, LOITER)
+            watched.watch.begin()
+            await vehicle.driver.set_mode(FlightMode.GUIDED)
+            await changes_to(link, vehicle, LOITER)
+            await vehicle.sleep(2.0)
+            takeover = watched.watch.takeover(FLYING)
+            assert takeover is not None
+            assert takeover.cause is Cause.STATION
 
     virtual(main)
 

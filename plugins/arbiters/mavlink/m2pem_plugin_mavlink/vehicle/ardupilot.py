@@ -9,7 +9,7 @@ from m2pem_plugin_mavlink.microservices.commands import CommandPosition
 from m2pem_plugin_mavlink.microservices.mission_items import MissionItem
 from m2pem_plugin_mavlink.protocol.transaction import RefusedError
 from m2pem_plugin_mavlink.vehicle import exchanges
-from m2pem_plugin_mavlink.vehicle.autopilot import Autopilot, cannot, not_now
+from m2pem_plugin_mavlink.vehicle.autopilot import SHOWS_WITHIN_S, Autopilot, cannot, not_now
 from m2pem_plugin_mavlink.vehicle.driver import FlightMode, TargetPosition
 from m2pem_plugin_mavlink.vehicle.fixed_wing import NO_LANDING, WINGED, landing_items, landing_start
 from m2pem_plugin_mavlink.vehicle.identity import Kind
@@ -138,6 +138,7 @@ class ArdupilotDriver(Autopilot):
         armed has stopped."""
         if self.state.armed is False:
             return
+        self.commanded.entered = False  # it stops from every mode
         *better, last = _STOP_MODES[self.kind]
         for name in better:
             try:
@@ -166,18 +167,21 @@ class ArdupilotDriver(Autopilot):
             )
 
     async def _reposition(self, place: TargetPosition, radius_m: float) -> None:
+        """Send a target to a vehicle in GUIDED. It must not change the mode: one that a pilot has
+        left GUIDED with refuses it."""
         frame, altitude_m = self._altitude(place)
-        await exchanges.command_at(
-            self.link,
-            dialect.MAV_CMD_DO_REPOSITION,
-            (
-                AS_IT_IS,
-                float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE),
-                radius_m,
-                math.nan,
-            ),
-            CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, frame),
-        )
+        try:
+            await exchanges.command_at(
+                self.link,
+                dialect.MAV_CMD_DO_REPOSITION,
+                (AS_IT_IS, 0.0, radius_m, math.nan),
+                CommandPosition(place.latitude_deg, place.longitude_deg, altitude_m, frame),
+            )
+        except RefusedError:
+            guided = self.modes.number("GUIDED")
+            if await self.vehicle.until(lambda: self._was_left(guided), SHOWS_WITHIN_S):
+                raise self._left("it was in GUIDED") from None
+            raise
 
     def _altitude(self, place: TargetPosition) -> tuple[int, float]:
         """Return a MAV_FRAME and a height in it; ArduPilot accepts no NaN for the present

@@ -36,6 +36,12 @@ BEGINS_WITHIN_S = 5.0
 
 RETRY_S = 1.0
 
+SHOWS_OTHERS_AFTER_S = 1.0
+"""A heartbeat that comes so long after an acknowledgement was sent after it, on every link."""
+
+_STAYS = frozenset({FlightMode.GUIDED, FlightMode.HOLD})
+"""The modes that autopilots do not leave by themselves, unless by a failsafe."""
+
 _SECONDS = re.compile(r", \d+ s(?=;|$)")
 _SET_POSITION_TARGET = message_type("SET_POSITION_TARGET_LOCAL_NED")
 _VELOCITY_ONLY = (
@@ -66,6 +72,11 @@ def cannot(reason: str) -> RefusedError:
 def not_now(reason: str) -> RefusedError:
     """Return the error for a command that is impossible in the present state; nothing was sent."""
     return RefusedError(reason, _LATER, temporary=True)
+
+
+class ModeLeftError(ExchangeError):
+    """Another client, a pilot or a failsafe has changed the mode while m2pem prepared a behavior.
+    That has precedence: nothing more is sent."""
 
 
 class DrivenVehicle(Protocol):
@@ -134,13 +145,42 @@ class Autopilot(ABC):
 
         Raises:
             ExchangeError: the mode does not change, or it is one of manual control.
+            ModeLeftError: others have changed it meanwhile.
         """
         if mode in (FlightMode.MANUAL, FlightMode.OTHER):
             raise cannot(f"mode {mode} is a mode of manual control")
         custom_mode = self.modes.for_purpose(mode)
         if custom_mode is None:
             raise cannot(f"a {self.kind} with {self.name} has no mode for {mode}")
+        if self._stays_in(custom_mode):
+            return  # again, it might revoke what a pilot has just commanded
         await self._change_mode(custom_mode)
+
+    def _stays_in(self, custom_mode: int) -> bool:
+        """Return whether the vehicle was brought into a mode for the present behavior, and is in
+        it."""
+        commanded = self.commanded
+        stays = self.modes.purpose(custom_mode) in _STAYS
+        brought = commanded.entered and commanded.custom_mode == custom_mode
+        return stays and brought and self.state.custom_mode == custom_mode
+
+    def _refuse_if_left(self) -> None:
+        """Check that nobody else has changed the mode since it was entered from here.
+
+        Raises:
+            ModeLeftError: somebody has.
+        """
+        commanded, number = self.commanded, self.state.custom_mode
+        if commanded.custom_mode is None or number is None or number == commanded.custom_mode:
+            return
+        if commanded.entered and self.modes.purpose(commanded.custom_mode) in _STAYS:
+            raise self._left(f"it was in {self.modes.name(commanded.custom_mode)}")
+
+    def _left(self, before: str) -> ModeLeftError:
+        return ModeLeftError(
+            f"{before}, and then another ground station, a pilot or a failsafe has changed the "
+            f"mode to {self.modes.name(self.state.custom_mode or 0)}"
+        )
 
     async def _change_mode(self, custom_mode: int, within_s: float = MODE_WITHIN_S) -> None:
         await self._enter(
@@ -163,14 +203,22 @@ class Autopilot(ABC):
         must_accept: bool = False,
     ) -> None:
         """Send a command that changes the mode, and note that the change was commanded here."""
-        before = self.commanded.custom_mode
-        self.commanded.custom_mode = custom_mode
+        self._refuse_if_left()
+        before = self.commanded.custom_mode, self.commanded.entered
+        self.commanded.custom_mode, self.commanded.entered = custom_mode, False
         self.commanded.changing += 1
         name = f"mode {self.modes.name(custom_mode)}"
+
+        def revoked(accepted_s: float) -> None:
+            heard_s = self.state.heartbeat_s
+            if heard_s is not None and heard_s >= accepted_s + SHOWS_OTHERS_AFTER_S:
+                raise self._left(f"{name} was accepted")
+
         try:
-            await self._repeat(command, shows, within_s, name, must_accept=must_accept)
+            await self._repeat(command, shows, within_s, name, revoked, must_accept=must_accept)
+            self.commanded.entered = self.state.custom_mode == custom_mode
         except RefusedError:
-            self.commanded.custom_mode = before
+            self.commanded.custom_mode, self.commanded.entered = before
             raise
         finally:
             self.commanded.changing -= 1
@@ -181,19 +229,22 @@ class Autopilot(ABC):
         shows: Callable[[], bool],
         within_s: float,
         what: str,
+        revoked: Callable[[float], None] = lambda _: None,
         *,
         must_accept: bool = False,
     ) -> None:
         """Send a command until received messages confirm it: an acknowledgement may be lost, and a
         refusal may be temporary. `must_accept`: the messages prove nothing, as the vehicle may have
-        been in this state before."""
+        been in this state before. `revoked` is called with the time of an acceptance that was not
+        confirmed; it raises an error if the command must not be repeated."""
         end_s = self.link.now_s() + within_s
         while True:
             error: ExchangeError = NoAnswerError(f"{what} was accepted, but was not confirmed")
             accepted, wait_s = False, RETRY_S
+            accepted_s = self.link.now_s()
             try:
                 await command()
-                accepted, wait_s = True, SHOWS_WITHIN_S
+                accepted, wait_s, accepted_s = True, SHOWS_WITHIN_S, self.link.now_s()
             except RefusedError as refused:
                 error = refused
                 if refused.result == _UNSUPPORTED:
@@ -204,6 +255,8 @@ class Autopilot(ABC):
                 await self.vehicle.sleep(wait_s)
             elif await self.vehicle.until(shows, wait_s):
                 return
+            if accepted:
+                revoked(accepted_s)
             if self.link.now_s() >= end_s:
                 raise error
 
@@ -225,6 +278,7 @@ class Autopilot(ABC):
         if not self.readiness().ready:
             await self._have_it_checked()
         await self._until(lambda: self.readiness().ready, CHECKED_WITHIN_S)
+        self._refuse_if_left()
         await self._arm()
 
     async def _locate(self) -> None:

@@ -84,6 +84,7 @@ class Px4Driver(Autopilot):
         """Enter AUTO.LOITER, which brakes at once; one that is not armed has stopped. As this is
         also the mode in which it goes to places, then clear its target."""
         if self.state.armed is not False:
+            self.commanded.entered = False  # it stops from every mode
             await self.set_mode(FlightMode.HOLD)
             change = float(dialect.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
             nowhere = (math.nan,) * 4

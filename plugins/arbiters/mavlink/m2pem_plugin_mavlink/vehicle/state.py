@@ -82,13 +82,15 @@ class AutopilotState:
 class CommandedState:
     """Kept by the driver. None, and False: not since this arbiter was started.
 
-    `custom_mode`: the mode commanded last; `changing`: how many commands that change it are on
-    their way. `mission`: what was uploaded last, as the driver's `upload` takes it; `exchanging`:
-    how many exchanges of missions go on; `first_item`: with which item a mission was started last.
-    `disarming`: a disarm command was sent.
+    `custom_mode`: the mode commanded last; `entered`: the vehicle has shown it since the present
+    behavior began; `changing`: how many commands that change it are on their way. `mission`: what
+    was uploaded last, as the driver's `upload` takes it; `exchanging`: how many exchanges of
+    missions go on; `first_item`: with which item a mission was started last. `disarming`: a disarm
+    command was sent.
     """
 
     custom_mode: int | None = None
+    entered: bool = False
     changing: int = 0
     mission: tuple[MissionItem, ...] | None = None
     exchanging: int = 0

@@ -113,6 +113,7 @@ class TakeoverMonitor:
         """A new command follows: the present state is no takeover."""
         self._disarmed = None
         self._boots = self.vehicle.state.boots
+        self.vehicle.commanded.entered = False
         self._settled = (self.vehicle.state.custom_mode, self.vehicle.commanded.custom_mode)
 
     def restarted(self) -> Takeover | None:
@@ -242,6 +243,8 @@ class TakeoverMonitor:
         )
         if state.custom_mode != self._mode:
             self._before, self._mode, self._mode_s = self._mode, state.custom_mode, now_s
+            if state.custom_mode == commanded.custom_mode:
+                self._settled = (None, None)  # to leave it again is a change
         if state.armed != self._armed:
             if self._armed and state.armed is False and not commanded.disarming:
                 self._disarmed = (now_s, state.mode)
