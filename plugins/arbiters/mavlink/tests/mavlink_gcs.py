@@ -2,11 +2,14 @@
 
 import asyncio
 import math
+import re
+import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 from m2pem_plugin_mavlink.face.face import MavlinkFace
 from mavlink_mavsdk_world import free_port
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -170,6 +173,27 @@ async def ground_station(
 
 
 @asynccontextmanager
+async def stalled_station(port: int) -> AsyncIterator[socket.socket]:
+    """A TCP connection to a port of this machine whose receiver does not read. It and the kernel of
+    the sender keep little, so that the sender's own bound is soon reached."""
+    with socket.socket() as stalled:
+        stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        stalled.setsockopt(socket.IPPROTO_TCP, socket.TCP_MAXSEG, 536)
+        stalled.setblocking(False)
+        await asyncio.get_running_loop().sock_connect(stalled, ("127.0.0.1", port))
+        yield stalled
+
+
+async def messages_dropped(name: str, caplog: pytest.LogCaptureFixture) -> int:
+    """Wait until the log says that a station is gone; how many messages to it were dropped."""
+    said = re.compile(rf"ground station {re.escape(name)} is gone; (\d+) messages to it")
+    async with asyncio.timeout(WITHIN_S):
+        while not (found := said.search(caplog.text)):
+            await asyncio.sleep(0.05)
+    return int(found[1])
+
+
+@asynccontextmanager
 async def served(control: MissionControl, **settings: Any) -> AsyncIterator[None]:
     """Serve the face."""
     face = MavlinkFace(control, FaceSettings("mavlink", settings))
@@ -185,11 +209,12 @@ async def served(control: MissionControl, **settings: Any) -> AsyncIterator[None
 
 @asynccontextmanager
 async def gateway(
-    folder: Path, *, speed: float = 1.0, fleet: str = FLEET, **settings: Any
+    folder: Path, *, speed: float = 1.0, fleet: str = FLEET, also: str = "", **settings: Any
 ) -> AsyncIterator[tuple[MissionControl, int]]:
-    """An executive with a face, and the face's port."""
+    """An executive with a face, and the face's port. `also`: another URL of it."""
     port = free_port()
-    settings.setdefault("url", f"udpin://127.0.0.1:{port}")
+    own = f"udpin://127.0.0.1:{port}"
+    settings.setdefault("url", [own, also] if also else own)
     loaded = load_fleet(str(write_fleet(folder, fleet)))
     async with (
         run_executive(loaded, speed=speed) as control,

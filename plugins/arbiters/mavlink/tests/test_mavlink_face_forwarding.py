@@ -1,6 +1,7 @@
 """Frames of MAVLink vehicles that pass m2pem as they are, by the rules of MAVLink routing."""
 
 import asyncio
+import logging
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -11,7 +12,15 @@ from typing import Any
 import pytest
 from m2pem_plugin_mavlink.simulator.simulator import Simulator
 from m2pem_plugin_mavlink.simulator.specification import Kind
-from mavlink_gcs import FLEET, GroundStation, gateway, ground_station
+from mavlink_gcs import (
+    FLEET,
+    GroundStation,
+    gateway,
+    ground_station,
+    messages_dropped,
+    stalled_station,
+)
+from mavlink_mavsdk_world import free_port
 from mavlink_simulated import specs
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -153,6 +162,35 @@ def test_signed_frames_and_unknown_messages_pass_between_stations_untouched(tmp_
             await other.gets(unknown)
             # For the vehicle a message that nobody knows counts as a command.
             await station.hears("HEARTBEAT", is_autopilot, len(station.received))
+
+    asyncio.run(main())
+
+
+def test_a_station_that_does_not_read_loses_forwarded_frames_and_delays_nobody(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+
+    async def main() -> None:
+        tcp = free_port()
+        async with (
+            forwarding(tmp_path, also=f"tcpin://127.0.0.1:{tcp}") as (_, _, station, port),
+            ground_station(port, system=253) as other,
+            stalled_station(tcp) as stalled,
+        ):
+            name = "{}:{}".format(*stalled.getsockname())
+            await other.hears("HEARTBEAT", lambda each: each.get_srcSystem() == 254)
+            for sender, receiver in ((station, other), (other, station)):
+                for number in range(700):
+                    sender.mav.encapsulated_data_send(number, bytes(range(1, 254)))
+                    if number % 50 == 49:  # 340 kB in all, in parts that fit into a UDP buffer
+                        await receiver.hears(
+                            "ENCAPSULATED_DATA", lambda each, number=number: each.seqnr == number
+                        )
+            since = len(station.received)
+            await station.hears("HEARTBEAT", is_autopilot, since)
+            stalled.close()
+            assert await messages_dropped(name, caplog) > 0
 
     asyncio.run(main())
 

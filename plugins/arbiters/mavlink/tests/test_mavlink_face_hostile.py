@@ -1,11 +1,13 @@
 """Programs that send garbage, too much, or do not read: nothing happens to the others."""
 
 import asyncio
+import logging
 import random
-import socket
 from pathlib import Path
 
-from mavlink_gcs import gateway, ground_station
+import pytest
+from m2pem_plugin_mavlink.face import modes
+from mavlink_gcs import gateway, ground_station, messages_dropped, stalled_station
 from mavlink_mavsdk_world import free_port
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -43,21 +45,28 @@ def test_garbage_and_floods_change_nothing(tmp_path: Path) -> None:
     asyncio.run(main())
 
 
-def test_a_station_that_does_not_read_delays_nobody(tmp_path: Path) -> None:
+def test_a_station_that_does_not_read_loses_messages_and_delays_nobody(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+
     async def main() -> None:
-        udp, tcp = free_port(), free_port()
-        rates = dict.fromkeys(("GLOBAL_POSITION_INT", "ATTITUDE", "VFR_HUD"), "20 Hz")
-        urls = [f"udpin://127.0.0.1:{udp}", f"tcpin://127.0.0.1:{tcp}"]
+        tcp = free_port()
         async with (
-            gateway(tmp_path, speed=5.0, url=urls, rates=rates) as (control, _),
+            gateway(tmp_path, speed=5.0, also=f"tcpin://127.0.0.1:{tcp}") as (control, udp),
             ground_station(udp) as station,
         ):
             await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
-            with socket.socket() as stalled:
-                stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-                stalled.setblocking(False)
+            async with stalled_station(tcp) as stalled:
                 loop = asyncio.get_running_loop()
-                await loop.sock_connect(stalled, ("127.0.0.1", tcp))
+                name = "{}:{}".format(*stalled.getsockname())
+                asking = dialect.MAVLink(None, 253, 190)
+                request = dialect.MAV_CMD_REQUEST_MESSAGE
+                for _ in range(700):  # each is answered with seven messages
+                    message = asking.command_long_encode(
+                        ROVER1, 1, request, 0, modes.AVAILABLE_MODES, *[0.0] * 6
+                    )
+                    await loop.sock_sendall(stalled, message.pack(asking))
                 run = await control.start(
                     scenarios.one_behavior("goto", "rover1", target="[38.1077, -77.3190]")
                 )
@@ -68,6 +77,7 @@ def test_a_station_that_does_not_read_delays_nobody(tmp_path: Path) -> None:
                 found = parser.parse_buffer(await loop.sock_recv(stalled, 4096))
                 assert len(found) > 10
                 assert "BAD_DATA" not in {each.get_type() for each in found[:-1]}
+            assert await messages_dropped(name, caplog) > 100
 
     asyncio.run(main())
 
