@@ -1,6 +1,6 @@
 """The face `mavlink`. To be registered it needs no MAVLink library."""
 
-from m2pem.api import FaceCapabilities, FaceSettings, MissionControl
+from m2pem.api import FaceCapabilities, FaceSettings, MissionControl, ThrownEvents
 from m2pem_plugin_mavlink.face.settings import read_settings
 
 
@@ -18,6 +18,15 @@ class MavlinkFace:
     def __init__(self, control: MissionControl, settings: FaceSettings) -> None:
         self._control = control
         self._settings = read_settings(settings, control.fleet())
+        from m2pem_plugin_mavlink.face.event_settings import (  # noqa: PLC0415  # it needs pymavlink
+            read_event_rules,
+        )
+
+        self._rules = read_event_rules(
+            settings, self._settings, control.fleet(), simulated=control.simulated()
+        )
+        sent = [each.rule for each in self._rules.sent]
+        self._thrown = ThrownEvents(control, sent) if sent else None
 
     async def serve(self) -> None:
         """Serve ground stations until cancelled.
@@ -27,4 +36,4 @@ class MavlinkFace:
         """
         from m2pem_plugin_mavlink.face.server import FaceServer  # noqa: PLC0415  # it needs pymavlink
 
-        await FaceServer(self._control, self._settings).serve()
+        await FaceServer(self._control, self._settings, self._rules, self._thrown).serve()

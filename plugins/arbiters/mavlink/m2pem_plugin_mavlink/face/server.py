@@ -7,9 +7,11 @@ from collections import OrderedDict
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from m2pem.api import (
+    EventThrower,
     MissionControl,
     PayloadState,
     ResourceId,
+    ThrownEvents,
     VehicleState,
     follow,
 )
@@ -21,11 +23,14 @@ from m2pem_plugin_mavlink.face.commands import (
     position_order,
 )
 from m2pem_plugin_mavlink.face.components import cameras_of
+from m2pem_plugin_mavlink.face.event_settings import EventRules
 from m2pem_plugin_mavlink.face.events import Events
 from m2pem_plugin_mavlink.face.forwarding import COMMAND_INT, COMMAND_LONG, Forwarder
 from m2pem_plugin_mavlink.face.orders import DENIED, Orders, acknowledgement
+from m2pem_plugin_mavlink.face.received_messages import MessageReceiver
 from m2pem_plugin_mavlink.face.requests import Requests
-from m2pem_plugin_mavlink.face.settings import Settings
+from m2pem_plugin_mavlink.face.sent_messages import MessageSender
+from m2pem_plugin_mavlink.face.settings import Settings, own_system
 from m2pem_plugin_mavlink.face.stations import Station, Stations
 from m2pem_plugin_mavlink.face.streams import Streams
 from m2pem_plugin_mavlink.face.texts import TextSeverity, status_texts
@@ -57,8 +62,18 @@ _NO_REQUEST = frozenset(
 class FaceServer:
     """Every vehicle of the fleet as a MAVLink system: shown by m2pem, or forwarded."""
 
-    def __init__(self, control: MissionControl, settings: Settings) -> None:
+    def __init__(
+        self,
+        control: MissionControl,
+        settings: Settings,
+        rules: EventRules,
+        thrown: ThrownEvents | None,
+    ) -> None:
+        """`thrown`: what missions throw that a rule of `rules` is about; None: there is no such
+        rule."""
         fleet = control.fleet()
+        self._rules = rules
+        self._thrown = thrown
         self._control = control
         self._settings = settings
         behaviors = {
@@ -107,8 +122,17 @@ class FaceServer:
             self._settings.forwarded_commands,
             self._refuse_forwarding,
         )
+        autopilots = {
+            name: Address(own, AUTOPILOT)
+            for name, vehicle in self._control.fleet().vehicles.items()
+            if (own := own_system(vehicle.settings)) is not None
+        }
+        thrower = EventThrower(self._control)
+        vehicles = {address: name for name, address in autopilots.items()}
+        self._receiver = MessageReceiver(shared_hub(), self._rules.received, vehicles, thrower)
         await self._stations.open()
         self._forwarder.open()
+        self._receiver.open()
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._follow_telemetry())
@@ -116,10 +140,26 @@ class FaceServer:
                 group.create_task(self._events.follow_holders(self._control))
                 group.create_task(self._stations.maintain())
                 group.create_task(self._streams.run())
+                group.create_task(thrower.run())
+                if self._thrown is not None:
+                    sender = MessageSender(
+                        shared_hub(), self._stations, self._control, autopilots, self._sources()
+                    )
+                    sent = {each.rule: each for each in self._rules.sent}
+                    group.create_task(sender.run(self._thrown, sent))
         finally:
+            self._receiver.close()
             self._forwarder.close()
             await self._orders.close()
             await self._stations.close()
+
+    def _sources(self) -> dict[ResourceId, Address]:
+        """Return in whose name m2pem tells ground stations about each vehicle."""
+        forwarded = self._settings.forwarded
+        return {
+            name: Address(system, ONBOARD_COMPUTER if name in forwarded else AUTOPILOT)
+            for name, system in self._settings.systems.items()
+        }
 
     async def _follow_telemetry(self) -> None:
         size = max(LEAST_WAITING, STATES_PER_VEHICLE * len(self._vehicles))
@@ -137,6 +177,7 @@ class FaceServer:
 
     def _receive(self, station: Station, frame: RawFrame) -> None:
         self._forwarder.from_station(station, frame)
+        self._receiver.from_station(frame)
         type_ = types_by_id().get(frame.id)
         vehicle = self._by_system.get(frame.target.system)
         if type_ is None or vehicle is None or frame.id in _NO_REQUEST:

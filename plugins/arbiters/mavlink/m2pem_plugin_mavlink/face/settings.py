@@ -31,14 +31,26 @@ RATES_HZ: Mapping[str, float] = {
 }
 """Messages that are sent by themselves, and how often in a second."""
 
-_KEYS = ("url", "system_ids", "commands", "rates", "forward", "forward_commands")
+_KEYS = (
+    "url",
+    "system_ids",
+    "commands",
+    "rates",
+    "forward",
+    "forward_commands",
+    "receive",
+    "send",
+    "send_to",
+)
+"""`receive` and `send`: event_settings.py."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
     """`systems`: the system id of each vehicle, in the order of the fleet file. `commands`: the
     vehicles that ground stations may command. `forwarded`: those whose own frames they get.
-    `forwarded_commands`: those of `forwarded` to which commands pass, too. `rates_hz`: by name."""
+    `forwarded_commands`: those of `forwarded` to which commands pass, too. `sent_to`: those to
+    which messages go that missions throw. `rates_hz`: by name."""
 
     urls: tuple[Url, ...]
     systems: Mapping[ResourceId, int]
@@ -46,6 +58,7 @@ class Settings:
     rates_hz: Mapping[str, float] = field(default_factory=dict)
     forwarded: frozenset[ResourceId] = frozenset()
     forwarded_commands: frozenset[ResourceId] = frozenset()
+    sent_to: frozenset[ResourceId] = frozenset()
 
 
 def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
@@ -57,7 +70,7 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
     reader.refuse_others(_KEYS)
     forwarded = _vehicles(reader, "forward", fleet)
     for each in fleet.vehicles.values():
-        if each.id in forwarded and (problem := _not_forwarded(fleet, each.id)):
+        if each.id in forwarded and (problem := passes_elsewhere(fleet, each.id)):
             if reader.values.get("forward") == ALL:
                 forwarded -= {each.id}
             else:
@@ -76,6 +89,7 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
         _rates(reader),
         forwarded,
         commands & forwarded,
+        _vehicles(reader, "send_to", fleet),
     )
 
 
@@ -101,22 +115,24 @@ def _vehicles(reader: FaceSettings, key: str, fleet: Fleet) -> frozenset[Resourc
     if not isinstance(value, list):
         raise reader.error(key, f"{value!r} is neither all, none, nor a list of vehicles")
     for name in value:
-        _known(reader, key, name, fleet.vehicles)
+        check_known(reader, key, name, fleet.vehicles)
     return frozenset(value)
 
 
-def _known(reader: FaceSettings, key: str, name: object, known: Collection[str]) -> None:
-    if name not in known:
-        hint = did_you_mean(str(name), known) or f"known: {', '.join(known)}"
+def check_known(reader: FaceSettings, key: str, name: object, names: Collection[str]) -> None:
+    """Raise an error for a vehicle that the fleet does not have."""
+    if name not in names:
+        hint = did_you_mean(str(name), names) or f"known: {', '.join(names)}"
         raise reader.error(key, f"the fleet has no vehicle '{name}'; {hint}")
 
 
-def _not_forwarded(fleet: Fleet, name: ResourceId) -> str:
+def passes_elsewhere(fleet: Fleet, name: ResourceId) -> str:
+    """Return why the frames of a vehicle do not pass m2pem here; "" if they do."""
     vehicle = fleet.vehicles[name]
     if vehicle.arbiter != "mavlink":
-        return f"its arbiter is {vehicle.arbiter}; only frames of MAVLink vehicles are forwarded"
+        return f"its arbiter is {vehicle.arbiter}; frames are those of MAVLink vehicles"
     if vehicle.host:
-        return f"its link is on the host {vehicle.host}; serve the face without forwarding it"
+        return f"its link is on the host {vehicle.host}, and its frames do not pass m2pem here"
     if vehicle.settings.get("driver") == "mavsdk":
         return "with the driver mavsdk its frames do not pass m2pem; use the driver pymavlink"
     if vehicle.settings.get("component_id", 1) != 1:
@@ -151,7 +167,7 @@ def _systems(
     the lowest that are free, in the order of the fleet file."""
     given = reader.inner("system_ids", "{rover1: 11}")
     for name in given.values:
-        _known(reader, "system_ids", name, fleet.vehicles)
+        check_known(reader, "system_ids", name, fleet.vehicles)
     owners: dict[int, ResourceId] = {}
     ids: dict[ResourceId, int] = {}
     for name, vehicle in fleet.vehicles.items():

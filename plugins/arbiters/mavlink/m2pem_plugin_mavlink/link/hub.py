@@ -8,7 +8,7 @@ not sent anything yet.
 
 import asyncio
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -18,6 +18,7 @@ from m2pem_plugin_mavlink.link.endpoint import Endpoint, Tap
 from m2pem_plugin_mavlink.link.route import Peer, Route
 from m2pem_plugin_mavlink.link.streams import SerialEndpoint, TcpInEndpoint, TcpOutEndpoint
 from m2pem_plugin_mavlink.link.udp import UdpEndpoint
+from m2pem_plugin_mavlink.link.vehicle_link import VehicleLink
 from m2pem_plugin_mavlink.protocol.messages import Address, Message, message_type
 from m2pem_plugin_mavlink.protocol.url import SerialUrl, Url, Way
 from m2pem_plugin_mavlink.signing.policy import SigningPolicy
@@ -61,6 +62,10 @@ class Hub:
     def __init__(self) -> None:
         self.taps: list[Tap] = []
         """They get the bytes of all endpoints."""
+        self.links: list[VehicleLink] = []
+        """Those to vehicles that are open."""
+        self.link_watchers: list[Callable[[VehicleLink], None]] = []
+        """Called with each link that is opened."""
         self._opened: dict[Url, _Opened] = {}
         self._sources: Counter[Address] = Counter()
         self._own_systems: set[int] = set()
@@ -75,6 +80,16 @@ class Hub:
     def endpoint(self, url: Url) -> Endpoint:
         """Return an open endpoint."""
         return self._opened[url].endpoint
+
+    def add_link(self, link: VehicleLink) -> None:
+        """A link was opened."""
+        self.links.append(link)
+        for watch in list(self.link_watchers):
+            watch(link)
+
+    def remove_link(self, link: VehicleLink) -> None:
+        """A link is closed."""
+        self.links.remove(link)
 
     def owners(self, system: int, component: int) -> list[Peer]:
         """Return the peers that own a component of a system, on all endpoints."""

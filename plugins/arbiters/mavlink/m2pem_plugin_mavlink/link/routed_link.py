@@ -54,7 +54,9 @@ async def open_link(
     hub = shared_hub()
     parsed = [parse_url(url) for url in urls]
     routes = await hub.join(address.system, parsed, source, clock, signing)
-    return RoutedLink(hub, address, source, routes, clock, may_send)
+    link = RoutedLink(hub, address, source, routes, clock, may_send)
+    hub.add_link(link)
+    return link
 
 
 class RoutedLink:
@@ -164,6 +166,7 @@ class RoutedLink:
         if self._closed:
             return
         self._closed = True
+        self._hub.remove_link(self)
         for exchange in list(self._exchanges):
             exchange.abort(ExchangeError("the link was closed"))
         for wanted, listener in self._listening:
