@@ -155,11 +155,11 @@ def gateway(domain: int = ROS_DOMAIN, vehicles_port: int = 14540, port: int = 14
         words = m2pem("sim", "mavlink", "--copters", "2", *AUTOPILOT)
         words += ["--home", "38.1075,-77.3192,60", "--to", f"udp://127.0.0.1:{vehicles_port}"]
         vehicles.start(words)
-        station = [sys.executable, programs / "ground_station.py", "--port", str(port)]
+        station = [sys.executable, str(programs / "ground_station.py"), "--port", str(port)]
         with Programs(_loopback(domain)) as served:
             served.start(m2pem("gateway", "--fleet", refusing, "--journal", "memory:"))
             _say("\nA ROS client sees all four, and sends a MAVLink copter somewhere.")
-            client = [sys.executable, programs / "ros_client.py", *GATEWAY_VEHICLES]
+            client = [sys.executable, str(programs / "ros_client.py"), *GATEWAY_VEHICLES]
             if status := served.run([*client, "--fly", "copter1"]):
                 return status
             _say("\nA ground station sees all four. It may not command rover1, a ROS vehicle.")

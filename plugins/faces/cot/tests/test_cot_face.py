@@ -46,15 +46,6 @@ def is_bound(port: int) -> bool:
     return False
 
 
-def is_bound(port: int) -> bool:
-    with socket.socket(type=socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return True
-    return False
-
-
 @asynccontextmanager
 async def fleet(**settings: Any) -> AsyncIterator[MissionControl]:
     """An executive with two simulated rovers, and the face with these settings."""
