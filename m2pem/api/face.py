@@ -1,14 +1,18 @@
 """A face: shows the fleet and its runs to programs that speak another protocol."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from m2pem.api.connection_reader import ConnectionReader
 from m2pem.errors import PluginError
 from m2pem.mission.catalogue import ResourceId
+from m2pem.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from m2pem.api.control import MissionControl
+
+ALL, NONE = "all", "none"
+"""In place of a list of vehicles."""
 
 
 class FaceSettings(ConnectionReader):
@@ -20,6 +24,25 @@ class FaceSettings(ConnectionReader):
     def error(self, key: str, problem: str) -> PluginError:
         """Return the error for the value of a key."""
         return PluginError(f"{self.path}.{key}: {problem}")
+
+    def vehicles(self, key: str, known: Collection[ResourceId]) -> frozenset[ResourceId]:
+        """Return the vehicles of a key whose value is `none`, as it is by default, `all`, or a list
+        of names. `known`: the vehicles of the fleet."""
+        value = self.values.get(key, NONE)
+        if value in (ALL, NONE):
+            return frozenset(known if value == ALL else ())
+        if not isinstance(value, list):
+            raise self.error(key, f"{value!r} is none of {NONE}, {ALL}, and a list of vehicles")
+        for name in value:
+            self.vehicle(key, name, known)
+        return frozenset(map(ResourceId, value))
+
+    def vehicle(self, key: str, name: object, known: Collection[ResourceId]) -> ResourceId:
+        """Return one of the vehicles that a key names."""
+        if not isinstance(name, str) or name not in known:
+            hint = did_you_mean(str(name), known) or f"known: {', '.join(known)}"
+            raise self.error(key, f"the fleet has no vehicle '{name}'; {hint}")
+        return ResourceId(name)
 
 
 class Face(Protocol):

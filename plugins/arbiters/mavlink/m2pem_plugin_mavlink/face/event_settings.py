@@ -7,7 +7,7 @@ from m2pem.api import AnswerRule, FaceSettings, Fleet, ReceiveRule, ResourceId, 
 from m2pem.api.event_rules import ANSWERED
 from m2pem.errors import ExpressionError
 from m2pem_plugin_mavlink.face.message_fields import FieldError, find_message, made
-from m2pem_plugin_mavlink.face.settings import RATES_HZ, Settings, check_known, passes_elsewhere
+from m2pem_plugin_mavlink.face.settings import RATES_HZ, Settings, passes_elsewhere
 from m2pem_plugin_mavlink.protocol.messages import MessageType
 
 STATIONS = "stations"
@@ -110,7 +110,7 @@ def _sent_to_stations(given: FaceSettings, type_: MessageType, fleet: Fleet) -> 
     sender = given.text("from", "")
     if not sender:
         raise given.error("from", "it is missing: the vehicle in whose name it is sent")
-    check_known(given, "from", sender, fleet.vehicles)
+    given.vehicle("from", sender, fleet.vehicles)
     _check(given, rule, type_)
     return SentMessage(type_, ResourceId(sender), True, 0, None, rule, given.path)
 
@@ -125,7 +125,7 @@ def _type(given: FaceSettings) -> MessageType:
 
 
 def _vehicle(given: FaceSettings, key: str, name: str, fleet: Fleet, simulated: bool) -> ResourceId:
-    check_known(given, key, name, fleet.vehicles)
+    given.vehicle(key, name, fleet.vehicles)
     if not simulated and (problem := passes_elsewhere(fleet, ResourceId(name))):
         raise given.error(key, f"{name}: {problem}")
     return ResourceId(name)

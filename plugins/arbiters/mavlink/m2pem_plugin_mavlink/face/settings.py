@@ -4,12 +4,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from m2pem.api import FaceSettings, Fleet, ResourceId, did_you_mean
+from m2pem.api import FaceSettings, Fleet, ResourceId
 from m2pem.errors import PluginError
 from m2pem_plugin_mavlink.protocol.url import Url, parse_url
 from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
 
-ALL, NONE = "all", "none"
+ALL = "all"
 DEFAULT_URL = "udpout://127.0.0.1:14550"
 HIGHEST_SYSTEM = 254
 FASTEST_HZ = 20.0
@@ -68,14 +68,14 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
         PluginError: something is wrong; the text names the key.
     """
     reader.refuse_others(_KEYS)
-    forwarded = _vehicles(reader, "forward", fleet)
+    forwarded = reader.vehicles("forward", fleet.vehicles)
     for each in fleet.vehicles.values():
         if each.id in forwarded and (problem := passes_elsewhere(fleet, each.id)):
             if reader.values.get("forward") == ALL:
                 forwarded -= {each.id}
             else:
                 raise reader.error("forward", f"{each.id}: {problem}")
-    commands = _vehicles(reader, "forward_commands", fleet)
+    commands = reader.vehicles("forward_commands", fleet.vehicles)
     if (
         extra := sorted(commands - forwarded)
         if reader.values.get("forward_commands") != ALL
@@ -85,11 +85,11 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
     return Settings(
         _urls(reader),
         _systems(reader, fleet, forwarded),
-        _vehicles(reader, "commands", fleet),
+        reader.vehicles("commands", fleet.vehicles),
         _rates(reader),
         forwarded,
         commands & forwarded,
-        _vehicles(reader, "send_to", fleet),
+        reader.vehicles("send_to", fleet.vehicles),
     )
 
 
@@ -105,25 +105,6 @@ def _urls(reader: FaceSettings) -> tuple[Url, ...]:
         except PluginError as error:
             raise reader.error("url", str(error)) from None
     return tuple(dict.fromkeys(urls))
-
-
-def _vehicles(reader: FaceSettings, key: str, fleet: Fleet) -> frozenset[ResourceId]:
-    """Return the vehicles of a key whose value is `all`, `none` or a list of names."""
-    value = reader.values.get(key, NONE)
-    if value in (ALL, NONE):
-        return frozenset(fleet.vehicles if value == ALL else ())
-    if not isinstance(value, list):
-        raise reader.error(key, f"{value!r} is neither all, none, nor a list of vehicles")
-    for name in value:
-        check_known(reader, key, name, fleet.vehicles)
-    return frozenset(value)
-
-
-def check_known(reader: FaceSettings, key: str, name: object, names: Collection[str]) -> None:
-    """Raise an error for a vehicle that the fleet does not have."""
-    if name not in names:
-        hint = did_you_mean(str(name), names) or f"known: {', '.join(names)}"
-        raise reader.error(key, f"the fleet has no vehicle '{name}'; {hint}")
 
 
 def passes_elsewhere(fleet: Fleet, name: ResourceId) -> str:
@@ -167,7 +148,7 @@ def _systems(
     the lowest that are free, in the order of the fleet file."""
     given = reader.inner("system_ids", "{rover1: 11}")
     for name in given.values:
-        check_known(reader, "system_ids", name, fleet.vehicles)
+        reader.vehicle("system_ids", name, fleet.vehicles)
     owners: dict[int, ResourceId] = {}
     ids: dict[ResourceId, int] = {}
     for name, vehicle in fleet.vehicles.items():

@@ -82,7 +82,7 @@ class MissionAction:
             M2pemError: it is refused.
         """
         request = goal.request
-        if self._options.commands is not None:
+        if not self._options.missions:
             raise OperatorError(NO_MISSIONS)
         mission = mission_of(request)
         process = bounded(request.process.strip(), "process", URL_CHARACTERS) or None

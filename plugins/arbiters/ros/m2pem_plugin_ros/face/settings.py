@@ -1,11 +1,11 @@
 """The settings `faces.ros` of a fleet file (docs/ros-face.md)."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from m2pem.api import Dimension, Fleet, did_you_mean
+from m2pem.api import Dimension, Fleet
 
 if TYPE_CHECKING:
     from m2pem.api import FaceSettings
@@ -27,7 +27,6 @@ RATES: Mapping[str, float] = {
 """The highest rate of each topic of a vehicle, in Hz. Telemetry that comes more slowly is published
 when it comes."""
 
-ALL, NONE = "all", "none"
 KEYS = ("namespace", "domain_id", "rate", "commands", "receive", "send")
 """`receive` and `send`: event_settings.py."""
 
@@ -35,17 +34,18 @@ KEYS = ("namespace", "domain_id", "rate", "commands", "receive", "send")
 @dataclass(frozen=True, slots=True)
 class Options:
     """The settings of the face. `namespace`: with its leading "/"; "": none. `domain_id` None: that
-    of the environment. `commands`: the vehicles that take commands; None: all of them, and
-    missions are started, too."""
+    of the environment. `commands`: the vehicles that take commands. `missions`: whether missions
+    may be started."""
 
     namespace: str = ""
     domain_id: int | None = None
     rates: Mapping[str, float] = field(default_factory=lambda: dict(RATES))
-    commands: frozenset[str] | None = frozenset()
+    commands: frozenset[str] = frozenset()
+    missions: bool = False
 
     def takes_commands(self, resource: str) -> bool:
         """Whether a vehicle, or the vehicle of a payload, may be commanded through the face."""
-        return self.commands is None or resource.partition("/")[0] in self.commands
+        return resource.partition("/")[0] in self.commands
 
 
 def read_options(settings: "FaceSettings", fleet: Fleet) -> Options:
@@ -60,7 +60,8 @@ def read_options(settings: "FaceSettings", fleet: Fleet) -> Options:
         _namespace(settings),
         None if domain_id is None else settings.whole("domain_id", None, 0, HIGHEST_DOMAIN),
         _rates(settings),
-        _commands(settings, fleet.vehicles),
+        settings.vehicles("commands", fleet.vehicles),
+        settings.values.get("commands") == "all",
     )
 
 
@@ -86,20 +87,3 @@ def _rates(settings: "FaceSettings") -> Mapping[str, float]:
         topic: inner.quantity(topic, usual, Dimension.FREQUENCY, SLOWEST_HZ, FASTEST_HZ)
         for topic, usual in RATES.items()
     }
-
-
-def _commands(settings: "FaceSettings", vehicles: Collection[str]) -> frozenset[str] | None:
-    value: Any = settings.values.get("commands", NONE)
-    if value == NONE or value is False:
-        return frozenset()
-    if value == ALL:
-        return None
-    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
-        raise settings.error(
-            "commands", f"{value!r} is none of {NONE}, {ALL}, and a list of vehicles: [evsg1]"
-        )
-    for vehicle in value:
-        if vehicle not in vehicles:
-            hint = did_you_mean(vehicle, vehicles) or f"the fleet has {', '.join(vehicles)}"
-            raise settings.error("commands", f"the fleet has no vehicle '{vehicle}'; {hint}")
-    return frozenset(value)
