@@ -22,6 +22,7 @@ from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.sensors.detectors import DetectorTopic
 from m2pem_plugin_ros.sensors.domain_search import search_domains
 from m2pem_plugin_ros.sensors.endpoints import Endpoints
+from m2pem_plugin_ros.sensors.graph import Graph
 from m2pem_plugin_ros.sensors.health import Battery, Diagnostics
 from m2pem_plugin_ros.sensors.localization import Localization, TopicLocalization
 from m2pem_plugin_ros.sensors.payload import PayloadSensors, PayloadStatusTopic
@@ -180,6 +181,7 @@ class DdsConnections:
     def __init__(self, installation: ConnectionsSetup) -> None:
         self._setup = installation
         self._runtimes: dict[int, RosRuntime] = {}
+        self._graphs: dict[int, Graph] = {}
         self._diagnostics: dict[tuple[int, str], Diagnostics] = {}
         self._tf: dict[tuple[int, str, str], TfTopics] = {}
         self._localizations: dict[ResourceId, TopicLocalization] = {}
@@ -192,10 +194,10 @@ class DdsConnections:
         if all(connection.sitl for connection in known.connections.values()):
             loopback.keep_on_loopback()
         try:
-            vehicles = {
-                resource: self._listen_to(resource, settings)
-                for resource, settings in known.vehicles.items()
-            }
+            vehicles = {}
+            for resource, own in known.vehicles.items():
+                vehicles[resource] = self._listen_to(resource, own)
+                await asyncio.sleep(0)  # DDS needs milliseconds for each subscription
             for resource, settings in known.detectors.items():
                 vehicle_position = self._vehicle_position(resource)
                 ros = self._runtime(settings.domain_id)
@@ -235,7 +237,7 @@ class DdsConnections:
             payload_status = PayloadStatusTopic(
                 ros, resource, settings, LogThrottle(context.logger, resource)
             )
-            endpoints = Endpoints(ros, settings, _domain(settings.domain_id), is_payload=True)
+            endpoints = self._endpoints_of(ros, settings, is_payload=True)
             self._endpoints[resource] = endpoints
             sensors = PayloadSensors(payload_status, endpoints)
             return VehicleConnection(
@@ -248,7 +250,7 @@ class DdsConnections:
         key = (_domain(settings.domain_id), topic)
         if key not in self._diagnostics:
             self._diagnostics[key] = Diagnostics(ros, topic, context.clock)
-        endpoints = Endpoints(ros, settings, _domain(settings.domain_id))
+        endpoints = self._endpoints_of(ros, settings)
         self._endpoints[resource] = endpoints
         topics = TopicSensors(
             localization,
@@ -261,6 +263,14 @@ class DdsConnections:
         is_node = settings.driver is DriverName.NODE
         publish_target = TargetPublisher(ros, settings).show if is_node else _publish_nothing
         return VehicleConnection(ros, topics, publish_target)
+
+    def _endpoints_of(
+        self, ros: "RosRuntime", settings: Settings, *, is_payload: bool = False
+    ) -> Endpoints:
+        domain = _domain(settings.domain_id)
+        if domain not in self._graphs:
+            self._graphs[domain] = Graph(ros.node)
+        return Endpoints(ros, settings, domain, is_payload=is_payload, graph=self._graphs[domain])
 
     def _runtime(self, domain_id: int | None) -> "RosRuntime":
         from m2pem_plugin_ros.runtime import RosRuntime  # noqa: PLC0415  # it needs rclpy

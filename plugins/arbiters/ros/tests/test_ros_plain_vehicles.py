@@ -13,7 +13,7 @@ import pytest
 from m2pem_plugin_ros.arbiter import RosArbiter
 from m2pem_plugin_ros.frames import to_geodetic
 from m2pem_plugin_ros.runtime import RosRuntime, qos
-from m2pem_plugin_ros.sensors.endpoints import NAMELESS
+from m2pem_plugin_ros.sensors.graph import NAMELESS
 from m2pem_plugin_ros.testing import Peer
 from std_msgs.msg import String
 

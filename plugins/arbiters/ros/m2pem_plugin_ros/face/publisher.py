@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from m2pem_plugin_ros.face.rate_limiter import RateLimiter
-from m2pem_plugin_ros.sensors.endpoints import UNKNOWN_NODE
+from m2pem_plugin_ros.sensors.graph import UNKNOWN_NODE, node_of
 
 TELEMETRY = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Reliable, as the displays of RViz and the nodes of Nav2 subscribe by default; a subscriber of
@@ -24,7 +24,7 @@ log = logging.getLogger("m2pem.face.ros")
 def publishers_of(node: Node, topic: str) -> list[str]:
     """Return the full name of the node of each publisher of a topic, of those that are known."""
     return [
-        f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+        node_of(endpoint)
         for endpoint in node.get_publishers_info_by_topic(topic)
         if endpoint.node_name != UNKNOWN_NODE
     ]

@@ -12,15 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from m2pem_plugin_ros.sensors.graph import Graph, node_of
 from m2pem_plugin_ros.settings import DriverName, Settings, Via
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
 
-UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-"""The name of a node whose endpoint was discovered before the node itself."""
-
-NAMELESS = "a node whose name is not known yet"
 LEASE = "a crashed one is listed for up to 20 s"
 ODOMETRY = "nav_msgs/msg/Odometry"
 VEHICLE_STATUS = "m2pem_interfaces/msg/VehicleStatus"
@@ -40,15 +37,25 @@ class Single:
 
 
 class Endpoints:
-    """The endpoints of one vehicle, or of a payload with its own node (`is_payload`).
+    """The endpoints of one vehicle, or of a payload with its own node (`is_payload`). Vehicles of
+    one domain share its `graph`.
 
     `elsewhere` are other ROS domains in which the vehicle was found.
     """
 
     def __init__(
-        self, ros: "RosRuntime", settings: Settings, domain: int, *, is_payload: bool = False
+        self,
+        ros: "RosRuntime",
+        settings: Settings,
+        domain: int,
+        *,
+        is_payload: bool = False,
+        graph: Graph | None = None,
     ) -> None:
         self._node = ros.node
+        self._graph = graph or Graph(ros.node)
+        self._said: tuple[object, str] = (None, "")
+        """What was found instead of the vehicle, and the text about it."""
         self._settings = settings
         self.domain = domain
         resolve = ros.node.resolve_topic_name  # names may be remapped (--ros-args)
@@ -104,7 +111,12 @@ class Endpoints:
             f"{awaited.topic} ({awaited.type}) {there} in ROS domain {self.domain},"
             f" namespace {self._settings.namespace or '/'}"
         )
-        return where if found else f"{where}: {self._instead(awaited)}"
+        if found:
+            return where
+        there_is = (self.elsewhere, self._graph.nodes(), self._graph.topics_of(awaited.type))
+        if self._said[0] != there_is:
+            self._said = there_is, self._instead(awaited)
+        return f"{where}: {self._said[1]}"
 
     def _instead(self, awaited: Single) -> str:
         """Return what is there instead of a vehicle, and what would be right."""
@@ -114,11 +126,11 @@ class Endpoints:
                 f"it is published in ROS domain {named}: write 'domain_id: {self.elsewhere[0]}' in"
                 f" its connection, or start the vehicle with ROS_DOMAIN_ID={self.domain}"
             )
-        nodes = self._other_nodes()
+        nodes = self._graph.nodes()
         if not nodes:
             return f"there is no other ROS node in domain {self.domain}; {self._why_domain()}"
         namespace = self._settings.namespace or "/"
-        alike = self._topics_of(awaited.type)
+        alike = self._graph.topics_of(awaited.type)
         prefix = f"{namespace.rstrip('/')}/"
         if own := sorted(topic for topic in alike if topic.startswith(prefix)):
             name = own[0].removeprefix(prefix)
@@ -153,32 +165,6 @@ class Endpoints:
         if self._settings.domain_id is None:
             return environment
         return f"its connection says domain_id: {self.domain}, {environment}"
-
-    def _other_nodes(self) -> list[str]:
-        """Return the full names of the nodes of other processes, without hidden ones."""
-        from m2pem_plugin_ros.runtime import own_nodes  # noqa: PLC0415  # it needs rclpy
-
-        own = own_nodes()
-        full = (
-            f"{namespace.rstrip('/')}/{name}"
-            for name, namespace in self._node.get_node_names_and_namespaces()
-            if not name.startswith("_")
-        )
-        return sorted(set(full) - own)
-
-    def _topics_of(self, type_: str) -> list[str]:
-        """Return the topics of a type that have a publisher of another process."""
-        from m2pem_plugin_ros.runtime import own_nodes  # noqa: PLC0415  # it needs rclpy
-
-        own = own_nodes() | {NAMELESS}  # which may be one of them
-        return [
-            name
-            for name, types in self._node.get_topic_names_and_types()
-            if type_ in types
-            and any(
-                _name(each) not in own for each in self._node.get_publishers_info_by_topic(name)
-            )
-        ]
 
     def _wrong_command(self) -> str:
         settings = self._settings
@@ -269,13 +255,7 @@ def _listed(names: Sequence[str]) -> str:
 
 def _named(found: Sequence[Any]) -> str:
     """Return the full names and gids of nodes. Two nodes may have the same name."""
-    return ", ".join(sorted(f"{_name(each)} (gid {_gid(each)})" for each in found))
-
-
-def _name(endpoint: Any) -> str:
-    if endpoint.node_name == UNKNOWN_NODE:
-        return NAMELESS
-    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+    return ", ".join(sorted(f"{node_of(each)} (gid {_gid(each)})" for each in found))
 
 
 def _gid(endpoint: Any) -> str:
