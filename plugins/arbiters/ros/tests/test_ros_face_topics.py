@@ -18,7 +18,7 @@ from m2pem_plugin_ros.sensors.endpoints import Endpoints
 from m2pem_plugin_ros.settings import DriverName, Settings
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from ros_face_client import LATCHED, STATIC, World, faced, point, two_vehicles, until
+from ros_face_client import LATCHED, STATIC, Client, World, faced, point, two_vehicles, until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState, NavSatFix, NavSatStatus
 from tf2_msgs.msg import TFMessage
@@ -359,6 +359,40 @@ async def test_frames_that_another_node_publishes_are_left_to_it_and_said_once(
     assert caplog.text.count("is left to that node") == 1
     ours_too = [e for each in frames for e in each.transforms if e.header.stamp.sec > number]
     assert not [e for e in ours_too if e.child_frame_id == "ugv1/base_link"]
+
+
+async def test_a_robot_never_sees_its_frames_from_the_face(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    theirs = TransformStamped(child_frame_id="ugv1/base_link")
+    theirs.header.frame_id = "map"
+    theirs.transform.translation.x = 77.0
+    async with Client(ros_domain) as robot:
+        frames = robot.hear("/tf", TFMessage)
+        publisher = robot.node.create_publisher(TFMessage, "/tf", 100)
+
+        async def publish() -> None:
+            while True:
+                theirs.header.stamp.nanosec += 1
+                publisher.publish(TFMessage(transforms=[theirs]))
+                await asyncio.sleep(0.05)
+
+        publishing = asyncio.create_task(publish())
+        async with faced(ros_domain) as world:
+            left = asyncio.create_task(until(lambda: "is left to that node" in caplog.text))
+            while not left.done():
+                world.bus.publish(STATE)
+                await asyncio.sleep(0.001)
+            # Others are published from then on.
+            second = VehicleState(ResourceId("ugv2"), TIME_US, PLACE)
+            theirs_too = asyncio.create_task(
+                until(lambda: [e for each in list(frames) for e in each.transforms if of_state(e)])
+            )
+            await said(world, second, theirs_too)
+        publishing.cancel()
+    seen = [each for message in frames for each in message.transforms]
+    robots = [each for each in seen if each.child_frame_id == "ugv1/base_link"]
+    assert {each.transform.translation.x for each in robots} == {77.0}
 
 
 async def test_the_face_of_an_executive_that_is_replaced_takes_no_frames_from_the_next_one(

@@ -41,6 +41,10 @@ SENT = 100
 """Stamps that were sent of each frame are remembered, to tell our own transforms from those of
 others."""
 
+LISTENED = 2
+"""Calls of `watch` before frames are published where others publish some, too: a robot must not see
+its own frames twice."""
+
 NO_ROTATION = Quaternion(0.0, 0.0, 0.0, 1.0)
 NO_WAY = (0.0, 0.0, 0.0)
 
@@ -68,6 +72,7 @@ class FramesPublisher:
         self._sent: dict[str, deque[tuple[int, int]]] = {}
         self._limiter: RateLimiter[None] = RateLimiter(rate_hz, self._publish)
         self._is_wanted = self._namesake_told = False
+        self._listened = 0
         self._subscriptions: dict[str, Any] = {}
         self._statics: dict[str, Any] = {}
         """The transforms that stay, by the frame that they lead to."""
@@ -100,7 +105,10 @@ class FramesPublisher:
     def watch(self) -> None:
         """Look who subscribes, and listen to other publishers if there are any."""
         own = "/tf" in self._subscriptions
-        self._is_wanted = self._publisher.get_subscription_count() > own
+        self._listened += own
+        is_alone = self._node.count_publishers(self._publisher.topic_name) <= 1
+        has_readers = self._publisher.get_subscription_count() > own
+        self._is_wanted = has_readers and (is_alone or self._listened >= LISTENED)
         for topic, hear, qos in (
             ("/tf", self._hear, TF),
             ("/tf_static", self._hear_static, OF_OTHERS),
