@@ -19,6 +19,8 @@ TYPES = {"air": "a-f-A-M-H-Q", "ground": "a-f-G-E-V", "surface": "a-f-S-C-U", "s
 """By the domain of a vehicle, friendly: an unmanned rotary-wing aircraft, a ground vehicle, an
 unmanned surface vehicle, something under water."""
 SPOT, ROUTE, SHAPE, WAYPOINT = "b-m-p-s-m", "b-m-r", "u-d-f", "b-m-p-w"
+LATEST_US = 4_102_444_800 * US_PER_S
+"""A device whose clock is wrong must not end the face: no calendar has all of its times."""
 MACHINE, ENTERED = "m-g", "h-e"
 """How: by a machine with GPS; entered by a human."""
 
@@ -137,8 +139,8 @@ def _course(degrees: float) -> str:
 
 
 def _written(time_us: int) -> str:
-    """A moment as xs:dateTime, UTC, in milliseconds."""
-    moment = datetime.fromtimestamp(time_us / US_PER_S, UTC)
+    """A moment as xs:dateTime, UTC, in milliseconds; one beyond the year 2100, as that."""
+    moment = datetime.fromtimestamp(min(max(time_us, 0), LATEST_US) / US_PER_S, UTC)
     return f"{moment:%Y-%m-%dT%H:%M:%S}.{moment.microsecond // 1000:03d}Z"
 
 

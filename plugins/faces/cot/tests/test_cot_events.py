@@ -1,6 +1,7 @@
 """What is sent, and what of received bytes is used."""
 
 import contextlib
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -144,3 +145,10 @@ def test_what_a_sender_calls_itself_is_one_line() -> None:
     with pytest.raises(EventError) as raised:
         read_event(b"<" + b"a" * 40_000 + b"></b>")
     assert len(str(raised.value)) < 200
+
+
+@pytest.mark.parametrize("time_us", [-(1 << 60), 1 << 60])
+def test_a_vehicle_whose_clock_is_wrong_is_sent_all_the_same(time_us: int) -> None:
+    sent = vehicle_event("uid", "a-f-G", replace(STATE, time_us=time_us), 30.0, "")
+    assert sent is not None
+    assert etree.fromstring(sent).get("stale") >= etree.fromstring(sent).get("time")

@@ -1,6 +1,7 @@
 """The messages of telemetry: each state as m2pem has it, and in Foxglove's and ROS's schemas."""
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -8,7 +9,13 @@ from m2pem.api import US_PER_S, LocalFrame, PayloadState, TeamState, Telemetry, 
 from m2pem_plugin_recorder import foxglove_messages, ros_messages
 from m2pem_plugin_recorder.channels import ChannelMessage, TelemetryMessage, telemetry_channel
 
+log = logging.getLogger("m2pem.face.recorder")
+
 _encode = msgspec.json.Encoder().encode
+
+
+def _key(state: Telemetry) -> str:
+    return state.behavior if isinstance(state, TeamState) else state.resource
 
 
 class RateLimit:
@@ -22,7 +29,7 @@ class RateLimit:
         """Whether a state is due. A detection always is, as no other state has it."""
         if isinstance(state, PayloadState) and state.detections:
             return True
-        key = state.behavior if isinstance(state, TeamState) else state.resource
+        key = _key(state)
         due_us = self._due_us.get(key)
         # A clock that was set back must not silence a vehicle.
         if due_us is None or state.time_us < due_us - 2 * self._every_us:
@@ -40,9 +47,24 @@ class TelemetryEncoder:
     def __init__(self, frame: LocalFrame, *, ros: bool = True) -> None:
         self._frame = frame
         self._ros = ros
+        self._refused: set[str] = set()
 
-    def messages(self, state: Telemetry) -> Iterator[ChannelMessage]:
-        """Yield the messages of a state; of a kind that this release does not know, none."""
+    def messages(self, state: Telemetry) -> Sequence[ChannelMessage]:
+        """Return the messages of a state; none of a kind that this release does not know.
+
+        None, too, of a state that no schema can hold, such as one of the year 40000 or with an
+        infinite heading: what one device sends must not end the recording of all.
+        """
+        try:
+            return list(self._messages(state))
+        except (ValueError, OverflowError) as error:
+            key = _key(state)
+            if key not in self._refused:
+                self._refused.add(key)
+                log.warning("%s: a state is left out: %s", key, error, extra={"resource": key})
+            return ()
+
+    def _messages(self, state: Telemetry) -> Iterator[ChannelMessage]:
         match state:
             case VehicleState():
                 yield self._own("vehicle", state)

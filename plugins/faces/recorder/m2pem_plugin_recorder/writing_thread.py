@@ -202,7 +202,7 @@ class WritingThread:
                         each.recording.write((log_message(alert, time_us),))
             case _:
                 if self._runs:
-                    messages = list(self._telemetry.messages(item))
+                    messages = self._telemetry.messages(item)
                     for each in self._runs.values():
                         each.recording.write(messages)
 

@@ -15,13 +15,14 @@ from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSe
 from lxml import etree
 from m2pem_plugin_recorder.fleets import fleet_json
 from m2pem_plugin_recorder.recording import recording_files
+from m2pem_plugin_recorder.telemetry_messages import TelemetryEncoder
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoder
 from mcap_ros2.decoder import DecoderFactory as Ros2Decoder
 from recording_world import DRIVE, FIELD, GATE, ROAD, recorded, simulated_fleet
 
 import m2pem
-from m2pem.api import LocalFrame, StampedRecord
+from m2pem.api import GeoPosition, LocalFrame, StampedRecord, VehicleState
 from m2pem.fleet.hosts import Host
 from m2pem.testing import MissionResult, run_executive, scenarios
 from m2pem.testing.harness import run_mission_on
@@ -208,6 +209,21 @@ def test_mission_diagram_and_fleet_are_attached(tmp_path: Path) -> None:
     told = metadata.metadata
     assert told["mission_sha256"] == hashlib.sha256(DRIVE).hexdigest()
     assert (told["run"], told["m2pem"], told["part"]) == ("r1", m2pem.__version__, "1")
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"time_us": -1}, {"time_us": 1 << 60}, {"yaw_rad": math.inf}, {"mode": "\udcff"}]
+)
+def test_a_state_that_no_schema_can_hold_is_left_out(
+    wrong: dict[str, Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    """It ended the recordings of all runs."""
+    good = VehicleState("ugv1", 1_767_225_600_123_456, GeoPosition(*GATE[:2], 60.0), yaw_rad=0.1)
+    encoder = TelemetryEncoder(LocalFrame(ORIGIN))
+    for _ in range(3):
+        assert not encoder.messages(replace(good, **wrong))
+    assert encoder.messages(good)
+    assert caplog.text.count("ugv1: a state is left out: ") == 1
 
 
 def test_no_address_is_handed_on_with_a_recording() -> None:
