@@ -9,6 +9,7 @@ from pathlib import Path
 import aiomqtt
 
 from m2pem.errors import PluginError
+from m2pem_plugin_vda5050.messages import RETAINED
 from m2pem_plugin_vda5050.settings import BrokerSettings, private, read_password
 
 RETRY_AFTER_S = 1.0
@@ -150,6 +151,8 @@ class Broker:
                 self.first_connected.set()
                 self._connected()
                 async for message in client.messages:
+                    if message.retain and message.topic.value.rpartition("/")[2] not in RETAINED:
+                        continue  # of a vehicle that is gone, perhaps: it is no sign of life
                     payload = message.payload
                     self._received(
                         str(message.topic), payload if isinstance(payload, bytes) else b""

@@ -1,6 +1,7 @@
 """What the arbiter makes of vehicles that refuse, delay, are taken over, or disappear."""
 
 import asyncio
+import json
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -352,6 +353,25 @@ async def test_messages_that_are_no_vda5050_change_nothing(world: World, caplog:
         await harness.start("r1.b1", "goto", AGV1, target=NEAR)
         assert (await harness.ended("r1.b1", 90)).state is BehaviorState.SUCCEEDED
     assert world.judge.problems
+    world.judge.problems.clear()  # the test itself has sent them
+
+
+async def test_a_state_that_the_broker_retains_is_no_sign_of_life(world: World) -> None:
+    """The standard retains none, but a vehicle may have sent it so, and be gone since."""
+    settings = world.simulate()
+    state = (await world.heard("state", AGV1, lambda state: "agvPosition" in state)).copy()
+    world.sim.kill()
+    prefix = "uagv/v2/m2pem/agv1"
+    world.judge.publish(f"{prefix}/state", json.dumps(state), retain=True)
+    world.judge.publish(f"{prefix}/connection", b"", retain=True)
+    connections = {AGV1: Connection(AGV1, "ground", settings, sitl=True)}
+    clock = SystemClock(SPEED)
+    async with ArbiterHarness(Vda5050Arbiter(connections, context(clock)), clock) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR)
+        end = await harness.ended("r1.b1", 60)
+        assert (end.state, harness.states) == (BehaviorState.LOST, [])
+        found = await harness.arbiter.query("r1.b2", end.native_ref)
+        assert "no state was received" in found.reason
     world.judge.problems.clear()  # the test itself has sent them
 
 
