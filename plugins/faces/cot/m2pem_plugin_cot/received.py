@@ -41,7 +41,10 @@ def read_event(content: bytes) -> Received | None:
     # Before the parser: a document type could declare entities, and those could be huge.
     if b"<!" in content or b"\0" in content:
         raise EventError("it has a document type, a comment or a null byte")
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
+    # As UTF-8, whatever it declares: in UTF-7, a document type looks otherwise.
+    parser = etree.XMLParser(
+        encoding="utf-8", resolve_entities=False, no_network=True, huge_tree=False
+    )
     try:
         event = etree.fromstring(content, parser)
     except (etree.XMLSyntaxError, ValueError) as error:

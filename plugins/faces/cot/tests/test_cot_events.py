@@ -152,3 +152,10 @@ def test_a_vehicle_whose_clock_is_wrong_is_sent_all_the_same(time_us: int) -> No
     sent = vehicle_event("uid", "a-f-G", replace(STATE, time_us=time_us), 30.0, "")
     assert sent is not None
     assert etree.fromstring(sent).get("stale") >= etree.fromstring(sent).get("time")
+
+
+def test_a_document_type_in_another_encoding_is_none() -> None:
+    entity = b'+ADwAIQ-DOCTYPE x [+ADwAIQ-ENTITY a "anna"+AD4AXQA+-'
+    content = b'<?xml version="1.0" encoding="UTF-7"?>' + entity + event()
+    with pytest.raises(EventError, match="no XML"):
+        read_event(content.replace(b'uid="m1"', b'uid="&a;"'))
