@@ -355,6 +355,8 @@ class RunState:
     run: str
     mission: Mission
     status: RunStatus = RunStatus.NEW
+    by: str = ""
+    """Who has started it."""
     outcome: RunOutcome | None = None
     detail: str = ""
     epoch: int = 1

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from m2pem.api.allocation import TakeEffect
+from m2pem.bpmn.one_task import PROCESS
 from m2pem.engine.elements.behaviors import preview_control_taken
 from m2pem.engine.incidents import error_policy
 from m2pem.engine.inputs import ControlReturned, ControlTaken
@@ -114,8 +115,20 @@ class Handover:
         """After a restart: who had what, by the journal of a run."""
         for name, holder in taken.items():
             resource = ResourceId(name)
-            self.taken.setdefault(resource, holder)
-            self._withdraw(resource)
+            if resource not in self.taken:
+                self.taken[resource] = holder
+                self._withdraw(resource)
+
+    def lent_to(self, state: RunState) -> frozenset[ResourceId]:
+        """Return what an operator has taken and commands by a run: one of a behavior that was
+        commanded from outside of a mission."""
+        if PROCESS not in {each.id for each in state.mission.processes}:
+            return frozenset()
+        return frozenset(
+            resource
+            for resource in resources_of_mission(state.mission, self._fleet)
+            if self.taken.get(resource) == state.by and resource not in state.taken
+        )
 
     def restore(self, resource: ResourceId) -> None:
         """Free a resource whose link is restored, unless an operator has it."""

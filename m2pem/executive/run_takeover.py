@@ -59,6 +59,9 @@ class RunTakeover:
         finally:
             supervisor.interrupted.expect(())
             for runner, commands in taken_over:
+                # Only now is known what operators have: any of the runs may say so.
+                for resource in supervisor.handover.lent_to(runner.run.state):
+                    supervisor.availability.lend(resource, runner.id)
                 runner.take_up(commands)
                 supervisor.drive(runner)
         return refused
@@ -92,7 +95,13 @@ class RunTakeover:
         await supervisor.dispatcher.fence(number, epoch)
         supervisor.handover.take_up(run.state.taken)
         outage_s = self._outage_s(number, last_us)
-        claim(runner, line.loss, supervisor.handover.taken, supervisor.geometries_given())
+        lent = supervisor.handover.lent_to(run.state)
+        taken = {
+            resource: operator
+            for resource, operator in supervisor.handover.taken.items()
+            if resource not in lent
+        }
+        claim(runner, line.loss, taken, supervisor.geometries_given())
         mark = supervisor.marks.get(number)
         if mark is not None:
             log.warning("%s was stopped before its executive ended; it stays stopped", number)

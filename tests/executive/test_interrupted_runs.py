@@ -10,28 +10,36 @@ import pytest
 from m2pem.api.arbiter import BehaviorReport
 from m2pem.api.runs import RunStatus
 from m2pem.bpmn import parse_mission
-from m2pem.engine.inputs import BehaviorReported, Input, StartRun
+from m2pem.bpmn.one_task import PROCESS, one_task
+from m2pem.engine.inputs import BehaviorReported, ControlTaken, Input, StartRun
 from m2pem.engine.run import MissionRun
 from m2pem.errors import BusyError, NotDrivenError, OperatorError
 from m2pem.fleet.fleet import dump
 from m2pem.journal import MemoryJournal
 from m2pem.journal.base import Entry, RunHeader
-from m2pem.mission.catalogue import BehaviorState
+from m2pem.mission.behavior import BehaviorType
+from m2pem.mission.catalogue import BehaviorState, ResourceId
 
 from .conftest import START_US, World, behavior, fleet, mission, sequence, task
 
 DRIVE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv1"))))
+ELSEWHERE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv2"))))
 BY_NEED = mission(sequence(("Drive", task("Drive", "requires='true' wait='unlimited'"))))
 VEHICLES = fleet("ugv1", "ugv2")
 OUTAGE_US = 60_000_000
 POINT = {"type": "Point", "coordinates": [-77.3, 38.1]}
 
 
-async def leave(journal: MemoryJournal, source: bytes, *inputs: Callable[[str], Input]) -> str:
+async def leave(
+    journal: MemoryJournal,
+    source: bytes,
+    *inputs: Callable[[str], Input],
+    start: StartRun = StartRun("P"),
+) -> str:
     """Leave a run behind that got `inputs`, each made with the run's number, a second apart."""
-    run = await journal.create(RunHeader("m.bpmn", source, "P", dump(VEHICLES)))
+    run = await journal.create(RunHeader("m.bpmn", source, start.process, dump(VEHICLES)))
     mission_run = MissionRun(parse_mission(source, "m.bpmn", accepted=True), VEHICLES, run)
-    for second, make in enumerate((lambda _: StartRun("P"), *inputs)):
+    for second, make in enumerate((lambda _: start, *inputs)):
         item, at_us = make(run), START_US + second * 1_000_000
         step = mission_run.receive(item, at_us)
         await journal.append([Entry(run, 1, step.seq, at_us, step.t_us, item, tuple(step.records))])
@@ -159,6 +167,49 @@ def test_what_operators_take_before_a_run_is_taken_up_is_taken_from_it(play):
         assert world.executive.runner("r1").run.state.taken == {"ugv1": "anna"}
 
     after_a_crash(play, story, (DRIVE, accepted, running))
+
+
+@pytest.mark.parametrize("knows_first", [True, False])
+def test_what_an_operator_has_taken_goes_on_with_what_the_operator_commands_there(
+    play, knows_first
+):
+    source, _ = one_task(BehaviorType.VEHICLE, ResourceId("ugv1"), "drive_stop", {})
+    journal = MemoryJournal()
+
+    async def leave_both() -> tuple[str, str]:
+        async def leave_mission() -> str:
+            taken = ControlTaken(ResourceId("ugv1"), "anna")
+            return await leave(journal, ELSEWHERE, accepted, running, lambda _: taken)
+
+        async def leave_direct() -> str:
+            start = StartRun(PROCESS, {}, "anna")
+            return await leave(journal, source, accepted, running, start=start)
+
+        first = await (leave_mission if knows_first else leave_direct)()
+        second = await (leave_direct if knows_first else leave_mission)()
+        return (second, first) if knows_first else (first, second)
+
+    direct, mission_run = asyncio.run(leave_both())
+
+    async def story(world: World) -> Any:
+        control = world.executive.control
+        for run in (direct, mission_run):
+            known = BehaviorReport(f"{run}.b1", 2, BehaviorState.RUNNING)
+            world.fake.known[known.id] = known
+        assert not await world.executive.resume_all([*sorted((direct, mission_run))])
+        world.fake.report(f"{direct}.b1", BehaviorState.SUCCEEDED)
+        ended = await control.wait(direct)
+        again = await control.execute_behavior("ugv1", "drive_stop", by="anna")
+        refused = await control.wait(await control.start(DRIVE, even_if_busy=True))
+        return ended, await control.holders(), again, refused
+
+    ended, holders, again, refused = play(
+        story, fleet=VEHICLES, journal=journal, start_us=START_US + OUTAGE_US
+    )
+    assert ended.status is RunStatus.COMPLETED
+    assert holders["ugv1"] == "anna"
+    assert again
+    assert "anna" in refused.detail
 
 
 def test_a_run_knows_the_geometries_that_were_handed_over_before_it_was_taken_up(play):

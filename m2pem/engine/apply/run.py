@@ -11,6 +11,7 @@ from m2pem.mission.losses import TAKEN_OVER
 
 def run_started(state: RunState, record: r.RunStarted) -> None:
     state.status = RunStatus.RUNNING
+    state.by = record.by
     state.started_us = record.started_us
 
 
