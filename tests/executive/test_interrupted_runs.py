@@ -27,6 +27,7 @@ ELSEWHERE = mission(sequence(("Drive", behavior("Drive", "drive_stop", "ugv2")))
 BY_NEED = mission(sequence(("Drive", task("Drive", "requires='true' wait='unlimited'"))))
 VEHICLES = fleet("ugv1", "ugv2")
 OUTAGE_US = 60_000_000
+START = StartRun("P")
 POINT = {"type": "Point", "coordinates": [-77.3, 38.1]}
 
 
@@ -34,7 +35,7 @@ async def leave(
     journal: MemoryJournal,
     source: bytes,
     *inputs: Callable[[str], Input],
-    start: StartRun = StartRun("P"),
+    start: StartRun = START,
 ) -> str:
     """Leave a run behind that got `inputs`, each made with the run's number, a second apart."""
     run = await journal.create(RunHeader("m.bpmn", source, start.process, dump(VEHICLES)))
