@@ -210,6 +210,20 @@ def test_a_station_that_poses_as_the_vehicle_is_not_listened_to(tmp_path: Path) 
     asyncio.run(main())
 
 
+def test_a_vehicle_that_is_simulated_is_shown_and_not_forwarded(tmp_path: Path) -> None:
+    async def main() -> None:
+        fleet = ROVER.format(host="127.0.0.1", port=free_port()).replace("mavlink", "sim")
+        settings = {"forward": ["rover1"], "forward_commands": ["rover1"]}
+        async with (
+            gateway(tmp_path, fleet=fleet, **settings) as (_, port),
+            ground_station(port) as station,
+        ):
+            shown = await station.hears("HEARTBEAT", is_autopilot)
+            assert shown.autopilot == dialect.MAV_AUTOPILOT_GENERIC
+
+    asyncio.run(main())
+
+
 @pytest.mark.parametrize(
     ("settings", "error"),
     [

@@ -68,7 +68,8 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
         PluginError: something is wrong; the text names the key.
     """
     reader.refuse_others(_KEYS)
-    forwarded = reader.vehicles("forward", fleet.vehicles)
+    named = reader.vehicles("forward", fleet.vehicles)
+    forwarded = frozenset(each for each in named if not _simulated(fleet, each))
     for each in fleet.vehicles.values():
         if each.id in forwarded and (problem := passes_elsewhere(fleet, each.id)):
             if reader.values.get("forward") == ALL:
@@ -77,7 +78,7 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
                 raise reader.error("forward", f"{each.id}: {problem}")
     commands = reader.vehicles("forward_commands", fleet.vehicles)
     if (
-        extra := sorted(commands - forwarded)
+        extra := sorted(commands - named)
         if reader.values.get("forward_commands") != ALL
         else []
     ):
@@ -105,6 +106,12 @@ def _urls(reader: FaceSettings) -> tuple[Url, ...]:
         except PluginError as error:
             raise reader.error("url", str(error)) from None
     return tuple(dict.fromkeys(urls))
+
+
+def _simulated(fleet: Fleet, name: ResourceId) -> bool:
+    """Return whether a MAVLink vehicle is simulated (`--simulate`), and so has no frames."""
+    vehicle = fleet.vehicles[name]
+    return vehicle.arbiter == "sim" and own_system(vehicle.settings) is not None
 
 
 def passes_elsewhere(fleet: Fleet, name: ResourceId) -> str:
