@@ -119,6 +119,46 @@ def test_a_vehicle_that_a_mission_has_is_refused_until_the_station_takes_it(tmp_
     asyncio.run(main())
 
 
+def test_a_station_gives_back_only_what_it_has_taken_itself(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            await control.take("rover1", by="anna")
+            result = await station.command(ROVER1, 32100, 0)
+            assert result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+            await station.told("REQUEST_OPERATOR_CONTROL", "with anna")
+            assert (await control.holders())["rover1"] == "anna"
+
+    asyncio.run(main())
+
+
+def test_another_speed_on_the_way_to_a_position_target_does_not_end_the_way(
+    tmp_path: Path,
+) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            frame, mask = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, 0b110111111000
+            x, y = round((HOME[0] + 0.005) * 1e7), round(HOME[1] * 1e7)
+            station.mav.set_position_target_global_int_send(
+                0, ROVER1, 1, frame, mask, x, y, math.nan, *[0.0] * 8
+            )
+            await station.told("rover1 begins goto")
+            speed = dialect.MAV_CMD_DO_CHANGE_SPEED
+            assert await station.command(ROVER1, speed, 1, 2.0) == dialect.MAV_RESULT_ACCEPTED
+            runs = await control.runs()
+            assert [each.mission for each in runs] == ["goto of rover1"] * 2
+            assert sum(each.ended_us is None for each in runs) == 1
+
+    asyncio.run(main())
+
+
 def test_the_plan_is_what_the_mission_does_now_and_uploads_are_denied(tmp_path: Path) -> None:
     async def main() -> None:
         async with gateway(tmp_path) as (control, port), ground_station(port) as station:

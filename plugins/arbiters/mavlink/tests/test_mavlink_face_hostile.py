@@ -107,3 +107,49 @@ def test_two_stations_have_their_own_intervals_and_answers(tmp_path: Path) -> No
             assert not any(each.get_type() == "COMMAND_ACK" for each in other.received[before:])
 
     asyncio.run(main())
+
+
+def test_an_interval_that_is_changed_often_is_one_interval(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with gateway(tmp_path) as (_, port), ground_station(port) as station:
+            await station.hears("ATTITUDE", lambda message: message.get_srcSystem() == ROVER1)
+            interval = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+            attitude = dialect.MAVLINK_MSG_ID_ATTITUDE
+            for period_us in (3.6e9, -1, 2e5) * 60:
+                station.mav.command_long_send(ROVER1, 1, interval, 0, attitude, period_us, *[0] * 5)
+            assert await station.command(ROVER1, interval, attitude, 2e5) == 0
+            since = len(station.received)
+            for _ in range(2):
+                beats = len(station.received)
+                await station.hears(
+                    "HEARTBEAT", lambda message: message.get_srcSystem() == ROVER1, beats
+                )
+            attitudes = [
+                each
+                for each in station.received[since:]
+                if each.get_type() == "ATTITUDE" and each.get_srcSystem() == ROVER1
+            ]
+            assert 3 <= len(attitudes) <= 15  # five in each second, between two heartbeats
+
+    asyncio.run(main())
+
+
+def test_many_senders_of_position_targets_are_few_orders(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with (
+            gateway(tmp_path, commands="all") as (control, port),
+            ground_station(port) as station,
+        ):
+            await station.hears("HEARTBEAT", lambda each: each.get_srcSystem() == ROVER1)
+            frame, mask = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, 0b110111111000
+            for number in range(200):
+                station.mav.srcComponent = number + 1
+                x, y = round(38.1077 * 1e7), round((-77.319 + number * 1e-5) * 1e7)
+                station.mav.set_position_target_global_int_send(
+                    0, ROVER1, 1, frame, mask, x, y, float("nan"), *[0.0] * 8
+                )
+            await station.told("commands come too fast")
+            await station.told("rover1 begins goto")
+            assert len(await control.runs()) <= 2
+
+    asyncio.run(main())

@@ -44,7 +44,8 @@ REPEATED_S = 3.0
 
 ORDERS_PER_S = 2.0
 MOST_ORDERS_AT_ONCE = 6.0
-"""Orders for one resource: each is a run in the journal. Those that stop it are counted apart."""
+"""Orders of one station for one resource: each is a run in the journal. Those that stop it are
+counted apart."""
 
 TARGET_EVERY_S = 1.0
 SAME_TARGET_M = 0.5
@@ -95,7 +96,7 @@ class Orders:
         self._pending: OrderedDict[_Key, _Pending] = OrderedDict()
         self._latest: dict[ResourceId, _Key] = {}
         self._last: dict[ResourceId, Order] = {}
-        self._budgets: dict[tuple[ResourceId, bool], tuple[float, float]] = {}
+        self._budgets: dict[tuple[Peer, ResourceId, bool], tuple[float, float]] = {}
         self._started: OrderedDict[RunId, _Started] = OrderedDict()
         self._targets: dict[tuple[Peer, Address, int], Order] = {}
         self._followed: set[tuple[Peer, Address, int]] = set()
@@ -205,10 +206,9 @@ class Orders:
         order = order_of(command, vehicle, camera)
         if order is None:
             return None
-        self._count(order)
+        self._count(order, station)
         order = self._with_speed(order, vehicle)
         self._latest[vehicle.resource] = key
-        self._last[order.resource] = order
         return self._carry_out(key, pending, order, station, vehicle, by)
 
     def _with_speed(self, order: Order, vehicle: ShownVehicle) -> Order:
@@ -221,19 +221,24 @@ class Orders:
             return order
         return Order(last.resource, "goto", {**last.parameters, **order.parameters})
 
-    def _count(self, order: Order) -> None:
-        """Count an order.
+    def _count(self, order: Order, station: Station) -> None:
+        """Count an order of a station.
 
         Raises:
             RefusedCommandError: there are too many.
         """
         now_s = self._now_s()
-        key = order.resource, order.behavior == "hold"
+        key = station.peer, order.resource, order.behavior == "hold"
         left, counted_s = self._budgets.get(key, (MOST_ORDERS_AT_ONCE, now_s))
         left = min(MOST_ORDERS_AT_ONCE, left + ORDERS_PER_S * (now_s - counted_s))
         if left < 1.0:
             raise RefusedCommandError("commands come too fast", REJECTED)
         self._budgets[key] = left - 1.0, now_s
+        if len(self._budgets) > MOST_OUTCOMES:
+            refilled_s = now_s - MOST_ORDERS_AT_ONCE / ORDERS_PER_S
+            self._budgets = {
+                each: budget for each, budget in self._budgets.items() if budget[1] > refilled_s
+            }
 
     async def _hand_over(
         self, key: _Key, pending: _Pending, station: Station, vehicle: ShownVehicle, by: str
@@ -243,6 +248,10 @@ class Orders:
             if takes:
                 await self._control.take(vehicle.resource, by=by)
             else:
+                # `give_back` leaves it to operators whose vehicle they give back.
+                holder = (await self._control.holders()).get(vehicle.resource)
+                if holder != by:
+                    raise OperatorError(f"it is not with {by}, but with {holder or 'nobody'}")
                 await self._control.give_back(vehicle.resource, by=by)
         except M2pemError as error:
             self._refuse(key, pending, station, vehicle, RefusedCommandError(str(error), REJECTED))
@@ -275,6 +284,17 @@ class Orders:
             self._refuse(key, pending, station, vehicle, RefusedCommandError(reason, result))
 
     async def _execute(self, order: Order, by: str) -> tuple[int, str]:
+        """Carry an order out, and note it as the last one unless it is refused."""
+        before = self._last.get(order.resource)
+        self._last[order.resource] = order
+        result, reason = await self._outcome_of(order, by)
+        if result != ACCEPTED and self._last.get(order.resource) is order:
+            del self._last[order.resource]
+            if before is not None:
+                self._last[order.resource] = before
+        return result, reason
+
+    async def _outcome_of(self, order: Order, by: str) -> tuple[int, str]:
         """Begin a behavior; return when it is under way or has ended: MAV_RESULT and reason."""
         try:
             run = await self._control.execute_behavior(
@@ -321,10 +341,15 @@ class Orders:
         try:
             while (order := self._targets.pop(key, None)) is not None:
                 if done is None or not _same(order, done):
-                    result, reason = await self._execute(order, by)
-                    done = order
-                    if result != ACCEPTED:
-                        self._say(station, vehicle, reason)
+                    try:
+                        self._count(order, station)
+                    except RefusedCommandError as error:
+                        self._say(station, vehicle, error.reason)
+                    else:
+                        done = order
+                        result, reason = await self._execute(order, by)
+                        if result != ACCEPTED:
+                            self._say(station, vehicle, reason)
                 await asyncio.sleep(TARGET_EVERY_S)
         finally:
             self._followed.discard(key)

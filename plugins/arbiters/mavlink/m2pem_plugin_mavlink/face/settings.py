@@ -77,11 +77,7 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
             else:
                 raise reader.error("forward", f"{each.id}: {problem}")
     commands = reader.vehicles("forward_commands", fleet.vehicles)
-    if (
-        extra := sorted(commands - named)
-        if reader.values.get("forward_commands") != ALL
-        else []
-    ):
+    if extra := sorted(commands - named) if reader.values.get("forward_commands") != ALL else []:
         raise reader.error("forward_commands", f"{extra[0]} is not one of those of `forward`")
     return Settings(
         _urls(reader),

@@ -63,6 +63,7 @@ class Streams:
         self._vehicles = vehicles
         self._default_s = {message_type(name).id: 1 / rate for name, rate in rates_hz.items()}
         self._own_s: dict[Peer, dict[tuple[int, int], float]] = {}
+        self._queued: dict[Peer, dict[tuple[int, int], int]] = {}
         self._now_s = now_s
         self._queue: list[_Entry] = []
         self._numbers = count()
@@ -80,15 +81,16 @@ class Streams:
         short become the shortest. Return False if the station has set too many."""
         own = self._own_s.setdefault(station.peer, {})
         key = vehicle.system, id_
+        if key not in own and len(own) >= MOST_INTERVALS and interval_s != 0:
+            return False
+        self._queued.setdefault(station.peer, {}).pop(key, None)
         if interval_s == 0:
             own.pop(key, None)
             return True
-        if key not in own and len(own) >= MOST_INTERVALS:
-            return False
-        begins = own.get(key, 0.0) == 0.0
         own[key] = min(max(interval_s, SHORTEST_S), LONGEST_S) if interval_s > 0 else 0.0
-        if begins and own[key]:
+        if own[key]:
             self._push(self._now_s(), station, vehicle, id_)
+            self._drop_replaced()
         return True
 
     async def run(self) -> None:
@@ -106,10 +108,30 @@ class Streams:
             self._forget()
 
     def _push(self, due_s: float, station: Station | None, vehicle: ShownVehicle, id_: int) -> None:
-        heapq.heappush(self._queue, (due_s, next(self._numbers), station, vehicle, id_))
+        number = next(self._numbers)
+        if station is not None:
+            self._queued.setdefault(station.peer, {})[vehicle.system, id_] = number
+        heapq.heappush(self._queue, (due_s, number, station, vehicle, id_))
+
+    def _drop_replaced(self) -> None:
+        """Bound the queue: a station may change its intervals often, and long ones stay long."""
+        in_use = len(self._default_s) * len(self._vehicles)
+        in_use += sum(len(each) for each in self._queued.values())
+        if len(self._queue) > in_use + MOST_INTERVALS:
+            self._queue = [each for each in self._queue if self._is_queued(each)]
+            heapq.heapify(self._queue)
+
+    def _is_queued(self, entry: _Entry) -> bool:
+        """Return whether no later entry has replaced this one."""
+        _, number, station, vehicle, id_ = entry
+        if station is None:
+            return True
+        return self._queued.get(station.peer, {}).get((vehicle.system, id_)) == number
 
     async def _send(self, entry: _Entry, now_s: float) -> None:
         due_s, _, station, vehicle, id_ = entry
+        if not self._is_queued(entry):
+            return
         if station is None:
             interval_s = self._default_s[id_]
             stations = [each for each in self._stations if not self._has_own(each, vehicle, id_)]
@@ -139,3 +161,4 @@ class Streams:
     def _forget(self) -> None:
         for peer in [peer for peer in self._own_s if not peer.open]:
             del self._own_s[peer]
+            self._queued.pop(peer, None)
