@@ -10,6 +10,7 @@ from m2pem.bpmn.context import MARK
 from m2pem.bpmn.xml import BPMN, M2PEM
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
+from m2pem.mission.mission import Mission
 from m2pem.mission.values import Value
 
 PROCESS = "ONE_TASK"
@@ -59,3 +60,8 @@ def one_task(
         flow.set("sourceRef", source)
         flow.set("targetRef", target)
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8"), data
+
+
+def is_one_task(mission: Mission) -> bool:
+    """Return whether a mission was made by `one_task`."""
+    return [each.id for each in mission.processes] == [PROCESS]

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 
 from m2pem.api.authoring import MissionFiles
 from m2pem.api.runs import RunId
-from m2pem.bpmn.one_task import one_task
+from m2pem.bpmn.one_task import is_one_task, one_task
 from m2pem.engine.state import RunStatus
 from m2pem.errors import BusyError, OperatorError
 from m2pem.executive.handover import UNNAMED_OPERATOR
 from m2pem.executive.run_starter import RunStarter
+from m2pem.executive.runner import Runner
 from m2pem.executive.supervisor import Supervisor
+from m2pem.fleet.allocation import resources_of_mission
 from m2pem.mission.behavior import BehaviorType
 from m2pem.mission.catalogue import ResourceId
 from m2pem.mission.values import Value
@@ -27,11 +29,9 @@ AGAIN_S = 0.1
 
 @dataclass(slots=True)
 class _Commanded:
-    """`run`: the last one of this resource, "" before the first, and who asked for it. `latest`:
-    the number of the last request that was well. `turn`: a request waits for the one before."""
+    """A resource. `latest`: the number of the last request that was well. `turn`: a request waits
+    for the one before."""
 
-    run: RunId = ""
-    by: str = ""
     latest: int = 0
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
@@ -70,38 +70,47 @@ class DirectBehaviors:
         async with commanded.turn:
             holder = self._supervisor.handover.taken.get(resource)
             if request == commanded.latest and holder in (None, by):
-                await self._end_earlier(resource, commanded, by)
+                await self._end_earlier(resource, by)
             own = holder == by
             if own:
                 await self._given_up(resource)
             if request != commanded.latest:
                 raise OperatorError(f"{behavior} of {resource}: a later request came before it")
-            commanded.run = await self._starter.begin_if_free(
+            return await self._starter.begin_if_free(
                 loaded, process, data, by, lent=(resource,) if own else ()
             )
-            commanded.by = by
-            return commanded.run
 
-    async def _end_earlier(self, resource: ResourceId, commanded: _Commanded, by: str) -> None:
+    async def _end_earlier(self, resource: ResourceId, by: str) -> None:
         """End the behavior that goes on by an earlier request.
 
         Raises:
             BusyError: it is that of another operator.
         """
-        runner = self._supervisor.runners.get(commanded.run)
-        if runner is None or runner.done.is_set():
+        runner = self._earlier(resource)
+        if runner is None:
             return
-        if commanded.by != by:
+        run, other = runner.id, runner.run.state.by
+        if other != by:
             raise BusyError(
-                f"{resource} does for {commanded.by} what it was asked for ({commanded.run}): "
-                f"stop {commanded.run}, or take {resource} first",
-                {str(resource): commanded.run},
+                f"{resource} does for {other} what it was asked for ({run}): "
+                f"stop {run}, or take {resource} first",
+                {str(resource): run},
             )
         if runner.run.state.status is not RunStatus.ENDED:
             reason = "replaced by a later request"
             asked = self._supervisor.emergency.stop(runner, by, reason)
-            await self._supervisor.emergency.written("stop", {commanded.run: asked})
+            await self._supervisor.emergency.written("stop", {run: asked})
         await runner.done.wait()
+
+    def _earlier(self, resource: ResourceId) -> Runner | None:
+        """Return the run of an earlier request that goes on; also one from before a restart."""
+        fleet = self._supervisor.fleet
+        for runner in self._supervisor.runners.values():
+            mission = runner.run.state.mission
+            is_request = not runner.done.is_set() and is_one_task(mission)
+            if is_request and resource in resources_of_mission(mission, fleet):
+                return runner
+        return None
 
     async def _given_up(self, resource: ResourceId) -> None:
         """Wait until a mission has released what an operator took from it, or for 10 s."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from m2pem.api.allocation import TakeEffect
-from m2pem.bpmn.one_task import PROCESS
+from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.elements.behaviors import preview_control_taken
 from m2pem.engine.incidents import error_policy
 from m2pem.engine.inputs import ControlReturned, ControlTaken
@@ -122,7 +122,7 @@ class Handover:
     def lent_to(self, state: RunState) -> frozenset[ResourceId]:
         """Return what an operator has taken and commands by a run: one of a behavior that was
         commanded from outside of a mission."""
-        if PROCESS not in {each.id for each in state.mission.processes}:
+        if not is_one_task(state.mission):
             return frozenset()
         return frozenset(
             resource

@@ -213,6 +213,28 @@ def test_what_an_operator_has_taken_goes_on_with_what_the_operator_commands_ther
     assert "anna" in refused.detail
 
 
+def test_who_commanded_a_behavior_before_a_restart_replaces_it_after_it(play):
+    source, _ = one_task(BehaviorType.VEHICLE, ResourceId("ugv1"), "drive_stop", {})
+    journal = MemoryJournal()
+    start = StartRun(PROCESS, {}, "anna")
+    run = asyncio.run(leave(journal, source, accepted, running, start=start))
+
+    async def story(world: World) -> Any:
+        control = world.executive.control
+        world.fake.known[f"{run}.b1"] = BehaviorReport(f"{run}.b1", 2, BehaviorState.RUNNING)
+        assert not await world.executive.resume_all([run])
+        with pytest.raises(BusyError, match="does for anna what it was asked for"):
+            await control.execute_behavior("ugv1", "drive_stop", by="ben")
+        asked = asyncio.create_task(control.execute_behavior("ugv1", "drive_stop", by="anna"))
+        await world.fake.until_called("cancel", f"{run}.b1")
+        world.fake.report(f"{run}.b1", BehaviorState.CANCELLED)
+        return await asked, await control.wait(run)
+
+    later, before = play(story, fleet=VEHICLES, journal=journal, start_us=START_US + OUTAGE_US)
+    assert later != run
+    assert "replaced by a later request" in before.detail
+
+
 def test_a_run_knows_the_geometries_that_were_handed_over_before_it_was_taken_up(play):
     async def story(world: World, runs):
         await world.executive.control.set_geometry("Route", POINT, by="anna")
