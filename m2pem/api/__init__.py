@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from m2pem.api.event_rules import (
         UNKNOWN,
         AnswerRule,
+        EventCondition,
         EventThrower,
         Fields,
         ReceiveRule,
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
         ThrownEvents,
         Unknown,
         read_rules,
+        read_template,
     )
     from m2pem.api.exporter import ExportedRecord, ExportedRun, Exporter, ExportOptions
     from m2pem.api.face import Face, FaceSettings
@@ -191,8 +193,8 @@ _MODULES = {
     "m2pem.api.behavior_tracker": "BehaviorTracker",
     "m2pem.api.async_queue": "AsyncQueue",
     "m2pem.api.latest_task": "LatestTask",
-    "m2pem.api.event_rules": "AnswerRule EventThrower Fields ReceiveRule SendRule Thrown "
-    "ThrownEvents UNKNOWN Unknown read_rules",
+    "m2pem.api.event_rules": "AnswerRule EventCondition EventThrower Fields ReceiveRule SendRule "
+    "Thrown ThrownEvents UNKNOWN Unknown read_rules read_template",
     "m2pem.api.exporter": "ExportedRecord ExportedRun Exporter ExportOptions",
     "m2pem.api.face": "Face FaceSettings",
     "m2pem.api.log_context": "current_run trace_ids",
@@ -247,9 +249,11 @@ _LAZY = {name: module for module, names in _MODULES.items() for name in names.sp
 
 __all__ = [
     "read_rules",
+    "read_template",
     "Unknown",
     "UNKNOWN",
     "ThrownEvents",
+    "EventCondition",
     "EventThrower",
     "AnswerRule",
     "SCHEDULE",

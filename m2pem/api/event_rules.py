@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
+from m2pem.api.connection_reader import ConnectionReader
 from m2pem.api.control import MissionControl
 from m2pem.api.face import FaceSettings
 from m2pem.api.runs import RunId, RunStatus, StampedRecord
@@ -67,23 +68,21 @@ class Thrown:
         return [key for key, each in declared.items() if each.name == wanted]
 
 
-class ReceiveRule:
-    """Received messages, such as those of a topic, and what they are to missions.
+class EventCondition:
+    """When a received message is an event: when `when` becomes true, or each time that it is true
+    (`every`, the default without a `when`); never more often than `rate`.
 
-    They are an event when `when` becomes true, or each time that it is true (`every`, the default
-    without a `when`); never more often than `rate`. A rule belongs to one thread, but for `throw`.
+    It belongs to one thread.
     """
 
     def __init__(
         self,
-        thrown: Thrown,
         when: Expression,
         data: Mapping[str, Expression],
         *,
         every: bool,
         period_s: float,
     ) -> None:
-        self.thrown = thrown
         self._when = when
         self._data = data
         self._every = every
@@ -92,19 +91,16 @@ class ReceiveRule:
         self._last_s: float | None = None
 
     @classmethod
-    def read(cls, given: FaceSettings, own: Collection[str]) -> Self:
-        """Read a rule. `own`: the keys that the face itself reads.
+    def read(cls, given: ConnectionReader, data: Mapping[str, Expression]) -> Self:
+        """Read `when`, `every` and `rate`. `data`: what an event brings.
 
         Raises:
             PluginError: one is wrong; it names the key.
         """
-        given.refuse_others([*own, *RECEIVED])
         rate_hz = given.quantity("rate", 1.0, Dimension.FREQUENCY, 0.001, 50.0)
-        data = given.inner("data", '{alarm.level: "${level}"}')
         return cls(
-            _thrown(given),
             _expression(given, "when", given.text("when", "true")),
-            {name: _template(data, name) for name in data.values},
+            data,
             every=given.flag("every", "when" not in given.values),
             period_s=1 / rate_hz,
         )
@@ -129,6 +125,30 @@ class ReceiveRule:
         data = {name: value.evaluate(read) for name, value in self._data.items()}
         self._last_s = now_s
         return data
+
+
+class ReceiveRule:
+    """Received messages, such as those of a topic, and what they are to missions."""
+
+    def __init__(self, thrown: Thrown, condition: EventCondition) -> None:
+        self.thrown = thrown
+        self._condition = condition
+
+    @classmethod
+    def read(cls, given: FaceSettings, own: Collection[str]) -> Self:
+        """Read a rule. `own`: the keys that the face itself reads.
+
+        Raises:
+            PluginError: one is wrong; it names the key.
+        """
+        given.refuse_others([*own, *RECEIVED])
+        data = given.inner("data", '{alarm.level: "${level}"}')
+        values = {name: read_template(data, name) for name in data.values}
+        return cls(_thrown(given), EventCondition.read(given, values))
+
+    def occurs(self, fields: Fields, now_s: float) -> Fields | None:
+        """See `EventCondition.occurs`."""
+        return self._condition.occurs(fields, now_s)
 
     async def throw(self, control: MissionControl, data: Fields, by: str) -> None:
         """Throw it in every run that goes on and has it."""
@@ -236,7 +256,7 @@ class AnswerRule:
             given.text("done", ""),
             given.text("failed", ""),
             _expression(given, "success", given.text("success", success)),
-            {name: _template(data, name) for name in data.values},
+            {name: read_template(data, name) for name in data.values},
         )
 
     async def throw(
@@ -335,14 +355,19 @@ def _thrown(given: FaceSettings) -> Thrown:
     return Thrown(signal, message)
 
 
-def _expression(given: FaceSettings, key: str, text: str) -> Expression:
+def _expression(given: ConnectionReader, key: str, text: str) -> Expression:
     try:
         return parse(text)
     except ExpressionSyntaxError as error:
         raise given.error(key, str(error)) from None
 
 
-def _template(given: FaceSettings, key: str) -> Expression:
+def read_template(given: ConnectionReader, key: str) -> Expression:
+    """Return a value or template of fields.
+
+    Raises:
+        PluginError: it is neither.
+    """
     value = given.values[key]
     if not isinstance(value, str):
         if value is None or isinstance(value, bool | int | float):
@@ -370,7 +395,7 @@ def _branch(given: FaceSettings, key: str, value: Any, level: int) -> Any:
             for number, each in enumerate(value)
             for name in [f"{key}[{number}]"]
         ]
-    return _template(FaceSettings(given.resource, {key: value}, given.path), key)
+    return read_template(FaceSettings(given.resource, {key: value}, given.path), key)
 
 
 def _filled(tree: Any, data: Fields | None) -> Any:

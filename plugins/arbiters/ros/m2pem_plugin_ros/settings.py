@@ -18,10 +18,14 @@ from m2pem.api import (
     Connection,
     ConnectionReader,
     Dimension,
+    EventCondition,
     ResourceId,
     read_declared_behaviors,
+    read_template,
 )
 from m2pem.errors import PluginError
+from m2pem_plugin_ros.installation import RosError
+from m2pem_plugin_ros.interfaces.types import MESSAGE, full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NAME = re.compile(rf"/?{_TOKEN}(/{_TOKEN})*")
@@ -164,15 +168,26 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
+class OtherMessage:
+    """Messages of another type than those of detections. `condition`: when one is a detection, with
+    its `type` as data. `position`: the path of the field with its position; "": it has none."""
+
+    type_name: str
+    condition: EventCondition
+    position: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class DetectorSettings:
     """The connection of a detector: the full name of its topic, and the type of detections whose
-    messages have none."""
+    messages have none. `other` None: `message` says what the messages are."""
 
     namespace: str
     topic: str
     domain_id: int | None = None
     type: str = ""
     message: DetectorMessage = DetectorMessage.DETECTION
+    other: OtherMessage | None = None
 
 
 def in_namespace(namespace: str, name: str) -> str:
@@ -183,7 +198,9 @@ def in_namespace(namespace: str, name: str) -> str:
 _KEYS = (*(each.name for each in fields(Settings)), "sim")
 """`sim` is for the simulator of the vehicle, and not read here."""
 
-DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim")
+OTHER_KEYS = ("when", "every", "rate", "position")
+"""Keys of a detector whose messages have another type."""
+DETECTOR_KEYS = ("namespace", "domain_id", "topic", "message", "type", "sim", *OTHER_KEYS)
 NODE_KEYS = ("driver", "via", "own_behaviors")
 """Further keys of a payload with an m2pem node."""
 
@@ -327,11 +344,29 @@ def _read_detector(
     reader.refuse_others((*DETECTOR_KEYS, *node_keys))
     topic = reader.topic("topic", "detections")
     namespace = reader.namespace("" if topic.startswith("/") else None)
-    message = reader.choice("message", DetectorMessage, DetectorMessage.DETECTION)
     type_ = reader.text("type", "")
-    return DetectorSettings(
-        namespace, in_namespace(namespace, topic), reader.domain_id(), type_, message
-    )
+    full = in_namespace(namespace, topic)
+    if "/" in str(own.get("message", "")):
+        other = _read_other(reader)
+        return DetectorSettings(namespace, full, reader.domain_id(), type_, other=other)
+    message = reader.choice("message", DetectorMessage, DetectorMessage.DETECTION)
+    if extra := next((key for key in OTHER_KEYS if key in own), ""):
+        raise reader.error(extra, f"it goes with a type of ROS as `message`: {EXAMPLE_TYPE}")
+    return DetectorSettings(namespace, full, reader.domain_id(), type_, message)
+
+
+EXAMPLE_TYPE = "std_msgs/msg/Float32"
+
+
+def _read_other(reader: RosConnectionReader) -> OtherMessage:
+    if "type" not in reader.values:
+        raise reader.error("type", "it is missing: what is detected, such as smoke")
+    try:
+        name = full_name(reader.text("message", ""), MESSAGE)
+    except RosError as error:
+        raise reader.error("message", str(error)) from error
+    condition = EventCondition.read(reader, {"type": read_template(reader, "type")})
+    return OtherMessage(name, condition, reader.text("position", ""))
 
 
 _PAYLOAD_KEYS = (*DETECTOR_KEYS, *NODE_KEYS)

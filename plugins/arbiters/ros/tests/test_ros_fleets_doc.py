@@ -9,6 +9,7 @@ from m2pem_plugin_ros.arbiter import RosArbiter
 from m2pem_plugin_ros.catalogue import LEVEL, PAYLOAD
 from m2pem_plugin_ros.settings import (
     BOUNDS,
+    DETECTOR_KEYS,
     DetectorMessage,
     DriverName,
     OdomFrame,
@@ -72,7 +73,7 @@ def test_there_are_fleets() -> None:
 
 def test_every_setting_is_explained() -> None:
     keys = {each.name for each in fields(Settings)} | {each.name for each in fields(Topics)}
-    keys |= {"sim", "topic", "message", "type"}
+    keys |= {"sim", *DETECTOR_KEYS}
     enums = (DriverName, Via, RouteAction, OdomFrame, DetectorMessage)
     words = {str(word) for enum in enums for word in enum}
     assert {name for name in keys | words if f"`{name}`" not in TEXT} == set()

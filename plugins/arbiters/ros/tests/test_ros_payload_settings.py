@@ -114,3 +114,37 @@ def test_the_catalogue_has_what_payloads_share_and_what_the_fleet_declares() -> 
     names = {spec.name for spec in arbiter.catalogue(PTZ)}
     assert {"ptz_point_at", "ptz_track", "take_picture", "record_video", "wipe"} <= names
     assert "goto" not in names
+
+
+OTHER = {"topic": "/smoke", "message": "std_msgs/Float32", "type": "smoke"}
+
+
+def test_a_detector_may_publish_any_type() -> None:
+    (found,) = read_detectors(
+        connections({**OTHER, "when": "data > 0.7", "position": "pose"}, detector=True)
+    ).values()
+    assert found.other is not None
+    assert (found.other.type_name, found.other.position) == ("std_msgs/msg/Float32", "pose")
+    found_types = [found.other.condition.occurs({"data": each}, 0.0) for each in (0.5, 0.8)]
+    assert found_types == [None, {"type": "smoke"}]
+
+
+@pytest.mark.parametrize(
+    ("said", "problem"),
+    [
+        ({"when": "data >"}, r"connection\.when"),
+        ({"type": "${"}, r"connection\.type"),
+        ({"rate": "0 Hz"}, r"connection\.rate"),
+        ({"message": "std_msgs/srv/X"}, r"connection\.message: .* is not the name of a ROS type"),
+        ({"message": "string"}, r"connection\.when: it goes with a type of ROS as `message`"),
+    ],
+)
+def test_what_is_wrong_of_another_type_is_named(said: dict[str, Any], problem: str) -> None:
+    with pytest.raises(PluginError, match=problem):
+        read_detectors(connections({**OTHER, "when": "data > 0.7", **said}, detector=True))
+
+
+def test_a_detector_of_another_type_says_what_it_detects() -> None:
+    said = {key: value for key, value in OTHER.items() if key != "type"}
+    with pytest.raises(PluginError, match=r"connection\.type: it is missing"):
+        read_detectors(connections(said, detector=True))

@@ -70,7 +70,13 @@ class DetectorTopic:
         self._tf = tf
         self._log_throttle = LogThrottle(context.logger, resource)
         self._waiting: deque[_Found] = deque(maxlen=WAITING)
-        if settings.message is DetectorMessage.STRING:
+        if settings.other is not None:
+            from m2pem_plugin_ros.sensors.other_messages import OtherMessages  # noqa: PLC0415
+
+            OtherMessages(
+                ros, resource, settings.topic, settings.other, self._on_other, self._log_throttle
+            )
+        elif settings.message is DetectorMessage.STRING:
             from std_msgs.msg import String  # noqa: PLC0415  # it is loaded where ROS is only
 
             ros.subscribe(String, settings.topic, self._on_text, qos.EVENTS)
@@ -91,34 +97,60 @@ class DetectorTopic:
     def _on_detection(self, message: Any) -> None:
         if message.source not in ("", self._resource, self._resource.partition("/")[2]):
             return  # several payloads share the topic
-        stamp = message.header.stamp
+        self._take(message.type, self._time_of(message), self._position_of(message))
+
+    def _on_other(self, found: "tuple[str, Any, Any]") -> None:
+        """A message of another type, and the field with its position, which may be None."""
+        type_, message, place = found
+        position = None
+        if hasattr(place, "latitude"):
+            altitude_m = float(getattr(place, "altitude", math.nan))
+            position = self._geographic(place.latitude, place.longitude, altitude_m)
+        elif place is not None:
+            numbers = (place.x, place.y, place.z)
+            position = self._local(getattr(message, "header", None), numbers)
+        self._take(type_, self._time_of(message), position)
+
+    def _time_of(self, message: Any) -> int:
+        """Return the time of a message: that of its header, if that is of our clock."""
         now_us = self._context.clock.now_us()
-        stamp_us = stamp.sec * 1_000_000 + stamp.nanosec // 1000
-        is_own_clock = 0 <= now_us - stamp_us <= LATE_S * 1e6
-        self._take(message.type, stamp_us if is_own_clock else now_us, self._position_of(message))
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        if stamp is None:
+            return now_us
+        stamp_us = int(stamp.sec) * 1_000_000 + int(stamp.nanosec) // 1000
+        return stamp_us if 0 <= now_us - stamp_us <= LATE_S * 1e6 else now_us
 
     def _position_of(self, message: Any) -> GeoPosition | None:
         if message.position_kind == _GEOGRAPHIC:
             geo = message.position_geographic
-            if -90.0 <= geo.latitude_deg <= 90.0 and -180.0 <= geo.longitude_deg <= 180.0:
-                return GeoPosition(geo.latitude_deg, geo.longitude_deg, geo.altitude_m)
-            cause = "an invalid position of a detection"
-            self._log_throttle.log(cause, f"({geo.latitude_deg:g}, {geo.longitude_deg:g})")
-        elif message.position_kind == _LOCAL:
+            return self._geographic(geo.latitude_deg, geo.longitude_deg, geo.altitude_m)
+        if message.position_kind == _LOCAL:
             place = message.position_local
-            numbers = (place.x, place.y, place.z)
-            if not all(abs(number) <= FARTHEST_M for number in numbers):
-                cause = "an invalid position of a detection"
-                self._log_throttle.log(cause, f"({place.x:g}, {place.y:g}, {place.z:g})")
-                return None
-            try:
-                east_m, north_m, up_m = self._in_map(message.header, numbers)
-            except TransformError as error:
-                cause = "the position of a detection in a frame of which the pose is not known"
-                self._log_throttle.log(cause, f"'{message.header.frame_id}': {error}")
-                return None
-            return to_geodetic(east_m, north_m, up_m, self._context.origin)
+            return self._local(message.header, (place.x, place.y, place.z))
         return None
+
+    def _geographic(
+        self, latitude_deg: float, longitude_deg: float, altitude_m: float
+    ) -> GeoPosition | None:
+        if -90.0 <= latitude_deg <= 90.0 and -180.0 <= longitude_deg <= 180.0:
+            return GeoPosition(latitude_deg, longitude_deg, altitude_m)
+        cause = "an invalid position of a detection"
+        self._log_throttle.log(cause, f"({latitude_deg:g}, {longitude_deg:g})")
+        return None
+
+    def _local(self, header: Any, numbers: tuple[float, float, float]) -> GeoPosition | None:
+        """Return a place in the frame of a header; None: `map`."""
+        if not all(abs(number) <= FARTHEST_M for number in numbers):
+            cause = "an invalid position of a detection"
+            self._log_throttle.log(cause, f"({numbers[0]:g}, {numbers[1]:g}, {numbers[2]:g})")
+            return None
+        try:
+            east_m, north_m, up_m = numbers if header is None else self._in_map(header, numbers)
+        except TransformError as error:
+            cause = "the position of a detection in a frame of which the pose is not known"
+            self._log_throttle.log(cause, f"'{header.frame_id}': {error}")
+            return None
+        return to_geodetic(east_m, north_m, up_m, self._context.origin)
 
     def _in_map(self, header: Any, place: tuple[float, float, float]) -> tuple[float, float, float]:
         """Return a place of the header's frame in `map`.

@@ -69,7 +69,7 @@ def read_specs(fleet: Fleet, words: Mapping[str, Any]) -> Iterator[VehicleSpec]:
             detectors=tuple(
                 _detector(payloads[name], vehicle.settings, detectors[name], fleet.origin)
                 for name in payloads
-                if fleet.payloads[name].vehicle == vehicle.id
+                if fleet.payloads[name].vehicle == vehicle.id and detectors[name].other is None
             ),
         )
         try:
