@@ -184,6 +184,32 @@ async def test_a_topic_of_another_type_is_named(ros_domain: int) -> None:
     ]
 
 
+async def test_of_a_flood_the_last_message_counts(ros_domain: int) -> None:
+    async with faced(ros_domain, {"receive": [ALARM]}) as world:
+        _, ended = await waits(world, WAITS)
+        publisher = world.client.node.create_publisher(Bool, "/alarm", 10)
+        await until(publisher.get_subscription_count)
+        for _ in range(5_000):
+            publisher.publish(Bool(data=False))
+        await publish(world, "/alarm", Bool(data=True), ended)
+        assert str(ended.result().status) == "completed"
+
+
+async def test_large_messages_and_those_of_liars_are_cut(ros_domain: int) -> None:
+    """A text of a megabyte, with what would steer a terminal, becomes data of a mission."""
+    text = {
+        "topic": "/text",
+        "type": "std_msgs/msg/String",
+        "signal": "alarm",
+        "data": {"alarm.text": "${data}"},
+    }
+    async with faced(ros_domain, {"receive": [text]}) as world:
+        run, ended = await waits(world, WAITS)
+        await publish(world, "/text", String(data="\x1b[2J" + "x" * 1_000_000), ended)
+        _, written = await thrown_by(world, run)
+    assert written == "alarm.text = ?[2J" + "x" * 996
+
+
 async def test_a_condition_that_does_not_fit_is_said_once(ros_domain: int) -> None:
     heard: list[str] = []
     text = {"topic": "/text", "type": "std_msgs/msg/String", "signal": "x", "when": "data - 1 > 2"}

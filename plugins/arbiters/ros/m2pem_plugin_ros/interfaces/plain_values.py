@@ -43,6 +43,13 @@ class MessageFields(Mapping[str, Any]):
         return len(self._names)
 
 
+def _printable(text: str) -> str:
+    """The text without what would steer a terminal; lines stay."""
+    if text.isprintable():
+        return text
+    return "".join(each if each.isprintable() or each in "\n\t" else "?" for each in text)
+
+
 def _is_message(value: Any) -> bool:
     return hasattr(value, "get_fields_and_field_types")
 
@@ -57,7 +64,7 @@ def _plain(value: Any, left: list[int]) -> Value:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, str):
-        return sendable(value[:LONGEST_TEXT])
+        return _printable(sendable(value[:LONGEST_TEXT]))
     if isinstance(value, bytes) and len(value) == 1:
         return value[0]
     if _is_message(value):
