@@ -152,15 +152,18 @@ class ReceiveRule:
 
     async def throw(self, control: MissionControl, data: Fields, by: str) -> None:
         """Throw it in every run that goes on and has it."""
+        if self.thrown.signal:  # at once: what comes often must not read the list of all runs
+            try:
+                await control.signal(self.thrown.signal, data=data, by=by)
+            except OperatorError as error:  # mostly that no run has it
+                log.info("%s by %s: %s", self.thrown, by, error)
+            return
         for run in await control.runs():
             if run.status not in (RunStatus.RUNNING, RunStatus.PAUSED):
                 continue
             try:
-                for id_ in self.thrown.ids(await control.mission(run.run)):
-                    if self.thrown.signal:
-                        await control.signal(id_, run=run.run, data=data, by=by)
-                    else:
-                        await control.message(id_, run=run.run, data=data, by=by)
+                for message in self.thrown.ids(await control.mission(run.run)):
+                    await control.message(message, run=run.run, data=data, by=by)
             except M2pemError as error:  # it may have ended meanwhile
                 log.info("%s for %s by %s: %s", self.thrown, run.run, by, error)
 
@@ -194,7 +197,10 @@ class EventThrower:
             self._wake.clear()
             while self._waiting:
                 rule, data, by = self._waiting.popleft()
-                await rule.throw(self._control, data, by)
+                try:
+                    await rule.throw(self._control, data, by)
+                except M2pemError as error:
+                    log.warning("%s by %s: %s", rule.thrown, by, error)
             self._dropped = 0
 
 
@@ -276,7 +282,7 @@ class AnswerRule:
         if signal := self.done if succeeded else self.failed:
             try:
                 await control.signal(signal, run=run, data=data, by=by)
-            except OperatorError as error:
+            except M2pemError as error:
                 log.warning("the answer of %s: %s", by, error)
 
 
