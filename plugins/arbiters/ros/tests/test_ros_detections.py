@@ -9,7 +9,7 @@ from m2pem_plugin_ros.installation import RosError
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_double import ORIGIN, at
-from ros_face_client import Client
+from ros_face_client import Client, until
 from ros_sensors import AMPLE_S, GPR, connected
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Float32, String
@@ -92,6 +92,16 @@ async def test_a_message_that_does_not_fit_is_no_detection(
                 publisher.publish(String(data="x"))
                 await asyncio.sleep(0.05)
         assert found(bench) == []
+
+
+async def test_a_topic_of_another_type_is_named(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    smoke = {"topic": "/smoke", "message": "std_msgs/msg/Float32", "type": "smoke"}
+    async with connected(ros_domain, {GPR: smoke}), Client(ros_domain) as client:
+        client.node.create_publisher(String, "/smoke", 10)
+        said = "evsg1/gpr: /smoke is published as std_msgs/msg/String by /client, but its "
+        await until(lambda: any(each.startswith(said) for each in caplog.messages))
 
 
 @pytest.mark.parametrize(

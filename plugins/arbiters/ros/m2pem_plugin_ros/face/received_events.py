@@ -18,6 +18,7 @@ from m2pem_plugin_ros.face.event_settings import ReceivedTopic
 from m2pem_plugin_ros.interfaces.plain_values import MessageFields
 from m2pem_plugin_ros.interfaces.texts import one_line
 from m2pem_plugin_ros.runtime import Inbox, RosRuntime
+from m2pem_plugin_ros.runtime.publishers import other_type
 
 NODE = "face_events"
 LOOK_EVERY_S = 0.5
@@ -90,16 +91,12 @@ class TopicReceiver:
         """Look at the publishers: subscribe as they offer it, and say if their type is another."""
         found = self._node.get_publishers_info_by_topic(self._topic)
         expected = self._received.type_name
-        wrong = next((each for each in found if each.topic_type != expected), None)
-        said = ""
-        if wrong is not None:
-            node = f"{wrong.node_namespace.rstrip('/')}/{wrong.node_name}"
-            said = f"is published as {wrong.topic_type} by {node}"
+        said = other_type(found, expected)
         if said and said != self._wrong:
             log.warning(
                 "ros %s %s, but %s says %s: its messages are not received",
                 self._topic,
-                one_line(said)[:LONGEST],
+                said,
                 self._received.key,
                 expected,
             )

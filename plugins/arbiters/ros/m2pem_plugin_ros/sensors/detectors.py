@@ -22,6 +22,7 @@ from m2pem_plugin_ros.settings import DetectorMessage, DetectorSettings
 
 if TYPE_CHECKING:
     from m2pem_plugin_ros.runtime import RosRuntime
+    from m2pem_plugin_ros.sensors.other_messages import OtherMessages
 
 LONGEST_TYPE = 200
 WAITING = 100
@@ -70,11 +71,18 @@ class DetectorTopic:
         self._tf = tf
         self._log_throttle = LogThrottle(context.logger, resource)
         self._waiting: deque[_Found] = deque(maxlen=WAITING)
+        self._other: OtherMessages | None = None
         if settings.other is not None:
-            from m2pem_plugin_ros.sensors.other_messages import OtherMessages  # noqa: PLC0415
+            from m2pem_plugin_ros.sensors import other_messages  # noqa: PLC0415  # it needs rclpy
 
-            OtherMessages(
-                ros, resource, settings.topic, settings.other, self._on_other, self._log_throttle
+            self._other = other_messages.OtherMessages(
+                ros,
+                resource,
+                settings.topic,
+                settings.other,
+                self._on_other,
+                context.logger,
+                self._log_throttle,
             )
         elif settings.message is DetectorMessage.STRING:
             from std_msgs.msg import String  # noqa: PLC0415  # it is loaded where ROS is only
@@ -87,7 +95,10 @@ class DetectorTopic:
             ros.subscribe(message_type, settings.topic, self._on_detection, qos.EVENTS)
 
     def retry(self) -> None:
-        """Publish the waiting detections, if the position of the vehicle is known now."""
+        """Publish the waiting detections, if the position of the vehicle is known now, and look who
+        publishes."""
+        if self._other is not None:
+            self._other.look()
         while self._waiting and self._publish(self._waiting[0]):
             self._waiting.popleft()
 

@@ -1,6 +1,7 @@
 """Detections from messages of any type: when they are one, and where."""
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
 from typing import Any
@@ -13,6 +14,7 @@ from m2pem_plugin_ros.interfaces.texts import one_line
 from m2pem_plugin_ros.interfaces.types import MESSAGE, find_type
 from m2pem_plugin_ros.log_throttle import LogThrottle
 from m2pem_plugin_ros.runtime import Inbox, RosRuntime
+from m2pem_plugin_ros.runtime.publishers import other_type
 from m2pem_plugin_ros.settings import OtherMessage
 
 QUALITY = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -41,9 +43,11 @@ class OtherMessages:
         topic: str,
         other: OtherMessage,
         hear: Callable[[Found], None],
+        logger: logging.Logger,
         log_throttle: LogThrottle,
     ) -> None:
         self._other = other
+        self._logger = logger
         self._log_throttle = log_throttle
         try:
             type_ = find_type(other.type_name, MESSAGE)
@@ -51,7 +55,25 @@ class OtherMessages:
         except RosError as error:
             raise RosError(f"{resource}: connection: {error}") from error
         self._inbox: Inbox[Found] = Inbox(asyncio.get_running_loop(), hear, WAITING)
+        self._node = ros.node
+        self._resource = resource
+        self._topic = topic
+        self._wrong = ""
         ros.node.create_subscription(type_, topic, self._hear, QUALITY)
+
+    def look(self) -> None:
+        """Look at the publishers, and say if their type is another. Call it now and then."""
+        found = self._node.get_publishers_info_by_topic(self._topic)
+        wrong = other_type(found, self._other.type_name)
+        if wrong and wrong != self._wrong:
+            self._logger.warning(
+                "%s: %s %s, but its connection says %s: nothing is detected",
+                self._resource,
+                self._topic,
+                wrong,
+                self._other.type_name,
+            )
+        self._wrong = wrong
 
     def _hear(self, message: Any) -> None:
         try:
