@@ -6,7 +6,9 @@ oldest messages (`backlog`), and nothing else is delayed.
 
 import asyncio
 import logging
+import threading
 import time
+from contextlib import suppress
 
 import foxglove
 from foxglove.websocket import WebSocketServer
@@ -48,6 +50,9 @@ STATES_WAITING = 1000
 SCENE_AGAIN_S = 5.0
 """Seconds after which the scene is sent again, for viewers that have come since."""
 
+STOP_WITHIN_S = 2.0
+"""How long viewers may take to close their connections."""
+
 log = logging.getLogger("m2pem.face.foxglove")
 
 
@@ -76,6 +81,10 @@ class LiveServer(Listener):
             *scene_channels(),
         ):
             self._channels[channel] = self._made(channel)
+        self._of_records = [
+            self._channels[each]
+            for each in (records_channel(), prompts_channel(), pictures_channel())
+        ]
         self._follower = follow(control, self)
 
     async def run(self) -> None:
@@ -94,8 +103,7 @@ class LiveServer(Listener):
         except ExceptionGroup as group:
             raise group.exceptions[0] from None
         finally:
-            stopping = asyncio.to_thread(server.stop)
-            await asyncio.shield(stopping)
+            await _stop(server)
 
     def _open(self) -> WebSocketServer:
         try:
@@ -121,8 +129,11 @@ class LiveServer(Listener):
         if not is_new:
             encoder.take(stamped)
             return
-        for message in encoder.messages(stamped):
-            self._send(message)
+        if any(channel.has_sinks() for channel in self._of_records):
+            for message in encoder.messages(stamped):
+                self._send(message)
+        else:
+            encoder.take(stamped)
         if isinstance(stamped.record, r.RunEnded):
             self._forget()
         if isinstance(stamped.record, r.GeometryReceived):
@@ -172,3 +183,19 @@ class LiveServer(Listener):
             schema=foxglove.Schema(name=kind.name, encoding=kind.encoding, data=kind.data),
             context=self._context,
         )
+
+
+async def _stop(server: WebSocketServer) -> None:
+    """Stop the server. It waits for each viewer to close its connection, which one that never reads
+    does not: that is left to a thread which ends with the process."""
+    loop, stopped = asyncio.get_running_loop(), asyncio.Event()
+
+    def stop() -> None:
+        server.stop()
+        with suppress(RuntimeError):  # nobody waits any more
+            loop.call_soon_threadsafe(stopped.set)
+
+    threading.Thread(target=stop, name="end of foxglove", daemon=True).start()
+    with suppress(TimeoutError):
+        async with asyncio.timeout(STOP_WITHIN_S):
+            await stopped.wait()

@@ -1,6 +1,6 @@
 """The messages of a run's records: each record, and what some say of questions and pictures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import msgspec
 
@@ -18,6 +18,18 @@ from m2pem_plugin_recorder.channels import (
 _encode = msgspec.json.Encoder().encode
 
 _PICTURES = "picture.files"
+
+_NOTED = frozenset((r.RunStarted, r.RunPaused, r.RunResumed, r.PromptOpened))
+_TOLD = frozenset((r.PromptOpened, r.PromptAnswered, r.PromptWithdrawn, r.DataWritten))
+"""Records with a second message. Most records are in neither set: they must be fast."""
+
+
+class _Head(msgspec.Struct):
+    """What a line says before the record."""
+
+    run: str
+    seq: int
+    t: float
 
 
 class RecordEncoder:
@@ -39,6 +51,21 @@ class RecordEncoder:
         """Take note of a record; return its time in microseconds since the Unix epoch."""
         record = stamped.record
         self.seq = stamped.seq
+        if type(record) in _NOTED:
+            self._note(record)
+        # Mission time stands during a pause, which begins at its own time.
+        at_us = self.started_us + self._paused_us + round(stamped.t_s * US_PER_S)
+        return max(at_us, self._paused_at_us)
+
+    def messages(self, stamped: StampedRecord) -> Iterable[ChannelMessage]:
+        """Take note of a record, and return its messages."""
+        at_us = self.take(stamped)
+        line = ChannelMessage(records_channel(), at_us, record_line(stamped), stamped.seq)
+        if type(stamped.record) in _TOLD:
+            return (line, *self._told(stamped.record, at_us))
+        return (line,)
+
+    def _note(self, record: r.Record) -> None:
         match record:
             case r.RunStarted():
                 self.started_us = record.started_us
@@ -49,15 +76,8 @@ class RecordEncoder:
                 self._paused_at_us = 0
             case r.PromptOpened():
                 self._prompts[record.prompt] = record
-        # Mission time stands during a pause, which begins at its own time.
-        at_us = self.started_us + self._paused_us + round(stamped.t_s * US_PER_S)
-        return max(at_us, self._paused_at_us)
 
-    def messages(self, stamped: StampedRecord) -> Iterator[ChannelMessage]:
-        """Take note of a record, and yield its messages."""
-        at_us = self.take(stamped)
-        yield ChannelMessage(records_channel(), at_us, record_line(stamped), stamped.seq)
-        record = stamped.record
+    def _told(self, record: r.Record, at_us: int) -> Iterator[ChannelMessage]:
         match record:
             case r.PromptOpened():
                 opened = PromptMessage(
@@ -88,5 +108,5 @@ class RecordEncoder:
 
 def record_line(stamped: StampedRecord) -> bytes:
     """Return a record as a line of JSON, as `m2pem runs --export` prints it."""
-    head = _encode({"run": stamped.run, "seq": stamped.seq, "t": stamped.t_s})
+    head = _encode(_Head(stamped.run, stamped.seq, stamped.t_s))
     return head[:-1] + b"," + _encode(stamped.record)[1:]

@@ -21,6 +21,12 @@ from m2pem.testing.harness import run_mission_on
 
 PROTOCOL = websockets.Subprotocol("foxglove.sdk.v1")
 MESSAGE_DATA = 1
+ASK = b"""
+<definitions xmlns="http://www.omg.org/spec/BPMN/20100524/MODEL" id="d" targetNamespace="d">
+<process id="ASK" isExecutable="true"><startEvent id="s"/><userTask id="u"/><endEvent id="e"/>
+<sequenceFlow id="su" sourceRef="s" targetRef="u"/>
+<sequenceFlow id="ue" sourceRef="u" targetRef="e"/></process></definitions>
+"""
 
 
 def free_port() -> int:
@@ -41,10 +47,11 @@ async def served(control: MissionControl, port: int, **settings: Any) -> AsyncIt
 
 
 class Viewer:
-    """Subscribes to all channels; `data` has what came, by topic."""
+    """Subscribes to all channels, or to `only` one; `data` has what came, by topic."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, only: str = "") -> None:
         self._port = port
+        self._only = only
         self.channels: dict[int, dict[str, Any]] = {}
         self.server: dict[str, Any] = {}
         self.status: list[str] = []
@@ -78,7 +85,11 @@ class Viewer:
             case "advertise":
                 new = {each["id"]: each for each in told["channels"]}
                 self.channels |= new
-                asked = [{"id": each, "channelId": each} for each in new]
+                asked = [
+                    {"id": each, "channelId": each}
+                    for each, channel in new.items()
+                    if self._only in ("", channel["topic"])
+                ]
                 await self.send({"op": "subscribe", "subscriptions": asked})
             case "status":
                 self.status.append(told["message"])
@@ -92,8 +103,8 @@ class Viewer:
 
 
 @asynccontextmanager
-async def viewing(port: int) -> AsyncIterator[Viewer]:
-    viewer = Viewer(port)
+async def viewing(port: int, only: str = "") -> AsyncIterator[Viewer]:
+    viewer = Viewer(port, only)
     task = asyncio.create_task(viewer.run())
     try:
         yield viewer
@@ -187,3 +198,34 @@ async def test_settings_are_checked(settings: dict[str, Any], problem: str) -> N
     async with run_executive(simulated_fleet()) as control:
         with pytest.raises(PluginError, match=problem):
             FoxgloveFace(control, FaceSettings("foxglove", settings))
+
+
+async def test_a_viewer_that_never_reads_does_not_keep_the_executive_from_its_end() -> None:
+    port = free_port()
+    async with asyncio.timeout(60.0):
+        async with (
+            run_executive(simulated_fleet(), speed=5.0) as control,
+            served(control, port),
+            viewing(port) as viewer,
+        ):
+            await viewer.until(lambda: "/ugv1/location" in viewer.data)
+            stalled = await websockets.connect(f"ws://127.0.0.1:{port}", subprotocols=[PROTOCOL])
+            stalled.transport.pause_reading()
+    stalled.transport.abort()
+
+
+async def test_questions_reach_a_viewer_that_subscribes_to_nothing_else() -> None:
+    port = free_port()
+    async with (
+        run_executive(simulated_fleet(), speed=5.0) as control,
+        served(control, port),
+        viewing(port, "/m2pem/prompts") as viewer,
+    ):
+        await viewer.until(lambda: viewer.channels)
+        await (await viewer.socket.ping())  # answered after the subscription was taken
+        run = await control.start(ASK)
+        await viewer.until(lambda: "/m2pem/prompts" in viewer.data)
+        (prompt,) = control.prompts()
+        await control.answer(run, prompt.prompt, "done")
+        await viewer.until(lambda: len(viewer.data["/m2pem/prompts"]) == 2)
+    assert [*viewer.data] == ["/m2pem/prompts"]
