@@ -5,6 +5,7 @@ import logging
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
@@ -15,6 +16,10 @@ TELEMETRY = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Reliable, as the displays of RViz and the nodes of Nav2 subscribe by default; a subscriber of
 sensor data, which is best-effort, gets it, too. It never waits for a reader: the oldest message is
 dropped."""
+
+NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
+"""rclpy looks at every event of every publisher whenever a message comes: hundreds of vehicles have
+thousands of them. All that these events do is to log what the subscribing node logs, too."""
 
 T = TypeVar("T")
 
@@ -46,7 +51,9 @@ class TelemetryPublisher(Generic[T]):
     ) -> None:
         self._node = node
         self._make = make
-        self._publisher: Any = node.create_publisher(message_type, topic, TELEMETRY)
+        self._publisher: Any = node.create_publisher(
+            message_type, topic, TELEMETRY, event_callbacks=NO_EVENTS
+        )
         self.topic: str = self._publisher.topic_name
         """Its name after remapping."""
         self._limiter = RateLimiter(rate_hz, self._publish)

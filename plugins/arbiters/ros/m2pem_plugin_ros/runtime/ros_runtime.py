@@ -14,6 +14,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -28,6 +29,10 @@ from m2pem_plugin_ros.runtime.calls import Calls, Responses
 
 JOIN_S = 5.0
 WAITING = 1000
+
+NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
+"""rclpy looks at every event of every subscription whenever a message comes. All that these events
+do is to log that types or QoS differ, which `sensors.endpoints` says by name."""
 
 SILENT = ("--ros-args", "--disable-stdout-logs", "--")
 """The console belongs to m2pem; what is logged with ROS is on /rosout."""
@@ -181,7 +186,9 @@ class RosRuntime:
         """Subscribe with a callback on the loop. Of more than `waiting` messages, the oldest are
         dropped."""
         inbox = Inbox(self._loop, callback, waiting)
-        return (node or self.node).create_subscription(message_type, topic, inbox.put, qos)
+        return (node or self.node).create_subscription(
+            message_type, topic, inbox.put, qos, event_callbacks=NO_EVENTS
+        )
 
     # --- services and actions that others offer -------------------------------------------------
 
