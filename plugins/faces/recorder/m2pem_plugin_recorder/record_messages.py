@@ -20,7 +20,7 @@ _encode = msgspec.json.Encoder().encode
 _PICTURES = "picture.files"
 
 _NOTED = frozenset((r.RunStarted, r.RunPaused, r.RunResumed, r.PromptOpened))
-_TOLD = frozenset((r.PromptOpened, r.PromptAnswered, r.PromptWithdrawn, r.DataWritten))
+_SHOWN = frozenset((r.PromptOpened, r.PromptAnswered, r.PromptWithdrawn, r.DataWritten))
 """Records with a second message. Most records are in neither set: they must be fast."""
 
 
@@ -61,8 +61,8 @@ class RecordEncoder:
         """Take note of a record, and return its messages."""
         at_us = self.take(stamped)
         line = ChannelMessage(records_channel(), at_us, record_line(stamped), stamped.seq)
-        if type(stamped.record) in _TOLD:
-            return (line, *self._told(stamped.record, at_us))
+        if type(stamped.record) in _SHOWN:
+            return (line, *self._for_operators(stamped.record, at_us))
         return (line,)
 
     def _note(self, record: r.Record) -> None:
@@ -77,7 +77,7 @@ class RecordEncoder:
             case r.PromptOpened():
                 self._prompts[record.prompt] = record
 
-    def _told(self, record: r.Record, at_us: int) -> Iterator[ChannelMessage]:
+    def _for_operators(self, record: r.Record, at_us: int) -> Iterator[ChannelMessage]:
         match record:
             case r.PromptOpened():
                 opened = PromptMessage(

@@ -78,7 +78,7 @@ class _Rule:
         self._thrower = thrower
         self._loop = asyncio.get_running_loop()
         self._second = 0
-        self._heard = 0
+        self._received = 0
         self._failed = False
 
     def listener(self, vehicle: ResourceId) -> Callable[[Message, Address], None]:
@@ -96,9 +96,9 @@ class _Rule:
             return
         now_s = self._loop.time()
         if int(now_s) != self._second:
-            self._second, self._heard = int(now_s), 0
-        self._heard += 1
-        if self._heard > MESSAGES_PER_S:
+            self._second, self._received = int(now_s), 0
+        self._received += 1
+        if self._received > MESSAGES_PER_S:
             return
         try:
             data = received.rule.occurs(values_of(message, sender), now_s)

@@ -210,8 +210,8 @@ class Autopilot(ABC):
         name = f"mode {self.modes.name(custom_mode)}"
 
         def revoked(accepted_s: float) -> None:
-            heard_s = self.state.heartbeat_s
-            if heard_s is not None and heard_s >= accepted_s + SHOWS_OTHERS_AFTER_S:
+            received_s = self.state.heartbeat_s
+            if received_s is not None and received_s >= accepted_s + SHOWS_OTHERS_AFTER_S:
                 raise self._left(f"{name} was accepted")
 
         try:

@@ -71,7 +71,7 @@ class FramesPublisher:
         self._latest: dict[ResourceId, VehicleState] = {}
         self._sent: dict[str, deque[tuple[int, int]]] = {}
         self._limiter: RateLimiter[None] = RateLimiter(rate_hz, self._publish)
-        self._is_wanted = self._namesake_told = False
+        self._is_wanted = self._namesake_said = False
         self._listened = 0
         self._subscriptions: dict[str, Any] = {}
         self._statics: dict[str, Any] = {}
@@ -176,8 +176,8 @@ class FramesPublisher:
         topic = self._publisher.topic_name
         known, name = publishers_of(self._node, topic), self._node.get_fully_qualified_name()
         if known.count(name) > 1:
-            if not self._namesake_told:
-                self._namesake_told = True
+            if not self._namesake_said:
+                self._namesake_said = True
                 log.warning(
                     "another node is %s, too: the face of an executive that this one replaces, or "
                     "of a second one in this ROS domain, which needs a namespace of its own",

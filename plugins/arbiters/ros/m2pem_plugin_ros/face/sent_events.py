@@ -87,10 +87,10 @@ class SentEvents:
         while not publisher.get_subscription_count() and self._loop.time() < until_s:  # noqa: ASYNC110
             await asyncio.sleep(LOOK_EVERY_S)
         if not publisher.get_subscription_count():
-            log.warning("%s", self._nobody(sent, publisher.topic_name, run))
+            log.warning("%s", self._unserved(sent, publisher.topic_name, run))
         publisher.publish(message)
 
-    def _nobody(self, sent: SentTopic, topic: str, run: RunId) -> str:
+    def _unserved(self, sent: SentTopic, topic: str, run: RunId) -> str:
         """Return that nobody receives what is published, and why."""
         found = self._node.get_subscriptions_info_by_topic(topic)
         text = f"{sent.key}: {sent.rule.thrown} of run {run}: nobody subscribes to {topic}"
