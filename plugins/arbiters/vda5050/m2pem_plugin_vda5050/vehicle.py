@@ -291,6 +291,8 @@ class Vehicle:
         """Send nothing more for these behaviors: the vehicle goes on with what was released."""
         if self._task is not None and self._task.request.id in behaviors:
             self._task = None
+            self._left.clear()
+            self._pause.wanted = None  # another executive says now whether it is to be paused
         for behavior in behaviors:
             self._left.pop(self._id(behavior), None)
 

@@ -118,6 +118,24 @@ async def test_a_cancel_without_a_broker_is_soon_said_not_to_have_arrived(world:
         await world.heard("state", AGV1, lambda state: state["orderId"] and not state["nodeStates"])
 
 
+async def test_a_vehicle_that_is_let_go_of_is_not_paused_later(world: World) -> None:
+    """Another executive drives it, which this one would stop when its broker is back."""
+    settings = world.simulate()
+    async with commanding(settings, lost_after_s=600.0) as harness:
+        await harness.start("r1.b1", "goto", AGV1, target=NEAR, speed=0.5)
+        await moving(harness)
+        world.broker.stop()
+        await harness.arbiter.hold(AGV1)
+        await harness.arbiter.disown("r1")
+        world.broker.start()
+        end = await world.heard(
+            "state", AGV1, lambda state: state["paused"] or state["lastNodeSequenceId"] == 2
+        )
+        assert not end["paused"]
+    sent = [each["actions"][0]["actionType"] for each in world.judge.of("instantActions", AGV1)]
+    assert "startPause" not in sent
+
+
 async def test_a_vehicle_that_stops_at_the_next_node_is_cancelled_when_it_is_there(
     world: World,
 ) -> None:
