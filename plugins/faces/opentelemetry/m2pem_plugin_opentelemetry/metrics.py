@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import TypeAlias
 
 from m2pem import __version__
+from m2pem.api.records import RunOutcome
 from m2pem.api.statistics import DurationCounts, ExecutiveStatistics
 from m2pem.api.telemetry import LinkState
 from m2pem_plugin_opentelemetry.run_measures import Histogram, RunMeasures
@@ -106,6 +107,8 @@ class Family:
     points: Sequence[tuple[tuple[str, ...], Value]]
 
 
+OUTCOMES = tuple(each.value for each in RunOutcome)
+
 SPANS: dict[str, int] = {"exported": 0, "dropped": 0, "failed": 0}
 """What became of spans in this process. dropped: the collector was too slow; failed: it was not
 there, or refused them."""
@@ -122,7 +125,8 @@ def snapshot(found: ExecutiveStatistics, measures: RunMeasures, fleet: str) -> l
         "m2pem.loop.lateness": _one(_histogram(found.loop)),
         "m2pem.loop.longest": _one(found.loop.longest_s),
         "m2pem.runs": _each(found.runs),
-        "m2pem.runs.ended": _each(found.runs_ended),
+        # All outcomes from the start: Prometheus sees no increase in a counter that begins at 1.
+        "m2pem.runs.ended": _each({**dict.fromkeys(OUTCOMES, 0), **found.runs_ended}),
         "m2pem.inbox.length": _each(found.inboxes),
         "m2pem.behaviors": _one(found.behaviors),
         "m2pem.prompts": _one(found.prompts),

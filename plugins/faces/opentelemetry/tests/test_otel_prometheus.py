@@ -86,7 +86,9 @@ async def test_both_formats_have_all_metrics_and_the_counts_of_the_executive() -
         }
         assert values(families, "m2pem_records_total") == {(): found.records}
         assert values(families, "m2pem_runs") == {("running",): 1, ("paused",): 0}
-        assert values(families, "m2pem_runs_ended_total") == {("completed",): 1}
+        ended = values(families, "m2pem_runs_ended_total")
+        assert ended.pop(("completed",)) == 1
+        assert ended == {("failed",): 0, ("stopped",): 0, ("terminated",): 0}
         assert values(families, "m2pem_inbox_length") == {(run,): 0}
         assert values(families, "m2pem_prompts") == {(): 1}
         assert values(families, "m2pem_commit_duration_seconds_count") == {(): found.commits.count}
