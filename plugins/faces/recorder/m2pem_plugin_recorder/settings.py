@@ -54,7 +54,7 @@ def recorder_settings(
     known = ("folder", "rate_hz", "ros", "file_mb", "total_mb", "min_free_mb")
     settings.refuse_others(known)
     if "folder" in settings.values:
-        folder = Path(settings.text("folder", "")).expanduser()
+        folder = Path(fleet.file).parent / Path(settings.text("folder", "")).expanduser()
     elif journal is not None:
         folder = folder_beside(journal)
     else:

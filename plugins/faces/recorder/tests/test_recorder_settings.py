@@ -36,6 +36,9 @@ def test_recordings_are_beside_the_journal_unless_a_folder_is_named() -> None:
     )
     named = FaceSettings("recorder", {"folder": "/flights"})
     assert recorder_settings(named, fleet, None).folder == Path("/flights")
+    beside = FaceSettings("recorder", {"folder": "flights"})
+    found = recorder_settings(beside, replace(fleet, file="/etc/m2pem/fleet.yaml"), None)
+    assert found.folder == Path("/etc/m2pem/flights")
     with pytest.raises(PluginError, match=r"faces\.recorder\.folder: it is missing"):
         recorder_settings(FaceSettings("recorder", {}), fleet, None)
 
