@@ -117,6 +117,34 @@ async def test_tf_leads_from_the_earth_to_where_the_fix_says(ros_domain: int) ->
     assert (east, north, up) == pytest.approx((0.0, math.cos(0.2), math.sin(0.2)), abs=1e-9)
 
 
+async def test_a_state_that_no_transform_can_have_ends_nothing(
+    ros_domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    def moves(message: Any) -> bool:
+        return any(of_state(each) for each in message.transforms)
+
+    async with faced(ros_domain) as world:
+        await hears(world, STATE, "/tf", TFMessage, moves)
+        strange = VehicleState(ResourceId("ugv2"), TIME_US, PLACE, roll_rad=math.inf)
+        told = asyncio.create_task(until(lambda: "ugv2" in caplog.text))
+        await said(world, strange, told)
+        frames = world.client.hear("/tf", TFMessage)
+        del frames[:]
+        later = replace(STATE, time_us=TIME_US + 1_000_000)
+        came = asyncio.create_task(
+            until(
+                lambda: [
+                    e
+                    for each in list(frames)
+                    for e in each.transforms
+                    if e.header.stamp.sec == 1_700_000_001
+                ]
+            )
+        )
+        await said(world, later, came)
+    assert caplog.text.count("no transform of ugv2 can be published") == 1
+
+
 async def test_odometry_has_the_place_in_the_fleets_frame_and_the_twist_in_the_vehicles(
     ros_domain: int,
 ) -> None:

@@ -69,6 +69,7 @@ class FramesPublisher:
         self._left: set[str] = set()
         """Frames that are left to other nodes."""
         self._latest: dict[ResourceId, VehicleState] = {}
+        self._failed: set[ResourceId] = set()
         self._sent: dict[str, deque[tuple[int, int]]] = {}
         self._limiter: RateLimiter[None] = RateLimiter(rate_hz, self._publish)
         self._is_wanted = self._namesake_said = False
@@ -126,7 +127,13 @@ class FramesPublisher:
     def _publish(self, _: None) -> None:
         transforms = []
         for vehicle, state in self._latest.items():
-            transform = self._topics[vehicle].transform(state)
+            try:
+                transform = self._topics[vehicle].transform(state)
+            except Exception:  # a state that no transform can have must not end the face
+                if vehicle not in self._failed:
+                    self._failed.add(vehicle)
+                    log.exception("no transform of %s can be published: %r", vehicle, state)
+                continue
             if transform is not None and transform.child_frame_id not in self._left:
                 transforms.append(transform)
                 self._sent[transform.child_frame_id].append(_stamp(transform))
