@@ -16,6 +16,7 @@ from ros_face_client import behavior_goal, faced, point, until
 
 from m2pem.api import RunId
 from m2pem.api import records as r
+from m2pem.errors import JournalError
 from m2pem.executive.control import Control
 from m2pem.testing import scenarios
 
@@ -229,6 +230,27 @@ async def test_a_goal_that_is_cancelled_while_it_waits_commands_nothing(
     assert (result.status.state, result.status.code) == (BehaviorStatus.CANCELLED, "")
     assert "before it began" in result.status.reason
     assert asked == ["ugv1", "ugv1"]
+
+
+async def test_a_goal_has_its_result_also_when_its_feedback_fails(
+    ros_domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    read, failed = Control.records, []
+
+    async def fails_once(self: Control, *arguments: Any, **options: Any) -> Any:
+        if not failed:
+            failed.append(arguments)
+            raise JournalError("the disk is full")
+        return await read(self, *arguments, **options)
+
+    monkeypatch.setattr(Control, "records", fails_once)
+    async with faced(ros_domain, ALL) as world:
+        sent = await world.client.send(UGV1, behavior_goal("goto", target=point(0.0005)))
+        status, result = await sent.end()
+    assert status == GoalStatus.STATUS_SUCCEEDED
+    assert result.status.state == BehaviorStatus.SUCCEEDED
+    assert failed
+    assert "the disk is full" in caplog.text
 
 
 async def test_what_a_goal_asked_for_is_freed_when_it_is_over(ros_domain: int) -> None:

@@ -4,7 +4,6 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
 from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -172,10 +171,14 @@ async def stop_when_cancelled(control: MissionControl, goal: Goal, run: RunId, b
 
 
 async def ended(task: "asyncio.Task[None]") -> None:
-    """Cancel a task, and wait for its end."""
+    """Cancel a task beside a goal, and wait for its end. If it failed, the goal goes on."""
     task.cancel()
-    with suppress(asyncio.CancelledError):
+    try:
         await task
+    except asyncio.CancelledError:
+        pass
+    except Exception:
+        log.exception("a goal has no more feedback, or cannot be cancelled")
 
 
 def _empty(request: Any) -> None:
