@@ -88,9 +88,17 @@ async def _serve(name: str, face: Face, broke: Callable[[str], None]) -> None:
     try:
         await face.serve()
         why = "it ended by itself"
-    except PluginError as error:
-        why = str(error)
     except Exception as error:
-        log.exception("the face %s broke", name)
-        why = f"{type(error).__name__}: {error}"
+        cause = _cause(error)
+        why = str(cause)
+        if not isinstance(cause, PluginError):
+            log.exception("the face %s broke", name)
+            why = f"{type(cause).__name__}: {cause}"
     broke(f"the face {name} does not serve any more: {why}; missions go on without it")
+
+
+def _cause(error: Exception) -> Exception:
+    """Return the first error within groups, which `asyncio.TaskGroup` raises."""
+    while isinstance(error, ExceptionGroup):
+        error = error.exceptions[0]
+    return error

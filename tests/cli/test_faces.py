@@ -23,7 +23,8 @@ class Echo:
 
     async def serve(self):
         if self.breaks:
-            raise PluginError("port 7 is taken")
+            async with asyncio.TaskGroup() as group:
+                group.create_task(self.open())
         run = ""
         async for event in self.control.subscribe():
             if not run:
@@ -31,6 +32,9 @@ class Echo:
                     "ugv2", "goto", {"target": [38.1076, -77.3192]}, by="echo")
                 summary = await self.control.wait(run)
                 self.file.write_text(f"{summary.mission}: {summary.status}")
+
+    async def open(self):
+        raise PluginError("port 7 is taken")
 
 @hookimpl
 def m2pem_register_faces(register):
