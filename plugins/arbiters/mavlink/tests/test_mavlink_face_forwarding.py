@@ -250,6 +250,17 @@ def test_wrong_settings_are_named(tmp_path: Path, settings: dict[str, Any], erro
     assert error in str(raised.value)
 
 
+def test_the_address_of_a_vehicle_is_not_one_for_ground_stations(tmp_path: Path) -> None:
+    async def main() -> None:
+        host, port = "127.0.0.1", free_port()
+        fleet = ROVER.format(host=host, port=port).replace("udpout", "udpin")
+        async with gateway(tmp_path, fleet=fleet, url=[f"udpin://{host}:{port}"]):
+            pass
+
+    with pytest.raises(PluginError, match=r"faces\.mavlink\.url: udpin://.* is where rover1 is"):
+        asyncio.run(main())
+
+
 def test_a_position_target_that_is_repeated_is_one_order(tmp_path: Path) -> None:
     async def main() -> None:
         async with (

@@ -1,6 +1,7 @@
 """The settings of the face in the fleet file, and the system id of each vehicle."""
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -80,7 +81,7 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
     if extra := sorted(commands - named) if reader.values.get("forward_commands") != ALL else []:
         raise reader.error("forward_commands", f"{extra[0]} is not one of those of `forward`")
     return Settings(
-        _urls(reader),
+        _urls(reader, fleet),
         _systems(reader, fleet, forwarded),
         reader.vehicles("commands", fleet.vehicles),
         _rates(reader),
@@ -90,7 +91,7 @@ def read_settings(reader: FaceSettings, fleet: Fleet) -> Settings:
     )
 
 
-def _urls(reader: FaceSettings) -> tuple[Url, ...]:
+def _urls(reader: FaceSettings, fleet: Fleet) -> tuple[Url, ...]:
     value = reader.values.get("url", DEFAULT_URL)
     texts = value if isinstance(value, list) and value else [value]
     urls = []
@@ -101,7 +102,22 @@ def _urls(reader: FaceSettings) -> tuple[Url, ...]:
             urls.append(parse_url(text))
         except PluginError as error:
             raise reader.error("url", str(error)) from None
+    for each in fleet.vehicles.values():
+        if each.arbiter == "mavlink" and (shared := _urls_of(each.settings).intersection(urls)):
+            raise reader.error(
+                "url", f"{shared.pop()} is where {each.id} is: ground stations need another address"
+            )
     return tuple(dict.fromkeys(urls))
+
+
+def _urls_of(settings: Mapping[str, Any]) -> set[Url]:
+    """Return the URLs of a vehicle, given its connection; wrong ones are left out."""
+    given = settings.get("url")
+    found: set[Url] = set()
+    for text in given if isinstance(given, list) else [given]:
+        with suppress(PluginError):
+            found.add(parse_url(str(text)))
+    return found
 
 
 def _simulated(fleet: Fleet, name: ResourceId) -> bool:
