@@ -15,6 +15,7 @@ from m2pem_plugin_mavlink.protocol.messages import Address, message_type
 from m2pem_plugin_mavlink.protocol.url import parse_url
 from m2pem_plugin_mavlink.signing.key_file import SigningError
 from m2pem_plugin_mavlink.signing.policy import SigningPolicy
+from m2pem_plugin_mavlink.signing.signature import Signer
 from mavlink_signed_end import KEY, OTHER_KEY, Recorded, sign_with, write_key
 from mavlink_wire import FarEnd, HandClock, tcp_end, udp_end, until
 
@@ -386,6 +387,15 @@ async def test_a_link_that_begins_to_sign_forgets_who_was_heard_without(tmp_path
         await vehicle.close()
     await attacker.close()
     await first.close()
+
+
+def test_a_large_fleet_may_have_one_key() -> None:
+    signer = Signer(KEY, None)
+    for system in range(1, 255):
+        for component in range(1, 11):
+            frame = bytes((system, component))
+            signed = frame + signer.signature(frame, 1)
+            assert signer.refusal(signed, system | component << 8) is None
 
 
 async def test_no_text_form_of_a_link_has_the_key(tmp_path: Path) -> None:

@@ -22,7 +22,10 @@ SIGNATURE_BYTES = 13
 NEWEST_STREAM = 60 * UNITS_PER_S
 """The first frame of a stream may be older by so much."""
 
-MOST_STREAMS = 1_024
+MOST_STREAMS = 8_192
+"""Of one key: only those who have it add streams. A large fleet may have one, with several
+components and links for each vehicle."""
+
 ANSWER_EVERY_S = 1.0
 
 
