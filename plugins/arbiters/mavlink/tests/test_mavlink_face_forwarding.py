@@ -195,6 +195,22 @@ def test_a_station_that_does_not_read_loses_forwarded_frames_and_delays_nobody(
     asyncio.run(main())
 
 
+def test_a_station_with_the_system_id_of_m2pem_is_named_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def main() -> None:
+        async with (
+            forwarding(tmp_path) as (_, _, _, port),
+            ground_station(port, system=255) as same,
+        ):
+            request = dialect.MAV_CMD_REQUEST_MESSAGE
+            for _ in range(2):
+                assert await same.command(SYSTEM, request, 148) == dialect.MAV_RESULT_ACCEPTED
+
+    asyncio.run(main())
+    assert caplog.text.count("has system id 255, which is m2pem's own") == 1
+
+
 def test_a_station_that_poses_as_the_vehicle_is_not_listened_to(tmp_path: Path) -> None:
     async def main() -> None:
         async with (

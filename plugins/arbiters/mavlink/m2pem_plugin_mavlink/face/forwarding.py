@@ -82,7 +82,7 @@ Refuse = Callable[[Station, RawFrame, int], None]
 
 class Forwarder:
     """`vehicles`: those that are forwarded, by system id; `commanded`: those to which commands
-    pass."""
+    pass; `own_systems`: the system ids with which m2pem itself commands vehicles."""
 
     def __init__(
         self,
@@ -90,16 +90,19 @@ class Forwarder:
         stations: Stations,
         vehicles: Mapping[int, ResourceId],
         commanded: Collection[ResourceId],
+        own_systems: Collection[int],
         refuse: Refuse,
     ) -> None:
         self._hub = hub
         self._stations = stations
         self._vehicles = vehicles
         self._commanded = commanded
+        self._own_systems = own_systems
         self._refuse = refuse
         self._splitters: dict[Peer, FrameSplitter] = {}
         self._used: dict[int, Peer] = {}
         self._passed: set[tuple[str, ResourceId]] = set()
+        self._confused: set[str] = set()
 
     def open(self) -> None:
         """Begin to forward."""
@@ -119,6 +122,14 @@ class Forwarder:
         """Forward a frame of a station to vehicles and to other stations."""
         if not self._vehicles:
             return
+        if frame.source.system in self._own_systems and station.name not in self._confused:
+            self._confused.add(station.name)
+            _logger.warning(
+                "ground station %s has system id %d, which is m2pem's own: vehicles answer both "
+                "alike, and what it does to a mission may stay unnoticed; give it another id",
+                station.name,
+                frame.source.system,
+            )
         systems = [frame.target.system] if frame.target.system else list(self._vehicles)
         for system in systems:
             if system in self._vehicles:

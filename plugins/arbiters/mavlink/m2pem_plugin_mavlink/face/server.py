@@ -39,6 +39,7 @@ from m2pem_plugin_mavlink.link.hub import shared_hub
 from m2pem_plugin_mavlink.link.route import Peer
 from m2pem_plugin_mavlink.protocol.messages import Address, types_by_id
 from m2pem_plugin_mavlink.protocol.raw_frames import RawFrame
+from m2pem_plugin_mavlink.settings import GCS_SYSTEM_ID
 
 _logger = logging.getLogger(__name__)
 
@@ -115,16 +116,21 @@ class FaceServer:
             PluginError: an endpoint cannot be opened.
         """
         forwarded = {self._settings.systems[name]: name for name in self._settings.forwarded}
+        in_fleet = self._control.fleet().vehicles
         self._forwarder = Forwarder(
             shared_hub(),
             self._stations,
             forwarded,
             self._settings.forwarded_commands,
+            {
+                in_fleet[name].settings.get("gcs_system_id", GCS_SYSTEM_ID)
+                for name in self._settings.forwarded
+            },
             self._refuse_forwarding,
         )
         autopilots = {
             name: Address(own, AUTOPILOT)
-            for name, vehicle in self._control.fleet().vehicles.items()
+            for name, vehicle in in_fleet.items()
             if (own := own_system(vehicle.settings)) is not None
         }
         thrower = EventThrower(self._control)
