@@ -229,7 +229,7 @@ page-test: setup
 test-long: lint ros ## check everything: fuzzing, large random counts, foreign corpora too
 	@$(BIN)/pytest -n 2 --timeout 1800 --hypothesis-profile random
 	@$(ROS_PYTHON) -m pytest -n 2 --timeout 1800 --hypothesis-profile random $(ROS_TESTS)
-	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery
+	@$(ROS_PYTHON) -m bench --quick --only ros_command,team_orders,ros_fleet,ros_discovery,face_latency,face_load
 
 FUZZ_S := 600
 

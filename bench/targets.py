@@ -144,6 +144,30 @@ def _ros_discovery(count: int) -> Program:
     return Program(f"{count} vehicle{'s' * (count > 1)}", command, quick, goals, ros=True)
 
 
+FACES = "otlp,prometheus,recorder,foxglove,mavlink,cot"
+
+
+def _face_latency(kind: str, title: str) -> Program:
+    goals = (Goal("p50_ms", f"{title}, p50", "ms"), Goal("p99_ms", f"{title}, p99", "ms"))
+    command, quick = ("face_latency", kind, "60"), ("face_latency", kind, "2")
+    return Program("1 vehicle, 10 positions/s", command, quick, goals, ros=True)
+
+
+def _face_load(faces: str) -> Program:
+    goals = (
+        Goal("lost", f"faces {faces}: MAVLink messages lost", "", 0),
+        Goal("messages_per_s", "the same, MAVLink messages", "/s"),
+        Goal("states_per_s", "the same, states on the fleet bus", "/s"),
+        Goal("longest_s", "the same, longest time without a state of a vehicle", "s"),
+        Goal("cpu_percent", "the same, of a core", "%"),
+        Goal("peak_mb", "the same, memory", "MB"),
+    )
+    command = ("face_load", "600", "50", "100", "10", "60", faces)
+    quick = ("face_load", "5", "50", "2", "10", "1", faces)
+    size = "600 MAVLink vehicles, 50 messages/s, 100 ROS vehicles, 10 Hz"
+    return Program(size, command, quick, goals, ros=True)
+
+
 PROGRAMS = (
     Program(
         "100 runs",
@@ -286,8 +310,34 @@ PROGRAMS = (
             Goal("longest_ms", "the page, the longest time between two pictures", "ms"),
         ),
     ),
+    Program(
+        "a run that never waits, all faces but ros",
+        ("faces", "cost", FACES, "3000", "3"),
+        ("faces", "cost", "mavlink", "50", "1"),
+        (
+            Goal("us", "a record until all faces have it, CPU", "us"),
+            Goal("alone_us", "the same without faces", "us"),
+        ),
+    ),
+    Program(
+        "3,000 token events/s, all faces but ros, of which no reader reads",
+        ("faces", "stalled", FACES, "60"),
+        ("faces", "stalled", "prometheus,foxglove,mavlink,cot", "1", "1"),
+        (
+            Goal("ratio", "an engine with stalled faces, times its speed without", "", 0.95, True),
+            Goal("records_per_s", "the same, records", "/s"),
+            Goal("cpu_percent", "an executive with stalled faces, of a core", "%"),
+            Goal("alone_cpu_percent", "the same without faces, of a core", "%"),
+        ),
+    ),
     _ros_command("memory", 3),
     _ros_command("sqlite", None),
+    _face_latency("udp", "MAVLink position to another program's socket, without m2pem"),
+    _face_latency("mavlink_ros", "MAVLink position to a subscriber of /v0/odom"),
+    _face_latency("ros", "ROS odometry to another node's callback, without m2pem"),
+    _face_latency("ros_mavlink", "ROS odometry to a ground station's GLOBAL_POSITION_INT"),
+    _face_load("none"),
+    _face_load("ros"),
     _team_orders("memory"),
     _team_orders("sqlite"),
     Program(

@@ -76,7 +76,7 @@ async def measure(
     link = await open_link(address(PAUSED), [URL], SystemClock())
     endpoint = shared_hub().endpoint(parse_url(URL))
     assert isinstance(endpoint, UdpEndpoint)
-    pipe.send(endpoint.port)
+    pipe.send([endpoint.port])
     watch = Stopwatch()
     async with Executive(fleet(count), journal, Plugins(MavlinkArbiter), SystemClock()) as running:
         operator = Operator(running, lambda: received(pipe), ORDERS)

@@ -1,4 +1,4 @@
-"""A process of rovers with ArduPilot, as far as an executive needs them, on one UDP port.
+"""A process of rovers with ArduPilot, as far as an executive needs them, on UDP ports.
 
 They stand armed, in GUIDED, each in its place; they send what autopilots send, and accept whatever
 they are commanded. Needs Linux: the kernel says when a command has come.
@@ -46,9 +46,13 @@ def place(rover: int) -> tuple[float, float]:
     return HOME[0], HOME[1] + rover * APART_DEG
 
 
+PER_PORT = 200
+"""Rovers that speak to one port: there are 255 system ids."""
+
+
 def address(rover: int) -> Address:
     """Of its autopilot."""
-    return Address(rover + 1, 1)
+    return Address(rover % PER_PORT + 1, 1)
 
 
 class Rover:
@@ -80,9 +84,10 @@ class Rover:
 
     def tell(self, name: str) -> None:
         """Send one of its messages."""
-        self._send(self._messages[name])
+        self.send(self._messages[name])
 
-    def _send(self, message: Message) -> None:
+    def send(self, message: Message) -> None:
+        """Send a message of any content."""
         self.socket.send(encode(message, self._sent & 255, address(self._number)))
         self._sent += 1
 
@@ -102,18 +107,18 @@ class Rover:
             if command.command == SET_MODE:
                 self._enter(round(command.param2))
                 self.tell("HEARTBEAT")
-            self._send(message_type("COMMAND_ACK").make(command=command.command))
+            self.send(message_type("COMMAND_ACK").make(command=command.command))
             if command.command in STEERING:
                 seconds, nanoseconds = struct.unpack("qq", stamp[2])
                 pipe.send((self._number, command.command, seconds * 10**9 + nanoseconds))
 
 
 def stream(count: int, rate_hz: int, pipe: Connection) -> None:
-    """The process: is told the port to speak to, and goes on until it is told something else."""
+    """The process: is told the ports to speak to, and goes on until it is told something else."""
     kinds = [name for name, rate in RATES_HZ.items() for _ in range(rate)]
     random.Random(4).shuffle(kinds)
-    port: int = pipe.recv()
-    rovers = [Rover(number, port) for number in range(count)]
+    ports: list[int] = pipe.recv()
+    rovers = [Rover(number, ports[number // PER_PORT]) for number in range(count)]
     with selectors.DefaultSelector() as selector:
         selector.register(pipe, selectors.EVENT_READ)
         for rover in rovers:

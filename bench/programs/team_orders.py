@@ -178,7 +178,7 @@ async def measure(
     )
     endpoint = shared_hub().endpoint(parse_url(mavlink_command.URL))
     assert isinstance(endpoint, UdpEndpoint)
-    pipe.send(endpoint.port)
+    pipe.send([endpoint.port])
     async with Executive(team, journal, Plugins(), SystemClock()) as running:
         commander = Commander(running, members, asyncio.get_running_loop())
         took = await asyncio.to_thread(commander.rounds, times)

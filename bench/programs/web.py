@@ -38,18 +38,18 @@ SPREAD_S = 0.003
 WARM_S = 0.5
 
 
-def mission() -> bytes:
-    """Rings of a gateway, tasks and a timer, with tokens in each."""
+def rings(round_s: float = ROUND_S) -> bytes:
+    """Rings of a gateway, tasks and a timer, with tokens in each. `round_s`: see `ROUND_S`."""
     parts = ['<startEvent id="start"/><parallelGateway id="fork"/>', flows(["start", "fork"])]
     for ring in range(RINGS):
         tasks = [f"t{ring}_{number}" for number in range(TASKS)]
         meet, timer = f"m{ring}", f"w{ring}"
-        round_s = ROUND_S + (ring - RINGS // 2) * SPREAD_S
+        own_s = round_s + (ring - RINGS // 2) * SPREAD_S
         parts.append(f'<exclusiveGateway id="{meet}"/>')
         parts += [f'<task id="{task}"/>' for task in tasks]
         parts.append(
             f'<intermediateCatchEvent id="{timer}"><timerEventDefinition id="d{ring}">'
-            f'<timeDuration xsi:type="tFormalExpression">PT{round_s:.3f}S</timeDuration>'
+            f'<timeDuration xsi:type="tFormalExpression">PT{own_s:.3f}S</timeDuration>'
             "</timerEventDefinition></intermediateCatchEvent>"
         )
         parts.append(flows([meet, *tasks, timer, meet]))
@@ -150,7 +150,7 @@ async def measure(seconds: float, turns: int, folder: Path) -> dict[str, float]:
     }
 
 
-MISSION = mission()
+MISSION = rings()
 
 
 def main() -> None:
