@@ -87,7 +87,7 @@ $(VENV)/for-%: $(CREATED) pyproject.toml constraints.txt
 npm-packages:
 	@missing=; for wanted in $(DEBIAN_PACKAGES); do first=$${wanted%%/*}; \
 	  program=$${first/nodejs/node}; program=$${program/iproute2/ip}; \
-	  command -v $${program/postgresql/pg_ctlcluster} >/dev/null || \
+	  PATH=$$PATH:/usr/sbin command -v $${program/postgresql/pg_ctlcluster} >/dev/null || \
 	  { command -v $${wanted#*/} >/dev/null && ! apt-cache show $$first >/dev/null 2>&1; } || missing="$$missing $$wanted"; \
 	done; \
 	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \

@@ -1,5 +1,6 @@
 """`m2pem ros onboard --ros-args`: what plain clients of ROS see of its node, and may do with it."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -204,5 +205,10 @@ def test_wrong_arguments_of_ros_are_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", f"{ros_domain}")
+    # The command line makes the log its own, for the rest of this process.
+    logger = logging.getLogger("m2pem")
+    for name in ("handlers", "propagate", "level"):
+        monkeypatch.setattr(logger, name, getattr(logger, name))
+    monkeypatch.setattr(logger, "handlers", [])
     assert run_command_line([*ONBOARD, "--ros-args", *words.split()]) == 2
     assert problem in capsys.readouterr().err
