@@ -135,6 +135,10 @@ class Vehicle:
 
     def receive(self, topic: str, payload: bytes) -> VehicleState | None:
         """Process a message. Return the new state for the fleet; None: nothing new is known."""
+        if not payload:
+            return (
+                None  # somebody has cleared what the broker retained: MQTT 3.1.1, section 3.3.1.3
+            )
         try:
             match topic:
                 case "state":
@@ -143,7 +147,7 @@ class Vehicle:
                     return self._receive_visualization(payload)
                 case "connection":
                     self._receive_connection(decode(payload, ConnectionMessage))
-                case "factsheet" if payload:
+                case "factsheet":
                     self._factsheet = decode(payload, Factsheet)
         except MessageError as error:
             self._invalid = f"its last message on {topic} was invalid: {text_of(error)}"

@@ -89,6 +89,7 @@ class TestVda5050Arbiter(ArbiterContract):
         return lambda arbiter, vehicle: sim.count(f"{vehicle}: accepts order")
 
 
+@pytest.mark.long
 class TestVda5050ArbiterWithHorizon(TestVda5050Arbiter):
     """The same, where two nodes ahead of the vehicle are released, and updates release more."""
 
@@ -96,6 +97,7 @@ class TestVda5050ArbiterWithHorizon(TestVda5050Arbiter):
     quick = ("test_less_and_less_is_left_of_a_route",)
 
 
+@pytest.mark.long
 class TestVda5050ArbiterWithBrokers(TestVda5050Arbiter):
     """The same, where each vehicle has a broker of its own, which breaks off and comes back."""
 

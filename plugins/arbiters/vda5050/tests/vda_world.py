@@ -141,7 +141,7 @@ class Judge:
 
     def _hear(self, _client: Any, _data: Any, message: mqtt.MQTTMessage) -> None:
         topic = message.topic.rpartition("/")[2]
-        if topic not in self._schemas:
+        if topic not in self._schemas or not message.payload:  # empty: what was retained is cleared
             return
         self.qos.setdefault(topic, set()).add(message.qos)
         try:
