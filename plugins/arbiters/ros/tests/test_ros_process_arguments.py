@@ -24,9 +24,7 @@ VARIABLE = "M2PEM_ROS_ARGS"
 async def test_topics_of_a_vehicle_are_remapped(
     ros_domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(
-        VARIABLE, "-r /ugv1/odom:=/evsg1/odom -r /ugv1/cmd_vel:=/evsg1/cmd_vel --log-level warn"
-    )
+    monkeypatch.setenv(VARIABLE, "-r /ugv1/odom:=/evsg1/odom -r /ugv1/cmd_vel:=/evsg1/cmd_vel")
     settings = {"namespace": "/ugv1", "domain_id": ros_domain, "driver": "base"}
     connections = {V: Connection(V, "ground", settings, sitl=True)}
     clock = SystemClock()
