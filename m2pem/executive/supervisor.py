@@ -18,6 +18,7 @@ from m2pem.api.epoch_fence import run_of
 from m2pem.api.runs import LEFT_ARMED, Alert, HandedOver, RunId
 from m2pem.api.service import ServiceContext
 from m2pem.api.telemetry import TeamState, Telemetry
+from m2pem.bpmn.one_task import is_one_task
 from m2pem.engine.inputs import GeometrySet, Input, ResourceFault
 from m2pem.engine.records import Record, RunEnded, WorkReassigned
 from m2pem.engine.run import STEPS_AT_ONCE, MissionRun
@@ -59,7 +60,7 @@ from m2pem.executive.separation import separation_for
 from m2pem.executive.services import Services
 from m2pem.executive.space_allocation import SpaceAllocation
 from m2pem.executive.waiting_tasks import waiting_tasks
-from m2pem.fleet.allocation import Availability
+from m2pem.fleet.allocation import Availability, resources_of_mission
 from m2pem.fleet.fleet import Fleet
 from m2pem.fleet.space import waits_for_space
 from m2pem.geo.geojson import GeometryError, parse_geojson
@@ -344,11 +345,15 @@ class Supervisor:
         self.allocator.let_go(runner.id)
         await self.journal.release(runner.id)
         del self._tasks[runner.id]
-        every, taken = self.fleet.vehicles.values(), self.handover.taken
+        mission, taken = runner.run.state.mission, self.handover.taken
+        # Single commands come one after the other: each speaks of its own vehicle alone.
+        single = resources_of_mission(mission, self.fleet) if is_one_task(mission) else None
         free = [
             each
-            for each in every
-            if each.id not in taken and not self._is_held_by_another(runner.id, each.id)
+            for each in self.fleet.vehicles.values()
+            if (single is None or each.id in single)
+            and each.id not in taken
+            and not self._is_held_by_another(runner.id, each.id)
         ]
         may_be_armed = not (runner.replaced or self.fleet.simulated)
         if may_be_armed and (text := describe_armed_vehicles(free, self._bus)):

@@ -124,3 +124,19 @@ def test_a_run_that_ends_does_not_speak_of_the_vehicles_of_another_run(play):
     alert = play(story, "ugv1", "ugv2")
     assert alert.run == "r2"
     assert alert.text.startswith("ugv2 stays armed in GUIDED. Nothing commands it now: disarm by")
+
+
+def test_a_single_behavior_that_ends_speaks_of_its_own_vehicle_alone(play):
+    async def story(world: World):
+        control, now_us = world.executive.control, world.clock.now_us()
+        for vehicle in (UGV1, UGV2):
+            world.fake.say(VehicleState(vehicle, now_us, armed=True, mode="GUIDED"))
+        await world.clock.sleep(0.1)
+        said = asyncio.create_task(alerts(world, "LEFT_ARMED"))
+        await world.clock.sleep(0.1)
+        run = await control.execute_behavior("ugv2", "drive_stop", by="anna")
+        await world.fake.until_called("start", f"{run}.b1")
+        world.fake.report(f"{run}.b1", BehaviorState.SUCCEEDED)
+        return (await asyncio.wait_for(said, 10))[-1]
+
+    assert play(story, "ugv1", "ugv2").text.startswith("ugv2 stays armed in GUIDED. Nothing")

@@ -137,7 +137,7 @@ class Vehicle:
         """Process a message. Return the new state for the fleet; None: nothing new is known."""
         if not payload:
             return (
-                None  # somebody has cleared what the broker retained: MQTT 3.1.1, section 3.3.1.3
+                None  # a client has cleared what the broker retained: MQTT 3.1.1, section 3.3.1.3
             )
         try:
             match topic:

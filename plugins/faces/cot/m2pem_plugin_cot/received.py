@@ -31,7 +31,7 @@ class Received:
 
 
 def read_event(content: bytes) -> Received | None:
-    """Return what an event draws; None if it draws nothing, such as where somebody is.
+    """Return what an event draws; None if it draws nothing, such as the position of a person.
 
     Raises:
         EventError: it is too long, no XML, or its positions make no sense.

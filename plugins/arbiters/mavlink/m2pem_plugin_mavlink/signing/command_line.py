@@ -51,7 +51,7 @@ def setup(
     """Give a vehicle the signing key that its fleet file names, over its own link.
 
     No executive may command the vehicle meanwhile, and it must be disarmed. Whoever reads the link
-    reads the key: use a USB cable, or the old key over a link that nobody else can read.
+    reads the key: use a USB cable, or the old key over a link that no other program can read.
 
     Example: m2pem mavlink signing setup --fleet fleet.yaml uav1
     """
@@ -117,8 +117,8 @@ def _confirm(settings: Settings, question: str, yes: bool) -> None:
         parsed = parse_url(url)
         if not isinstance(parsed, SerialUrl) and not parsed.host.startswith(_LOOPBACK):
             click.echo(
-                f"Warning: whoever reads what is sent over {url} has the key afterwards. Use a "
-                "serial line or USB, or a network that nobody else can read.",
+                f"Warning: every program that reads what is sent over {url} gets the key. Use "
+                "a serial line or USB, or a network that no other program can read.",
                 err=True,
             )
     if not yes:
