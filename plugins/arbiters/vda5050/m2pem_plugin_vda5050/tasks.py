@@ -430,7 +430,7 @@ class StopTask(Task):
     """`hold` and `drive_stop`: the vehicle is paused until it is at rest, or for a duration.
 
     `drive_stop` leaves the vehicle paused; the next order lets it go on. `may_release`: whether
-    nobody else has asked for the vehicle to be held meanwhile.
+    no other client has asked for the vehicle to be held meanwhile.
     """
 
     def __init__(self, setup: TaskSetup, may_release: Callable[[], bool]) -> None:

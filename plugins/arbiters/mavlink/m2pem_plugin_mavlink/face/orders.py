@@ -251,7 +251,7 @@ class Orders:
                 # `give_back` leaves it to operators whose vehicle they give back.
                 holder = (await self._control.holders()).get(vehicle.resource)
                 if holder != by:
-                    raise OperatorError(f"it is not with {by}, but with {holder or 'nobody'}")
+                    raise OperatorError(f"it is not with {by}, but with {holder or 'no operator'}")
                 await self._control.give_back(vehicle.resource, by=by)
         except M2pemError as error:
             self._refuse(key, pending, station, vehicle, RefusedCommandError(str(error), REJECTED))

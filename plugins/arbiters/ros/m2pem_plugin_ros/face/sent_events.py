@@ -93,7 +93,7 @@ class SentEvents:
     def _unserved(self, sent: SentTopic, topic: str, run: RunId) -> str:
         """Return that nobody receives what is published, and why."""
         found = self._node.get_subscriptions_info_by_topic(topic)
-        text = f"{sent.key}: {sent.rule.thrown} of run {run}: nobody subscribes to {topic}"
+        text = f"{sent.key}: {sent.rule.thrown} of run {run}: no node subscribes to {topic}"
         if not found:
             return text
         kinds = ", ".join(sorted({each.topic_type for each in found}))
